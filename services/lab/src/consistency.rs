@@ -1,4 +1,4 @@
-//! What several views of a person have in common, learned from sequences with truth.
+//! Common structure of several views of a person, learned from sequences with truth.
 
 mod report;
 mod split;

@@ -1,11 +1,11 @@
-//! What a number of cameras on a number of hosts takes: processor time, network, latency. For planning, from measured costs.
+//! Forecast of what cameras on hosts need: processor time, network, latency. For planning, from measured costs.
 //!
 //! Every stage is a queue with one server of deterministic service (M/D/1 is not assumed: frames come at a fixed rate, so what waits is what the
 //! other processes of a host take of its cores). A host is full when its processes take all of its cores.
 
 use serde::Serialize;
 
-/// What one frame of one view costs, milliseconds of processor time, and what it weighs.
+/// Processor time of one frame of one view, milliseconds, and its size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Costs {
     /// `capture`.
@@ -24,11 +24,11 @@ pub struct Costs {
     pub frame_bytes: f64,
     /// Bytes of the poses of a view, with their head.
     pub pose_bytes: f64,
-    /// Of the network, one way, for a small message.
+    /// Network time of a small message, one way.
     pub network_ms: f64,
 }
 
-/// What is asked.
+/// Cameras and hosts to plan for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Load {
     /// Cameras.
@@ -41,13 +41,13 @@ pub struct Load {
     pub rate_hz: f64,
     /// Bytes per second that a host can send or receive.
     pub network_bytes_s: f64,
-    /// Whether poses cross in place of frames.
+    /// True if poses cross in place of frames.
     pub with_poses: bool,
     /// Views of the host that fuses; none where they are to be spread.
     pub near: Option<usize>,
 }
 
-/// What it takes.
+/// Resources that a load needs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Forecast {
     /// Views of the host that fuses, and the most of any other.
@@ -58,13 +58,13 @@ pub struct Forecast {
     pub bytes_s: [f64; 2],
     /// From capture to result, milliseconds, where it fits.
     pub latency_ms: f64,
-    /// Of it: what the link adds, codec and network.
+    /// Share of the link in it, codec and network.
     pub link_ms: f64,
-    /// Whether every host has the cores, and the network the room.
+    /// True if every host has enough cores, and the network enough room.
     pub fits: bool,
 }
 
-/// What a number of cameras on a number of hosts takes. Cameras are spread evenly over the hosts, by their cost: the host that fuses gets
+/// Returns the resources that cameras on hosts need. Cameras are spread evenly over the hosts, by their cost: the host that fuses gets
 /// fewer where it has more to do, unless its views are given.
 pub fn forecast(costs: &Costs, load: &Load) -> Forecast {
     let n_far = load.n_hosts.saturating_sub(1);

@@ -18,12 +18,12 @@ use crate::person::{Chosen, deal, read_options, sides_of};
 /// Fewest people of a data set who were found: fewer cannot be dealt into shares.
 const FEWEST: usize = 20;
 
-/// What is learned.
+/// A learned joint map.
 #[derive(Debug)]
 pub struct Learned {
     /// The file.
     pub file: JointFile,
-    /// What was tried: reach, ridge, and the error of every data set on people that were left out.
+    /// Trials: reach, ridge, and the error of every data set on people that were left out.
     pub tried: Vec<multiview::learned::Tried>,
 }
 

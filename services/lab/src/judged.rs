@@ -59,7 +59,7 @@ pub fn judged(
         go_on(stop)?;
         let found = find(&reader.search, person)?;
         console.advance(1);
-        Ok(found.map(|it| it.and_then(|it| reader.joints(&it))))
+        Ok(found.map(|detection| detection.and_then(|candidate| reader.joints(&candidate))))
     };
     pictures(name, people, console, |people| {
         people.par_iter().map(find).collect()
@@ -74,7 +74,7 @@ pub(crate) fn go_on(stop: &Stop) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What was found on people, beside the truth.
+/// Returns the joints found on people, beside the truth.
 ///
 /// * `find`: the detections of every person; it advances the bar of the console.
 pub(crate) fn pictures(
@@ -133,7 +133,7 @@ pub(crate) fn find(search: &Search, person: &Person) -> Result<[Option<Centres>;
         let found = solver.above(evidence, threshold, MOST);
         (found, solver.best(evidence, None))
     });
-    let boxes: Vec<_> = found.iter().map(|it| around(model, it, &layout)).collect();
+    let boxes: Vec<_> = found.iter().map(|candidate| around(model, candidate, &layout)).collect();
     let [x, y] = [0, 1].map(|axis| {
         let values = person.joints.iter().map(|joint| joint[axis]);
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {

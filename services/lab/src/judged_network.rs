@@ -10,7 +10,7 @@ use training::datasets::{People, Person, Picture, Sides};
 
 use crate::judged::{go_on, pictures, truth};
 
-/// Of the neck and the top of the head in `skeleton::PARSE14`.
+/// Index of the neck in `skeleton::PARSE14`; below, that of the top of the head.
 const NECK: usize = 12;
 const HEAD: usize = 13;
 
@@ -19,18 +19,18 @@ const HEAD: usize = 13;
 pub struct NetworkReader {
     /// The network.
     pub network: PoseNetwork,
-    /// What left and right mean in the marks.
+    /// Meaning of left and right in the marks.
     pub sides: Sides,
     /// Finds the boxes; the box around the marked joints is used without it.
     pub finder: Option<Detector>,
 }
 
-/// What a network found on people.
+/// Joints that a network found on people.
 #[derive(Debug)]
 pub struct Seen {
     /// The joints at the maxima of the maps: the first of [`Pictures::found`].
     pub pictures: Pictures,
-    /// Of every person, the joints with a mark and a maximum.
+    /// Errors of the joints with a mark and a maximum, by person.
     pub errors: Vec<Vec<JointError>>,
 }
 
@@ -46,7 +46,7 @@ pub struct JointError {
 }
 
 impl JointError {
-    /// Whether it is off by more than half a head.
+    /// Returns true if it is off by more than half a head.
     pub fn is_far(&self) -> bool {
         self.in_heads > 0.5
     }
@@ -119,7 +119,7 @@ impl NetworkReader {
             (Some(finder), _) => {
                 let found = finder.people(image, &mut Vec::new());
                 let found = found.or_fail(ExitKind::Input)?.into_iter();
-                let outlines: Vec<[f64; 4]> = found.map(|it| it.outline).collect();
+                let outlines: Vec<[f64; 4]> = found.map(|person| person.outline).collect();
                 looker.best_of((image, &outlines), Turn::Up, memory, maps)
             }
             (None, Some(outline)) => looker.look((image, outline), memory, maps),

@@ -57,7 +57,7 @@ pub fn html(model: &Model) -> String {
 /// How much of the score a part loses on the ellipse that is drawn for its spring.
 pub const SPRING_COST: f64 = 0.05;
 
-/// What only this page needs.
+/// Styles that only this page needs.
 const MORE_STYLE: &str = "
 body { max-width: 84em; }
 h3 { margin: 0 0 .5em; }

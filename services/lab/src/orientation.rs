@@ -18,7 +18,7 @@ use viewquality::orientation::{Detector, Network, Score, Settings};
 
 use crate::scenes::Scenes;
 
-/// What to learn from, and what to judge on.
+/// Data to learn from and to judge on.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Annotated people: folders or files.
@@ -50,7 +50,7 @@ pub struct Judged {
     pub surprise: f64,
 }
 
-/// What was learned, and from how much.
+/// Result of a training and the amount of its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// Photographs learned from.
@@ -63,7 +63,7 @@ pub struct Report {
     pub judged: Vec<Judged>,
 }
 
-/// What the threads share.
+/// State that the threads share.
 struct Work {
     stop: Stop,
 }

@@ -33,7 +33,7 @@ pub struct People {
     pub scenes: Scenes,
 }
 
-/// Of so many blocks of people in a row, and of so many subjects of scenes, one is kept apart.
+/// One in this many blocks of people in a row, and of subjects of scenes, is kept apart.
 const KEPT: usize = 12;
 /// People in a row of a data set that are kept apart together: neighbours often show the same event.
 const BLOCK: usize = 20;
@@ -50,7 +50,7 @@ impl Example for Person {
     }
 }
 
-/// What the threads share.
+/// State that the threads share.
 struct Work<'a> {
     stop: Stop,
     console: &'a dyn Console,

@@ -36,7 +36,7 @@ impl Scenes {
 pub(crate) struct Shown<'a> {
     /// The subject, as a name.
     pub(crate) group: &'a str,
-    /// What it shows, as a name.
+    /// Content of the picture, as a name.
     pub(crate) source: String,
     /// The picture.
     pub(crate) picture: Rgb8View<'a>,
@@ -68,7 +68,7 @@ pub(crate) fn of_pictures<T: Send>(
     Ok(made?.into_iter().flatten().collect())
 }
 
-/// What a scene is, by its number: actions and subjects in turn, all else by chance.
+/// Returns the settings of a scene, by its number: actions and subjects in turn, all else by chance.
 fn settings(scenes: &Scenes, nth: u32) -> Settings {
     let mut rng = scenes.rng(nth);
     let [from, to] = scenes.subjects;

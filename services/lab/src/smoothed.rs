@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 use statistics::score::{Bootstrap, Share};
 
-/// What is compared, in the order of tables.
+/// Methods that are compared, in the order of tables.
 const METHODS: [&str; 5] = ["raw", "rts", "rts, constant bones", "butterworth", "kalman"];
 
 /// A mean and its 95 % interval.
@@ -20,7 +20,7 @@ const METHODS: [&str; 5] = ["raw", "rts", "rts, constant bones", "butterworth", 
 pub struct Mean {
     /// The mean.
     pub mean: f64,
-    /// Of the mean.
+    /// Confidence interval of the mean.
     pub interval: [f64; 2],
 }
 
@@ -104,9 +104,9 @@ fn truth(
             continue;
         };
         for (joint, place) in sequence.joints.joints.iter().zip(&frame.joints) {
-            let is_it = |it: &Joint| {
-                let same_role = it.role.is_some() && it.role == Role::of(joint.name);
-                it.name == joint.name || same_role
+            let is_it = |known: &Joint| {
+                let same_role = known.role.is_some() && known.role == Role::of(joint.name);
+                known.name == joint.name || same_role
             };
             let known = recorded.joints.iter().position(is_it);
             if let (Some(known), Some(place)) = (known, place) {
@@ -145,9 +145,9 @@ pub fn compare(
         block: rate_hz.round().max(1.0) as usize,
         ..Bootstrap::default()
     };
-    let n = tried
-        .first()
-        .map_or(0.0, |tried| tried.iter().map(|it| it.0.position_m.n).sum());
+    let n = tried.first().map_or(0.0, |tried| {
+        tried.iter().map(|errors| errors.0.position_m.n).sum()
+    });
     Comparison {
         n_compared: n as usize,
         rows: rows(&tried, &bootstrap),
@@ -180,7 +180,7 @@ fn tried(
     for (joint, truth) in truth.iter().enumerate() {
         let path = |track: &Option<Motion>| -> Option<Vec<Option<Vector3<f64>>>> {
             let track = &track.as_ref()?.joints[joint];
-            Some(track.iter().map(|track| track.ok().map(|it| it.position)).collect())
+            Some(track.iter().map(|track| track.ok().map(|state| state.position)).collect())
         };
         let paths: Vec<_> = tracks.iter().map(path).collect();
         let has_all = |at: usize| paths.iter().flatten().all(|path| path[at].is_some());
@@ -211,9 +211,9 @@ fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
             let shares: Vec<Share> = tried
                 .iter()
                 .map(of)
-                .map(|it| Share {
-                    sum: it.sum,
-                    n: it.n,
+                .map(|sum| Share {
+                    sum: sum.sum,
+                    n: sum.n,
                 })
                 .collect();
             let interval = bootstrap.interval(&shares)?;
@@ -224,15 +224,15 @@ fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
         };
         Row {
             method,
-            position_mm: mean(1e3, &|it| it.0.position_m),
-            velocity_m_s: mean(1.0, &|it| it.0.velocity_m_s),
-            acceleration_m_s2: mean(1.0, &|it| it.0.acceleration_m_s2),
-            jitter_mm: mean(1e3, &|it| it.0.jitter_m),
-            lag_ms: mean(1e3, &|it| Sum {
-                sum: it.0.late[0],
-                n: it.0.late[1],
+            position_mm: mean(1e3, &|errors| errors.0.position_m),
+            velocity_m_s: mean(1.0, &|errors| errors.0.velocity_m_s),
+            acceleration_m_s2: mean(1.0, &|errors| errors.0.acceleration_m_s2),
+            jitter_mm: mean(1e3, &|errors| errors.0.jitter_m),
+            lag_ms: mean(1e3, &|errors| Sum {
+                sum: errors.0.late[0],
+                n: errors.0.late[1],
             }),
-            filled_mm: mean(1e3, &|it| it.1),
+            filled_mm: mean(1e3, &|errors| errors.1),
         }
     };
     let rows = METHODS.iter().zip(tried).map(row);
@@ -258,7 +258,7 @@ impl Row {
         for (name, mean) in self.numbers() {
             value[name] = mean.map_or(
                 Value::Null,
-                |it| json!({ "mean": it.mean, "interval": it.interval }),
+                |mean| json!({ "mean": mean.mean, "interval": mean.interval }),
             );
         }
         value

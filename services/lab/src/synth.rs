@@ -30,9 +30,9 @@ pub struct Job {
     pub others: u64,
     /// How many people walk and pass the subject.
     pub passers: u64,
-    /// What they do, one after the other; of no meaning with `recording`.
+    /// Actions of the people, one after the other; unused with `recording`.
     pub actions: Vec<Action>,
-    /// What was recorded and is done in the place of an action.
+    /// Recorded motion in the place of an action.
     pub recording: Option<Recording>,
     /// Seed of the performance, the room and the lamps.
     pub seed: u64,
@@ -42,15 +42,15 @@ pub struct Job {
     pub rate_hz: f64,
     /// How pictures are stored.
     pub format: Format,
-    /// Whether masks are written.
+    /// True if masks are written.
     pub with_masks: bool,
     /// Folder of photographs that stand in the place of a room.
     pub backdrop: Option<PathBuf>,
     /// The model that the deployment names; none if not given.
     pub model: Option<PathBuf>,
-    /// Whether no pictures are written, and cameras of the deployment make them while it runs.
+    /// True if no pictures are written, and cameras of the deployment make them while it runs.
     pub live: bool,
-    /// What is wrong with the cameras.
+    /// Flaws of the cameras.
     pub flaws: Flaws,
     /// How long after the instants of the frames every camera takes its pictures, milliseconds; at most one for each of the rig.
     pub skews_ms: Vec<f64>,
@@ -72,7 +72,7 @@ pub struct Written {
     pub folder: PathBuf,
     /// Number of the subject.
     pub subject: u64,
-    /// What the subject does.
+    /// Action of the subject.
     pub action: String,
     /// Seed of the performance, the room and the lamps.
     pub seed: u64,

@@ -280,7 +280,7 @@ fn an_unusable_consistency_file_is_refused() {
     );
 }
 
-/// What takes long; see `.ci/run`.
+/// Tests that take long; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use super::*;

@@ -174,7 +174,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
             ["times.jsonl", "times.jsonl.part"].map(|name| case.path("live/out").join(name));
         let text = files.iter().find_map(|file| fs::read_to_string(file).ok());
         let text = text.unwrap_or_default();
-        let whole = text.rsplit_once('\n').map_or("", |it| it.0);
+        let whole = text.rsplit_once('\n').map_or("", |parts| parts.0);
         let lines = whole.lines().map(|line| serde_json::from_str(line).unwrap());
         lines.collect()
     };

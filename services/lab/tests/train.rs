@@ -302,7 +302,7 @@ fn bad_labels_are_reported_and_counted_or_fatal() {
         (&15.into(), &1.into())
     );
     assert!(
-        expected.iter().all(|it| data["left_out"][it.1] == 1),
+        expected.iter().all(|fault| data["left_out"][fault.1] == 1),
         "{data}"
     );
 

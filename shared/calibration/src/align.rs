@@ -57,7 +57,7 @@ pub fn aligned(from: &[Camera], to: &[Camera], with_scale: bool) -> Option<Simil
     let matrix = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
     let middle = |cameras: &[Camera]| {
-        let sum: Vector3<f64> = cameras.iter().map(|it| it.centre_in_world().coords).sum();
+        let sum: Vector3<f64> = cameras.iter().map(|camera| camera.centre_in_world().coords).sum();
         sum / n
     };
     let [of_from, of_to] = [middle(from), middle(to)];

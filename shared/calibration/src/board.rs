@@ -54,7 +54,7 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// Of corners by their numbers; those that the board does not have are left out.
+    /// Takes corners by their numbers and leaves out those that the board does not have.
     pub fn new(
         camera: usize,
         frame: usize,
@@ -84,7 +84,7 @@ impl Sight {
     }
 }
 
-/// What is found of a lens.
+/// Parameters of a lens that are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LensKind {
     /// Pinhole with k1, k2, k3, p1, p2.
@@ -106,7 +106,7 @@ impl CornerLoss {
     const FINAL: Loss = Loss::Huber(4.0);
 }
 
-/// What is to be calibrated.
+/// Input of a calibration.
 #[derive(Debug, Clone)]
 pub struct Task {
     /// Names of the cameras.
@@ -115,7 +115,7 @@ pub struct Task {
     pub sizes: Vec<[u32; 2]>,
     /// Intrinsics that are known, and kept.
     pub known: Vec<Option<Intrinsics>>,
-    /// What is found of the others' lenses.
+    /// Lens parameters that are estimated for the other cameras.
     pub lens: LensKind,
     /// The points of the board by their numbers, metres.
     pub board: Vec<Point2<f64>>,
@@ -123,7 +123,7 @@ pub struct Task {
     pub look_alikes: Vec<Vec<usize>>,
     /// Where the board was seen.
     pub sights: Vec<Sight>,
-    /// Whether the poses of the cameras are wanted, or each camera's intrinsics alone.
+    /// True if the poses of the cameras are wanted, not only the intrinsics of each.
     pub wants_rig: bool,
     /// The most frames that are used.
     pub most_frames: usize,
@@ -140,14 +140,14 @@ pub struct Residual {
     pub at: Point2<f64>,
     /// Where it would be by what was found, less where it was seen, pixels.
     pub off: Vector2<f64>,
-    /// Whether it was left out as a wrong one.
+    /// True if it was left out as wrong.
     pub is_wrong: bool,
 }
 
-/// What is known of a number, and how well.
+/// A quantity and how well it is known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Known {
-    /// What it is, such as `focal length`.
+    /// Name of the quantity, such as `focal length`.
     pub name: String,
     /// The number: pixels, metres in the world, degrees, or a coefficient.
     pub value: f64,
@@ -155,12 +155,12 @@ pub struct Known {
     pub sd: f64,
 }
 
-/// What was found of a camera.
+/// Result for a camera.
 #[derive(Debug, Clone)]
 pub struct CameraOutcome {
     /// The camera; in a world of its own where no rig was wanted.
     pub camera: Camera,
-    /// Whether its intrinsics were given.
+    /// True if its intrinsics were given.
     pub is_known: bool,
     /// Boards that were seen, and those that were used.
     pub n_boards: [usize; 2],
@@ -219,7 +219,7 @@ pub struct Outcome {
     pub sigma_px: f64,
     /// Where pictures of one frame were not taken at the same time.
     pub out_of_step: Option<OutOfStep>,
-    /// What forbids to trust it.
+    /// Reasons not to trust it.
     pub doubts: Vec<Doubt>,
 }
 

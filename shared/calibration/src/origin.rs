@@ -108,9 +108,9 @@ fn place(rig: &Rig, clicks: &[Click], point: usize) -> Result<Point3<f64>, Origi
         .collect();
     let found = triangulate(&seen, &Settings::default());
     let found = found.map_err(|source| OriginError::Point { point, source })?;
-    let squares = seen.iter().map(|it| {
-        let image = it.camera.project(&found.in_world);
-        image.map_or(1e6, |image| (image - it.point_px).norm_squared())
+    let squares = seen.iter().map(|seen| {
+        let image = seen.camera.project(&found.in_world);
+        image.map_or(1e6, |image| (image - seen.point_px).norm_squared())
     });
     let rms_px = (squares.sum::<f64>() / clicks.len() as f64).sqrt();
     if rms_px > CLICK_PX {

@@ -41,22 +41,22 @@ use crate::synchronisation::Film;
 
 use geometry::Camera;
 
-/// What is looked at, and what is wanted.
+/// Settings of a calibration from people.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
     pub n_joints: usize,
-    /// Of each joint the one on the other side.
+    /// The mirror of each joint on the other side of the body.
     pub sides: Vec<usize>,
-    /// Whether left and right are those of the picture in some camera, so that cameras may contradict each other.
+    /// True if left and right are those of the picture in some camera, so that cameras may contradict each other.
     pub as_seen: bool,
-    /// What is added to the times of each camera to have the common ones, as far as it is known, seconds.
+    /// Offset added to the times of each camera to have common ones, as far as it is known, seconds.
     pub offsets_s: Vec<f64>,
     /// How far these may be wrong, seconds: offsets are searched within. A few frames are found without.
     pub window_s: f64,
-    /// What tells lengths.
+    /// Source of the scale.
     pub scale: Scale,
-    /// Whether focal lengths are estimated, too: less certain.
+    /// True if focal lengths are estimated, too: less certain.
     pub focal: bool,
     /// The most instants that are looked at.
     pub most_instants: usize,
@@ -64,12 +64,12 @@ pub struct Settings {
     pub seed: u64,
 }
 
-/// What the cameras saw: films and cameras in the same order. Of the cameras the intrinsics count; the poses do only for
-/// [`Scale::Rig`].
+/// Films of the cameras, and the cameras in the same order. Only their intrinsics count, except for [`Scale::Rig`],
+/// which uses the poses.
 #[derive(Debug, Clone, Copy)]
 pub struct Recording<'a> {
     /// The cameras.
     pub cameras: &'a [Camera],
-    /// What each saw, by its own clock.
+    /// Film of each camera, by its own clock.
     pub films: &'a [Film],
 }

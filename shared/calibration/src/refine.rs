@@ -2,8 +2,8 @@
 //!
 //! The rig that is given is believed with stated deviations; a camera that was moved breaks away from them (the belief in a
 //! camera's pose has a loss that saturates). Only what the joints tell better than that moves: a camera that they do not is held.
-//! Whether the new rig is better is told by blocks of the recording that it was not fitted to: each camera's joints against where
-//! the other cameras see them.
+//! The new rig is judged on blocks of the recording that it was not fitted to: each camera's joints against where the other
+//! cameras see them.
 
 mod held_out;
 
@@ -31,43 +31,43 @@ const TOLD: f64 = 0.8;
 /// another camera.
 const SUSPECT: [f64; 2] = [0.15, 1.5];
 
-/// What is looked at, and what is believed.
+/// Settings of a refinement.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
     pub n_joints: usize,
-    /// Of each joint the one on the other side.
+    /// The mirror of each joint on the other side of the body.
     pub sides: Vec<usize>,
-    /// What is added to the times of each camera to have the common ones, seconds.
+    /// Offset added to the times of each camera to have common ones, seconds.
     pub offsets_s: Vec<f64>,
     /// Standard deviation of these, seconds.
     pub offset_sd_s: f64,
     /// Standard deviations of the poses that are given: degrees, metres.
     pub pose_sd: [f64; 2],
-    /// Whether focal lengths move, too.
+    /// True if focal lengths move, too.
     pub focal: bool,
     /// The most instants that are looked at.
     pub most_instants: usize,
 }
 
-/// What became of a camera.
+/// Change of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
     /// By how much it has moved: degrees, metres.
     pub moved: [f64; 2],
     /// Standard deviation of its pose now: degrees, metres.
     pub sd: [f64; 2],
-    /// Whether the joints tell its pose; held if not.
+    /// True if the joints tell its pose; held if not.
     pub is_told: bool,
     /// Median residual of the rig fitted to everything, pixels.
     pub residual_px: f64,
     /// Median distance of its joints from where the others see them, held out, pixels: before and after.
     pub held_out_px: [f64; 2],
-    /// What is added to its times, seconds.
+    /// Offset added to its times to have common ones, seconds.
     pub offset_s: f64,
 }
 
-/// What came out.
+/// Result of a refinement.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The new rig.
@@ -80,7 +80,7 @@ pub struct Outcome {
     pub certainty: f64,
     /// Blocks that were held out, and how many of them became better.
     pub blocks: [usize; 2],
-    /// Whether the new rig is better.
+    /// True if the new rig is better.
     pub is_better: bool,
     /// Every reason not to believe either.
     pub doubts: Vec<Doubt>,
@@ -297,9 +297,9 @@ fn deviations(all: &Solved) -> Vec<[f64; 2]> {
             return [0.0; 2];
         };
         let sd = |own: &[usize]| {
-            let squares = own
-                .iter()
-                .map(|it| known.as_ref().map_or(f64::INFINITY, |known| known.sd(*it).powi(2)));
+            let squares = own.iter().map(|parameter| {
+                known.as_ref().map_or(f64::INFINITY, |known| known.sd(*parameter).powi(2))
+            });
             inflation * (squares.sum::<f64>() / 3.0).sqrt()
         };
         [sd(&pose[..3]).to_degrees(), sd(&pose[3..])]

@@ -35,9 +35,9 @@ pub use term::{Loss, Term};
 /// A step of all unknowns, in the coordinates that the problem chose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// Of the shared parameters.
+    /// Step of the shared parameters.
     pub shared: Vec<f64>,
-    /// Of every local block.
+    /// Step of every local block.
     pub locals: Vec<Vec<f64>>,
 }
 

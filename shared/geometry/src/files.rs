@@ -152,7 +152,7 @@ pub struct ReadOptions {
     pub up: Option<UnitVector3<f64>>,
     /// Image size, where the file does not state it.
     pub size: Option<[u32; 2]>,
-    /// Whether a camera without a place is read too, with its lens alone; it stands at the origin.
+    /// True if a camera without a place is read too, with its lens alone; it stands at the origin.
     pub lenses_suffice: bool,
 }
 

@@ -42,7 +42,7 @@ pub enum RigError {
     NotFinite {
         /// Name of the camera.
         camera: String,
-        /// What the number is.
+        /// Name of the quantity.
         quantity: &'static str,
         /// The number.
         value: f64,
@@ -249,9 +249,11 @@ impl Rig {
         &self.left_out
     }
 
-    /// What the rig lacks of a camera and what it has, for errors: `no camera "c"; it has a, b`.
+    /// Describes a missing camera and those that the rig has, for errors: `no camera "c"; it has a, b`.
     pub fn lacks(&self, name: &str) -> String {
-        if let Some(LeftOut { why, .. }) = self.left_out.iter().find(|it| it.camera == name) {
+        if let Some(LeftOut { why, .. }) =
+            self.left_out.iter().find(|left_out| left_out.camera == name)
+        {
             return format!("no place of camera {name:?}: {why}");
         }
         let names: Vec<&str> = self.cameras.iter().map(|camera| &*camera.name).collect();
@@ -420,11 +422,11 @@ fn check_image(camera: &Camera) -> Result<(), RigError> {
 #[cfg(test)]
 mod tests;
 
-/// What [`is_plain_name`] requires, as text for error messages.
+/// Requirement of [`is_plain_name`], as text for error messages.
 pub const PLAIN_NAME: &str = "1 to 64 bytes that begin with none of . - and space, without / \\ , \" and control \
                               characters: the name of a camera becomes that of a folder";
 
-/// Whether a name can be the name of a folder and a field of a table.
+/// Returns true if a name can be the name of a folder and a field of a table.
 pub fn is_plain_name(name: &str) -> bool {
     (1..=64).contains(&name.len())
         && !name.starts_with(['.', '-', ' '])

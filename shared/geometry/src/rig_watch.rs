@@ -61,7 +61,7 @@ pub struct RigWatch {
 struct Group {
     /// The camera that is projected into, and the two others, or the one other twice.
     views: [usize; 3],
-    /// Of the last frames: the median offset of the observed from the predicted points, pixels.
+    /// Median offset of the observed from the predicted points in each of the last frames, pixels.
     offsets_px: VecDeque<[f64; 2]>,
 }
 
@@ -144,7 +144,7 @@ impl RigWatch {
         }
     }
 
-    /// Whether a camera was ever suspected for several usable frames in a row.
+    /// Returns true if a camera was ever suspected for several usable frames in a row.
     pub fn is_reported(&self, view: usize) -> bool {
         self.reported.get(view).copied().unwrap_or(false)
     }
@@ -182,7 +182,7 @@ impl RigWatch {
         found
     }
 
-    /// Of the cameras that are not left out, the one without which the others agree best, if it is wrong.
+    /// Returns the camera without which the others agree best, if it is wrong, among those not left out.
     fn worst(&self, left_out: &[usize]) -> Option<Suspect> {
         let views = (0..self.cameras.len()).filter(|view| !left_out.contains(view));
         let suspects = views.filter_map(|view| self.suspect(view, left_out));

@@ -62,7 +62,7 @@ impl SearchSize {
         self.person_px.map(|person_px| person_px * self.scale)
     }
 
-    /// Whether the person is smaller than [`GOOD_PX`], for the sake of time.
+    /// Returns true if the person is smaller than [`GOOD_PX`], for the sake of time.
     pub fn is_limited(&self) -> bool {
         let px = self.person_in_frame_px();
         self.scale < self.wanted && px.is_some_and(|px| px < GOOD_PX[0])
@@ -72,7 +72,7 @@ impl SearchSize {
 /// How large the frames of all cameras of a rig are searched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSizes {
-    /// Of every camera, in the order of the rig.
+    /// Size for every camera, in the order of the rig.
     pub cameras: Vec<SearchSize>,
     /// The most cameras that share a space in which a person can stand; 0 if no two do.
     pub n_sharing: usize,
@@ -110,11 +110,11 @@ pub fn search_sizes(rig: &Rig) -> SearchSizes {
 /// The one scale for all cameras that gives good heights in all, nearest to what is aimed at.
 fn common(person_px: &[Option<f64>], limits: &[f64]) -> Option<f64> {
     let known: Vec<f64> = person_px.iter().flatten().copied().collect();
-    let limits = person_px.iter().zip(limits).filter(|it| it.0.is_some());
+    let limits = person_px.iter().zip(limits).filter(|camera| camera.0.is_some());
     let limit = limits.map(|limit| *limit.1).fold(1.0, f64::min);
     let is_good = |scale: f64| {
         let mut px = known.iter().map(|value| value * scale);
-        px.all(|it| (GOOD_PX[0]..=GOOD_PX[1]).contains(&it))
+        px.all(|height_px| (GOOD_PX[0]..=GOOD_PX[1]).contains(&height_px))
     };
     let off = |scale: f64| {
         let logs = known.iter().map(|px| (px * scale / AIM_PX).ln());

@@ -81,7 +81,7 @@ impl Tracks {
         });
         let before = known.next()??;
         let velocity = between(before, (taken_s, at))?;
-        let earlier = known.next().flatten().and_then(|it| between(it, before));
+        let earlier = known.next().flatten().and_then(|earlier| between(earlier, before));
         let change = earlier.map_or(0.0, |earlier| (earlier.px_per_s - velocity.px_per_s).norm());
         let is_person =
             velocity.px_per_s.norm() <= MOST_SPEED * height_px && change <= MOST_CHANGE * height_px;
@@ -112,7 +112,7 @@ pub fn moved(
     skew_s: f64,
     [sigma_px, height_px]: [f64; 2],
 ) -> (Point2<f64>, f64) {
-    let known = velocity.and_then(|it| Some((it.shift(skew_s)?, it.gap_s)));
+    let known = velocity.and_then(|velocity| Some((velocity.shift(skew_s)?, velocity.gap_s)));
     let Some((shift, gap_s)) = known else {
         return (at, widened_px(0.0, UNKNOWN_SPEED * height_px, skew_s));
     };
@@ -142,7 +142,7 @@ mod tests {
 
     fn speed(tracks: &Tracks, taken_s: f64, x: f64) -> Option<f64> {
         let found = tracks.velocity(0, (taken_s, Point2::new(x, 7.0)), HEIGHT);
-        found.map(|it| it.px_per_s.x)
+        found.map(|velocity| velocity.px_per_s.x)
     }
 
     #[test]

@@ -62,19 +62,19 @@ pub struct Step {
 }
 
 impl Step {
-    /// Whether the offset exceeds [`OUT_OF_STEP_MS`] beyond doubt.
+    /// Returns true if the offset exceeds [`OUT_OF_STEP_MS`] beyond doubt.
     pub fn is_out(&self) -> bool {
         self.offset_ms.abs() - N_ERRORS * self.error_ms > OUT_OF_STEP_MS
     }
 }
 
-/// What all views saw in a frame.
+/// Observations of all views in a frame.
 #[derive(Debug, Clone)]
 struct Frame {
     views: Vec<Option<View>>,
 }
 
-/// What a view saw in a frame.
+/// Observation of a view in a frame.
 #[derive(Debug, Clone)]
 struct View {
     /// When, seconds; and how long after the instant of the frame.
@@ -134,7 +134,7 @@ impl StepWatch {
             };
             let each = now.views.iter().enumerate().map(|(nth, view)| {
                 let view = view.as_ref()?;
-                let ends = [before, after].map(|it| it.views.get(nth)?.as_ref());
+                let ends = [before, after].map(|end| end.views.get(nth)?.as_ref());
                 let points = view.moving([ends[0]?, ends[1]?])?;
                 Some(Seen {
                     points,
@@ -162,7 +162,7 @@ impl StepWatch {
             }
         }
         for view in 0..self.cameras.len() {
-            self.reported[view] |= self.step(view).is_some_and(|it| it.is_out());
+            self.reported[view] |= self.step(view).is_some_and(|step| step.is_out());
         }
     }
 
@@ -175,7 +175,7 @@ impl StepWatch {
         let n = kept.len() as f64;
         let weight = |estimate: &Estimate| 1.0 / estimate.variance.max(MIN_ERROR_S * MIN_ERROR_S);
         let all: f64 = kept.iter().map(weight).sum();
-        let sum: f64 = kept.iter().map(|it| weight(it) * it.offset_s).sum();
+        let sum: f64 = kept.iter().map(|estimate| weight(estimate) * estimate.offset_s).sum();
         let offset = sum / all;
         // What the samples tell of themselves, or how the estimates scatter, whichever is more.
         let off = |estimate: &Estimate| (weight(estimate) * (estimate.offset_s - offset)).powi(2);
@@ -187,7 +187,7 @@ impl StepWatch {
         })
     }
 
-    /// Whether a camera was ever out of step ([`Step::is_out`]).
+    /// Returns true if a camera was ever out of step ([`Step::is_out`]).
     pub fn is_reported(&self, view: usize) -> bool {
         self.reported.get(view).copied().unwrap_or(false)
     }
@@ -215,7 +215,7 @@ impl View {
             return None;
         }
         let each = self.points.iter().enumerate().map(|(nth, at)| {
-            let ends = [before, after].map(|it| it.points.get(nth).copied().flatten());
+            let ends = [before, after].map(|end| end.points.get(nth).copied().flatten());
             let velocity = (ends[1]? - ends[0]?) / gap;
             let is_person = velocity.norm() <= MOST_SPEED * self.side;
             Some(((*at)?, velocity)).filter(|_| is_person)

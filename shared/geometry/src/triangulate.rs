@@ -138,7 +138,7 @@ pub struct Triangulated {
 }
 
 impl Triangulated {
-    /// Whether an observation was used, by its position in the list.
+    /// Returns true if an observation was used, by its position in the list.
     pub fn uses(&self, view: usize) -> bool {
         view < MAX_VIEWS && self.views_used & (1 << view) != 0
     }

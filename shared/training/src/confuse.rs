@@ -47,7 +47,7 @@ pub(crate) fn loss<'a>(
 impl Loss<'_> {
     /// Loss of a part whose centre is `off` pixels from the marked one: 0 up to a quarter of the box's
     /// side, 1 from three quarters on.
-    fn of(&self, off: f64) -> f64 {
+    fn of_part(&self, off: f64) -> f64 {
         self.weight * ((off / self.marked.side - 0.25) / 0.5).clamp(0.0, 1.0)
     }
 
@@ -55,7 +55,7 @@ impl Loss<'_> {
     pub(crate) fn of_pose(&self, model: &Model, pose: &Pose) -> f64 {
         let centres = pose.centres(model, self.layout);
         let off = centres.iter().zip(&self.marked.parts);
-        off.map(|(a, b)| self.of((a[0] - b[0]).hypot(a[1] - b[1]))).sum()
+        off.map(|(a, b)| self.of_part((a[0] - b[0]).hypot(a[1] - b[1]))).sum()
     }
 }
 
@@ -68,7 +68,7 @@ impl ExtraTerms for Loss<'_> {
             let (row, col) = (at / it.cols, at % it.cols);
             let dx = (col as f64 - self.layout.pad[1] as f64) * it.scale + half - x;
             let dy = (row as f64 - self.layout.pad[0] as f64) * it.scale + half - y;
-            *score += self.of(dx.hypot(dy)) as f32;
+            *score += self.of_part(dx.hypot(dy)) as f32;
         }
         true
     }

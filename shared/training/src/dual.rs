@@ -121,7 +121,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         self.entries.len()
     }
 
-    /// Whether there is no example.
+    /// Returns true if there is no example.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -148,7 +148,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
 
     /// Keeps only the wanted examples; the others lose their share in the solution.
     pub fn retain(&mut self, wanted: impl Fn(&T) -> bool) {
-        self.keep(&|it| wanted(&it.tag));
+        self.keep(&|entry| wanted(&entry.tag));
     }
 
     /// Shrinks the working set: removes examples without a share that exceed their margin by `room`, and of
@@ -169,7 +169,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             left -= self.entries[it].x.bytes();
             self.entries[it].share = f64::NAN;
         }
-        self.keep(&|it| !it.share.is_nan());
+        self.keep(&|entry| !entry.share.is_nan());
     }
 
     /// Removes entries; groups without any go too, and the others take the order of their first one,

@@ -76,7 +76,7 @@ pub(crate) fn best_near(
             cells,
         };
         let pose = search.best();
-        if best.as_ref().is_none_or(|it| pose.score > it.score) {
+        if best.as_ref().is_none_or(|best| pose.score > best.score) {
             best = Some(pose);
         }
     }
@@ -104,7 +104,7 @@ pub(crate) fn nearest(
         };
         let picked: Vec<Cell> = cells.iter().map(nearest).collect();
         let sum = picked.iter().map(|picked| picked.overlap).sum();
-        if best.as_ref().is_none_or(|it| sum > it.0) {
+        if best.as_ref().is_none_or(|best| sum > best.0) {
             let mixture = |part: usize| marked.types.as_ref().map_or(0, |kind| kind[part]);
             let placed = picked.iter().enumerate();
             let placed = placed.map(|(part, it)| placement(it, mixture(part)));
@@ -116,7 +116,7 @@ pub(crate) fn nearest(
             best = Some((sum, pose));
         }
     }
-    best.map(|it| it.1)
+    best.map(|best| best.1)
 }
 
 fn placement(cell: &Cell, mixture: usize) -> Placement {
@@ -198,7 +198,7 @@ impl Search<'_> {
             let choice = self.votes(part, &scores[part]);
             for (of_cell, choice) in scores[edge.parent].iter_mut().zip(&choice) {
                 for (of_type, bias) in of_cell.iter_mut().zip(&edge.bias) {
-                    let best = choice.iter().zip(bias).map(|(it, bias)| it.0 + bias);
+                    let best = choice.iter().zip(bias).map(|(vote, bias)| vote.0 + bias);
                     *of_type += best.fold(f64::NEG_INFINITY, f64::max);
                 }
             }
@@ -207,7 +207,7 @@ impl Search<'_> {
         self.backtrack(&scores[0], &choices)
     }
 
-    /// What the filters answer, `-inf` for types that the part may not have.
+    /// Returns the responses of the filters, `-inf` for types that the part may not have.
     fn own(&self, part: usize) -> Scores {
         let map = self.pyramid.level(self.level);
         let n_types = self.model.n_types(part);

@@ -22,7 +22,7 @@ impl Placed {
         }
     }
 
-    /// Whether it has the parts and types of a shape.
+    /// Returns true if it has the parts and types of a shape.
     pub(crate) fn fits(&self, shape: &Shape) -> bool {
         let has_type =
             |(part, it): (usize, &(u16, u16, u8))| usize::from(it.2) < shape.n_types(part);

@@ -1,4 +1,4 @@
-//! What follows from the annotations without images: sizes of the people and types of their parts.
+//! Sizes of the people and types of their parts, from the annotations alone, without images.
 
 use crate::latent::Marked;
 use crate::scale::{box_sides, filter_side};
@@ -94,7 +94,7 @@ impl Plan {
     ) -> Result<Self, PlanError> {
         let expected = tree.parents.len();
         for (person, parts) in people.iter().enumerate() {
-            let finite = |it: &&[f64; 2]| it.iter().all(|value| value.is_finite());
+            let finite = |part: &&[f64; 2]| part.iter().all(|value| value.is_finite());
             let got = parts.iter().filter(finite).count();
             if got != expected || parts.len() != expected {
                 let person = person + 1;

@@ -25,7 +25,8 @@ pub(crate) fn box_sides(people: &[Vec<[f64; 2]>], parents: &[Option<usize>]) -> 
         return vec![0.0; people.len()];
     };
     let usual = |edge: (usize, usize)| {
-        let of_person = |it: &Vec<[f64; 2]>| (length(it, edge) / length(it, first)).ln();
+        let of_person =
+            |person: &Vec<[f64; 2]>| (length(person, edge) / length(person, first)).ln();
         let ratios: Vec<_> = people.iter().map(of_person).collect();
         let ratios = ratios.into_iter().filter(|ratio| ratio.is_finite()).collect();
         quantile(ratios, 0.5).exp()
@@ -61,7 +62,7 @@ mod tests {
     fn person(scale: f64) -> Vec<[f64; 2]> {
         [[0.0, 0.0], [0.0, 20.0], [15.0, 30.0], [30.0, 55.0]]
             .iter()
-            .map(|it| it.map(|value| 7.0 + scale * value))
+            .map(|part| part.map(|value| 7.0 + scale * value))
             .collect()
     }
 

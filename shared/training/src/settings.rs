@@ -14,7 +14,7 @@ pub struct Settings {
     pub n_types: usize,
     /// How the parts are clustered into types.
     pub types_by: TypesBy,
-    /// Whether the left side of the body is the mirror image of the right one: types, filters, springs and
+    /// True if the left side of the body is the mirror image of the right one: types, filters, springs and
     /// biases. Only valid if the training set contains the mirror images.
     pub symmetric: bool,
     /// Random starts of every clustering, of which the tightest is taken.

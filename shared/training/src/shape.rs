@@ -33,8 +33,8 @@ pub struct Shape {
 /// The vector of a [`Shape`]: all filters, the quadratic and the linear coefficients of all springs,
 /// the biases of all pairs of types, the root's bias.
 ///
-/// What is trained is not the model's parameter `w` but `v = (w - w_0) r` with `w_0` the least
-/// stiffness and `r` the scale of the root's bias, so that the norm of `v` is what is minimised.
+/// The trained vector is not the model's parameter `w` but `v = (w - w_0) r` with `w_0` the least
+/// stiffness and `r` the scale of the root's bias, so that the minimised norm is that of `v`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coordinates {
     first_type: Vec<usize>,
@@ -149,7 +149,7 @@ impl Coordinates {
         self.root + 1
     }
 
-    /// Whether the vector is empty; never, since the root has a bias.
+    /// Returns true if the vector is empty; never, since the root has a bias.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

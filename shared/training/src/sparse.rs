@@ -209,7 +209,7 @@ mod tests {
     fn vector() -> impl Strategy<Value = Sparse> {
         let run = (any::<bool>(), prop::collection::vec(-9_i8..9, 4));
         (prop::collection::vec(run, LEN / 4), any::<bool>()).prop_map(|(runs, negated)| {
-            let runs = runs.into_iter().enumerate().filter(|it| it.1.0);
+            let runs = runs.into_iter().enumerate().filter(|run| run.1.0);
             let runs = runs.map(|(at, (_, values))| {
                 let values = values[..=at % 4].iter().map(|value| f32::from(*value));
                 (4 * at, values.collect::<Vec<_>>())

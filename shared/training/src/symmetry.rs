@@ -15,8 +15,8 @@ pub(crate) struct Symmetry {
 }
 
 impl Symmetry {
-    /// Of a shape whose types are mirrored as [`cluster`](crate::types::cluster) makes them; `None` if
-    /// they are not, or if it has no mirror.
+    /// Takes a shape whose types are mirrored as [`cluster`](crate::types::cluster) makes them;
+    /// returns `None` if they are not, or if it has no mirror.
     pub(crate) fn of(shape: &Shape) -> Option<Self> {
         let mirror = shape.mirror.as_deref()?;
         let of = |part: usize, k: usize| {
@@ -44,7 +44,7 @@ impl Symmetry {
                 filters((&at, shape.side), &mut mirrored, own, their);
                 springs(&at, &mut mirrored, own, their);
                 let parent = shape.parents[part];
-                for of_parent in 0..parent.map_or(0, |it| shape.n_types(it)) {
+                for of_parent in 0..parent.map_or(0, |parent| shape.n_types(parent)) {
                     let parent = parent.unwrap_or_default();
                     let to = at.bias(their.0, of(parent, of_parent), their.1);
                     mirrored[at.bias(part, of_parent, k)].0 = to as u32;

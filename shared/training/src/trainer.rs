@@ -217,8 +217,8 @@ impl<'a> Trainer<'a> {
                 shares[*person as usize] = share;
             }
         }
-        self.machine.retain(|it| matches!(it, Origin::Background { .. }));
-        self.right = placed.into_iter().map(|placed| placed.map(|it| it.0)).collect();
+        self.machine.retain(|origin| matches!(origin, Origin::Background { .. }));
+        self.right = placed.into_iter().map(|placed| placed.map(|placed| placed.0)).collect();
         let people = self.right.iter().zip(shares).enumerate();
         let (origins, shares): (Vec<_>, Vec<_>) = people
             .filter_map(|(person, (pose, share))| {

@@ -32,7 +32,7 @@ pub(crate) fn cluster(
     let other = |part: usize| mirror.map_or(part, |mirror| mirror[part]);
     let clustered = |part: usize| -> Vec<(usize, OfPart)> {
         let mut random = fastrand::Rng::with_seed(settings.seed ^ ((part as u64) << 32));
-        let sight = Offsets::of(part, parents, settings.types_by);
+        let sight = Offsets::new(part, parents, settings.types_by);
         match mirror {
             Some(mirror) if other(part) == part && settings.n_types > 1 => {
                 let both = [
@@ -70,13 +70,13 @@ pub(crate) fn cluster(
 struct Offsets {
     part: usize,
     neighbours: Vec<usize>,
-    /// Whether the offsets are mirrored.
+    /// True if the offsets are mirrored.
     in_mirror: bool,
 }
 
 impl Offsets {
     /// The parts whose offsets define the types of `part`, its parent first.
-    fn of(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
+    fn new(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
         let children = (0..parents.len()).filter(|&i| parents[i] == Some(part));
         let mut neighbours: Vec<_> = parents[part].into_iter().collect();
         match by {
@@ -126,7 +126,7 @@ impl OfPart {
         let labels = k_means(points, settings, random);
         let mut centres = vec![Vec::new(); labels.iter().max().map_or(0, |label| label + 1)];
         for (label, centre) in centres.iter_mut().enumerate() {
-            let members = labels.iter().zip(points).filter(|it| *it.0 == label);
+            let members = labels.iter().zip(points).filter(|member| *member.0 == label);
             *centre = middle(&mut members.map(|member| member.1));
         }
         Self { labels, centres }
@@ -136,7 +136,7 @@ impl OfPart {
     ///
     /// * `points`: the mirrored offsets of the other side.
     fn mirrored(&self, points: &[Vec<f64>]) -> Self {
-        let nearest = |point: &Vec<f64>| nearest(point, &self.centres).map_or(0, |it| it.0);
+        let nearest = |point: &Vec<f64>| nearest(point, &self.centres).map_or(0, |centre| centre.0);
         Self {
             labels: points.iter().map(nearest).collect(),
             centres: self.centres.iter().map(|centre| in_mirror(centre)).collect(),
@@ -145,7 +145,7 @@ impl OfPart {
 
     /// The anchors of the types, `[x, y]` from the first neighbour, cells.
     fn anchors(&self) -> Vec<[i32; 2]> {
-        let anchor = |it: &Vec<f64>| match it[..] {
+        let anchor = |centre: &Vec<f64>| match centre[..] {
             [x, y, ..] => [x, y].map(|value| value.round() as i32),
             _ => [0; 2],
         };
@@ -195,7 +195,7 @@ fn middle(points: &mut dyn Iterator<Item = &Vec<f64>>) -> Vec<f64> {
 
 /// The nearest of some points, and its squared distance; the first of several.
 fn nearest(point: &[f64], to: &[Vec<f64>]) -> Option<(usize, f64)> {
-    let distances = to.iter().map(|it| squared_distance(point, it));
+    let distances = to.iter().map(|other| squared_distance(point, other));
     distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -208,11 +208,14 @@ fn k_means(points: &[Vec<f64>], settings: &Settings, random: &mut fastrand::Rng)
         let picked = random.choose_multiple(0..points.len(), settings.n_types);
         let centres = picked.into_iter().map(|picked| points[picked].clone()).collect();
         let (spread, labels) = lloyd(points, centres);
-        if best.as_ref().is_none_or(|it| spread < it.0) {
+        if best.as_ref().is_none_or(|best| spread < best.0) {
             best = Some((spread, labels));
         }
     }
-    by_size(best.map(|it| it.1).unwrap_or_default(), settings.n_types)
+    by_size(
+        best.map(|best| best.1).unwrap_or_default(),
+        settings.n_types,
+    )
 }
 
 fn lloyd(points: &[Vec<f64>], mut centres: Vec<Vec<f64>>) -> (f64, Vec<usize>) {

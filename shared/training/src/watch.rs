@@ -64,6 +64,6 @@ pub trait Watch: Sync {
     /// Receives an event.
     fn tell(&self, event: Event);
 
-    /// Whether to continue; called often.
+    /// Returns true to continue; called often.
     fn go_on(&self) -> bool;
 }

@@ -108,10 +108,10 @@ fn an_array_of_two_sizes_is_one_person() {
 #[test]
 fn the_third_number_is_hidden_in_lsp_and_visible_in_lsp_extended() {
     const N: usize = 4;
-    let flag = |it: usize| f64::from(u8::from(it == 1));
-    let value = |it: usize, axis: usize, person: usize| match axis {
-        2 => flag(it),
-        _ => joint(person, it)[axis] + 1.0,
+    let flag = |joint: usize| f64::from(u8::from(joint == 1));
+    let value = |i: usize, axis: usize, person: usize| match axis {
+        2 => flag(i),
+        _ => joint(person, i)[axis] + 1.0,
     };
     let original = array([3, N, 2], |[axis, it, person]| value(it, axis, person));
     let extended = array([N, 3, 2], |[it, axis, person]| value(it, axis, person));

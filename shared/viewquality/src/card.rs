@@ -256,15 +256,15 @@ fn colour(
     value: &str,
     is_fit: impl Fn(f32) -> bool,
 ) -> Result<[f32; 3], CardError> {
-    let read = numbers(value, |it| it.is_finite() && is_fit(it));
-    let read = read.and_then(|it| <[f32; 3]>::try_from(it).ok());
+    let read = numbers(value, |value| value.is_finite() && is_fit(value));
+    let read = read.and_then(|values| <[f32; 3]>::try_from(values).ok());
     let above = if key == key::STD { " above 0" } else { "" };
     read.ok_or_else(|| entry(key, value, format!("three numbers{above}")))
 }
 
 fn tau(value: &str, n_parts: usize) -> Result<Vec<f32>, CardError> {
-    let read = numbers(value, |it| (0.0..=f32::MAX).contains(&it));
-    let read = read.filter(|it| it.len() == n_parts);
+    let read = numbers(value, |value| (0.0..=f32::MAX).contains(&value));
+    let read = read.filter(|values| values.len() == n_parts);
     read.ok_or_else(|| entry(key::TAU, value, format!("{n_parts} finite numbers from 0")))
 }
 

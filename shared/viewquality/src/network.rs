@@ -53,9 +53,9 @@ pub enum NetworkError {
     /// The inputs and the card do not agree.
     #[error("the network {takes} `evidence`, but its file {declares} its version")]
     EvidenceVersion {
-        /// Whether it has the input.
+        /// `takes` or `does not take`, by whether it has the input.
         takes: &'static str,
-        /// Whether it has the entry.
+        /// `declares` or `does not declare`, by whether it has the entry.
         declares: &'static str,
     },
     /// The library could not run it.
@@ -140,12 +140,12 @@ impl Network {
         self.shape
     }
 
-    /// Whether it takes the tile.
+    /// Returns true if it takes the tile.
     pub fn takes_tile(&self) -> bool {
         self.takes_tile
     }
 
-    /// Whether it takes [`evidence`](crate::evidence()).
+    /// Returns true if it takes [`evidence`](crate::evidence()).
     pub fn takes_evidence(&self) -> bool {
         self.takes_evidence
     }
@@ -194,7 +194,7 @@ impl Network {
 }
 
 fn names(what: &'static str, found: &[&str]) -> NetworkError {
-    let found: Vec<String> = found.iter().map(|it| format!("`{it}`")).collect();
+    let found: Vec<String> = found.iter().map(|name| format!("`{name}`")).collect();
     let expected = match what {
         "inputs" => "`tile` f32 [n, 3, H, W], `evidence` f32 [n, K], or both",
         _ => "`sigma` f32 [n, parts]",

@@ -35,7 +35,7 @@ pub enum TableError {
         column: usize,
         /// The name.
         got: String,
-        /// What is wrong with it.
+        /// Fault of the value.
         problem: &'static str,
     },
     /// The header lacks a column.

@@ -313,7 +313,7 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Whether single pictures are evaluated; refuses pictures together with sequences.
+/// Returns true if single pictures are evaluated; refuses pictures together with sequences.
 fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
     let n = arguments
         .sequences
@@ -423,7 +423,7 @@ fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Fail
         names.push("adaptive");
     }
     let each = ["", "+all-views"].into_iter();
-    let each = each.flat_map(|it| names.iter().map(move |name| format!("{name}{it}")));
+    let each = each.flat_map(|suffix| names.iter().map(move |name| format!("{name}{suffix}")));
     let mut versions = vec![Version::SINGLE];
     for name in each {
         versions.push(name.parse().or_fail(ExitKind::Run)?);
@@ -461,7 +461,7 @@ fn settings_text(
     };
     let joints = joints.fingerprint();
     let mut tables = Vec::new();
-    let files = config.compatibility.iter().flat_map(|it| &it.files);
+    let files = config.compatibility.iter().flat_map(|table| &table.files);
     for file in files {
         tables.push(digest(file)?);
     }

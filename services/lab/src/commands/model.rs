@@ -12,7 +12,7 @@ use terminal::output;
 
 use super::network;
 
-/// What `show` says of networks.
+/// Help on what `show` prints of networks.
 const NETWORKS: &str = "\
 For a network (.onnx) it prints inputs and outputs and, by its card, their meaning: preparation, codec, keypoints, the resulting \
 joints, licence. For a detector of people it prints the rule for boxes, and with --image the boxes. A network that \
@@ -82,7 +82,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Whether a file is called as networks are.
+/// Returns true if a file has the ending of networks.
 fn is_network(file: &Path) -> bool {
     let ending = file.extension();
     ending.is_some_and(|ending| ending.eq_ignore_ascii_case("onnx"))

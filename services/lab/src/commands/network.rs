@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Whether any is given.
+    /// Returns true if any is given.
     pub(crate) fn is_given(&self) -> bool {
         self.card.is_some() || self.image.is_some()
     }
@@ -145,9 +145,9 @@ fn first_picture(file: &Path) -> Result<Picture, Failure> {
 
 fn ports(ports: &[Port]) -> Vec<Value> {
     let each = ports.iter();
-    each.map(|it| {
-        let sides: Vec<String> = it.sides.iter().map(ToString::to_string).collect();
-        json!({ "name": it.name, "sides": sides })
+    each.map(|port| {
+        let sides: Vec<String> = port.sides.iter().map(ToString::to_string).collect();
+        json!({ "name": port.name, "sides": sides })
     })
     .collect()
 }

@@ -226,7 +226,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let threads = arguments.threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
-        .thread_name(|it| format!("synth-{it}"))
+        .thread_name(|i| format!("synth-{i}"))
         .build()
         .or_fail(ExitKind::Run)?;
     let terminal = Terminal::with_bar(globals.quiet, arguments.json, BAR);
@@ -244,7 +244,7 @@ fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
         );
         return Err(Failure::new(ExitKind::Usage, message));
     }
-    let is_off = skews_ms.iter().any(|it| *it != 0.0);
+    let is_off = skews_ms.iter().any(|skew_ms| *skew_ms != 0.0);
     Ok(if is_off {
         skews_ms.to_vec()
     } else {

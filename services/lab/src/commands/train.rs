@@ -153,7 +153,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
     let threads = arguments.threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
-        .thread_name(|it| format!("train-{it}"))
+        .thread_name(|i| format!("train-{i}"))
         .build()
         .or_fail(ExitKind::Run)?;
     let worker = Arc::clone(&shared);

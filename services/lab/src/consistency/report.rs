@@ -1,4 +1,4 @@
-//! What is said about what was learned.
+//! Report on learned consistency.
 
 use std::path::Path;
 
@@ -82,7 +82,7 @@ fn text(out: &Path, done: &Done) -> String {
 
 fn row(point: &Point, mark: &str) -> String {
     let it = &point.weights;
-    let cap = it.max_distance_cells.map_or_else(|| "-".to_owned(), |it| it.to_string());
+    let cap = it.max_distance_cells.map_or_else(|| "-".to_owned(), |cells| cells.to_string());
     let form = match (it.beta > 0.0, it.appearance) {
         (false, _) => "-",
         (true, Appearance::Joint) => "joint",

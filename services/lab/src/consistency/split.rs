@@ -8,10 +8,10 @@ pub(super) fn split(
     all: Vec<Sequence>,
     hold_out: &[String],
 ) -> Result<(Vec<Sequence>, Vec<Sequence>), Failure> {
-    let mut subjects: Vec<&str> = all.iter().map(|it| it.subject.as_str()).collect();
+    let mut subjects: Vec<&str> = all.iter().map(|sequence| sequence.subject.as_str()).collect();
     subjects.sort_by_key(|subject| (subject.len(), *subject));
     subjects.dedup();
-    if let Some(unknown) = hold_out.iter().find(|it| !subjects.contains(&it.as_str())) {
+    if let Some(unknown) = hold_out.iter().find(|subject| !subjects.contains(&subject.as_str())) {
         let known = subjects.join(", ");
         let message = format!("--hold-out: there is no subject {unknown:?}, only {known}");
         return Err(Failure::new(ExitKind::Usage, message));
@@ -19,12 +19,12 @@ pub(super) fn split(
     let held: Vec<String> = if hold_out.is_empty() {
         let n = subjects.len().div_ceil(4);
         let last = subjects.iter().rev().take(n);
-        last.map(|it| (*it).to_owned()).collect()
+        last.map(|subject| (*subject).to_owned()).collect()
     } else {
         hold_out.to_vec()
     };
     let (held, train): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|it| held.contains(&it.subject));
+        all.into_iter().partition(|sequence| held.contains(&sequence.subject));
     if train.is_empty() {
         let message = "all subjects are held out: nobody is left to learn from";
         let failure = Failure::new(ExitKind::Usage, message);

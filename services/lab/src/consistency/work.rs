@@ -21,18 +21,18 @@ const BINS: [usize; 5] = [3, 6, 9, 12, 18];
 /// Ridges that are compared, in squared sizes of the person.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
-/// What is learned, and how.
+/// Settings of a training of consistency.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Most instants of the subjects held out that weights are tried on, evenly over all of them.
     pub tries: usize,
     /// Learn the pairs of the cameras of this rig by name too.
     pub rig: Option<String>,
-    /// Whether joints are learned as a map of the parts.
+    /// True if joints are learned as a map of the parts.
     pub with_joints: bool,
     /// How the frames are made.
     pub film: FilmSettings,
-    /// What identifies the model in the file.
+    /// Identity of the model in the file.
     pub fingerprint: String,
 }
 
@@ -46,10 +46,10 @@ pub struct Learning<'a> {
     begin: Instant,
 }
 
-/// What was found.
+/// Result of a training.
 #[derive(Debug)]
 pub struct Done {
-    /// What goes into the file.
+    /// Content of the file.
     pub learned: Learned,
     /// Number of bins, and what so many know of the types of people held out.
     pub bins: Vec<(usize, Option<f64>)>,
@@ -105,7 +105,7 @@ impl<'a> Learning<'a> {
         keep(&first)?;
         let tried = self.thinned(held);
         let (single, surface) = self.choose(&tried, &first)?;
-        let weights = best(&surface).map_or(first.weights, |it| it.weights);
+        let weights = best(&surface).map_or(first.weights, |point| point.weights);
         let mut learned = self.learned(learner, weights, ridge)?;
         learned.learned.held_out = tried.iter().map(|tried| tried.frames.len() as u64).sum();
         keep(&learned)?;
@@ -147,7 +147,7 @@ impl<'a> Learning<'a> {
         learned.or_fail(ExitKind::Input)
     }
 
-    /// What single views show, by every number of bins.
+    /// Learns from single views, for every number of bins.
     fn look(&self, sequences: &[Sequence], what: &str) -> Result<Vec<Learner>, Failure> {
         let shape = Shape::of(&self.model);
         let learner = |n_bins: usize| {
@@ -172,7 +172,7 @@ impl<'a> Learning<'a> {
         held: &[Sequence],
         learned: &Learned,
     ) -> Result<(Option<Point>, Vec<Point>), Failure> {
-        if held.iter().all(|it| it.frames.is_empty()) {
+        if held.iter().all(|sequence| sequence.frames.is_empty()) {
             return Ok((None, Vec::new()));
         }
         let grid = Grid::default();

@@ -28,16 +28,16 @@ const LIMIT: f64 = 15.0 / 1080.0;
 /// Name of the row of what `run` gives.
 const AS_RUN: &str = "as run";
 
-/// What is judged.
+/// Methods and disturbances to judge.
 #[derive(Debug)]
 pub struct EvidenceJob<'a> {
     /// The network that finds keypoints.
     pub network: &'a PoseNetwork,
-    /// What finds the boxes.
+    /// Detector of the boxes.
     pub detector: &'a Detector,
     /// Solves the undisturbed sequences as `run` does, beside the methods that are compared.
     pub as_run: &'a AsRun<'a>,
-    /// What goes wrong.
+    /// Disturbances.
     pub stress: &'a [Stress],
     /// How the frames are derived.
     pub film: FilmSettings,
@@ -50,16 +50,16 @@ pub struct EvidenceJob<'a> {
 /// The scores of one method under one stress.
 #[derive(Debug, Clone, Default)]
 struct Tally {
-    /// Of every frame: segments found.
+    /// Segments found in every frame.
     found: Vec<Share>,
-    /// Of every frame: errors of the limbs' joints, millimetres.
+    /// Errors of the limbs' joints in every frame, millimetres.
     errors: Vec<Share>,
 }
 
 /// A row of the table.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct EvidenceRow {
-    /// What went wrong.
+    /// Name of the disturbance.
     pub stress: String,
     /// How the joints were found.
     pub method: &'static str,
@@ -87,7 +87,7 @@ struct Instant<'a> {
     nth: usize,
     images: Vec<Option<Rgb8View<'a>>>,
     cameras: &'a [Camera],
-    /// Of `skeleton::PARSE14`.
+    /// Joints of `skeleton::PARSE14`.
     truth: Vec<Option<Point>>,
 }
 
@@ -128,7 +128,7 @@ impl EvidenceJob<'_> {
         }
         console.finish();
         let mut rows = self.rows(&tallies);
-        if let Some(undisturbed) = self.stress.iter().position(|it| *it == Stress::Clean) {
+        if let Some(undisturbed) = self.stress.iter().position(|stress| *stress == Stress::Clean) {
             let tally = self.as_run(sequences, console)?;
             let last = tallies[undisturbed].last().unwrap_or(&tally);
             rows.push(self.row(&Stress::Clean, AS_RUN, &tally, last));
@@ -183,7 +183,7 @@ impl EvidenceJob<'_> {
                 name_sides(&mut chosen);
             }
             let views: Vec<(&Camera, &NetworkView)> =
-                chosen.iter().map(|it| (&it.0, &it.1)).collect();
+                chosen.iter().map(|view| (&view.0, &view.1)).collect();
             let height = instant.cameras.iter().map(|camera| camera.intrinsics.size[1]).max();
             let limit_px = LIMIT * f64::from(height.unwrap_or(0));
             for (method, tally) in Method::ALL.into_iter().zip(tallies) {
@@ -294,8 +294,10 @@ fn chosen(
     (stress, as_seen): (Stress, bool),
 ) -> Vec<(Camera, NetworkView)> {
     let n_views = instant.cameras.len();
-    let people: Vec<Vec<SeenPerson>> =
-        seen.iter().map(|it| it.1.iter().map(|it| it.0.clone()).collect()).collect();
+    let people: Vec<Vec<SeenPerson>> = seen
+        .iter()
+        .map(|view| view.1.iter().map(|person| person.0.clone()).collect())
+        .collect();
     let each: Vec<(&Camera, &[SeenPerson])> = seen
         .iter()
         .zip(&people)

@@ -24,17 +24,17 @@ use crate::failures::film_failure;
 /// How the views of a sequence are solved together, and the part-type tables of its cameras.
 pub type Fusion = (multiview::Settings, PairTables);
 
-/// What is done with every sequence.
+/// Evaluation of every sequence.
 pub struct Job<'a> {
     /// The single-view model.
     pub model: Arc<Model>,
     /// Gives the fusion of a sequence, by the mean of its pixels of the frame per pixel of the footage.
     pub fusion: &'a (dyn Fn(&Sequence, f32) -> Result<Fusion, Failure> + Sync),
-    /// Whether it is decided for every view which way a person faces.
+    /// True if the direction in which a person faces is decided for every view.
     pub facing: bool,
     /// Gives the map from parts to the joints of a set; a joint is a choice of parts without it.
     pub joint_map: &'a (dyn Fn(&JointSet) -> Option<Arc<JointMap>> + Sync),
-    /// What was learned about several views.
+    /// Learned relations of several views.
     pub learned: Option<&'a Learned>,
     /// The signal to compare.
     pub versions: Vec<Version>,
@@ -44,7 +44,7 @@ pub struct Job<'a> {
     pub film: FilmSettings,
     /// Most candidates of a view.
     pub n_candidates: usize,
-    /// What tells in which direction a person faces.
+    /// Detector of the direction in which a person faces.
     pub orientation: Option<Arc<Detector>>,
     /// Expected errors, pixels of the footage.
     pub sigma: Option<Table>,
@@ -52,9 +52,9 @@ pub struct Job<'a> {
     pub tau_px: Vec<f32>,
     /// Predicts the errors.
     pub forecaster: Option<Mutex<Forecaster>>,
-    /// Whether the true errors are expected.
+    /// True if the true errors are expected.
     pub oracle: bool,
-    /// Whether to go on with what is in `poses`.
+    /// True to go on with the contents of `poses`.
     pub resume: bool,
     /// The folder for what is found in every frame.
     pub poses: PathBuf,
@@ -62,7 +62,7 @@ pub struct Job<'a> {
     pub stop: Stop,
 }
 
-/// What was found.
+/// Results of an evaluation.
 #[derive(Debug, Default)]
 pub struct Done {
     /// The sequences that were begun, and their frames.
@@ -155,7 +155,7 @@ impl Job<'_> {
         Ok((records, n_missing))
     }
 
-    /// What the table expects of a view.
+    /// Returns the errors that the table expects of a view.
     fn looked_up(
         &self,
         sequence: &Sequence,
@@ -173,7 +173,7 @@ impl Job<'_> {
         })
     }
 
-    /// What the network expects of a view; and that beside the truth, where it is known.
+    /// Returns the errors that the network expects of a view, and these beside the truth, where it is known.
     ///
     /// * `joints`: the true ones in the frame.
     /// * `frame_scale`: pixels of the frame per pixel of the footage.

@@ -12,7 +12,7 @@ use training::datasets::People;
 
 use crate::judged;
 
-/// Whether a path is a data set of single pictures, by what lies there.
+/// Returns true if a path is a data set of single pictures, by the files in it.
 pub fn is_one(path: &Path) -> bool {
     if path.is_dir() {
         let has = |name: &str| path.join(name).is_file();
@@ -49,7 +49,7 @@ pub fn write_found(folder: &Path, people: &People, set: &Pictures) -> Result<(),
     put(&file, &lines(people, set))
 }
 
-/// What was found, a line a person.
+/// Returns the joints found, a line a person.
 fn lines(people: &People, set: &Pictures) -> String {
     let each = people.people.iter().zip(&set.found);
     let mut text = String::new();

@@ -1,4 +1,4 @@
-//! What is left behind: the report for people, for programs and for papers.
+//! Reports for people, for programs and for papers.
 
 use std::path::Path;
 
@@ -65,7 +65,7 @@ fn measured(done: &Done) -> Vec<Measured> {
         for frame in &sequence.frames {
             if let Some(record) = records.iter().find(|record| record.frame == frame.number) {
                 let found = record.found.iter();
-                scores.push(found.map(|it| score(sequence, frame, it)).collect());
+                scores.push(found.map(|result| score(sequence, frame, result)).collect());
             }
         }
         all.push(Measured {
@@ -85,8 +85,9 @@ pub fn text(summary: &Summary, versions: &[Version]) -> String {
     let mut lines = vec![head.join(" ")];
     lines.extend(summary.groups.iter().map(row));
     if let Some(it) = summary.predictions.first() {
-        let number =
-            |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |it| format!("{it:.3}"));
+        let number = |value: Option<f64>| {
+            value.map_or_else(|| "-".to_owned(), |number| format!("{number:.3}"))
+        };
         let [auc, correlation] = [it.auc, it.rank_correlation].map(number);
         lines.push(format!(
             "expected errors, mean over parts: area under the ROC {auc}, rank correlation {correlation}"

@@ -235,12 +235,12 @@ impl Bench {
         let answers: Vec<Option<ViewResult>> = evidence
             .answers
             .iter()
-            .map(|it| {
-                let mut it = it.clone()?;
+            .map(|answer| {
+                let mut answer = answer.clone()?;
                 // Without adaptive selection there are no expected errors: the candidate with the better
                 // score comes first.
-                it.sigma_px = it.sigma_px.filter(|_| version.terms == Terms::Adaptive);
-                Some(it)
+                answer.sigma_px = answer.sigma_px.filter(|_| version.terms == Terms::Adaptive);
+                Some(answer)
             })
             .collect();
         // Frames are independent: nobody was followed before.
@@ -298,7 +298,7 @@ impl Bench {
 
     fn found(&self, skeleton: &Skeleton, effort: Effort) -> FrameResult {
         let joints = skeleton.joints.iter();
-        let joints = joints.map(|joint| joint.as_ref().ok().map(|it| it.in_world.into()));
+        let joints = joints.map(|joint| joint.as_ref().ok().map(|joint| joint.in_world.into()));
         let view = |(view, it): (usize, &Option<pipeline::FusedView>)| {
             let rows = self.footage_from_frame[view];
             let in_footage = |[x, y]: [f64; 2]| rows.map(|row| row[0] * x + row[1] * y + row[2]);
@@ -353,7 +353,7 @@ impl Effort {
                 let view = skeleton.views[view].as_ref();
                 view.is_some_and(|view| view.exchanged)
             });
-            let is_taken = |it: &&PairEstimate| it.start.exchanged == (first != second);
+            let is_taken = |estimate: &&PairEstimate| estimate.start.exchanged == (first != second);
             let taken = pair.hypotheses.iter().find(is_taken);
             if let Some(it) = taken.or(pair.hypotheses.first()) {
                 self.count(it.iterations.len(), it.converged);

@@ -44,12 +44,12 @@ impl Method {
     }
 }
 
-/// What a network sees of a person in a view.
+/// Evidence of a network about a person in a view.
 #[derive(Debug, Clone)]
 pub struct NetworkView {
     maps: JointMaps,
     maxima: Vec<Vec<([f64; 2], f32)>>,
-    /// What the network tells of the direction in which the person faces.
+    /// Evidence of the network on the direction in which the person faces.
     front: Option<FrontEvidence>,
 }
 
@@ -76,7 +76,7 @@ impl NetworkView {
         Self { front, ..self }
     }
 
-    /// What the network tells of that direction.
+    /// Returns the evidence on that direction.
     pub fn front(&self) -> Option<FrontEvidence> {
         self.front
     }
@@ -96,7 +96,9 @@ impl NetworkView {
     ///
     /// * `height`: of the box, as a share of that of the picture.
     pub fn person(&self, height: f64) -> SeenPerson {
-        let joint = |keypoint: &Option<keypoints::Keypoint>| keypoint.map(|it| (it.at, it.score));
+        let joint = |keypoint: &Option<keypoints::Keypoint>| {
+            keypoint.map(|keypoint| (keypoint.at, keypoint.score))
+        };
         SeenPerson {
             joints: self.maps.peaks().iter().map(joint).collect(),
             height,
@@ -167,7 +169,7 @@ pub fn joints_by(
     match method {
         Method::Linear => (0..N).map(|i| linear(&seen(i)).map(as_point)).collect(),
         Method::Dropping => {
-            let of_joint = |it: usize| dropping(&seen(it), limit_px).map(as_point);
+            let of_joint = |joint: usize| dropping(&seen(joint), limit_px).map(as_point);
             (0..N).map(of_joint).collect()
         }
         Method::Maps | Method::Space => {

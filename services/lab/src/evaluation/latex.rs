@@ -18,7 +18,7 @@ pub fn latex(summary: &Summary, versions: &[Version]) -> String {
     line(&mut out, &[words(&names), words(&titles)].concat());
     out.push_str("\\hline\n");
     for group in &summary.groups {
-        let names = [&group.dataset, &group.subject, &group.action].map(|it| escape(it));
+        let names = [&group.dataset, &group.subject, &group.action].map(|name| escape(name));
         line(&mut out, &[words(&names), cells(group, versions)].concat());
     }
     end(&mut out);
@@ -60,7 +60,7 @@ pub fn pictures_latex(sets: &[Pictures], bootstrap: &Bootstrap) -> String {
 
 /// A number with so many digits after the point, or a dash.
 pub fn number(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(|| "–".to_owned(), |it| format!("{it:.digits$}"))
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
 }
 
 /// The largest group of every data set.
@@ -68,7 +68,7 @@ pub fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
     let last = |(nth, it): &(usize, &Group)| {
         summary.groups[nth + 1..].iter().all(|other| other.dataset != it.dataset)
     };
-    summary.groups.iter().enumerate().filter(last).map(|it| it.1)
+    summary.groups.iter().enumerate().filter(last).map(|group| group.1)
 }
 
 /// Ours, and the paper's in parentheses.

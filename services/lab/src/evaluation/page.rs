@@ -19,7 +19,7 @@ pub struct Page<'a> {
     pub summary: &'a Summary,
     /// The versions of the summary.
     pub versions: &'a [Version],
-    /// What was run: key and value.
+    /// Description of the run: key and value.
     pub about: &'a [(String, String)],
 }
 
@@ -97,7 +97,7 @@ fn scores(out: &mut Html, page: &Page<'_>, titles: &[String]) {
 
 fn interval(ends: Option<[f64; 2]>, digits: usize) -> Html {
     ends.map_or_else(Html::default, |[low, high]| {
-        let [low, high] = [low, high].map(|it| format!("{it:.digits$}"));
+        let [low, high] = [low, high].map(|end| format!("{end:.digits$}"));
         html!("<br><small>{low} to {high}</small>", [low, high])
     })
 }
@@ -107,38 +107,38 @@ fn measures(out: &mut Html, group: &Group, titles: &[String]) {
     /// A number, its interval, and how many decimals both have.
     type Cell = fn(&Numbers) -> (Option<f64>, Option<[f64; 2]>, usize);
     let rows: [(&str, Cell); 17] = [
-        ("PCP3D at 0.5, %", |it| (it.pcp3d, it.pcp3d_interval, 2)),
-        ("gain over the first, points", |it| {
-            (it.gain, it.gain_interval, 2)
+        ("PCP3D at 0.5, %", |own| (own.pcp3d, own.pcp3d_interval, 2)),
+        ("gain over the first, points", |own| {
+            (own.gain, own.gain_interval, 2)
         }),
-        ("MPJPE, mm", |it| (it.mpjpe_mm, it.mpjpe_interval, 1)),
-        ("MPJPE after alignment, mm", |it| {
-            (it.aligned_mpjpe_mm, None, 1)
+        ("MPJPE, mm", |own| (own.mpjpe_mm, own.mpjpe_interval, 1)),
+        ("MPJPE after alignment, mm", |own| {
+            (own.aligned_mpjpe_mm, None, 1)
         }),
-        ("left and right exchanged, %", |it| {
-            (it.exchanged, it.exchanged_interval, 1)
+        ("left and right exchanged, %", |own| {
+            (own.exchanged, own.exchanged_interval, 1)
         }),
-        ("joints within 150 mm, %", |it| (it.pck3d, None, 1)),
-        ("joints not found, %", |it| (it.lost, None, 2)),
-        ("images: PCP, %", |it| (it.pcp2d, None, 1)),
-        ("images: PCK at 0.1, %", |it| {
-            (it.pck2d.map(|pck2d| pck2d[0]), None, 1)
+        ("joints within 150 mm, %", |own| (own.pck3d, None, 1)),
+        ("joints not found, %", |own| (own.lost, None, 2)),
+        ("images: PCP, %", |own| (own.pcp2d, None, 1)),
+        ("images: PCK at 0.1, %", |own| {
+            (own.pck2d.map(|pck2d| pck2d[0]), None, 1)
         }),
-        ("images: PCK at 0.2, %", |it| {
-            (it.pck2d.map(|pck2d| pck2d[1]), None, 1)
+        ("images: PCK at 0.2, %", |own| {
+            (own.pck2d.map(|pck2d| pck2d[1]), None, 1)
         }),
-        ("iterations until settled", |it| (it.iterations, None, 2)),
-        ("not settled, %", |it| (it.unsettled, None, 2)),
-        ("solutions a frame", |it| (it.solutions, None, 1)),
-        ("terms switched off, %", |it| (it.off, None, 1)),
-        ("joints in images improved, %", |it| {
-            (Some(it.changes.improved), None, 1)
+        ("iterations until settled", |own| (own.iterations, None, 2)),
+        ("not settled, %", |own| (own.unsettled, None, 2)),
+        ("solutions a frame", |own| (own.solutions, None, 1)),
+        ("terms switched off, %", |own| (own.off, None, 1)),
+        ("joints in images improved, %", |own| {
+            (Some(own.changes.improved), None, 1)
         }),
-        ("deteriorated, %", |it| {
-            (Some(it.changes.deteriorated), None, 1)
+        ("deteriorated, %", |own| {
+            (Some(own.changes.deteriorated), None, 1)
         }),
-        ("deteriorated by more than 5 px, %", |it| {
-            (Some(it.changes.deteriorated_5px), None, 2)
+        ("deteriorated by more than 5 px, %", |own| {
+            (Some(own.changes.deteriorated_5px), None, 2)
         }),
     ];
     put!(out, "<div class=\"scroll\"><table>\n<tr><th>");

@@ -44,9 +44,9 @@ impl Judged {
 /// Confidence intervals over pictures, percent; `None` without a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intervals {
-    /// Of PCP by the mean of both ends, and by both ends.
+    /// Intervals of PCP by the mean of both ends, and by both ends.
     pub pcp: [Option<[f64; 2]>; 2],
-    /// Of PCK at each of [`PCK_SHARES`].
+    /// Interval of PCK at each of [`PCK_SHARES`].
     pub pck: [Option<[f64; 2]>; 2],
 }
 
@@ -70,8 +70,8 @@ impl Pictures {
             bootstrap.interval(&each.iter().map(share).collect::<Vec<_>>())
         };
         Intervals {
-            pcp: RULES.map(|(rule, _)| over(&|it| it.pcp(rule))),
-            pck: [0, 1].map(|share| over(&|it| it.pck(share))),
+            pcp: RULES.map(|(rule, _)| over(&|image| image.pcp(rule))),
+            pck: [0, 1].map(|share| over(&|image| image.pck(share))),
         }
     }
 
@@ -87,7 +87,7 @@ impl Pictures {
 
     fn pairs(&self, which: Judged) -> impl Iterator<Item = (Option<&Joints>, &Joints)> {
         let place = which as usize;
-        let found = self.found.iter().map(move |it| it[place].as_ref());
+        let found = self.found.iter().map(move |found| found[place].as_ref());
         found.zip(&self.truths)
     }
 }

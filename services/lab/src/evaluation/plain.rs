@@ -1,4 +1,4 @@
-//! What everyone does with the keypoints of a network: plain triangulation, and triangulation that leaves out cameras.
+//! Usual ways to solve keypoints of a network: plain triangulation, and triangulation that leaves out cameras.
 //!
 //! These are what the solution in space is compared with; nothing in the pipeline uses them.
 
@@ -49,15 +49,15 @@ pub fn dropping(views: &[Sighting<'_>], limit_px: f64) -> Option<Point3<f64>> {
                     .map_or(f64::INFINITY, |at| (at.x - pixel[0]).hypot(at.y - pixel[1]))
             };
             let mean = chosen.iter().map(error).sum::<f64>() / kept as f64;
-            if best.is_none_or(|it| mean < it.0) {
+            if best.is_none_or(|best| mean < best.0) {
                 best = Some((mean, point));
             }
         }
-        if best.is_some_and(|it| it.0 < limit_px) {
+        if best.is_some_and(|best| best.0 < limit_px) {
             break;
         }
     }
-    best.map(|it| it.1)
+    best.map(|best| best.1)
 }
 
 #[cfg(test)]

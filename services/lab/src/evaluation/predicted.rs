@@ -23,7 +23,7 @@ pub struct Judgement {
     pub part: String,
     /// Views that were judged.
     pub n: usize,
-    /// Of these, those in which the error is above the threshold, percent.
+    /// Share of them in which the error is above the threshold, percent.
     pub above: Option<f64>,
     /// Those of them that are switched off, percent.
     pub caught: Option<f64>,
@@ -59,11 +59,11 @@ pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
     let all = Judgement {
         part: "mean".to_owned(),
         n: parts.iter().map(|part| part.n).sum::<usize>() / N_PARTS,
-        above: mean(|it| it.above),
-        caught: mean(|it| it.caught),
-        wasted: mean(|it| it.wasted),
-        auc: mean(|it| it.auc),
-        rank_correlation: mean(|it| it.rank_correlation),
+        above: mean(|part| part.above),
+        caught: mean(|part| part.caught),
+        wasted: mean(|part| part.wasted),
+        auc: mean(|part| part.auc),
+        rank_correlation: mean(|part| part.rank_correlation),
     };
     std::iter::once(all).chain(parts).collect()
 }
@@ -88,9 +88,9 @@ fn of_part(name: &str, samples: impl Iterator<Item = (f64, f64)>) -> Judgement {
     Judgement {
         part: name.to_owned(),
         n: samples.len(),
-        above: share(&|it| it.1, &|_| true),
-        caught: share(&|it| it.0 > 1.0, &|it| it.1),
-        wasted: share(&|it| it.0 > 1.0, &|it| !it.1),
+        above: share(&|class| class.1, &|_| true),
+        caught: share(&|class| class.0 > 1.0, &|class| class.1),
+        wasted: share(&|class| class.0 > 1.0, &|class| !class.1),
         auc: area_under_roc(&classes),
         rank_correlation: rank_correlation(&samples),
     }

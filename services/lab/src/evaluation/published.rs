@@ -39,7 +39,7 @@ pub fn published(dataset: &str, subject: &str, action: &str, version: Version) -
         Terms::Adaptive => 3,
     };
     let subject = if dataset == "UMPM" { "All" } else { subject };
-    let is_it = |it: &&Row| (it.0, it.1, it.2) == (dataset, subject, action);
+    let is_it = |row: &&Row| (row.0, row.1, row.2) == (dataset, subject, action);
     PCP3D.iter().find(is_it).map(|pcp3d| pcp3d.3[column])
 }
 

@@ -11,13 +11,13 @@ use crate::evaluation::{FrameResult, parse14};
 /// The errors of one version on one frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameScore {
-    /// Of the twelve segments, as shares of their length ([`segment_errors`]).
+    /// Errors of the twelve segments, as shares of their length ([`segment_errors`]).
     pub segments: Vec<Option<f64>>,
-    /// Of the joints, metres; infinite where one was not found.
+    /// Errors of the joints, metres; infinite where one was not found.
     pub joints_m: Vec<Option<f64>>,
     /// The same after the best alignment; empty where there is none.
     pub aligned_m: Vec<Option<f64>>,
-    /// Whether the body fits the truth better with left and right exchanged; `None` without joints to tell.
+    /// True if the body fits the truth better with left and right exchanged; `None` without joints to compare.
     pub is_exchanged: Option<bool>,
     /// For each view the 14 joints that were found (if any) and the true ones, pixels of the footage; `None`
     /// if a true joint is unknown or behind the camera.
@@ -49,7 +49,7 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
         let offset = view.source_offset_px.unwrap_or_default().map(f64::from);
         let truth = projected(camera, offset, &in_space)?;
         let found = found.views.get(nth).and_then(Option::as_ref);
-        let found = found.and_then(|it| Joints::try_from(it.as_slice()).ok());
+        let found = found.and_then(|joints| Joints::try_from(joints.as_slice()).ok());
         Some((found, truth))
     });
     FrameScore {
@@ -65,8 +65,8 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
     }
 }
 
-/// Whether the joints on the right are nearer to the true ones on the left, and the other way round, than as they are
-/// named: by the sum of the distances.
+/// Returns true if the joints on the right are nearer to the true ones on the left, and the other way round, than as
+/// they are named: by the sum of the distances.
 ///
 /// * `found`, `truth`: of `skeleton::PARSE14`, metres.
 /// * Returns `None` if no pair of joints of both sides is found and known.

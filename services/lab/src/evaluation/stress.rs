@@ -1,4 +1,4 @@
-//! What goes wrong in real rooms, made on purpose: part of a view is covered, a camera is turned, a view looks at somebody else.
+//! Disturbances of real rooms, made on purpose: part of a view is covered, a camera is turned, a view looks at another person.
 
 use core::fmt;
 use core::str::FromStr;
@@ -44,7 +44,7 @@ impl Stress {
         }
     }
 
-    /// Whether it happens to a view at a frame: to each in turn.
+    /// Returns true if a view is disturbed at a frame: each in turn.
     pub fn hits(self, nth: usize, view: usize, n_views: usize) -> bool {
         let place = (view + nth) % n_views.max(1);
         match self {
@@ -172,7 +172,7 @@ mod tests {
                 .map(|nth| (0..4).filter(|view| stress.hits(nth, *view, 4)).collect())
                 .collect();
             let n = if stress == Stress::Bystander { 1 } else { 2 };
-            assert!(hit.iter().all(|it| it.len() == n), "{hit:?}");
+            assert!(hit.iter().all(|views| views.len() == n), "{hit:?}");
             assert!((0..4).all(|view| hit.iter().filter(|hit| hit.contains(&view)).count() == n));
         }
         assert_eq!(Stress::Views(2).views(3, 4), [3, 0]);
@@ -198,6 +198,6 @@ mod tests {
         }
         let mut small = vec![9; 3 * 4 * 4];
         cover_half(&mut small, [4, 4], [-90.0, -90.0, -50.0, -50.0], 0);
-        assert!(small.iter().all(|it| *it == 9));
+        assert!(small.iter().all(|value| *value == 9));
     }
 }

@@ -129,7 +129,8 @@ pub struct ChangesOf {
 pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootstrap) -> Summary {
     let mut groups: Vec<Group> = Vec::new();
     let add = |groups: &mut Vec<Group>, names: [&str; 3], of: Vec<&Measured>| {
-        let scores: Vec<&Vec<FrameScore>> = of.iter().flat_map(|it| &it.scores).collect();
+        let scores: Vec<&Vec<FrameScore>> =
+            of.iter().flat_map(|sequence| &sequence.scores).collect();
         let [dataset, subject, action] = names.map(str::to_owned);
         let numbers = (0..versions.len()).map(|i| numbers(&scores, i, bootstrap));
         groups.push(Group {
@@ -148,16 +149,17 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
         let own: Vec<&Measured> =
             sequences.iter().filter(|sequence| sequence.dataset == dataset).collect();
         let several = |of: &[&Measured]| of.len() > 1;
-        for action in distinct(own.iter().map(|it| &it.action)) {
-            let of: Vec<&Measured> = own.iter().copied().filter(|it| it.action == action).collect();
+        for action in distinct(own.iter().map(|sequence| &sequence.action)) {
+            let of: Vec<&Measured> =
+                own.iter().copied().filter(|sequence| sequence.action == action).collect();
             if several(&of) {
                 add(&mut groups, [dataset, "All", action], of);
             }
         }
-        let subjects = distinct(own.iter().map(|it| &it.subject));
+        let subjects = distinct(own.iter().map(|sequence| &sequence.subject));
         for subject in subjects.iter().filter(|_| subjects.len() > 1) {
             let of: Vec<&Measured> =
-                own.iter().copied().filter(|it| it.subject == *subject).collect();
+                own.iter().copied().filter(|sequence| sequence.subject == *subject).collect();
             if several(&of) {
                 add(&mut groups, [dataset, subject, "Overall"], of);
             }
@@ -212,25 +214,25 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
     let own: Vec<&FrameScore> = frames.iter().filter_map(|frame| frame.get(version)).collect();
     let first: Vec<&FrameScore> = frames.iter().filter_map(|frame| frame.first()).collect();
     let each = |share: fn(&FrameScore) -> Share| -> Vec<Share> {
-        own.iter().map(|it| share(it)).collect()
+        own.iter().map(|score| share(score)).collect()
     };
     let of_joints = |test: fn(f64) -> bool| {
-        let known = own.iter().flat_map(|it| it.joints_m.iter().flatten());
-        Share::mean(&[Share::of(known.map(|it| percent(test(*it))))])
+        let known = own.iter().flat_map(|score| score.joints_m.iter().flatten());
+        Share::mean(&[Share::of(known.map(|error| percent(test(*error))))])
     };
     let segment = |nth: usize| {
-        let errors = own.iter().filter_map(|it| *it.segments.get(nth)?);
+        let errors = own.iter().filter_map(|score| *score.segments.get(nth)?);
         Share::mean(&[Share::of(errors.map(|error| percent(error <= GAMMA)))])
     };
     let pcp = each(correct);
     let gains = own.iter().zip(&first).map(|(own, first)| gain(own, first));
     let gains: Vec<Share> = gains.collect();
-    let errors = each(|it| errors_mm(&it.joints_m));
-    let exchanged = each(|it| Share::of(it.is_exchanged.map(percent)));
+    let errors = each(|score| errors_mm(&score.joints_m));
+    let exchanged = each(|score| Share::of(score.is_exchanged.map(percent)));
     let images = images(&own);
-    let effort = own.iter().flat_map(|it| &it.iterations);
+    let effort = own.iter().flat_map(|score| &score.iterations);
     let effort = Share::of(effort.map(|effort| f64::from(*effort)));
-    let n_unsettled: u32 = own.iter().map(|it| it.unsettled).sum();
+    let n_unsettled: u32 = own.iter().map(|score| score.unsettled).sum();
     let off = |frame_score: &FrameScore| Share::of(frame_score.on.map(|on| 100.0 * (1.0 - on)));
     let is_compared = version > 0;
     Numbers {
@@ -242,7 +244,7 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
         curve: curve(&own),
         mpjpe_mm: Share::mean(&errors),
         mpjpe_interval: bootstrap.interval(&errors),
-        aligned_mpjpe_mm: Share::mean(&each(|it| errors_mm(&it.aligned_m))),
+        aligned_mpjpe_mm: Share::mean(&each(|score| errors_mm(&score.aligned_m))),
         exchanged: Share::mean(&exchanged),
         exchanged_interval: bootstrap.interval(&exchanged),
         pck3d: of_joints(|value| value <= PCK_M),
@@ -251,7 +253,7 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
         pck2d: images.map(|image| [0, 1].map(|share| image.pck(share).percent())),
         iterations: Share::mean(&[effort]),
         unsettled: (effort.n > 0.0).then(|| 100.0 * f64::from(n_unsettled) / effort.n),
-        solutions: Share::mean(&each(|it| Share::of([f64::from(it.solutions)]))),
+        solutions: Share::mean(&each(|score| Share::of([f64::from(score.solutions)]))),
         off: Share::mean(&each(off)),
         changes: changes(&first, &own),
     }
@@ -293,7 +295,7 @@ fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
                 continue;
             };
             for ((before, after), truth) in before.iter().zip(after).zip(truth) {
-                let off = |it: &[f64; 2]| (it[0] - truth[0]).hypot(it[1] - truth[1]);
+                let off = |joint: &[f64; 2]| (joint[0] - truth[0]).hypot(joint[1] - truth[1]);
                 changes.add(off(before), off(after));
                 n_far += usize::from(off(after) - off(before) > FAR_PX);
             }
@@ -312,7 +314,7 @@ fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
 mod tests {
     use super::*;
 
-    /// Of twelve segments the first `n_right` are right, the next half as far off again as is allowed.
+    /// Returns a frame whose first `n_right` of twelve segments are right, the next half as far off again as is allowed.
     fn frame(n_right: usize) -> FrameScore {
         let error = |nth: usize| Some(if nth < n_right { 0.25 } else { 0.75 });
         let truth = [[5.0, 5.0]; 14];
@@ -333,7 +335,7 @@ mod tests {
     }
 
     fn measured(subject: &str, action: &str, frames: &[[usize; 2]]) -> Measured {
-        let of_frame = |it: &[usize; 2]| it.map(frame).to_vec();
+        let of_frame = |counts: &[usize; 2]| counts.map(frame).to_vec();
         Measured {
             dataset: "HumanEva".to_owned(),
             subject: subject.to_owned(),
@@ -407,7 +409,7 @@ mod tests {
         );
         assert_eq!(it.off, Some(25.0));
         assert_eq!(it.changes.improved, 100.0, "from 6 to 3 pixels");
-        let at = |gamma: f64| it.curve.iter().find(|it| it[0] == gamma).unwrap()[1];
+        let at = |gamma: f64| it.curve.iter().find(|point| point[0] == gamma).unwrap()[1];
         assert_eq!(
             [at(0.2), at(0.25), at(0.5), at(0.75)],
             [0.0, 75.0, 75.0, 100.0]

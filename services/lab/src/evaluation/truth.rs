@@ -11,7 +11,7 @@ pub fn parse14(set: &JointSet, joints: &[Option<Point>]) -> Vec<Option<Point>> {
         let at = set.joints.iter().position(|joint| joint.parts == parts)?;
         joints[at]
     };
-    PARSE14.joints.iter().map(|it| joint(it.parts)).collect()
+    PARSE14.joints.iter().map(|parse_joint| joint(parse_joint.parts)).collect()
 }
 
 /// The parts of the right side that lie between two joints (as parts), and the share of the second.
@@ -35,7 +35,7 @@ fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
         parts[joint.parts[0]] = *at;
     }
     for (part, from, to, share) in BETWEEN {
-        for side in [|it: usize| it, |i: usize| MIRROR[i]] {
+        for side in [|part: usize| part, |i: usize| MIRROR[i]] {
             let ends = [parts[side(from)], parts[side(to)]];
             parts[side(part)] = [0, 1].map(|i| ends[0][i] + share * (ends[1][i] - ends[0][i]));
         }
@@ -173,7 +173,7 @@ mod tests {
         let truth = parts(&joints);
         let found: Vec<[f64; 2]> = (0..N_PARTS).map(|i| truth[MIRROR[i]]).collect();
         let off = |may: bool| part_errors(&found, &joints, may).unwrap();
-        assert!(off(true).iter().all(|it| *it == 0.0));
+        assert!(off(true).iter().all(|error| *error == 0.0));
         assert!(off(false).iter().any(|value| *value > 1.0));
     }
 

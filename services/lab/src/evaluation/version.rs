@@ -77,7 +77,7 @@ impl Version {
     /// Its title in the paper's tables.
     pub fn title(self) -> String {
         let terms = TERMS.iter().find(|term| term.0 == self.terms);
-        let combining = COMBINING.iter().find(|it| it.0 == self.combining);
+        let combining = COMBINING.iter().find(|known| known.0 == self.combining);
         let words = [
             terms.map_or("", |term| term.2),
             combining.map_or("", |combining| combining.2),
@@ -90,7 +90,7 @@ impl fmt::Display for Version {
     /// Its name in settings: `geometry+all-views`.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let terms = TERMS.iter().find(|term| term.0 == self.terms);
-        let combining = COMBINING.iter().find(|it| it.0 == self.combining);
+        let combining = COMBINING.iter().find(|known| known.0 == self.combining);
         out.write_str(terms.map_or("", |term| term.1))?;
         out.write_str(combining.map_or("", |combining| combining.1))
     }

@@ -31,7 +31,7 @@ impl Figure {
             let edge = spec.edge.as_ref();
             let its = edge.and_then(|edge| of_pair(edge, types[edge.parent], types[part]));
             let from = edge.map_or([0.0; 2], |edge| corner[edge.parent]);
-            let offset = its.map_or([0.0; 2], |it| it.centre);
+            let offset = its.map_or([0.0; 2], |ellipse| ellipse.centre);
             corner.push([from[0] + offset[0], from[1] + offset[1]]);
             spring.push(its);
         }
@@ -166,7 +166,7 @@ fn ordinary_types(model: &Model) -> Vec<usize> {
             edge.parent == 0 || of_pair(edge, parent_type, own).is_some()
         };
         let nearness = |own: usize| {
-            let of_type = all.iter().filter(|it| it.0 == own && is_possible(own));
+            let of_type = all.iter().filter(|spring| spring.0 == own && is_possible(own));
             let distances =
                 of_type.map(|(_, it)| (it.centre[0] - mean[0]).hypot(it.centre[1] - mean[1]));
             -distances.fold(f64::INFINITY, f64::min)

@@ -90,7 +90,7 @@ fn strokes(filter: &Filter) -> Html {
         );
     }
     let mut out = Html::default();
-    for (step, path) in paths.iter().enumerate().filter(|it| !it.1.is_empty()) {
+    for (step, path) in paths.iter().enumerate().filter(|step| !step.1.is_empty()) {
         let grey = 55 + 200 * step / (N_STEPS - 1);
         let width = 0.7 + 0.9 * step as f64 / (N_STEPS - 1) as f64;
         put!(

@@ -36,7 +36,7 @@ pub(super) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
         Springs::PerTypePair(rows) => rows
             .iter()
             .flat_map(|row| row.iter().enumerate())
-            .filter_map(|(own, it)| it.as_ref().map(|it| (own, Ellipse::of(it))))
+            .filter_map(|(own, it)| it.as_ref().map(|spring| (own, Ellipse::of(spring))))
             .collect(),
     }
 }

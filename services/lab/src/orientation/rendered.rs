@@ -84,7 +84,7 @@ pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
         })
         .collect();
     let known: Vec<&Point3<f64>> = joints.iter().flatten().collect();
-    let sum: Vector3<f64> = known.iter().map(|it| it.coords).sum();
+    let sum: Vector3<f64> = known.iter().map(|joint| joint.coords).sum();
     let place = Point3::from(sum / known.len().max(1) as f64);
     let front = multiview::front(&joints)?;
     let in_view = multiview::front_in_view(shown.camera, &place, &front);

@@ -66,7 +66,7 @@ pub(super) fn count(
             Ok(scores) => {
                 alarms.n_images += 1;
                 for (threshold, count) in &mut alarms.counts {
-                    let above = |it: &&f32| f64::from(**it) >= *threshold;
+                    let above = |score: &&f32| f64::from(**score) >= *threshold;
                     *count += scores.iter().filter(above).count();
                 }
             }
@@ -93,7 +93,7 @@ fn scores(
     let found = search.on(picture.view(), &layout, |evidence| {
         search.solver.candidates(evidence, settings)
     });
-    Ok(found.iter().map(|it| it.score).collect())
+    Ok(found.iter().map(|candidate| candidate.score).collect())
 }
 
 impl Alarms {

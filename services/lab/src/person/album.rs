@@ -10,8 +10,8 @@ use training::{Album, AlbumError};
 
 use super::data::Data;
 
-/// What is drawn where a turned image has no pixels: the border goes on, so that there is no edge that
-/// could be learnt.
+/// Fill where a turned image has no pixels: the border goes on, so that there is no edge that could be
+/// learnt.
 const FILL: Fill = Fill::Replicate;
 
 /// Everybody, turned and mirrored, and the images without people.

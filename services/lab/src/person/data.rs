@@ -1,4 +1,4 @@
-//! What a model is trained on: data sets joined, and images without people.
+//! Training data of a model: data sets joined, and images without people.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ pub struct Chosen {
     pub sides: Vec<String>,
     /// Angles of turned copies, degrees, anticlockwise, separated by commas.
     pub rotate: Vec<String>,
-    /// Whether mirror images are trained on.
+    /// True if mirror images are trained on.
     pub with_mirror: bool,
     /// Faults of labels that end the training instead of leaving the person out.
     pub fatal: Vec<FaultKind>,
@@ -64,7 +64,7 @@ pub(super) struct Data {
     pub(super) people: Vec<(Person, Vec<f64>)>,
     /// How many people were left out, for every kind of fault.
     pub(super) left_out: BTreeMap<&'static str, usize>,
-    /// Whether mirror images are trained on.
+    /// True if mirror images are trained on.
     pub(super) with_mirror: bool,
     /// Images without people, all of which can be decoded.
     pub(super) negatives: Vec<PathBuf>,
@@ -148,7 +148,7 @@ pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     images::listed(folders)
 }
 
-/// What of every data set is read.
+/// Returns the options to read every data set with.
 pub(crate) fn read_options(
     arguments: &Chosen,
     table: &SkeletonTable,

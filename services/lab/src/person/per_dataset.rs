@@ -15,15 +15,15 @@ pub(super) enum Whose<'a> {
 
 /// Tells whom a value is for: `DATASET=VALUE` with the data set as it was written, else all of them.
 ///
-/// Of two data sets one of which begins with the other and `=`, the longer one is meant.
+/// The longer one is meant where one data set begins with the other and `=`.
 pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {
     let value_of = |path: &Path| {
         let rest = argument.strip_prefix(path.to_str()?)?;
         rest.strip_prefix('=')
     };
     let named = datasets.iter().enumerate();
-    let named = named.filter_map(|(it, path)| Some((it, value_of(path)?)));
-    match named.min_by_key(|it| it.1.len()) {
+    let named = named.filter_map(|(i, path)| Some((i, value_of(path)?)));
+    match named.min_by_key(|named| named.1.len()) {
         Some((it, value)) => Whose::One(it, value),
         None => Whose::All(argument),
     }

@@ -1,4 +1,4 @@
-//! What a user sees of a training while it runs.
+//! Progress of a training, for users.
 
 use std::error::Error;
 use std::path::Path;
@@ -222,7 +222,7 @@ impl State {
             (n > 0).then(|| taken.sum::<f64>() / n as f64)
         };
         let any = mean(&|_| true)?;
-        let left = self.all.get(self.at..).filter(|it| !it.is_empty())?.iter();
+        let left = self.all.get(self.at..).filter(|left| !left.is_empty())?.iter();
         let of_step = |step: &Step| mean(&|other| kind(other) == kind(*step)).unwrap_or(any);
         Some(left.map(of_step).sum())
     }

@@ -1,4 +1,4 @@
-//! What became of a training.
+//! Report on a training.
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -42,7 +42,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// What is known before the training.
+    /// Returns the report as known before the training.
     pub(super) fn new(data: &Data, gallery: &Gallery, plan: &Plan) -> Self {
         let copies = (0..plan.n_people()).map(|i| gallery.person_of(plan.person(i)));
         let mut people: Vec<usize> = copies.collect();
@@ -83,7 +83,7 @@ impl Report {
         self.n_sound - self.n_people
     }
 
-    /// What is trained on, in a line.
+    /// Describes the training data in a line.
     pub(super) fn data_text(&self) -> String {
         format!(
             "{} people in {} images ({} left out, {} too small), {} negatives ({} unreadable); {} \

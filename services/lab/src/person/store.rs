@@ -1,4 +1,4 @@
-//! What a training leaves on the disk: its checkpoint, and at the end the model.
+//! Files of a training: its checkpoint, and at the end the model.
 
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
@@ -19,7 +19,7 @@ pub struct Store {
     _mine: File,
 }
 
-/// What is on the disk.
+/// State of the files.
 #[derive(Debug, Clone, Copy, Default)]
 struct State {
     n_done: usize,
@@ -82,7 +82,7 @@ impl Store {
         Ok(store)
     }
 
-    /// What the model is called: its file without the ending.
+    /// Returns the name of the model: its file without the ending.
     pub(super) fn model_name(&self) -> String {
         let stem = self.out.file_stem().unwrap_or_default();
         stem.to_string_lossy().into_owned()

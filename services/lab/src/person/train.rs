@@ -14,7 +14,7 @@ use super::progress::Progress;
 use super::report::Report;
 use super::store::Store;
 
-/// What a model is trained on, and how.
+/// Data and settings of the training of a model.
 #[derive(Debug)]
 pub struct Job {
     /// The people, and the images without people.
@@ -26,7 +26,7 @@ pub struct Job {
     /// Folder of images without people on which false alarms are counted at the end; the negatives themselves if
     /// not given.
     pub judge: Option<PathBuf>,
-    /// Whether to go on from the checkpoint of an interrupted training, if there is one.
+    /// True to go on from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
 }
 

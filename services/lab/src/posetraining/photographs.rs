@@ -89,7 +89,7 @@ fn of_all(
                 return Ok::<_, Failure>(found);
             };
             work.go_on()?;
-            found.extend(of_person(person, sides, teachers)?.map(|it| (nth, it)));
+            found.extend(of_person(person, sides, teachers)?.map(|found| (nth, found)));
             work.console.advance(1);
         }
     };
@@ -111,7 +111,7 @@ fn of_all(
         threads.into_iter().map(join).collect()
     });
     let mut found: Vec<(usize, Person)> = found?.into_iter().flatten().collect();
-    found.sort_by_key(|it| it.0);
+    found.sort_by_key(|person| person.0);
     Ok(found)
 }
 
@@ -239,7 +239,7 @@ fn length([x, y]: Point) -> f32 {
 /// seen from behind. The teacher's where there is no mark; nothing where neither is known.
 fn across(marks: &Marks) -> Option<f32> {
     let widths = PAIRS.iter().filter_map(|[right, left]| {
-        let is_marked = [right, left].iter().all(|it| marks.marked[**it][0].is_finite());
+        let is_marked = [right, left].iter().all(|joint| marks.marked[**joint][0].is_finite());
         let x = |joint: usize| {
             if is_marked {
                 marks.marked[joint][0]
@@ -254,7 +254,7 @@ fn across(marks: &Marks) -> Option<f32> {
     (!widths.is_empty()).then(|| widths.iter().sum::<f32>() / widths.len() as f32)
 }
 
-/// What the teacher finds in the upright picture and in its mirror image, put together.
+/// Returns the keypoints that the teacher finds in the upright picture, merged with those of its mirror image.
 fn taught(
     teacher: &PoseNetwork,
     rgb: &[u8],

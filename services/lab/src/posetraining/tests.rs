@@ -24,7 +24,7 @@ fn people_are_read_as_they_were_written_and_a_file_that_was_cut_is_refused() {
     };
     write(&file, &people).unwrap();
     let back = read(&file).unwrap();
-    let names = |of: &[Person]| of.iter().map(|it| it.name.clone()).collect::<Vec<_>>();
+    let names = |of: &[Person]| of.iter().map(|person| person.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&back.learnt), ["a", "b"]);
     assert_eq!(names(&back.kept), ["c"]);
     assert_eq!(back.kept[0].rgb, people.kept[0].rgb);

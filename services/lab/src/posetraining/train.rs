@@ -29,7 +29,7 @@ fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
     Ok(Some(begun))
 }
 
-/// What was learned, and how good the network is on people who are kept apart.
+/// Draws the costs of all passes, and the scores on people who are kept apart.
 fn drawn(passes: &[Pass]) -> String {
     let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
         name,
@@ -42,20 +42,23 @@ fn drawn(passes: &[Pass]) -> String {
     };
     let panel = |what, lines| Panel { what, lines };
     let panels = [
-        panel("cost of the maps", vec![cost("learnt", &|it| it.cost.maps)]),
+        panel(
+            "cost of the maps",
+            vec![cost("learnt", &|pass| pass.cost.maps)],
+        ),
         panel(
             "cost of direction and error",
             vec![
-                cost("direction", &|it| it.cost.front),
-                cost("error", &|it| it.cost.error),
+                cost("direction", &|pass| pass.cost.front),
+                cost("error", &|pass| pass.cost.error),
             ],
         ),
         panel(
             "share, people kept apart",
             vec![
-                score("limbs, both ends", &|it| it.both_ends),
-                score("direction", &|it| it.front),
-                score("area of errors", &|it| it.area),
+                score("limbs, both ends", &|score| score.both_ends),
+                score("direction", &|score| score.front),
+                score("area of errors", &|score| score.area),
                 score("extra keypoints", &|score| score.extras),
             ],
         ),
@@ -96,7 +99,7 @@ pub fn train(
     trained::run(job, task, &shown, &written, (stop, console))
 }
 
-/// What a pass came to, for people.
+/// Describes a pass in a line.
 fn line(pass: &Pass) -> String {
     let cost = pass.cost;
     let learnt = format!(

@@ -22,7 +22,7 @@ use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file};
 type Pass = training::networks::Pass<f32, Validated>;
 type Trainer<'a> = training::networks::Trainer<QualityTask<'a>>;
 
-/// What a network is trained on, and where to.
+/// Data and settings of the training of a network.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Files of samples to learn from and to validate on.
@@ -33,9 +33,9 @@ pub struct Job {
     pub out: PathBuf,
     /// Weights of torchvision's VGG-16 to begin with.
     pub weights: Option<PathBuf>,
-    /// What the file says that it is; its name if not given.
+    /// Identity in the file; its name if not given.
     pub identity: Option<String>,
-    /// Whether to go on from the checkpoint of an interrupted training, if there is one.
+    /// True to go on from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
 }
 

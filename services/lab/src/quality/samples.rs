@@ -33,7 +33,7 @@ pub struct Job {
     pub tile: TileShape,
 }
 
-/// What was written.
+/// Number of samples written, and of pictures without one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Made {
     /// Samples.

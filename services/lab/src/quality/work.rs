@@ -1,4 +1,4 @@
-//! What the threads share that search pictures.
+//! State shared by the threads that search pictures.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -6,7 +6,7 @@ use failure::{Console, ExitKind, Failure, Stop};
 
 use super::observer::Observer;
 
-/// What all threads share.
+/// State that all threads share.
 pub(super) struct Work<'a> {
     pub(super) observer: Observer,
     stop: Stop,

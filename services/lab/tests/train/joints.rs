@@ -44,7 +44,7 @@ impl Drawn {
         self.start(&[&words[..], more].concat()).wait()
     }
 
-    /// What `judge` says of the mean offset of a joint along its bone, and of where joints lie.
+    /// Returns the mean offset of a joint along its bone and the positions of joints, as printed by `judge`.
     fn offset(&self, joint: &str, joint_map: &str) -> (f64, Value) {
         let words = ["judge", "m.fmp", "others-low.jsonl", "--json"];
         let more = ["--offsets", "--joint-map", joint_map];

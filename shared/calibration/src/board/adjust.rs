@@ -31,7 +31,7 @@ pub(crate) fn adjusted(
     let all: Vec<Vec<(usize, Observation)>> =
         boards.iter().map(|board| observations(task, board)).collect();
     let seen: Vec<Vec<Observation>> =
-        all.iter().map(|it| it.iter().map(|it| it.1).collect()).collect();
+        all.iter().map(|frame| frame.iter().map(|corner| corner.1).collect()).collect();
     let settings = Settings {
         max_iterations: 100,
         least_gain: 1e-9,
@@ -149,7 +149,7 @@ fn right(solved: &BoardProblem<'_>, limits: &[f64]) -> Vec<Vec<bool>> {
 
 fn used(seen: &[Vec<Observation>], kept: &[Vec<bool>]) -> Vec<Vec<Observation>> {
     let of_frame = |(seen, kept): (&Vec<Observation>, &Vec<bool>)| {
-        let used = seen.iter().zip(kept).filter(|it| *it.1);
+        let used = seen.iter().zip(kept).filter(|corner| *corner.1);
         used.map(|used| *used.0).collect()
     };
     seen.iter().zip(kept).map(of_frame).collect()

@@ -33,9 +33,9 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
             let own: Vec<&Sight> = sights.iter().filter(|sight| sight.frame == *frame).collect();
             let mut list: Vec<usize> = own
                 .iter()
-                .flat_map(|it| {
-                    let size = sizes[it.camera].map(f64::from);
-                    features_of(it, size).map(move |feature| it.camera * per_camera + feature)
+                .flat_map(|sight| {
+                    let size = sizes[sight.camera].map(f64::from);
+                    features_of(sight, size).map(move |feature| sight.camera * per_camera + feature)
                 })
                 .collect();
             for a in &own {
@@ -76,7 +76,7 @@ pub(crate) fn speeds(sights: &[Sight], n_cameras: usize) -> BTreeMap<(usize, usi
     let mut speeds = BTreeMap::new();
     for camera in 0..n_cameras {
         let mut own: Vec<&Sight> = sights.iter().filter(|sight| sight.camera == camera).collect();
-        own.sort_by_key(|it| it.frame);
+        own.sort_by_key(|sight| sight.frame);
         for (nth, sight) in own.iter().enumerate() {
             let before = nth.checked_sub(1).and_then(|difference| own.get(difference));
             let near = [before, own.get(nth + 1)].into_iter().flatten();
@@ -109,7 +109,7 @@ pub(crate) fn slow(
         .collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     order.truncate((order.len() / 2).max(least));
-    let is_slow = |sight: &&Sight| order.iter().any(|it| it.1 == sight.frame);
+    let is_slow = |sight: &&Sight| order.iter().any(|frame| frame.1 == sight.frame);
     sights.iter().filter(is_slow).cloned().collect()
 }
 
@@ -123,7 +123,7 @@ fn speed(a: &Sight, b: &Sight) -> Option<f64> {
     Some(moved / a.frame.abs_diff(b.frame).max(1) as f64)
 }
 
-/// What a board in a picture covers: cells, its size, its tilt in both directions.
+/// Returns the features that a sight of a board covers: cells, its size, its tilt in both directions.
 fn features_of(sight: &Sight, size: [f64; 2]) -> impl Iterator<Item = usize> {
     let mut cells: Vec<usize> = sight.points.iter().map(|(_, at)| cell(*at, size)).collect();
     cells.sort_unstable();

@@ -95,7 +95,8 @@ pub(crate) fn standing(n_cameras: usize, pairs: &[([usize; 2], Pair)]) -> Standi
         let mut own: Vec<(usize, Isometry3<f64>)> = vec![(first, Isometry3::identity())];
         is_in[first] = true;
         loop {
-            let known = |camera: usize| own.iter().find(|it| it.0 == camera).map(|it| it.1);
+            let known =
+                |camera: usize| own.iter().find(|placed| placed.0 == camera).map(|placed| placed.1);
             let outward = pairs.iter().filter_map(|([a, b], pair)| match (known(*a), known(*b)) {
                 (Some(a_from_first), None) => {
                     Some((pair.n_agree, *b, pair.a_from_b.inverse() * a_from_first))
@@ -105,13 +106,13 @@ pub(crate) fn standing(n_cameras: usize, pairs: &[([usize; 2], Pair)]) -> Standi
                 }
                 _ => None,
             });
-            let Some((_, camera, pose)) = outward.max_by_key(|it| it.0) else {
+            let Some((_, camera, pose)) = outward.max_by_key(|link| link.0) else {
                 break;
             };
             is_in[camera] = true;
             own.push((camera, pose));
         }
-        let mut group: Vec<usize> = own.iter().map(|it| it.0).collect();
+        let mut group: Vec<usize> = own.iter().map(|placed| placed.0).collect();
         group.sort_unstable();
         groups.push(group);
         if groups.len() == 1 {

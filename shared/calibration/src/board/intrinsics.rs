@@ -63,7 +63,7 @@ fn square(intrinsics: &Intrinsics, pose: &Isometry3<f64>, points: &[Sighted]) ->
     sum.map(|sum| sum / points.len().max(1) as f64)
 }
 
-/// What of a camera's intrinsics is free.
+/// Returns the parameters of a camera that are free.
 pub(crate) fn free(lens: LensKind, pose: bool) -> Free {
     Free {
         pose,

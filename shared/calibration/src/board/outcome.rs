@@ -1,4 +1,4 @@
-//! What an adjustment tells of every camera.
+//! Result of an adjustment for every camera.
 
 use geometry::Camera;
 use geometry::bundle::{Problem as _, clustered, covariance};
@@ -13,10 +13,10 @@ const MOST_PARTS: usize = 10;
 /// A frame that is used.
 pub(crate) struct Shown {
     pub(crate) frame: usize,
-    /// Of a board whose origin is its middle.
+    /// Pose of the board; its origin is in its middle.
     pub(crate) world_from_board: Isometry3<f64>,
     pub(crate) sights: Vec<Sight>,
-    /// Of each sight, see [`Observation::spread`].
+    /// Spread of each sight, see [`Observation::spread`].
     pub(crate) spreads: Vec<f64>,
 }
 
@@ -28,12 +28,12 @@ pub(crate) fn middle(task: &Task) -> Isometry3<f64> {
     Translation3::new(sum.x / n, sum.y / n, 0.0).into()
 }
 
-/// What the adjustment ended with.
+/// State at the end of the adjustment.
 pub(crate) struct Adjusted<'a> {
     pub(crate) boards: &'a [Shown],
     /// Every corner of every frame, with its number.
     pub(crate) all: &'a [Vec<(usize, Observation)>],
-    /// Whether it was used.
+    /// True for corners that were used.
     pub(crate) kept: &'a [Vec<bool>],
     /// With what was used.
     pub(crate) solved: &'a BoardProblem<'a>,
@@ -67,7 +67,7 @@ pub(crate) fn outcome(task: &Task, adjusted: &Adjusted<'_>) -> Outcome {
     let known = numbers(solved);
     let cameras = residuals.into_iter().enumerate().map(|(nth, residuals)| {
         frames[nth].dedup();
-        let used = |it: &&Residual| !it.is_wrong;
+        let used = |residual: &&Residual| !residual.is_wrong;
         let place = |residual: &Residual| -> Point2<f64> { residual.at };
         CameraOutcome {
             camera: solved.cameras.cameras()[nth].clone(),

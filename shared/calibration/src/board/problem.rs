@@ -4,9 +4,9 @@ use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
 use geometry::{Camera, LensModel};
 use nalgebra::{Isometry3, Matrix2x3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 
-/// What is believed of any camera beforehand, as standard deviations: pixels are square to half a percent, the principal point
-/// is within a few percent of the middle, lenses are centred. It holds what few pictures leave open; where pictures cover
-/// much it is not felt: they tell each of these ten times better and more.
+/// Prior on any camera, as standard deviations: pixels are square to half a percent, the principal point is within a few
+/// percent of the middle, lenses are centred. It holds what few pictures leave open; where pictures cover much it is not felt:
+/// they tell each of these ten times better and more.
 const PRINCIPAL_POINT: f64 = 0.04;
 const ASPECT: f64 = 0.005;
 const RADIAL: f64 = 0.5;
@@ -31,7 +31,7 @@ pub(crate) struct BoardProblem<'a> {
     pub(crate) cameras: Cameras,
     /// `world_from_board` of every frame, of a board whose origin is its middle.
     pub(crate) boards: Vec<Isometry3<f64>>,
-    /// What is seen in every frame.
+    /// Corners observed in every frame.
     pub(crate) seen: &'a [Vec<Observation>],
     /// Standard deviation of a corner, pixels.
     pub(crate) sigma_px: f64,

@@ -27,7 +27,7 @@ const OUT_OF_STEP_PX: f64 = 0.4;
 ///
 /// [`BoardError`] where there is no answer; an answer that is not to be trusted has [`Outcome::doubts`].
 pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
-    let usable = |it: &&Sight| it.points.len() >= LEAST_CORNERS && verdict::is_spread(it);
+    let usable = |sight: &&Sight| sight.points.len() >= LEAST_CORNERS && verdict::is_spread(sight);
     let sights: Vec<Sight> = task.sights.iter().filter(usable).cloned().collect();
     let mut started = Vec::new();
     for camera in 0..task.names.len() {
@@ -69,8 +69,8 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     Ok(outcome)
 }
 
-/// Whether all cameras together do not fit as each alone does: by residuals, or by lenses, which bend to hide it where few frames
-/// have several cameras.
+/// Returns the evidence that cameras fit worse together than each alone: by residuals, or by lenses, which bend to hide it where
+/// few frames have several cameras.
 fn out_of_step(alone: &Outcome, together: &Outcome) -> Option<OutOfStep> {
     let [alone_px, together_px] = [alone, together].map(pooled);
     let is_worse = together_px > OUT_OF_STEP * alone_px && together_px > OUT_OF_STEP_PX;
@@ -125,7 +125,7 @@ fn in_step(
     Ok(outcome)
 }
 
-/// What one camera saw.
+/// Returns the sights of one camera and those that were placed.
 fn own(nth: usize, sights: &[Sight], placed: &[Placed]) -> (Vec<Sight>, Vec<Placed>) {
     let sights = sights.iter().filter(|sight| sight.camera == nth);
     let placed = placed.iter().filter(|placed| placed.sight.camera == nth);
@@ -135,7 +135,10 @@ fn own(nth: usize, sights: &[Sight], placed: &[Placed]) -> (Vec<Sight>, Vec<Plac
 /// The root mean square of all residuals that were used, pixels.
 fn pooled(outcome: &Outcome) -> f64 {
     let all = outcome.cameras.iter().flat_map(|camera| &camera.residuals);
-    let squares: Vec<f64> = all.filter(|it| !it.is_wrong).map(|it| it.off.norm_squared()).collect();
+    let squares: Vec<f64> = all
+        .filter(|residual| !residual.is_wrong)
+        .map(|residual| residual.off.norm_squared())
+        .collect();
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
@@ -219,7 +222,7 @@ fn first_intrinsics(
         return Ok(known);
     }
     let frames = choose::frames(&own, &task.sizes, MOST_FOR_START);
-    let chosen = own.iter().filter(|it| frames.contains(&it.frame));
+    let chosen = own.iter().filter(|sight| frames.contains(&sight.frame));
     let boards: Vec<_> = chosen.map(Sight::sighted).collect();
     let kind = task.lens;
     // Eight coefficients are begun with five, whose minimum is wider.
@@ -298,15 +301,15 @@ fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) 
     for &frame in frames {
         let own: Vec<&Placed> =
             placed.iter().filter(|placed| placed.sight.frame == frame).collect();
-        let candidates = own.iter().map(|it| {
-            let camera = &cameras[it.sight.camera];
-            camera.camera_from_world.inverse() * it.ways[0].1
+        let candidates = own.iter().map(|placed| {
+            let camera = &cameras[placed.sight.camera];
+            camera.camera_from_world.inverse() * placed.ways[0].1
         });
         let judged = candidates.map(|pose| {
             let ways: Vec<(f64, Sight)> = own
                 .iter()
-                .filter_map(|it| {
-                    let costs = it
+                .filter_map(|placed| {
+                    let costs = placed
                         .ways
                         .iter()
                         .map(|(way, _)| (cost(&cameras[way.camera], &pose, way), way.clone()));

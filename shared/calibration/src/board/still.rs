@@ -43,7 +43,8 @@ pub fn standing_board(
         };
         let (solved, _) = solve(problem, &Settings::default());
         let residuals = solved.residuals(0);
-        let squares = residuals.iter().map(|residual| residual.map_or(1e6, |it| it.norm_squared()));
+        let squares =
+            residuals.iter().map(|residual| residual.map_or(1e6, |off| off.norm_squared()));
         let rms_px = (squares.sum::<f64>() / residuals.len().max(1) as f64).sqrt();
         Some((solved.boards[0], rms_px))
     });

@@ -58,7 +58,7 @@ struct Show<'a> {
     noise_px: f64,
 }
 
-/// What a camera sees of a board in a frame, from either side if the board has two.
+/// Returns the sight of a board by a camera in a frame, from either side if the board has two.
 fn seen(
     (nth, camera): (usize, &Camera),
     (board, pose): (&[Point2<f64>], &Isometry3<f64>),
@@ -171,7 +171,7 @@ fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
     );
     assert_eq!(outcome.doubts, []);
     let all = outcome.cameras.iter().flat_map(|camera| &camera.residuals);
-    let left_out = all.clone().filter(|it| it.is_wrong).count();
+    let left_out = all.clone().filter(|residual| residual.is_wrong).count();
     assert!(
         left_out > 0 && left_out <= n_wrong,
         "{left_out} of {n_wrong}"

@@ -1,4 +1,4 @@
-//! What forbids to trust a calibration from a board.
+//! Reasons not to trust a calibration from a board.
 
 use super::{CameraOutcome, Outcome, Sight, Task};
 
@@ -130,7 +130,7 @@ impl Doubt {
     }
 }
 
-/// Whether the points of a sight span a plane.
+/// Returns true if the points of a sight span a plane.
 pub(super) fn is_spread(sight: &Sight) -> bool {
     let n = sight.on_board.len() as f64;
     let sum = sight
@@ -155,12 +155,12 @@ fn focal_share(camera: &CameraOutcome) -> f64 {
     focal.map_or(f64::INFINITY, |focal| focal.sd / focal.value)
 }
 
-/// Whether the focal length of a camera is given, or known at all.
+/// Returns true if the focal length of a camera was given or is well determined.
 fn is_lens_told(camera: &CameraOutcome) -> bool {
     camera.is_known || focal_share(camera) <= TOLD_SHARE
 }
 
-/// Whether a joint adjustment left every lens as the camera's own pictures tell it, or that is not told.
+/// Returns true if a joint adjustment kept every lens as found from the camera's own pictures, where these determine it.
 pub(super) fn are_lenses_the_same(joint: &Outcome, alone: &Outcome) -> bool {
     let is_same = |(joint, alone): (&CameraOutcome, &CameraOutcome)| {
         let [own, joint] = [alone, joint].map(|camera| camera.camera.intrinsics.fx);
@@ -174,7 +174,7 @@ pub(super) fn are_lenses_the_same(joint: &Outcome, alone: &Outcome) -> bool {
 fn place_of(camera: &CameraOutcome) -> [f64; 2] {
     ["rotation", "place"].map(|name| {
         let own = camera.numbers.iter().filter(|number| number.name.starts_with(name));
-        own.map(|it| it.sd).fold(0.0, f64::max)
+        own.map(|number| number.sd).fold(0.0, f64::max)
     })
 }
 

@@ -12,7 +12,7 @@ const USUAL_MARKERS: &str = "DICT_4X4_1000";
 /// The dictionary of an `AprilTag` grid that names none.
 const USUAL_TAGS: &str = "DICT_APRILTAG_36h11";
 
-/// What is on a board.
+/// Pattern of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Black and white squares; counted are inner corners.
@@ -28,7 +28,7 @@ pub enum Kind {
 /// As text: `charuco:7x5:40mm`, `chessboard:9x6:25mm`, `aprilgrid:6x6:88mm`, with options after further colons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Board {
-    /// What is on it.
+    /// Its pattern.
     pub kind: Kind,
     /// Squares (`ChArUco`), inner corners (chessboard) or markers (grid) from left to right.
     pub columns: usize,
@@ -76,7 +76,7 @@ pub enum BoardError {
     Option {
         /// The text.
         text: String,
-        /// What may stand there.
+        /// Accepted values.
         expected: &'static str,
     },
     /// A dictionary that does not exist.

@@ -156,7 +156,7 @@ fn number(
 pub(crate) fn look_alikes(board: &Board) -> Vec<Vec<usize>> {
     let size = [board.columns, board.rows];
     let mut turns: Vec<[bool; 3]> = Vec::new();
-    let is_even = |it: usize| it.is_multiple_of(2);
+    let is_even = |count: usize| count.is_multiple_of(2);
     // Half a turn keeps the colours if both counts of squares are odd, or both even.
     if is_even(board.columns) == is_even(board.rows) {
         turns.push([false, true, true]);

@@ -11,7 +11,7 @@ use crate::boards::{Board, Kind, Layout};
 const MARGIN: f64 = 8.0;
 const FOOT: f64 = 20.0;
 
-/// What is drawn, in millimetres from the upper left corner of the page, y down.
+/// A shape of a drawing, in millimetres from the upper left corner of the page, y down.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A filled rectangle.
@@ -41,7 +41,7 @@ pub struct Drawing {
     pub page: [f64; 2],
     /// Where the upper left corner of the board is.
     pub board_at: [f64; 2],
-    /// What is on it; later shapes cover earlier ones.
+    /// Shapes on the page; later ones cover earlier ones.
     pub shapes: Vec<Shape>,
 }
 
@@ -63,7 +63,7 @@ pub enum PaperError {
         .needed[0], .needed[1], .page[0], .page[1]
     )]
     TooSmall {
-        /// What the board needs, millimetres.
+        /// Size that the board needs, millimetres.
         needed: [f64; 2],
         /// The page.
         page: [f64; 2],
@@ -104,7 +104,7 @@ impl FromStr for Paper {
         let side = |text: &str| text.trim().trim_end_matches("mm").parse::<f64>().ok();
         let size = sides.and_then(|(width, height)| Some([side(width)?, side(height)?]));
         match size {
-            Some(size) if size.iter().all(|it| (20.0..=5000.0).contains(it)) => {
+            Some(size) if size.iter().all(|side| (20.0..=5000.0).contains(side)) => {
                 Ok(Self::Sized(size))
             }
             _ => Err(PaperError::Unknown {
@@ -236,7 +236,8 @@ impl Drawing {
 
 fn page_for(needed: [f64; 2], paper: Paper) -> Result<[f64; 2], PaperError> {
     let fits = |page: [f64; 2]| page[0] >= needed[0] && page[1] >= needed[1];
-    let either_way = |size: [f64; 2]| [size, [size[1], size[0]]].into_iter().find(|it| fits(*it));
+    let either_way =
+        |size: [f64; 2]| [size, [size[1], size[0]]].into_iter().find(|page| fits(*page));
     match paper {
         Paper::Fitting => {
             let found = PAPERS[..5].iter().find_map(|(_, size)| either_way(*size));
@@ -253,7 +254,8 @@ mod tests {
     #[test]
     fn the_smallest_page_that_fits_is_taken() {
         let board = |text: &str| text.parse::<Board>().unwrap();
-        let page = |text: &str, paper| Drawing::new(&board(text), paper).map(|it| it.page);
+        let page =
+            |text: &str, paper| Drawing::new(&board(text), paper).map(|drawing| drawing.page);
         let fitting = Paper::Fitting;
         assert_eq!(page("charuco:5x7:30mm", fitting), Ok([210.0, 297.0]));
         assert_eq!(page("charuco:7x5:38mm", fitting), Ok([297.0, 420.0]));

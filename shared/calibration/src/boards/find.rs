@@ -13,7 +13,7 @@ const DOUBLED_UP_TO: usize = 2000;
 /// The largest picture that is not halved.
 const HALVED_FROM: usize = 900;
 
-/// What was found.
+/// A board found in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// The corners, by number.
@@ -28,10 +28,10 @@ pub struct Found {
     pub n_markers: usize,
 }
 
-/// What is known from other pictures of the same camera.
+/// Hints from other pictures of the same camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Hints {
-    /// Whether white is black.
+    /// True if black and white are exchanged.
     pub is_inverted: Option<bool>,
     /// The variant of the board.
     pub variant: Option<usize>,
@@ -56,8 +56,8 @@ pub struct Finder {
 }
 
 impl Finder {
-    /// Of a board, and of those that it may have been confused with: rows and columns exchanged, the older pattern of
-    /// `OpenCV`, tags counted from below.
+    /// Looks for a board and for those that it may have been confused with: rows and columns exchanged, the older
+    /// pattern of `OpenCV`, tags counted from below.
     pub fn new(board: &Board) -> Self {
         let codes = board.codes().map(|dictionary| {
             Codes::new(
@@ -121,11 +121,12 @@ impl Finder {
                 let Some((variant, agreed)) = self.agreed(&sightings, hints) else {
                     continue;
                 };
-                let n_best = best.as_ref().map_or(0, |it| it.2.len());
+                let n_best = best.as_ref().map_or(0, |best| best.2.len());
                 if agreed.len() > n_best {
                     best = Some((is_inverted, variant, agreed));
                 }
-                if 2 * n_best.max(best.as_ref().map_or(0, |it| it.2.len())) >= self.n_markers() {
+                if 2 * n_best.max(best.as_ref().map_or(0, |best| best.2.len())) >= self.n_markers()
+                {
                     break;
                 }
             }
@@ -144,7 +145,7 @@ impl Finder {
         let Variant { board, layout, .. } = &self.variants[variant];
         let known: Vec<Known> = agreed
             .iter()
-            .filter_map(|it| Some((layout.marker(it.id)?, it)))
+            .filter_map(|sighting| Some((layout.marker(sighting.id)?, sighting)))
             .flat_map(|(marker, it)| (0..4).map(|i| (marker.corners[i], it.corners[i], 1.0)))
             .collect();
         let corners = grow(&seen, board, layout, &known);
@@ -155,7 +156,7 @@ impl Finder {
             corners,
             variant,
             is_inverted,
-            is_mirrored: agreed.iter().any(|it| it.is_mirrored),
+            is_mirrored: agreed.iter().any(|sighting| sighting.is_mirrored),
             n_markers: agreed.len(),
         })
     }
@@ -180,7 +181,7 @@ impl Finder {
                 continue;
             }
             let agreed = agreeing(&variant.layout, sightings);
-            if agreed.len() > best.as_ref().map_or(1, |it| it.1.len()) {
+            if agreed.len() > best.as_ref().map_or(1, |best| best.1.len()) {
                 best = Some((index, agreed));
             }
         }
@@ -222,7 +223,7 @@ fn read(codes: &Codes, picture: &Picture, scale: f64, frames: &[usize]) -> Vec<S
 fn variants(board: &Board) -> Vec<Variant> {
     let mut list: Vec<Variant> = Vec::new();
     let mut add = |board: Board, layout: Layout, note: Option<String>| {
-        if list.iter().all(|it| it.layout != layout) {
+        if list.iter().all(|variant| variant.layout != layout) {
             list.push(Variant {
                 board,
                 layout,

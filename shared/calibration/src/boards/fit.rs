@@ -63,14 +63,14 @@ fn supporters(layout: &Layout, map: &Homography, sightings: &[Sighting]) -> (f64
         else {
             continue;
         };
-        match kept.iter_mut().find(|it| it.1.id == sighting.id) {
+        match kept.iter_mut().find(|kept| kept.1.id == sighting.id) {
             Some(known) if off < known.0 => *known = (off, *sighting),
             Some(_) => {}
             None => kept.push((off, *sighting)),
         }
     }
-    let sum = kept.iter().map(|it| it.0).sum();
-    (sum, kept.into_iter().map(|it| it.1).collect())
+    let sum = kept.iter().map(|kept| kept.0).sum();
+    (sum, kept.into_iter().map(|kept| kept.1).collect())
 }
 
 /// The largest distance of a corner of a marker from where a map has it, in its sides.

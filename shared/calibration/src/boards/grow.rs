@@ -33,7 +33,7 @@ pub(crate) fn grow(
     // Near known places first; what they give carries further.
     for reach in [1.2, 1.8, 3.0, 100.0] {
         for (id, point) in layout.points.iter().enumerate() {
-            let is_near = known.iter().any(|it| (it.0 - point).norm() < reach * side);
+            let is_near = known.iter().any(|known| (known.0 - point).norm() < reach * side);
             if found[id].is_some() || !is_near {
                 continue;
             }
@@ -87,7 +87,7 @@ fn look(
     is_there.then_some(at)
 }
 
-/// Whether black and white lie around a corner as they do on the board; `value` is the grey value by the offset in squares.
+/// Returns true if black and white lie around a corner as on the board; `value` is the grey value by the offset in squares.
 fn is_crossing(
     is_black_before: bool,
     board: &Board,

@@ -30,7 +30,7 @@ pub struct Layout {
     pub points: Vec<Point2<f64>>,
     /// The markers, by number.
     pub markers: Vec<Marker>,
-    /// Whether the square up and left of a point is black, for points between squares.
+    /// True if the square up and left of a point is black, for points between squares.
     pub is_black_before: Vec<bool>,
 }
 
@@ -50,7 +50,7 @@ impl Layout {
     }
 }
 
-/// Whether a square is black; columns and rows from 0 at the upper left.
+/// Returns true if a square is black; columns and rows from 0 at the upper left.
 pub(crate) fn is_black(board: &Board, column: usize, row: usize) -> bool {
     let is_white_first =
         board.kind == Kind::Charuco && board.is_legacy && board.rows.is_multiple_of(2);

@@ -83,9 +83,9 @@ impl Codes {
                 let Some(sighting) = self.best(bits, *quad) else {
                     continue;
                 };
-                let is_same = |it: &&mut Sighting| {
-                    it.id == sighting.id
-                        && (it.centre() - sighting.centre()).norm() < 0.25 * sighting.side_px()
+                let is_same = |known: &&mut Sighting| {
+                    known.id == sighting.id
+                        && (known.centre() - sighting.centre()).norm() < 0.25 * sighting.side_px()
                 };
                 match found.iter_mut().find(is_same) {
                     Some(known) if sighting.n_wrong < known.n_wrong => *known = sighting,
@@ -108,7 +108,7 @@ impl Codes {
             for (turn, seen) in turns(seen, self.side).into_iter().enumerate() {
                 for (id, code) in self.bits.iter().enumerate() {
                     let n_wrong = (code ^ seen).count_ones();
-                    if n_wrong <= self.tolerance && best.is_none_or(|it| n_wrong < it.n_wrong) {
+                    if n_wrong <= self.tolerance && best.is_none_or(|best| n_wrong < best.n_wrong) {
                         let corners = [0, 1, 2, 3].map(|nth| {
                             let along = (turn + nth) % 4;
                             // In a mirror the corners run the other way.

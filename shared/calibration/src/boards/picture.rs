@@ -11,7 +11,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Of grey values, row by row; `None` if their count is not width times height, or none.
+    /// Takes grey values, row by row; returns `None` if there are none or not width times height.
     pub fn new(width: usize, height: usize, pixels: Vec<u8>) -> Option<Self> {
         let count = width.checked_mul(height)?;
         (count > 0 && count == pixels.len()).then_some(Self {
@@ -21,10 +21,10 @@ impl Picture {
         })
     }
 
-    /// Of red, green and blue; `None` as for [`new`](Self::new). Weights of ITU-R BT.601.
+    /// Takes red, green and blue; returns `None` as [`new`](Self::new) does. Weights of ITU-R BT.601.
     pub fn of_rgb(width: usize, height: usize, rgb: &[u8]) -> Option<Self> {
-        let grey = |it: &[u8]| {
-            let [r, g, b] = [it[0], it[1], it[2]].map(u32::from);
+        let grey = |rgb: &[u8]| {
+            let [r, g, b] = [rgb[0], rgb[1], rgb[2]].map(u32::from);
             ((299 * r + 587 * g + 114 * b + 500) / 1000) as u8
         };
         Self::new(width, height, rgb.chunks_exact(3).map(grey).collect())
@@ -70,7 +70,7 @@ impl Picture {
         )
     }
 
-    /// Whether a point is inside by a margin in pixels.
+    /// Returns true if a point is inside by a margin in pixels.
     pub(crate) fn holds(&self, at: Point2<f64>, margin: f64) -> bool {
         at.x >= margin
             && at.y >= margin

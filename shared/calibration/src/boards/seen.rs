@@ -37,7 +37,7 @@ pub enum Nothing {
 impl Nothing {
     /// The one that says more.
     pub(crate) fn or(self, other: Self) -> Self {
-        let says = |it: Self| match it {
+        let says = |nothing: Self| match nothing {
             Self::NoGrid | Self::NoMarkers => 0,
             Self::OtherGrid { .. } => 1,
             Self::Elsewhere { n_markers } => 1 + n_markers,

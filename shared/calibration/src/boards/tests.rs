@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point2};
 
 use super::*;
 
-/// What is printed, at a point of the page (millimetres).
+/// Returns the grey value of a drawing at a point of the page (millimetres).
 fn grey(drawing: &Drawing, at: [f64; 2]) -> f64 {
     let mut value = 235.0;
     for shape in &drawing.shapes {

@@ -8,7 +8,7 @@ const DARKER: i64 = 7;
 /// For every pixel whether it is darker than the mean of the square of `2 radius + 1` pixels around it.
 pub(crate) fn dark(picture: &Picture, radius: usize) -> Vec<bool> {
     let (width, height) = (picture.width(), picture.height());
-    let sums = Sums::of(picture);
+    let sums = Sums::new(picture);
     let mut mask = Vec::with_capacity(width * height);
     for y in 0..height {
         let (top, bottom) = (y.saturating_sub(radius), (y + radius + 1).min(height));
@@ -30,7 +30,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(picture: &Picture) -> Self {
+    fn new(picture: &Picture) -> Self {
         let stride = picture.width() + 1;
         let mut sums = vec![0; stride * (picture.height() + 1)];
         for (y, row) in picture.pixels().chunks_exact(picture.width()).enumerate() {

@@ -15,7 +15,7 @@ const PLACE: f64 = 0.04;
 /// Standard deviation of a bone's length over time, as a share of it.
 const BONE_SPREAD: f64 = 0.06;
 
-/// What is known of the pose of a camera beforehand.
+/// Prior on the pose of a camera.
 #[derive(Debug, Clone)]
 pub(crate) struct PosePrior {
     pub(crate) camera: Camera,
@@ -23,7 +23,7 @@ pub(crate) struct PosePrior {
     pub(crate) sd: [f64; 2],
 }
 
-/// What the terms are, besides what is seen.
+/// Prior terms, besides the observations.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Beliefs {
     /// The distance of two cameras, which holds the scale: exactly for all that matters.
@@ -90,7 +90,7 @@ impl Adjustment {
                 nth: i,
                 ..instant(cameras.cameras(), &sightings.seen[i], sigmas_px)
             })
-            .filter(|it| !it.points.is_empty())
+            .filter(|instant| !instant.points.is_empty())
             .collect();
         let mut next = cameras.n_parameters();
         let mut offsets = vec![(None, 0.0); n];
@@ -154,7 +154,7 @@ impl Adjustment {
                 self.bones[nth] = Some(*parameter);
                 continue;
             }
-            let alike = BONES.iter().filter(|it| it.kind == bone.kind);
+            let alike = BONES.iter().filter(|other| other.kind == bone.kind);
             let ends: Vec<[usize; 2]> = alike.map(|alike| [alike.from[0], alike.to]).collect();
             let mut all: Vec<f64> = Vec::new();
             for instant in &self.instants {

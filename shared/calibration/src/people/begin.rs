@@ -33,7 +33,7 @@ pub(crate) struct Choice {
     pub(crate) is_exchanged: bool,
 }
 
-/// What is searched.
+/// Input of the search for a first rig.
 #[derive(Debug, Clone)]
 pub(crate) struct Study<'a> {
     /// Without distortion.
@@ -42,7 +42,7 @@ pub(crate) struct Study<'a> {
     pub(crate) times_s: Vec<f64>,
     pub(crate) n_joints: usize,
     pub(crate) sides: &'a [usize],
-    /// What each camera may be: the first is the likeliest.
+    /// Choices for each camera, the likeliest first.
     pub(crate) choices: Vec<Vec<Choice>>,
 }
 
@@ -81,15 +81,16 @@ pub(crate) fn choices(n_chains: usize, offset_s: f64, window_s: f64, as_seen: bo
 }
 
 impl Study<'_> {
-    /// What the chosen cameras see.
+    /// Returns the sightings of the chosen chains.
     pub(crate) fn sightings(&self, chosen: &[Option<Choice>]) -> Sightings {
         let chains = chosen.iter().enumerate();
         let chains: Vec<Option<&Chain>> =
             chains.map(|(camera, it)| self.chains[camera].get((*it)?.chain)).collect();
-        let offsets: Vec<f64> = chosen.iter().map(|it| it.map_or(0.0, |it| it.offset_s)).collect();
+        let offsets: Vec<f64> =
+            chosen.iter().map(|choice| choice.map_or(0.0, |known| known.offset_s)).collect();
         let mut all = Sightings::new(&chains, &self.times_s, &offsets, self.n_joints);
         for (camera, it) in chosen.iter().enumerate() {
-            if it.is_some_and(|it| it.is_exchanged) {
+            if it.is_some_and(|choice| choice.is_exchanged) {
                 all.exchange_all(camera, self.sides);
             }
         }
@@ -145,7 +146,9 @@ impl Study<'_> {
             // The clock and the sides of the first camera are those that the other one is compared with.
             let mut of_a = self.choices[a].clone();
             let first = of_a[0];
-            of_a.retain(|it| it.offset_s == first.offset_s && !it.is_exchanged || *it == first);
+            of_a.retain(|choice| {
+                choice.offset_s == first.offset_s && !choice.is_exchanged || *choice == first
+            });
             for choice_a in of_a {
                 for choice_b in &self.choices[b] {
                     let matches = self.matches(pair, [choice_a, *choice_b]);
@@ -232,7 +235,7 @@ impl Study<'_> {
     /// Expected errors at the start, by camera and joint.
     pub(crate) fn sigmas(&self, choices: &[Option<Choice>]) -> Vec<Vec<f64>> {
         let of = |(camera, it): (usize, &Option<Choice>)| {
-            let sigma = it.map_or(1.0, |it| self.sigma_px(camera, it));
+            let sigma = it.map_or(1.0, |choice| self.sigma_px(camera, choice));
             vec![sigma; self.n_joints]
         };
         choices.iter().enumerate().map(of).collect()
@@ -262,7 +265,7 @@ impl Study<'_> {
                     }));
                 }
                 if let Some((placed, cost)) = resected(&self.cameras[camera], &known, random)
-                    && best.as_ref().is_none_or(|it| cost < it.3)
+                    && best.as_ref().is_none_or(|best| cost < best.3)
                 {
                     best = Some((camera, *choice, placed, cost));
                 }

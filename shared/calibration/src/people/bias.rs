@@ -1,4 +1,4 @@
-//! What a joint errs by in a camera all the time: a hip is marked elsewhere from the front than from the side.
+//! Constant error of a joint in a camera: a hip is marked elsewhere from the front than from the side.
 //!
 //! Such errors do not average out over a recording in which somebody stays in one place. Each is an unknown of its own, believed
 //! to be near 0 by a standard deviation that the residuals tell: where people walk about it comes out as next to nothing.
@@ -27,7 +27,7 @@ pub(super) struct Biases {
     places: Vec<Vec<Option<usize>>>,
     /// Pixels.
     values: Vec<Vector2<f64>>,
-    /// What is believed of each, pixels.
+    /// Standard deviation of each beforehand, pixels.
     sd_px: Vec<f64>,
 }
 
@@ -82,7 +82,7 @@ impl Biases {
         }
     }
 
-    /// What is believed.
+    /// Gives the prior terms.
     pub(super) fn priors(&self, take: &mut dyn FnMut(&Term)) {
         let mut term = Term::default();
         for (nth, (value, sd)) in self.values.iter().zip(&self.sd_px).enumerate() {
@@ -102,15 +102,15 @@ impl Biases {
     }
 }
 
-/// What joints err by all the time, from their residuals: a share of the size of the person, all joints and cameras together. None
-/// where it is next to nothing.
+/// Returns the constant error of joints, from their residuals, as a share of the size of the person, all joints and cameras
+/// together; `None` where it is next to nothing.
 ///
 /// * `residuals`: of each joint in each camera, as shares of the size.
 pub(super) fn share_of(residuals: &[Vec<Vector2<f64>>]) -> Option<f64> {
     let mut squares = Vec::new();
     for of_joint in residuals.iter().filter(|residual| residual.len() >= LEAST) {
         for axis in 0..2 {
-            let each: Vec<f64> = of_joint.iter().map(|it| it[axis]).collect();
+            let each: Vec<f64> = of_joint.iter().map(|residual| residual[axis]).collect();
             let middle = Sorted::new(each.clone()).upper_median()?;
             let away = each.iter().map(|value| (value - middle).abs());
             let noise = 1.4826 * Sorted::new(away.collect::<Vec<_>>()).upper_median()?;

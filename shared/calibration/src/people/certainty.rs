@@ -60,15 +60,16 @@ pub(super) fn spread(all: &Solved, known: &Covariance) -> Vec<[f64; 2]> {
 /// The distance of a camera to the people, metres.
 fn distances(outcome: &Outcome) -> Vec<f64> {
     let all: Vec<&Point3<f64>> = outcome.skeletons.iter().flatten().flatten().collect();
-    let axis =
-        |axis: usize| Sorted::new(all.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median();
+    let axis = |axis: usize| {
+        Sorted::new(all.iter().map(|point| point[axis]).collect::<Vec<_>>()).upper_median()
+    };
     let middle = Point3::new(
         axis(0).unwrap_or(0.0),
         axis(1).unwrap_or(0.0),
         axis(2).unwrap_or(0.0),
     );
     let each = outcome.cameras.iter();
-    each.map(|it| (it.centre_in_world() - middle).norm()).collect()
+    each.map(|camera| (camera.centre_in_world() - middle).norm()).collect()
 }
 
 /// Adds to the deviations of the rotations what no block of the recording tells: where a network finds the joints, rigs of few cameras
@@ -81,7 +82,7 @@ fn add_common(outcome: &mut Outcome) {
     }
 }
 
-/// What is to be said of the deviations, and of how joints fit.
+/// Adds doubts and cautions about the deviations and the fit of the joints.
 pub(super) fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) {
     add_common(outcome);
     let distances = distances(outcome);
@@ -156,9 +157,9 @@ pub(super) fn halves(
             }
         }
     }
-    let laid = rigs.iter().filter_map(|it| {
-        let similarity = aligned(it, &outcome.cameras, true)?;
-        Some(it.iter().map(|it| similarity.camera(it)).collect())
+    let laid = rigs.iter().filter_map(|rig| {
+        let similarity = aligned(rig, &outcome.cameras, true)?;
+        Some(rig.iter().map(|camera| similarity.camera(camera)).collect())
     });
     let laid: Vec<Vec<Camera>> = laid.collect();
     let [one, other] = &laid[..] else { return };
@@ -171,11 +172,11 @@ pub(super) fn halves(
         outcome.reports[camera].halves = Some([by[0], it.way]);
         let excess = (by[0] / MOST_HALVES[0]).max(by[1] / MOST_HALVES[1]);
         // NaN counts as worst.
-        if worst.is_none_or(|it| excess > it.0 || excess.is_nan()) {
+        if worst.is_none_or(|worst| excess > worst.0 || excess.is_nan()) {
             worst = Some((excess, camera, by));
         }
     }
-    if let Some((_, camera, by)) = worst.filter(|it| it.0 > 1.0 || it.0.is_nan()) {
+    if let Some((_, camera, by)) = worst.filter(|worst| worst.0 > 1.0 || worst.0.is_nan()) {
         let limits = MOST_HALVES;
         outcome.doubts.push(Doubt::Halves { camera, by, limits });
     }

@@ -208,7 +208,7 @@ pub(crate) fn instants(
     (0..n).map(|i| from + step_s * i as f64).collect()
 }
 
-/// What is to be said of an answer.
+/// Adds the doubts about a result.
 fn judge(
     outcome: &mut Outcome,
     (given, study): (&[Camera], &Study<'_>),
@@ -237,13 +237,13 @@ fn judge(
         camera
     });
     outcome.cameras = placed.collect();
-    let to_metres_point = |point: &Option<Point3<f64>>| point.map(|it| to_metres.point(&it));
+    let to_metres_point = |point: &Option<Point3<f64>>| point.map(|point| to_metres.point(&point));
     outcome.times_s = times_s.to_vec();
     outcome.skeletons = skeletons
         .iter()
         .map(|skeleton| skeleton.iter().map(to_metres_point).collect())
         .collect();
-    outcome.stature_m = stature_of(&outcome.skeletons).map(|it| it.0);
+    outcome.stature_m = stature_of(&outcome.skeletons).map(|stature| stature.0);
     let fits = fits(&all.problem, &all.sigmas_px);
     let blocks = blocks(&all.problem, &study.times_s);
     let known = clustered(&all.problem, &blocks);
@@ -279,7 +279,7 @@ fn report(
     known: Option<&Covariance>,
 ) -> CameraReport {
     debug_assert_eq!(fit.cells.len(), CELLS * CELLS, "a square of cells");
-    let of = |parameter: usize| known.map_or(f64::INFINITY, |it| it.sd(parameter));
+    let of = |parameter: usize| known.map_or(f64::INFINITY, |known| known.sd(parameter));
     let offset_sd = all.problem.offset_parameter(camera).map_or(0.0, of);
     CameraReport {
         joints: fit.n,

@@ -33,14 +33,14 @@ pub fn floor(times_s: &[f64], skeletons: &Skeletons) -> Option<Floor> {
     let median = |value: &dyn Fn(&Point3<f64>) -> f64| {
         Sorted::new(feet.iter().map(value).collect::<Vec<_>>()).upper_median()
     };
-    let height = median(&|it| it.coords.dot(&up))?;
-    let spread_m = median(&|it| (it.coords.dot(&up) - height).abs())?;
+    let height = median(&|foot| foot.coords.dot(&up))?;
+    let spread_m = median(&|foot| (foot.coords.dot(&up) - height).abs())?;
     let middle = Vector3::new(
-        median(&|it| it.x)?,
-        median(&|it| it.y)?,
-        median(&|it| it.z)?,
+        median(&|foot| foot.x)?,
+        median(&|foot| foot.y)?,
+        median(&|foot| foot.z)?,
     );
-    let ankle = ANKLE * stature_of(skeletons).map_or(1.7, |it| it.0);
+    let ankle = ANKLE * stature_of(skeletons).map_or(1.7, |stature| stature.0);
     let above = middle.dot(&up) - (height - ankle);
     Some(Floor {
         middle: Point3::from(middle - up.scale(above)),

@@ -23,7 +23,7 @@ pub(crate) const LEAST: usize = 5;
 const LEGS: [[usize; 3]; 2] = [[0, 1, 2], [5, 4, 3]];
 const NECK: usize = 12;
 
-/// What tells lengths.
+/// Source of the scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scale {
     /// The standing height of the person, metres, by the lengths of the bones.
@@ -84,7 +84,7 @@ pub(crate) fn world(
     };
     let scaled: Skeletons = skeletons
         .iter()
-        .map(|skeleton| skeleton.iter().map(|it| it.map(|value| value * factor)).collect())
+        .map(|skeleton| skeleton.iter().map(|joint| joint.map(|value| value * factor)).collect())
         .collect();
     let (up, vertical) = vertical(times_s, &scaled)?;
     let to_z = turn_to_z(up);
@@ -95,7 +95,7 @@ pub(crate) fn world(
     let middle = |axis: usize| {
         Sorted::new(turned.iter().map(|turned| turned[axis]).collect::<Vec<_>>()).upper_median()
     };
-    let ankle = ANKLE * stature_of(&scaled).map_or(1.7, |it| it.0);
+    let ankle = ANKLE * stature_of(&scaled).map_or(1.7, |stature| stature.0);
     let floor = match Sorted::new(feet.iter().map(|foot| foot.z).collect::<Vec<_>>()).upper_median()
     {
         Some(height) if feet.len() >= LEAST => height - ankle,
@@ -138,7 +138,7 @@ pub(crate) fn stature_of(skeletons: &Skeletons) -> Option<(f64, f64)> {
     let mut each: Vec<[f64; 2]> = skeletons
         .iter()
         .filter_map(|skeleton| stature(&joints(skeleton)))
-        .map(|it| [it.metres, it.sd])
+        .map(|stature| [stature.metres, stature.sd])
         .collect();
     if each.len() < LEAST {
         return None;
@@ -154,7 +154,7 @@ fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
     let tall = |factor: f64| {
         let scaled = skeletons.iter();
         let scaled: Skeletons = scaled
-            .map(|scaled| scaled.iter().map(|it| it.map(|value| value * factor)).collect())
+            .map(|scaled| scaled.iter().map(|joint| joint.map(|value| value * factor)).collect())
             .collect();
         stature_of(&scaled)
     };
@@ -244,10 +244,10 @@ fn floor(feet: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
             return None;
         }
         let n = kept.len() as f64;
-        let middle = kept.iter().map(|it| it.coords).sum::<Vector3<f64>>() / n;
+        let middle = kept.iter().map(|foot| foot.coords).sum::<Vector3<f64>>() / n;
         let spread: Matrix3<f64> = kept
             .iter()
-            .map(|it| (it.coords - middle) * (it.coords - middle).transpose() / n)
+            .map(|foot| (foot.coords - middle) * (foot.coords - middle).transpose() / n)
             .sum();
         let eigen = SymmetricEigen::new(spread);
         let mut sizes: Vec<f64> =
@@ -257,7 +257,7 @@ fn floor(feet: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
         let is_floor = sizes[1] > FLOOR_M[0] && sizes[0] < FLOOR_M[1];
         normal = is_floor.then(|| UnitVector3::new_normalize(axis));
         let limit = (2.5 * sizes[0]).max(0.01);
-        kept.retain(|it| (it.coords - middle).dot(&axis).abs() < limit);
+        kept.retain(|foot| (foot.coords - middle).dot(&axis).abs() < limit);
     }
     normal
 }
@@ -283,8 +283,9 @@ fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
     if all.len() < LEAST {
         return None;
     }
-    let axis =
-        |axis: usize| Sorted::new(all.iter().map(|it| it[axis]).collect::<Vec<_>>()).upper_median();
+    let axis = |axis: usize| {
+        Sorted::new(all.iter().map(|direction| direction[axis]).collect::<Vec<_>>()).upper_median()
+    };
     UnitVector3::try_new(Vector3::new(axis(0)?, axis(1)?, axis(2)?), 1e-9)
 }
 

@@ -29,14 +29,14 @@ pub(super) struct Instant {
     /// The joint of each point.
     pub(super) joints: Vec<usize>,
     pub(super) points: Vec<Point3<f64>>,
-    /// What each point counts as: a joint that stays in its place errs alike all the time.
+    /// Weight of each point: a joint that stays in its place has the same error all the time.
     pub(super) shares: Vec<f64>,
     pub(super) seen: Vec<Seen>,
 }
 
 impl Instant {
     pub(super) fn place(&self, joint: usize) -> Option<usize> {
-        self.joints.iter().position(|it| *it == joint)
+        self.joints.iter().position(|known| *known == joint)
     }
 
     /// From one end of the person to the other.

@@ -23,10 +23,14 @@ pub(crate) const CELLS: usize = 8;
 /// * `sizes_px`: the size of the person in each camera.
 pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {
     let mut all = vec![Vec::new(); n_joints];
-    problem.residuals(&mut |it| all[it.joint].push(it.own.norm() / sizes_px[it.camera]));
+    problem.residuals(&mut |residual| {
+        all[residual.joint].push(residual.own.norm() / sizes_px[residual.camera]);
+    });
     let whole = Sorted::new(all.concat()).upper_median().unwrap_or(1.0);
-    let share = |it: &Vec<f64>| {
-        let own = Sorted::new(it.clone()).upper_median().filter(|_| it.len() >= LEAST);
+    let share = |residuals: &Vec<f64>| {
+        let own = Sorted::new(residuals.clone())
+            .upper_median()
+            .filter(|_| residuals.len() >= LEAST);
         FITTED * own.unwrap_or(whole) / MEDIAN
     };
     let shares: Vec<f64> = all.iter().map(share).collect();
@@ -34,11 +38,12 @@ pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
     sizes_px.iter().map(of_camera).collect()
 }
 
-/// What joints err by in a camera all the time, pixels, by camera; none where that is next to nothing.
+/// Returns the constant error of joints by camera, pixels; `None` where it is next to nothing.
 pub(crate) fn biases(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Option<Vec<f64>> {
     let mut all = vec![Vec::new(); n_joints * sizes_px.len()];
-    problem.residuals(&mut |it| {
-        all[it.camera * n_joints + it.joint].push(it.whole / sizes_px[it.camera]);
+    problem.residuals(&mut |residual| {
+        all[residual.camera * n_joints + residual.joint]
+            .push(residual.whole / sizes_px[residual.camera]);
     });
     let share = share_of(&all)?;
     Some(sizes_px.iter().map(|sizes_px| share * sizes_px).collect())
@@ -63,10 +68,10 @@ pub(crate) fn fits(problem: &Adjustment, sigmas_px: &[Vec<f64>]) -> Vec<Fit> {
     let mut lengths = vec![Vec::new(); cameras.len()];
     let mut good = vec![0_usize; cameras.len()];
     let mut cells = vec![vec![0_usize; CELLS * CELLS]; cameras.len()];
-    problem.residuals(&mut |it| {
-        let (camera, at) = (it.camera, it.at);
-        lengths[camera].push(it.whole.norm());
-        good[camera] += usize::from(it.own.norm() < 3.0 * sigmas_px[camera][it.joint]);
+    problem.residuals(&mut |residual| {
+        let (camera, at) = (residual.camera, residual.at);
+        lengths[camera].push(residual.whole.norm());
+        good[camera] += usize::from(residual.own.norm() < 3.0 * sigmas_px[camera][residual.joint]);
         let [width, height] = cameras[camera].intrinsics.size.map(f64::from);
         let share = [(at.x + 0.5) / width, (at.y + 0.5) / height];
         let cell = share

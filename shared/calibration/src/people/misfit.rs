@@ -12,16 +12,16 @@ const LEAST: usize = 6;
 /// Two pictures of a camera are at least so far apart, seconds.
 const APART_S: f64 = 0.5;
 
-/// What a rig and the films of its cameras are.
+/// A rig and the films of its cameras.
 #[derive(Debug, Clone, Copy)]
 pub struct Fitted<'a> {
     /// The cameras of the rig.
     pub cameras: &'a [Camera],
-    /// What each saw.
+    /// Film of each camera.
     pub films: &'a [Film],
-    /// What is added to the times of each to have the common ones, seconds.
+    /// Offset added to the times of each camera to have common ones, seconds.
     pub offsets_s: &'a [f64],
-    /// Of each joint the one on the other side.
+    /// The mirror of each joint on the other side of the body.
     pub sides: &'a [usize],
     /// Instants, seconds on the common clock, and the skeleton at each.
     pub skeletons: (&'a [f64], &'a Skeletons),
@@ -71,7 +71,7 @@ impl Fitted<'_> {
         let mut found = Vec::new();
         for (time_s, skeleton) in times_s.iter().zip(skeletons) {
             let own_s = time_s - offset_s;
-            let away = |it: &&Shot| (it.time_s - own_s).abs();
+            let away = |shot: &&Shot| (shot.time_s - own_s).abs();
             let shot = film.shots.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
             let Some(shot) = shot.filter(|shot| away(shot) <= 0.51 * interval_s) else {
                 continue;
@@ -101,7 +101,8 @@ impl Fitted<'_> {
             let each = person.joints.iter().enumerate();
             let joints: Vec<[[f64; 2]; 2]> = each
                 .filter_map(|(joint, seen)| {
-                    let seen = seen.filter(|it| it.at.iter().all(|value| value.is_finite()))?;
+                    let seen =
+                        seen.filter(|joint| joint.at.iter().all(|value| value.is_finite()))?;
                     let at = skeleton.get(other(joint))?.as_ref()?;
                     let expected = self.cameras[camera].project(at)?;
                     Some([seen.at, [expected.x, expected.y]])
@@ -114,8 +115,8 @@ impl Fitted<'_> {
             Some((median.filter(|_| joints.len() >= LEAST)?, joints))
         };
         let both = [
-            of_sides(&|it| it),
-            of_sides(&|it| self.sides.get(it).copied().unwrap_or(it)),
+            of_sides(&|joint| joint),
+            of_sides(&|joint| self.sides.get(joint).copied().unwrap_or(joint)),
         ];
         let each = both.into_iter().flatten();
         each.min_by(|a, b| a.0.total_cmp(&b.0))
@@ -135,21 +136,21 @@ mod tests {
         let times_s: Vec<f64> = (0..40).map(|i| f64::from(i) * 0.1).collect();
         let skeletons: Skeletons = times_s
             .iter()
-            .map(|times_s| walker(*times_s, 1.0).map(|it| Some(Point3::from(it))).to_vec())
+            .map(|times_s| walker(*times_s, 1.0).map(|point| Some(Point3::from(point))).to_vec())
             .collect();
         let offsets_s = [0.0, 0.5, -0.2];
         let mut films: Vec<Film> = Vec::new();
         for (nth, camera) in cameras.iter().enumerate() {
             let shots = times_s.iter().map(|time_s| {
-                let joints = walker(*time_s, 1.0).map(|it| {
-                    let at = camera.project(&Point3::from(it)).unwrap();
+                let joints = walker(*time_s, 1.0).map(|point| {
+                    let at = camera.project(&Point3::from(point)).unwrap();
                     Some(Joint {
                         at: [at.x, at.y],
                         score: 1.0,
                     })
                 });
                 // The sides of one camera are exchanged.
-                let other = |it: usize| if nth == 2 { sides()[it] } else { it };
+                let other = |joint: usize| if nth == 2 { sides()[joint] } else { joint };
                 let joints = (0..14).map(|i| joints[other(i)]).collect();
                 Shot {
                     time_s: time_s - offsets_s[nth],
@@ -175,6 +176,6 @@ mod tests {
         assert_eq!(worst[0].camera, 1);
         assert!((worst[0].time_s - 2.0).abs() < 1e-9, "{}", worst[0].time_s);
         assert!((worst[0].residual_px - 30.0).abs() < 0.01);
-        assert!(worst[1..].iter().all(|it| it.residual_px < 0.01));
+        assert!(worst[1..].iter().all(|misfit| misfit.residual_px < 0.01));
     }
 }

@@ -1,4 +1,4 @@
-//! What comes out of a calibration from people.
+//! Result of a calibration from people.
 
 use geometry::Camera;
 use nalgebra::{Point3, UnitVector3};
@@ -6,7 +6,7 @@ use nalgebra::{Point3, UnitVector3};
 use super::doubt::Doubt;
 use super::frame::Vertical;
 
-/// What came out for a camera.
+/// Result for a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraReport {
     /// Joints that took part.
@@ -21,13 +21,13 @@ pub struct CameraReport {
     pub sd: [f64; 2],
     /// Standard deviation of the focal length, pixels, where it was estimated.
     pub focal_sd_px: Option<f64>,
-    /// What halves of the recording differ by: degrees, metres.
+    /// Difference between halves of the recording: degrees, metres.
     pub halves: Option<[f64; 2]>,
-    /// What is added to its times, seconds, and the standard deviation.
+    /// Offset added to its times to have common ones, seconds, and the standard deviation.
     pub offset_s: [f64; 2],
 }
 
-/// What came out.
+/// Result of a calibration from people.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The cameras with their new poses; as given where there is no answer at all.
@@ -44,9 +44,9 @@ pub struct Outcome {
     pub reports: Vec<CameraReport>,
     /// Every reason not to use it.
     pub doubts: Vec<Doubt>,
-    /// What is to be known by whoever uses it: cameras that are known less well than is good.
+    /// Warnings about cameras that are known less well than is good.
     pub cautions: Vec<Doubt>,
-    /// Whether time offsets were found, the joints contradicting those that were given; else they are as given.
+    /// True if time offsets were found, the joints contradicting those that were given; else they are as given.
     pub clocks_are_found: bool,
     /// Instants that were looked at.
     pub n_instants: usize,

@@ -12,7 +12,7 @@ const CLEARLY: f64 = 4.0;
 /// The fewest joints with sides that are compared.
 pub(crate) const LEAST_JOINTS: usize = 4;
 
-/// What joints cost one way and the other.
+/// Costs of joints as named and with sides exchanged.
 #[derive(Default)]
 struct Costs {
     here: f64,
@@ -62,7 +62,8 @@ fn costs(
     sigmas_px: &[Vec<f64>],
     sides: &[usize],
 ) -> Costs {
-    let others = |it: &usize| *it != camera && seen[*it].iter().flatten().count() >= LEAST_JOINTS;
+    let others =
+        |other: &usize| *other != camera && seen[*other].iter().flatten().count() >= LEAST_JOINTS;
     let others: Vec<usize> = (0..cameras.len()).filter(others).collect();
     let mut costs = Costs::default();
     let sided = |joint: &usize| sides.get(*joint).is_some_and(|side| side != joint);
@@ -112,7 +113,7 @@ pub(crate) fn point(
 
 fn of_point(camera: &Camera, point: &Point3<f64>, both: [Sight; 2]) -> Option<[f64; 2]> {
     let image = camera.project(point)?;
-    Some(both.map(|it| (it.at - image).norm()))
+    Some(both.map(|sight| (sight.at - image).norm()))
 }
 
 /// Distances from the epipolar line, pixels of the second camera.
@@ -126,10 +127,10 @@ pub(crate) fn of_pair(
     let b_from_a = second.camera_from_world * first.camera_from_world.inverse();
     let essential = essential_of(&b_from_a);
     let at = normalised(first, &seen?.at);
-    Some(both.map(|it| {
+    Some(both.map(|sight| {
         let pair = Match {
             a: at,
-            b: normalised(second, &it.at),
+            b: normalised(second, &sight.at),
         };
         sampson(&pair, &essential).abs() * second.intrinsics.fx
     }))

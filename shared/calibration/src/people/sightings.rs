@@ -67,9 +67,9 @@ impl Chain {
     }
 
     fn sight(&self, joint: usize, time_s: f64) -> Option<Sight> {
-        let is_at = |it: &&Track| (it.span()[0]..=it.span()[1]).contains(&time_s);
+        let is_at = |track: &&Track| (track.span()[0]..=track.span()[1]).contains(&time_s);
         let mut tracks = self.tracks.iter().filter(is_at);
-        let (track, place) = tracks.find_map(|it| Some((it, it.place(joint, time_s)?)))?;
+        let (track, place) = tracks.find_map(|track| Some((track, track.place(joint, time_s)?)))?;
         Some(Sight {
             at: place.at.into(),
             speed: self.speed(track, joint, time_s),
@@ -90,7 +90,7 @@ impl Chain {
         (after - before) / (2.0 * self.interval_s)
     }
 
-    /// Whether the person of a track may be the one of this chain, and how long the gap is; less than 0 where both are seen at once.
+    /// Returns the gap before a track that this chain may continue with, seconds; less than 0 where both are seen at once.
     fn gap(&self, track: &Track, n_joints: usize) -> Option<f64> {
         let [[_, end], [begin, track_end]] = [self.span(), track.span()];
         let gap = begin - end;
@@ -99,16 +99,16 @@ impl Chain {
         (can_be && may_be).then_some(gap)
     }
 
-    /// Whether a track begins where the last one of the chain then is.
+    /// Returns true if a track begins where the last one of the chain then is.
     fn is_in_place(&self, track: &Track, n_joints: usize) -> bool {
         let Some(last) = self.tracks.last() else {
             return false;
         };
         // Where a joint is first seen, or last: not all are at the very end.
-        let near = |it: &Track, joint: usize, from_s: f64, sign: f64| {
+        let near = |track: &Track, joint: usize, from_s: f64, sign: f64| {
             let n = (LONGEST_OVERLAP_S / self.interval_s).ceil() as i32;
             let mut times = (0..=n).map(|nth| from_s + sign * self.interval_s * f64::from(nth));
-            let place = times.find_map(|time_s| it.place(joint, time_s));
+            let place = times.find_map(|time_s| track.place(joint, time_s));
             place.map(|place| Vector2::from(place.at))
         };
         let apart = (0..n_joints).filter_map(|joint| {
@@ -270,9 +270,12 @@ mod tests {
             shot.time_s = nth as f64 / 60.0;
             let joints = shot.people[0].joints.iter().enumerate();
             let other = |(joint, it): (usize, &Option<Joint>)| {
-                it.map(|it| Joint {
-                    at: [it.at[0] + if joint < 9 { away_px } else { 0.0 }, it.at[1]],
-                    ..it
+                it.map(|seen| Joint {
+                    at: [
+                        seen.at[0] + if joint < 9 { away_px } else { 0.0 },
+                        seen.at[1],
+                    ],
+                    ..seen
                 })
             };
             let other = Person {
@@ -317,7 +320,7 @@ mod tests {
                 let times = (5..295).map(|i| 0.1 * f64::from(i) + phase);
                 let each: Vec<Sight> = times.filter_map(|time| chain.sight(joint, time)).collect();
                 let n = each.len() as f64;
-                let middle = each.iter().map(|it| it.at.coords).sum::<Vector2<f64>>() / n;
+                let middle = each.iter().map(|sight| sight.at.coords).sum::<Vector2<f64>>() / n;
                 for it in &each {
                     let error = it.at.coords - middle;
                     both += error.dot(&it.speed);

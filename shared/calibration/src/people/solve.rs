@@ -45,7 +45,7 @@ impl Solved {
 /// Joints contradict the clocks that were given where they fit by this share better with others.
 const BETTER: f64 = 0.15;
 
-/// What is done about the clocks.
+/// Treatment of the clocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Clocks {
     /// They are as given.
@@ -54,7 +54,7 @@ pub(crate) enum Clocks {
     Found,
 }
 
-/// What is free.
+/// Free parameters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wanted {
     pub(crate) focal: bool,
@@ -76,7 +76,7 @@ pub(crate) fn with_clocks(
     let of = |clocks: Clocks| from(study, start.clone(), Wanted { focal, clocks });
     let found = of(Clocks::Found);
     if search {
-        return found.map(|it| (it, Clocks::Found));
+        return found.map(|solved| (solved, Clocks::Found));
     }
     let given = of(Clocks::Given);
     match (given, found) {

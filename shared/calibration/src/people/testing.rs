@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 pub(crate) const N_JOINTS: usize = 14;
 pub(crate) const RADIUS: f64 = 5.0;
 
-/// Of each joint the one on the other side.
+/// Returns the mirror of each joint on the other side of the body.
 pub(crate) fn sides() -> Vec<usize> {
     vec![5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13]
 }
@@ -136,7 +136,7 @@ pub(crate) fn walker(time_s: f64, size: f64) -> [[f64; 3]; N_JOINTS] {
     stepping(now, turn, TAU * 0.95 * way(time_s))
 }
 
-/// What the cameras and the finder of joints do to it.
+/// Flaws of the cameras and of the finder of joints.
 #[derive(Debug, Clone)]
 pub(crate) struct Flaws {
     pub(crate) seconds: f64,
@@ -199,8 +199,8 @@ impl Flaws {
                 if random.f64() < self.wrong {
                     at = at.map(|at| at + 250.0 * (random.f64() - 0.5));
                 }
-                let is_seen =
-                    random.f64() >= self.missing && at.iter().all(|it| (0.0..1000.0).contains(it));
+                let is_seen = random.f64() >= self.missing
+                    && at.iter().all(|coordinate| (0.0..1000.0).contains(coordinate));
                 is_seen.then_some(Joint { at, score: 0.9 })
             };
             let person = Person {

@@ -21,9 +21,9 @@ fn settings() -> Settings {
 /// Cameras whose poses say nothing.
 fn nowhere(cameras: &[Camera]) -> Vec<Camera> {
     let each = cameras.iter().cloned();
-    each.map(|it| Camera {
+    each.map(|camera| Camera {
         camera_from_world: nalgebra::Isometry3::identity(),
-        ..it
+        ..camera
     })
     .collect()
 }
@@ -67,7 +67,7 @@ fn the_height_of_the_person_and_the_feet_make_a_world() {
     // Shares of people's statures are means: the scale is known to a few percent.
     let heights = outcome.cameras.iter().zip(&truth);
     for (a, b) in heights {
-        let [a, b] = [a, b].map(|it| it.centre_in_world().z);
+        let [a, b] = [a, b].map(|camera| camera.centre_in_world().z);
         assert!((a - b).abs() < 0.15, "{a} m, not {b} m above the floor");
     }
     let across = Settings {
@@ -228,7 +228,7 @@ fn rings_are_found_and_no_wrong_answer_goes_unrefused() {
         turns.sort_by(f64::total_cmp);
         ways.sort_by(f64::total_cmp);
         assert!(refused <= N_SEEDS / 2, "{n}: {refused} refused");
-        let [turn, way] = [&turns, &ways].map(|it| it[it.len() / 2]);
+        let [turn, way] = [&turns, &ways].map(|sorted| sorted[sorted.len() / 2]);
         assert!(
             turn < 0.3 && way < 0.01,
             "{n}: {turn} degrees, {way} of the radius"

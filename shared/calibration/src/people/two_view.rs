@@ -72,7 +72,7 @@ pub(crate) fn relative(matches: &[Match], sigma: f64, random: &mut Rng) -> Optio
 
 fn judged(pose: Isometry3<f64>, cost: f64, matches: &[Match], sigma: f64) -> Relative {
     let essential = essential_of(&pose);
-    let good = |it: &&Match| sampson(it, &essential).abs() < 3.0 * sigma;
+    let good = |pair: &&Match| sampson(pair, &essential).abs() < 3.0 * sigma;
     let (mut n, mut angles) = (0, Vec::new());
     for it in matches.iter().filter(good) {
         if let Some((depths, angle)) = depths(&pose, it)
@@ -144,7 +144,7 @@ fn normaliser(points: &[Vector2<f64>; 8]) -> Option<Matrix3<f64>> {
     scale.is_finite().then_some(matrix)
 }
 
-/// Of the four poses of an essential matrix, the one with most matches in front of both cameras.
+/// Returns the pose with most matches in front of both cameras, among the four of an essential matrix.
 fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<Isometry3<f64>> {
     let svd = essential.svd(true, true);
     let (mut u, mut v_t) = (svd.u?, svd.v_t?);
@@ -175,8 +175,9 @@ fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<
         .take(60)
         .collect();
     let in_front = |pose: &Isometry3<f64>| {
-        let front =
-            |it: &&&Match| depths(pose, it).is_some_and(|it| it.0.iter().all(|depth| *depth > 0.0));
+        let front = |pair: &&&Match| {
+            depths(pose, pair).is_some_and(|found| found.0.iter().all(|depth| *depth > 0.0))
+        };
         good.iter().filter(front).count()
     };
     let best = poses.iter().max_by_key(|pose| in_front(pose))?;

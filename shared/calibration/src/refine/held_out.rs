@@ -17,7 +17,7 @@ const CERTAIN: f64 = 2.0;
 /// A block has at least so many joints.
 const LEAST: usize = 20;
 
-/// Of each camera the chain that fits what the others see, by the rig that is given.
+/// Returns for each camera the chain that fits the other cameras best, by the rig that is given.
 pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     let choice = |(camera, chain): (usize, usize)| Choice {
         chain,
@@ -38,11 +38,11 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
         };
         let all: Vec<(f64, usize)> =
             (0..n).map(|i| if i == anchor { (0.0, chain) } else { with(i) }).collect();
-        let sum: f64 = all.iter().map(|it| it.0).sum();
+        let sum: f64 = all.iter().map(|fit| fit.0).sum();
         (sum, all)
     });
     let best = followed.min_by(|a, b| a.0.total_cmp(&b.0));
-    let chains = best.map_or_else(|| vec![(0.0, 0); n], |it| it.1);
+    let chains = best.map_or_else(|| vec![(0.0, 0); n], |best| best.1);
     let chains = chains.iter().enumerate();
     chains.map(|(camera, it)| choice((camera, it.1))).collect()
 }
@@ -77,9 +77,9 @@ fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) 
 /// Distances of joints from where the other cameras see them, by block of time, before and after.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
-    /// Of each block the mean robust costs.
+    /// Mean robust costs of each block.
     costs: BTreeMap<i64, [f64; 2]>,
-    /// Of each camera all distances, pixels.
+    /// All distances of each camera, pixels.
     distances: Vec<[Vec<f64>; 2]>,
 }
 
@@ -111,7 +111,7 @@ impl Blocks {
                         let away = match &others[..] {
                             [only] => {
                                 of_pair(cameras, [*only, camera], instant[*only][joint], [it; 2])
-                                    .map(|it| it[0])
+                                    .map(|distances| distances[0])
                             }
                             many => point(cameras, instant, many, joint, &sigmas_px)
                                 .and_then(|point| cameras[camera].project(&point))
@@ -127,7 +127,7 @@ impl Blocks {
             }
         }
         for (block, both) in sums {
-            if both.iter().all(|it| it.1 >= LEAST) {
+            if both.iter().all(|sum| sum.1 >= LEAST) {
                 self.costs.insert(block, both.map(|(sum, n)| sum / n as f64));
             }
         }
@@ -135,13 +135,15 @@ impl Blocks {
 
     /// Median distances of a camera, pixels: before and after.
     pub(super) fn of_camera(&self, camera: usize) -> [f64; 2] {
-        let of = |it: &Vec<f64>| Sorted::new(it.clone()).upper_median().unwrap_or(f64::NAN);
+        let of = |distances: &Vec<f64>| {
+            Sorted::new(distances.clone()).upper_median().unwrap_or(f64::NAN)
+        };
         self.distances.get(camera).map_or([f64::NAN; 2], |distance| {
             [of(&distance[0]), of(&distance[1])]
         })
     }
 
-    /// Whether the new rig is better.
+    /// Decides if the new rig is better.
     pub(super) fn judge(&self, outcome: &mut Outcome) {
         let all = |nth: usize| {
             let each = self.distances.iter().flat_map(|distance| distance[nth].iter().copied());

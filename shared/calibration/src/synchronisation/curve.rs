@@ -37,8 +37,8 @@ impl Grid {
             let to = ((track.span[1] / STEP_S).floor() as i64).min(last);
             for index in from..=to {
                 let time_s = index as f64 * STEP_S;
-                let joint = |it: usize| {
-                    let place = track.place(it, time_s);
+                let joint = |joint: usize| {
+                    let place = track.place(joint, time_s);
                     place.map_or(([0.0; 2], 0.0), |place| (place.at, place.weight))
                 };
                 let joints: Vec<_> = (0..n_joints).map(joint).collect();
@@ -55,7 +55,7 @@ impl Grid {
 
     fn at(&self, index: i64) -> &[Standing] {
         let nth = usize::try_from(index - self.first).ok();
-        nth.and_then(|nth| self.columns.get(nth)).map_or(&[], |it| it)
+        nth.and_then(|nth| self.columns.get(nth)).map_or(&[], |column| column)
     }
 }
 
@@ -66,7 +66,7 @@ pub(crate) struct Costs {
     pub(crate) time_s: f64,
     /// By offset; not a number where the second camera sees nobody.
     each: Vec<f32>,
-    /// Of the offsets that have one.
+    /// Mean over the offsets that have a cost.
     mean: f64,
 }
 
@@ -78,7 +78,7 @@ impl Costs {
     }
 }
 
-/// What the offsets between the clocks of two cameras cost.
+/// Cost of every offset between the clocks of two cameras.
 #[expect(
     clippy::partial_pub_fields,
     reason = "the samples are what the search works with; all else is read outside"
@@ -136,10 +136,10 @@ impl Curve {
                 }
             }
         }
-        (!samples.is_empty()).then(|| Self::of(numbers, half, samples))
+        (!samples.is_empty()).then(|| Self::from_samples(numbers, half, samples))
     }
 
-    fn of(cameras: [usize; 2], half: i64, samples: Vec<Costs>) -> Self {
+    fn from_samples(cameras: [usize; 2], half: i64, samples: Vec<Costs>) -> Self {
         let n_offsets = (2 * half + 1) as usize;
         let mut it = Self {
             cameras,
@@ -181,7 +181,7 @@ impl Curve {
 impl Epipolar {
     /// The mean cost of the joints that two people have both; none where these are too few.
     fn costs(&self, a: &Standing, b: &Standing, mirror: Option<&[usize]>) -> Option<f64> {
-        let plain = self.costs_of(a, b, |it| it)?;
+        let plain = self.costs_of(a, b, |joint| joint)?;
         let Some(mirror) = mirror else {
             return Some(plain);
         };

@@ -175,7 +175,7 @@ struct Worded<'a> {
 
 impl fmt::Display for Worded<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
+        let name = |camera: &usize| self.names.get(*camera).map_or("?", |name| name);
         match self.doubt {
             Doubt::NoPeople {
                 camera,
@@ -227,7 +227,7 @@ impl fmt::Display for Worded<'_> {
 impl Worded<'_> {
     /// Too little that tells, or nothing that fits.
     fn fit(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
+        let name = |camera: &usize| self.names.get(*camera).map_or("?", |name| name);
         match self.doubt {
             Doubt::Flat {
                 camera,
@@ -266,9 +266,9 @@ impl Worded<'_> {
         }
     }
 
-    /// What contradicts itself.
+    /// Writes a contradiction.
     fn contradiction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
+        let name = |camera: &usize| self.names.get(*camera).map_or("?", |name| name);
         match self.doubt {
             Doubt::Pair {
                 cameras: [a, b],
@@ -310,9 +310,9 @@ impl Worded<'_> {
         }
     }
 
-    /// What was heard.
+    /// Writes a doubt about sounds.
     fn sound(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |it: &usize| self.names.get(*it).map_or("?", |name| name);
+        let name = |camera: &usize| self.names.get(*camera).map_or("?", |name| name);
         match self.doubt {
             Doubt::Quiet { camera, n, least } => write!(
                 f,

@@ -32,7 +32,7 @@ pub struct Settings {
     pub reference: usize,
     /// Offsets between two cameras are searched up to this, both ways, seconds.
     pub window_s: f64,
-    /// Of each joint the one on the other side of the body, where the finder of joints may have exchanged sides.
+    /// The mirror of each joint on the other side of the body, where the finder of joints may have exchanged sides.
     pub mirror: Option<Vec<usize>>,
     /// Number of joints of a person.
     pub n_joints: usize,
@@ -41,7 +41,7 @@ pub struct Settings {
 /// The clock of one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraClock {
-    /// What is added to its times at its time 0, seconds.
+    /// Offset added to its times to have common ones, at its time 0, seconds.
     pub offset_s: f64,
     /// Standard error of the offset in the middle of the footage, seconds; infinite where nothing is known.
     pub error_s: f64,
@@ -58,7 +58,7 @@ pub struct CameraClock {
     pub after_px: f64,
 }
 
-/// What a pair of cameras tells by itself.
+/// Result for a pair of cameras alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairReport {
     /// The cameras, by number.
@@ -75,7 +75,7 @@ pub struct PairReport {
     pub n: usize,
 }
 
-/// What came out.
+/// Result of a synchronisation.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// One for each camera, in order.
@@ -122,7 +122,7 @@ pub fn estimate(
         }
     }
     let mut active: Vec<usize> = (0..cameras.len()).filter(|i| seen[*i] >= LEAST_SEEN_S).collect();
-    active.sort_by_key(|it| *it != settings.reference);
+    active.sort_by_key(|camera| *camera != settings.reference);
     let study = Study {
         cameras,
         tracks: &tracks,
@@ -230,7 +230,7 @@ impl Study<'_> {
         let n_joints = self.settings.n_joints;
         let grids = |span: [f64; 2]| -> Vec<Grid> {
             let each = self.tracks.iter();
-            each.map(|it| Grid::new(it, n_joints, span)).collect()
+            each.map(|tracks| Grid::new(tracks, n_joints, span)).collect()
         };
         let (firsts, seconds) = (grids(searched), grids(wide));
         let mirror = self.settings.mirror.as_deref();
@@ -269,7 +269,7 @@ impl Study<'_> {
     /// How fast people move at a time, sizes of them per second, over all cameras.
     fn movement(&self, time_s: f64) -> f64 {
         let all = self.active.iter().flat_map(|i| &self.tracks[*i]);
-        let alive = all.filter(|it| it.span[0] <= time_s && time_s <= it.span[1]);
+        let alive = all.filter(|track| track.span[0] <= time_s && time_s <= track.span[1]);
         let of_track = |track: &Track| -> f64 {
             let joints = (0..self.settings.n_joints).filter_map(|joint| track.place(joint, time_s));
             let speeds = joints.map(|place| place.speed[0].hypot(place.speed[1]) / track.size);
@@ -358,9 +358,9 @@ impl Study<'_> {
                 all_known.then_some(errors),
             );
         }
-        let start = fit.clocks.iter().zip(&drifting).map(|(it, drifts)| Clock {
-            drift: if *drifts { it.drift } else { 0.0 },
-            ..*it
+        let start = fit.clocks.iter().zip(&drifting).map(|(clock, drifts)| Clock {
+            drift: if *drifts { clock.drift } else { 0.0 },
+            ..*clock
         });
         let start: Vec<Clock> = start.collect();
         (problem.refine(&start, span, &drifting), Some(errors))

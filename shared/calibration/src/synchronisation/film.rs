@@ -1,6 +1,6 @@
-//! What the cameras saw.
+//! Films: people in the pictures of every camera.
 
-/// What one camera saw, by its own clock.
+/// Pictures of one camera, by its own clock.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Film {
     /// Its pictures, in the order of their times.

@@ -52,20 +52,20 @@ impl Clock {
     }
 }
 
-/// What is refined.
+/// Input of the refinement.
 pub(crate) struct Problem<'a> {
-    /// Of every camera.
+    /// Tracks of every camera.
     pub(crate) tracks: &'a [Vec<Track>],
     /// Every pair that has an epipolar constraint, both ways.
     pub(crate) pairs: Vec<([usize; 2], Epipolar)>,
     /// The camera whose clock is the common one.
     pub(crate) reference: usize,
-    /// Of each joint the one on the other side, where sides may be exchanged.
+    /// The mirror of each joint on the other side, where sides may be exchanged.
     pub(crate) mirror: Option<&'a [usize]>,
     pub(crate) n_joints: usize,
 }
 
-/// What came out.
+/// Result of the refinement.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub(crate) clocks: Vec<Clock>,
@@ -99,7 +99,7 @@ struct Timed {
     block: i64,
 }
 
-/// What all pairs cost near some clocks.
+/// Costs of all pairs near given clocks.
 struct Table {
     pieces: Vec<Piece>,
     /// Cameras, residual in expected errors, and in pixels.
@@ -120,13 +120,13 @@ impl Problem<'_> {
             let known = fit.errors.iter().map(|error| error[0]);
             let error = known.filter(|value| value.is_finite()).fold(0.0, f64::max);
             from.clone_from(&fit.clocks);
-            if error > 0.0 && best.as_ref().is_none_or(|it| error < it.0) {
+            if error > 0.0 && best.as_ref().is_none_or(|best| error < best.0) {
                 best = Some((error, fit));
             }
         }
         best.map_or_else(
             || self.refine_at(start, span, drifts, REACHES_S[2]),
-            |it| it.1,
+            |best| best.1,
         )
     }
 
@@ -168,7 +168,7 @@ impl Problem<'_> {
     pub(crate) fn residuals(&self, clocks: &[Clock], span: [f64; 2]) -> Vec<Residuals> {
         let table = self.table(clocks, span, REACHES_S[3]);
         let each = 0..clocks.len();
-        each.map(|it| residuals(&table.residuals, it)).collect()
+        each.map(|camera| residuals(&table.residuals, camera)).collect()
     }
 
     /// All joints in all pairs, at the times that the clocks tell.
@@ -244,7 +244,7 @@ impl Problem<'_> {
                 }
             }
         }
-        let found = best.and_then(|it| Some((it.1, self.sides(it.2)?)));
+        let found = best.and_then(|best| Some((best.1, self.sides(best.2)?)));
         let Some((other, other_of)) = found else {
             return Vec::new();
         };
@@ -259,7 +259,7 @@ impl Problem<'_> {
                 Some((residual, a.weight * b.weight))
             };
             let (now, weight) = at(0)?;
-            let residuals = (-HALF..=HALF).map(|it| Some(at(it)?.0.value));
+            let residuals = (-HALF..=HALF).map(|delay| Some(at(delay)?.0.value));
             let row = Row {
                 residual: now.value,
                 px: now.px,
@@ -280,7 +280,7 @@ impl Problem<'_> {
 }
 
 fn alive(tracks: &[Track], time_s: f64) -> impl Iterator<Item = &Track> {
-    let is_there = move |it: &&Track| it.span[0] <= time_s && time_s <= it.span[1];
+    let is_there = move |track: &&Track| track.span[0] <= time_s && time_s <= track.span[1];
     tracks.iter().filter(is_there)
 }
 
@@ -306,7 +306,7 @@ fn mean_cost(
     (n >= LEAST_JOINTS).then(|| sum / weights)
 }
 
-/// Of every pair the variance of the biases of its joints: what their medians vary by more than those of joints without bias do.
+/// Returns for every pair the variance of the biases of its joints: by how much their medians vary more than without bias.
 fn spreads(n_pairs: usize, biased: &BTreeMap<(usize, usize, i64), Vec<Timed>>) -> Vec<f64> {
     let mut found: Vec<Vec<[f64; 2]>> = vec![Vec::new(); n_pairs];
     for ((pair, ..), rows) in biased {
@@ -316,7 +316,7 @@ fn spreads(n_pairs: usize, biased: &BTreeMap<(usize, usize, i64), Vec<Timed>>) -
         ]);
     }
     let spread = |of_pair: &Vec<[f64; 2]>| {
-        let median = |axis: usize| median(of_pair.iter().map(|it| it[axis]).collect());
+        let median = |axis: usize| median(of_pair.iter().map(|numbers| numbers[axis]).collect());
         ((NORMAL * median(0)).powi(2) - median(1)).max(0.0)
     };
     found.iter().map(spread).collect()
@@ -333,7 +333,7 @@ fn variance_of_median(rows: &[Timed]) -> f64 {
     sigma * sigma / n.max(1.0)
 }
 
-/// What is taken from the residuals of a joint of a pair for its bias, over the delay of the second camera, expected errors.
+/// Returns the bias to subtract from the residuals of a joint of a pair, over the delay of the second camera, expected errors.
 ///
 /// The mean of the residuals has the variance of their errors and that of biases; what is left of it counts as much as that says.
 ///
@@ -362,7 +362,7 @@ fn filled(costs: &[Option<f64>]) -> Option<Vec<f64>> {
         return None;
     }
     let between = |nth: usize| {
-        let after = known.partition_point(|it| it.0 < nth);
+        let after = known.partition_point(|entry| entry.0 < nth);
         let (to, at_end) = *known.get(after)?;
         if to == nth {
             return Some(at_end);
@@ -375,7 +375,7 @@ fn filled(costs: &[Option<f64>]) -> Option<Vec<f64>> {
 }
 
 fn residuals(all: &[([usize; 2], f64, f64)], camera: usize) -> Residuals {
-    let of_camera = all.iter().filter(|it| it.0.contains(&camera));
+    let of_camera = all.iter().filter(|residual| residual.0.contains(&camera));
     let median = |of: fn(&([usize; 2], f64, f64)) -> f64| {
         let mut each: Vec<f64> = of_camera.clone().map(of).collect();
         each.sort_by(f64::total_cmp);
@@ -383,7 +383,7 @@ fn residuals(all: &[([usize; 2], f64, f64)], camera: usize) -> Residuals {
     };
     Residuals {
         n: of_camera.clone().count(),
-        median: median(|it| it.1.abs()),
-        median_px: median(|it| (it.1 * it.2).abs()),
+        median: median(|residual| residual.1.abs()),
+        median_px: median(|residual| (residual.1 * residual.2).abs()),
     }
 }

@@ -26,10 +26,10 @@ pub(crate) struct Rival {
     pub(crate) t: f64,
 }
 
-/// What the search found.
+/// Result of the search.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
-    /// Of each camera, seconds; 0 for the reference.
+    /// Offset of each camera, seconds; 0 for the reference.
     pub(crate) offsets_s: Vec<f64>,
     /// One for every division, the most doubtful first.
     pub(crate) rivals: Vec<Rival>,
@@ -60,11 +60,11 @@ pub(crate) fn search(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Fo
             }
         }
         let value = total(curves, &offsets_s);
-        if best.as_ref().is_none_or(|it| value > it.0) {
+        if best.as_ref().is_none_or(|best| value > best.0) {
             best = Some((value, offsets_s));
         }
     }
-    let mut offsets_s = best.map_or_else(|| vec![0.0; n_cameras], |it| it.1);
+    let mut offsets_s = best.map_or_else(|| vec![0.0; n_cameras], |best| best.1);
     let zero = active.first().map_or(0.0, |active| offsets_s[*active]);
     for it in &mut offsets_s {
         *it -= zero;
@@ -85,7 +85,7 @@ fn groups(active: &[usize]) -> Vec<Vec<usize>> {
     }
     let chosen = |bits: usize| {
         let each = others.iter().enumerate();
-        each.filter(|(nth, _)| bits >> nth & 1 == 1).map(|it| *it.1).collect()
+        each.filter(|(nth, _)| bits >> nth & 1 == 1).map(|other| *other.1).collect()
     };
     (1..1_usize << others.len()).map(chosen).collect()
 }
@@ -152,10 +152,10 @@ fn other_peak(values: &[f64], best: usize) -> Option<usize> {
     let is_below = |i: &usize| values[*i] < BASIN * values[best];
     let after = (best..=last).find(is_below).unwrap_or(last);
     let before = (0..=best).rev().find(is_below).unwrap_or(0);
-    let is_peak = |it: &usize| {
-        let near = it.saturating_sub(NEAR)..=(it + NEAR).min(last);
+    let is_peak = |i: &usize| {
+        let near = i.saturating_sub(NEAR)..=(i + NEAR).min(last);
         // A flank of the basin is no peak: what is beside it on the way to the best is higher.
-        near.clone().all(|other| values[other] <= values[*it])
+        near.clone().all(|other| values[other] <= values[*i])
     };
     let others = (0..=before).chain(after..=last);
     let others = others.filter(|other| *other != best && is_peak(other));
@@ -188,7 +188,7 @@ struct Joint<'a> {
 impl<'a> Joint<'a> {
     fn new(curves: &'a [Curve], group: &[usize], offsets_s: &[f64]) -> Self {
         let crosses =
-            |it: &&Curve| group.contains(&it.cameras[0]) != group.contains(&it.cameras[1]);
+            |curve: &&Curve| group.contains(&curve.cameras[0]) != group.contains(&curve.cameras[1]);
         let crossing = curves.iter().filter(crosses);
         let crossing: Vec<_> = crossing
             .map(|crossing| {
@@ -223,7 +223,7 @@ impl<'a> Joint<'a> {
     }
 
     fn best(&self) -> (i64, f64) {
-        let each = (-self.half..=self.half).map(|it| (it, self.value(it)));
+        let each = (-self.half..=self.half).map(|offset| (offset, self.value(offset)));
         each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
     }
 
@@ -231,7 +231,7 @@ impl<'a> Joint<'a> {
     fn blocks(&self, by: i64) -> Vec<[f64; 2]> {
         let mut blocks = std::collections::BTreeMap::<(usize, i64), [f64; 2]>::new();
         for (number, &(curve, now, sign)) in self.crossing.iter().enumerate() {
-            let entries = [now, now + sign * by].map(|it| usize::try_from(it).ok());
+            let entries = [now, now + sign * by].map(|index| usize::try_from(index).ok());
             for sample in &curve.samples {
                 let block = (sample.time_s / BLOCK_S).floor() as i64;
                 let sums = blocks.entry((number, block)).or_default();
@@ -247,7 +247,7 @@ impl<'a> Joint<'a> {
 /// The second-best offset of a group.
 fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
     let joint = Joint::new(curves, group, offsets_s);
-    let values: Vec<f64> = (-joint.half..=joint.half).map(|it| joint.value(it)).collect();
+    let values: Vec<f64> = (-joint.half..=joint.half).map(|offset| joint.value(offset)).collect();
     let now = joint.half as usize;
     let best = values.get(now).copied().unwrap_or(0.0);
     let other = other_peak(&values, now);

@@ -32,12 +32,12 @@ const LEAST_COSINE: f64 = 0.2;
 const LEAST_CONTRAST: f64 = 8.0;
 /// How good the second best offset may be, as a share of the best.
 const MOST_RATIO: f64 = 0.75;
-/// What pairs may contradict each other by beside the way of the sound, seconds.
+/// Largest contradiction between pairs beside the way of the sound, seconds.
 const SPARE_S: f64 = 0.01;
 /// Length of the part that is searched in full, seconds.
 const SEARCHED_S: f64 = 60.0;
 
-/// What the microphone of a camera recorded.
+/// Recording of the microphone of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sound {
     /// Samples a second.
@@ -80,7 +80,7 @@ struct Study<'a> {
     settings: &'a SoundSettings,
 }
 
-/// What two cameras heard together.
+/// Sounds that two cameras heard together.
 struct Pair {
     cameras: [usize; 2],
     found: Match,
@@ -125,12 +125,12 @@ impl Study<'_> {
             doubts.extend(drift.doubt(camera));
         }
         let length_s = self.heard.iter().map(Beginnings::length_s);
-        let camera = |it: usize| CameraClock {
-            offset_s: drifts[it].offset_s(offsets_s[it]),
-            error_s: self.error_s(it),
-            drift: drifts[it].sure(),
-            drift_error: drifts[it].error(),
-            n: shared(&pairs, it),
+        let camera = |camera: usize| CameraClock {
+            offset_s: drifts[camera].offset_s(offsets_s[camera]),
+            error_s: self.error_s(camera),
+            drift: drifts[camera].sure(),
+            drift_error: drifts[camera].error(),
+            n: shared(&pairs, camera),
             before_px: f64::NAN,
             after_px: f64::NAN,
         };
@@ -224,20 +224,20 @@ impl Study<'_> {
         (0..n).map(offset).collect()
     }
 
-    /// What forbids to use the offsets.
+    /// Adds reasons not to use the offsets.
     fn doubt(&self, pairs: &[Pair], offsets_s: &[Option<f64>], doubts: &mut Vec<Doubt>) {
         for (camera, offset_s) in offsets_s.iter().enumerate() {
             if self.heard[camera].n() < LEAST {
                 continue;
             }
             match offset_s {
-                None => doubts.extend(best(pairs, camera).map(|it| Doubt::Unheard {
-                    cameras: it.cameras,
-                    n: it.found.n,
+                None => doubts.extend(best(pairs, camera).map(|pair| Doubt::Unheard {
+                    cameras: pair.cameras,
+                    n: pair.found.n,
                     least: LEAST,
-                    cosine: it.found.cosine,
+                    cosine: pair.found.cosine,
                     least_cosine: LEAST_COSINE,
-                    ratio: it.found.ratio(),
+                    ratio: pair.found.ratio(),
                     most_ratio: MOST_RATIO,
                 })),
                 Some(offset_s) if offset_s.abs() >= self.settings.window_s - 2.0 * HOP_S => {
@@ -257,7 +257,7 @@ impl Study<'_> {
             };
             let away_s = it.found.offset_s - (of_a - of_b);
             let reference = self.settings.reference;
-            let ways = [[a, b], [a, reference], [b, reference]].map(|it| self.way_s(it));
+            let ways = [[a, b], [a, reference], [b, reference]].map(|pair| self.way_s(pair));
             let most_s = ways.iter().sum::<f64>() + SPARE_S;
             if away_s.abs() > most_s {
                 doubts.push(Doubt::Heard {
@@ -273,7 +273,7 @@ impl Study<'_> {
 /// Beginnings that a camera shares with the one with which it shares most.
 fn shared(pairs: &[Pair], camera: usize) -> usize {
     let own = pairs.iter().filter(|pair| pair.cameras.contains(&camera));
-    own.map(|it| it.found.n).max().unwrap_or(0)
+    own.map(|pair| pair.found.n).max().unwrap_or(0)
 }
 
 /// The pair of a camera that fits best.

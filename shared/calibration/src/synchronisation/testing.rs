@@ -97,7 +97,7 @@ pub(crate) fn walker(time_s: f64) -> [[f64; 3]; N_JOINTS] {
     stepping(now, turn, core::f64::consts::TAU * 0.95 * way(time_s), 1.0)
 }
 
-/// What the cameras do to it.
+/// Effects of the cameras on the scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Recording {
     pub(crate) rates_hz: Vec<f64>,
@@ -194,7 +194,7 @@ impl Recording {
     }
 }
 
-/// Of each joint the one on the other side.
+/// Returns the mirror of each joint on the other side of the body.
 pub(crate) fn mirror() -> [usize; N_JOINTS] {
     [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13]
 }

@@ -204,7 +204,7 @@ fn seen(person: &Person, camera: &Camera, n_joints: usize, least_size: f64) -> O
         return None;
     }
     let extent = |axis: usize| {
-        let each = known.clone().map(|it| it.0[axis]);
+        let each = known.clone().map(|joint| joint.0[axis]);
         let [from, to] = each.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], it| {
             [from.min(it), to.max(it)]
         });
@@ -278,8 +278,11 @@ fn middle(samples: &[Sample]) -> Option<Sample> {
         (n > 0).then(|| f64::midpoint(each[(n - 1) / 2], each[n / 2]))
     };
     Some(Sample {
-        time_s: median(|it| it.time_s)?,
-        at: [median(|it| it.at[0])?, median(|it| it.at[1])?],
+        time_s: median(|sample| sample.time_s)?,
+        at: [
+            median(|sample| sample.at[0])?,
+            median(|sample| sample.at[1])?,
+        ],
         score: 1.0,
     })
 }

@@ -62,12 +62,12 @@ pub struct Cameras {
     first: Vec<usize>,
 }
 
-/// What the derivative of a term by its point is.
+/// Derivatives of a term by its point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observed {
     /// Derivative of the residuals (in standard deviations) by the point in the world (metres).
     pub by_point: Matrix2x3<f64>,
-    /// Whether the point has an image; if not, the derivatives are 0.
+    /// True if the point has an image; if not, the derivatives are 0.
     pub has_image: bool,
 }
 

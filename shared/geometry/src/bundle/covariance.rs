@@ -79,7 +79,7 @@ pub fn clustered<P: Problem>(
     let mut clusters = Vec::new();
     let mut weights = [0.0; 2];
     for cluster in 0..n_clusters {
-        let equations = Equations::of(problem, |it| cluster_of.get(it) == Some(&cluster));
+        let equations = Equations::of(problem, |local| cluster_of.get(local) == Some(&cluster));
         weights = [0, 1].map(|i| weights[i] + equations.weights[i]);
         clusters.push(equations.reduced(0.0).ok_or(Undetermined::NotFinite)?);
     }
@@ -138,7 +138,7 @@ fn inverse<P: Problem>(
     }))
 }
 
-/// What the terms tell of the shared parameters, all local blocks being unknown: the inverse of the covariance.
+/// Returns the information of the terms on the shared parameters, all local blocks being unknown: the inverse of the covariance.
 fn information<P: Problem>(problem: &P) -> Option<DMatrix<f64>> {
     let reduced = Equations::new(problem).reduced(0.0)?;
     let is_finite = reduced.matrix.iter().all(|value| value.is_finite());

@@ -60,11 +60,17 @@ fn compared<P: Problem>(
 ) -> f64 {
     let back = Step {
         shared: by.shared.iter().map(|shared| -shared).collect(),
-        locals: by.locals.iter().map(|local| local.iter().map(|it| -it).collect()).collect(),
+        locals: by
+            .locals
+            .iter()
+            .map(|local| local.iter().map(|value| -value).collect())
+            .collect(),
     };
     let analytic = terms(problem, local, of);
-    let forwards = terms(&problem.moved(by), local, &|it| it.residuals().to_vec());
-    let backwards = terms(&problem.moved(&back), local, &|it| it.residuals().to_vec());
+    let forwards = terms(&problem.moved(by), local, &|term| term.residuals().to_vec());
+    let backwards = terms(&problem.moved(&back), local, &|term| {
+        term.residuals().to_vec()
+    });
     let each = analytic.iter().zip(forwards.iter().zip(&backwards));
     each.map(|(analytic, (a, b))| {
         let numeric = (a - b) / (2.0 * step);

@@ -12,7 +12,7 @@ const LEAST_DIAGONAL: f64 = 1e-12;
 struct Block {
     /// The shared parameters that it touches.
     shared: Vec<usize>,
-    /// Of the block with itself.
+    /// Product of the block with itself.
     own: DMatrix<f64>,
     /// Row = coordinate of the block, column = shared parameter.
     across: DMatrix<f64>,
@@ -73,7 +73,7 @@ impl Equations {
         // Where each shared parameter is among those of the block; n: nowhere.
         let mut places = vec![n; n];
         let each = problem.locals().into_iter().enumerate();
-        for (local, size) in each.filter(|it| is_wanted(it.0)) {
+        for (local, size) in each.filter(|block| is_wanted(block.0)) {
             let block = all.block(problem, local, size, &mut places);
             for parameter in &block.shared {
                 places[*parameter] = n;
@@ -193,7 +193,7 @@ impl Equations {
         };
         let each = self.blocks.iter().zip(&reduced.factors);
         let of_block = |(block, factor): (&Block, &Cholesky<f64, Dyn>)| {
-            let known = block.shared.iter().map(|it| shared[*it]);
+            let known = block.shared.iter().map(|parameter| shared[*parameter]);
             let known = DVector::from_iterator(block.shared.len(), known);
             let right = -(&block.gradient + &block.across * known);
             factor.solve(&right).iter().copied().collect()

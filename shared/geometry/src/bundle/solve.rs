@@ -57,7 +57,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Whether a minimum was found.
+    /// Returns true if a minimum was found.
     pub fn is_converged(&self) -> bool {
         matches!(self.stopped, Stopped::Converged | Stopped::NoDescent)
     }

@@ -1,14 +1,14 @@
 //! One term of the sum: residuals, their derivatives, and a loss.
 
-/// What a residual costs, by s, the squared length of a term's residuals (which are in standard deviations).
+/// Cost of a residual, by s, the squared length of a term's residuals (which are in standard deviations).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Loss {
     /// s: least squares.
     #[default]
     Square,
-    /// Of width k: s up to k², from there on 2 k √s - k² (Huber 1964).
+    /// Loss of width k: s up to k², from there on 2 k √s - k² (Huber 1964).
     Huber(f64),
-    /// Of width k: k² ln(1 + s / k²) (Cauchy). What is far off has next to no weight.
+    /// Loss of width k: k² ln(1 + s / k²) (Cauchy). Outliers have next to no weight.
     Cauchy(f64),
 }
 
@@ -47,7 +47,7 @@ impl Loss {
 pub struct Term {
     pub(super) residuals: Vec<f64>,
     pub(super) loss: Loss,
-    /// What it counts as.
+    /// Its weight.
     share: f64,
     /// Shared parameters, and their columns one after the other.
     pub(super) shared: Vec<usize>,

@@ -194,7 +194,7 @@ fn focal_lengths_and_lenses_are_found_with_the_poses() {
     let truth = Cloud::new(4, 200, BROWN, free);
     let (found, report) = solve(truth.disturbed(), &Settings::default());
     assert!(report.cost_after < 1e-8, "{report:?}");
-    let [a, b] = [&truth, &found].map(|it| it.cameras.cameras()[2].intrinsics);
+    let [a, b] = [&truth, &found].map(|cloud| cloud.cameras.cameras()[2].intrinsics);
     assert!((a.fx - b.fx).abs() < 1e-3, "{} {}", a.fx, b.fx);
     assert!((a.cy - b.cy).abs() < 1e-3, "{} {}", a.cy, b.cy);
 }
@@ -235,7 +235,7 @@ fn the_covariance_is_how_answers_spread() {
             *it += 0.5 * Vector2::new(normal(), normal());
         }
         let (found, _) = solve(noisy, &Settings::default());
-        let [a, b] = [&truth, &found].map(|it| it.cameras.cameras()[2].centre_in_world());
+        let [a, b] = [&truth, &found].map(|cloud| cloud.cameras.cameras()[2].centre_in_world());
         spread += (a.y - b.y).powi(2) / f64::from(n);
     }
     // A variance of 60 is known to 18 %, three of which are allowed for.
@@ -265,7 +265,7 @@ fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
             }
         }
         let (found, _) = solve(noisy, &Settings::default());
-        let [a, b] = [&truth, &found].map(|it| it.cameras.cameras()[2].centre_in_world());
+        let [a, b] = [&truth, &found].map(|cloud| cloud.cameras.cameras()[2].centre_in_world());
         spread += (a.y - b.y).powi(2);
         let known = clustered(&found, &cluster_of).unwrap().unwrap();
         by_clusters += known.sd(place).powi(2);
@@ -303,7 +303,7 @@ fn a_point_that_one_camera_alone_sees_tells_nothing_and_harms_nothing() {
     let truth = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
     let mut lonely = truth.clone();
     lonely.seen[3] = vec![None, lonely.seen[3][1], None];
-    let [all, less] = [&truth, &lonely].map(|it| covariance(it).unwrap().sd(3));
+    let [all, less] = [&truth, &lonely].map(|cloud| covariance(cloud).unwrap().sd(3));
     assert!(less >= all && less < 1.2 * all, "{less} {all}");
     let (_, report) = solve(lonely.disturbed(), &Settings::default());
     assert!(report.cost_after < 1e-8, "{report:?}");

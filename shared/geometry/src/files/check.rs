@@ -78,7 +78,7 @@ fn check_intrinsics(camera: &Camera, findings: &mut Vec<Finding>) {
     findings.extend(lens_range(camera).or_else(|| lens_strength(camera)));
 }
 
-/// Whether every pixel has a ray: checked on a grid and in the corners.
+/// Finds a pixel without a ray: checked on a grid and in the corners.
 fn lens_range(camera: &Camera) -> Option<Finding> {
     const STEPS: usize = 16;
     let [width, height] = camera.intrinsics.size.map(f64::from);
@@ -97,7 +97,7 @@ fn lens_range(camera: &Camera) -> Option<Finding> {
     })
 }
 
-/// Whether the distortion changes the angle of a corner to the axis by more than a factor of two.
+/// Finds a distortion that changes the angle of a corner to the axis by more than a factor of two.
 fn lens_strength(camera: &Camera) -> Option<Finding> {
     let [width, height] = camera.intrinsics.size.map(f64::from);
     let ratio = |[bent, straight]: [f64; 2]| bent / straight;
@@ -113,7 +113,8 @@ fn lens_strength(camera: &Camera) -> Option<Finding> {
         let bent = camera.undistort(&at)?.coords.norm();
         Some([bent, straight].map(|tangent| tangent.atan().to_degrees()))
     });
-    let is_implausible = |it: &[f64; 2]| it[1] > 0.1 && !(0.5..=2.0).contains(&ratio(*it));
+    let is_implausible =
+        |angles: &[f64; 2]| angles[1] > 0.1 && !(0.5..=2.0).contains(&ratio(*angles));
     let worst = angles.filter(is_implausible).min_by(|a, b| ratio(*a).total_cmp(&ratio(*b)));
     worst.map(|[bent_degrees, straight_degrees]| Finding::LensStrength {
         camera: camera.name.clone(),
@@ -151,7 +152,7 @@ fn one_place(cameras: &[Camera]) -> Option<Finding> {
     })
 }
 
-/// Whether no two cameras see a common place, up to twenty times the size of the rig away.
+/// Finds a rig in which no two cameras see a common place, up to twenty times its size away.
 fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
     const STEPS: usize = 8;
     const DEPTHS: usize = 40;

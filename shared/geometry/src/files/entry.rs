@@ -1,4 +1,4 @@
-//! What a calibration file says of one camera, and the rig of those whose place it says.
+//! Entry of a calibration file for one camera, and the rig of those that have a place.
 
 use nalgebra::{Isometry3, UnitVector3};
 

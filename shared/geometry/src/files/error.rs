@@ -49,7 +49,7 @@ pub enum RigFileError {
     Parse {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Fault of its text.
         source: ParseError,
     },
     /// The format cannot describe the rig.
@@ -57,7 +57,7 @@ pub enum RigFileError {
     Unwritable {
         /// The file.
         path: PathBuf,
-        /// What it cannot describe.
+        /// Part that it cannot describe.
         source: UnwritableRig,
     },
     /// The file could not be written.
@@ -70,7 +70,7 @@ pub enum RigFileError {
     },
 }
 
-/// What is wrong with the text of a calibration file. Fields are named as in the file.
+/// Fault in the text of a calibration file. Fields are named as in the file.
 #[derive(Debug, thiserror::Error)]
 pub enum ParseError {
     /// The text is not of its format.
@@ -92,9 +92,9 @@ pub enum ParseError {
     Shape {
         /// The field.
         field: String,
-        /// What it should hold.
+        /// Expected contents.
         expected: &'static str,
-        /// What it holds.
+        /// Contents found.
         found: String,
     },
     /// A number that is invalid in the format, or not supported.
@@ -104,7 +104,7 @@ pub enum ParseError {
         field: String,
         /// The number.
         value: f64,
-        /// What it must be.
+        /// Requirement on it.
         requirement: &'static str,
     },
     /// Nine numbers that are not a rotation.
@@ -118,7 +118,7 @@ pub enum ParseError {
     /// The file has no camera.
     #[error("no camera found: {expected}")]
     NoCameras {
-        /// What describes a camera in this format.
+        /// Description of a camera in this format.
         expected: &'static str,
     },
     /// No camera of the file has a place.
@@ -135,7 +135,7 @@ pub enum ParseError {
         camera: String,
         /// Why it has none.
         why: &'static str,
-        /// Whether the file has the lens of a camera.
+        /// True if the file has the lens of a camera.
         has_lens: bool,
     },
     /// The cameras cannot be combined into a rig.
@@ -143,7 +143,7 @@ pub enum ParseError {
     Rig(#[source] RigError),
 }
 
-/// What a format cannot describe.
+/// Part of a rig that a format cannot describe.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnwritableRig {
     /// This format is only read.

@@ -136,7 +136,7 @@ fn camera(
     }))
 }
 
-/// Whether the distortion is that of a fisheye lens.
+/// Returns true if the distortion is that of a fisheye lens.
 ///
 /// # Errors
 ///

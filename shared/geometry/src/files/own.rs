@@ -63,7 +63,7 @@ enum LensKind {
     KannalaBrandt,
 }
 
-/// Whether a text is a rig file of this format.
+/// Returns true if a text is a rig file of this format.
 pub(super) fn is_own(text: &str) -> bool {
     text.parse::<toml::Table>()
         .is_ok_and(|table| table.get("format").and_then(toml::Value::as_str) == Some(FORMAT))
@@ -211,7 +211,7 @@ pub fn write(rig: &Rig) -> String {
                 format!("radial = {}", list(k)),
             ]),
         }
-        if rig.left_out().iter().any(|it| it.camera == camera.name) {
+        if rig.left_out().iter().any(|left_out| left_out.camera == camera.name) {
             continue;
         }
         let pose = &camera.camera_from_world;

@@ -42,7 +42,7 @@ enum Translation {
     Column([[f64; 1]; 3]),
 }
 
-/// Whether a text is JSON with the keys of these files.
+/// Returns true if a text is JSON with the keys of these files.
 pub(super) fn is_panoptic(text: &str) -> bool {
     let start = text.trim_start_matches('\u{feff}').trim_start();
     start.starts_with('{') && text.contains("\"cameras\"") && text.contains("\"distCoef\"")

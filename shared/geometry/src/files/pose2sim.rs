@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{Camera, Rig};
 
-/// Whether a text is TOML with at least one camera.
+/// Returns true if a text is TOML with at least one camera.
 pub(super) fn is_pose2sim(text: &str) -> bool {
     text.parse::<Table>().is_ok_and(|table| !camera_tables(&table).is_empty())
 }

@@ -16,7 +16,7 @@ impl<'a> Fields<'a> {
         format!("{}.{key}", self.path)
     }
 
-    /// Whether a key is there; Caliscope writes `"null"` for what it does not know.
+    /// Returns true if a key is there; Caliscope writes `"null"` for unknown values.
     pub(super) fn has(&self, key: &str) -> bool {
         let value = self.table.get(key);
         value.is_some_and(|value| value.as_str() != Some("null"))

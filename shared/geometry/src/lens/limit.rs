@@ -21,7 +21,7 @@ pub(super) fn max_radius(model: &LensModel) -> f64 {
     WIDEST
 }
 
-/// Whether the distorted radius is finite, positive and growing at `r`, and above what it is at `before`.
+/// Returns true if the distorted radius is finite, positive and growing at `r`, and above its value at `before`.
 fn grows(model: &LensModel, before: f64, r: f64) -> bool {
     let (distorted, slope) = model.radius(r);
     slope > 0.0 && distorted.is_finite() && distorted > model.radius(before).0

@@ -38,7 +38,7 @@ pub struct SwapWatch {
     mirror: Option<Vec<usize>>,
     /// By pair of views: of every frame the residual as configured, and with the two exchanged, degrees.
     tried: Vec<([usize; 2], Vec<[f64; 2]>)>,
-    /// Of every frame the residual as configured, degrees.
+    /// Residual of every frame as configured, degrees.
     configured: Vec<f64>,
 }
 
@@ -62,7 +62,7 @@ pub struct Swap {
     pub degrees: f64,
     /// Angular residual with the two exchanged, degrees.
     pub exchanged_degrees: f64,
-    /// Whether it is certainly these two. With three cameras at equal angles around people, exchanging any two fits
+    /// True if it is certainly these two. With three cameras at equal angles around people, exchanging any two fits
     /// almost equally well.
     pub is_sure: bool,
 }
@@ -129,8 +129,8 @@ impl SwapWatch {
     /// Observations that contradict the rig: exchanged footage, the rig of other footage, unsynchronised views, or
     /// wrong detections in every view.
     ///
-    /// What is impossible is reported from the first frame on. It is also reported where an exchange is not clear enough for [`Self::swap`]: frames that were turned upright
-    /// for another camera show people tilted, and the detections in them fit no camera.
+    /// An impossible residual is reported from the first frame on. An exchange that is not clear enough for [`Self::swap`] is reported, too: frames
+    /// that were turned upright for another camera show people tilted, and the detections in them fit no camera.
     pub fn contradiction(&self) -> Option<Contradiction> {
         let least = if self.configured.len() >= MIN_FRAMES {
             CONTRADICTION_DEGREES

@@ -37,7 +37,7 @@ const MIN_FORESHORTENING: f64 = 0.7;
 /// How high a standing person is seen by every camera in the space that it shares with others.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heights {
-    /// Of every camera: the median, pixels of the calibrated image; none of a camera that shares no space.
+    /// Median height of every camera, pixels of the calibrated image; `None` for a camera that shares no space.
     pub(super) median_px: Vec<Option<f64>>,
     /// The most cameras that share a space worth the name; 0 if no two do.
     pub(super) n_sharing: usize,
@@ -79,12 +79,12 @@ struct Place {
 
 impl Place {
     fn seen_by(&self, camera: usize, bound: Bound) -> Option<Projection> {
-        self.seen[camera].filter(|it| it.is_within(bound))
+        self.seen[camera].filter(|projection| projection.is_within(bound))
     }
 
     fn n_seen(&self, bound: Bound) -> usize {
         let seen = self.seen.iter().flatten();
-        seen.filter(|it| it.is_within(bound)).count()
+        seen.filter(|projection| projection.is_within(bound)).count()
     }
 }
 
@@ -97,8 +97,8 @@ pub(super) fn heights(rig: &Rig) -> Heights {
     for is_whole in [true, false] {
         let places = places(rig, is_whole);
         let found = BOUNDS.map(|bound| (bound, n_sharing(&places, n, bound)));
-        let most = found.iter().map(|it| it.1).max().unwrap_or(0);
-        let first = found.iter().find(|it| it.1 == most && most >= 2);
+        let most = found.iter().map(|found| found.1).max().unwrap_or(0);
+        let first = found.iter().find(|found| found.1 == most && most >= 2);
         if let Some((bound, n_sharing)) = first {
             let median = |camera| median_px(&places, camera, *bound, *n_sharing);
             return Heights {
@@ -127,8 +127,8 @@ fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
 fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) -> Option<f64> {
     let of = |n: usize, bound: Bound| {
         let shared = places.iter().filter(|place| place.n_seen(bound) >= n);
-        let seen = shared.filter_map(|it| it.seen_by(camera, bound));
-        let px: Vec<f64> = seen.map(|it| it.px).collect();
+        let seen = shared.filter_map(|place| place.seen_by(camera, bound));
+        let px: Vec<f64> = seen.map(|projection| projection.px).collect();
         Sorted::new(px).upper_median()
     };
     let fewer = (2..=n_sharing).rev();
@@ -140,7 +140,7 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
 /// Places on the rays of all cameras that at least two of them see.
 fn places(rig: &Rig, is_whole: bool) -> Vec<Place> {
     let (up, focus) = (rig.up_in_world(), aim(rig));
-    let viewpoint = |it| Viewpoint::new(it, up, focus, is_whole);
+    let viewpoint = |camera| Viewpoint::new(camera, up, focus, is_whole);
     let viewpoints: Vec<Viewpoint<'_>> = rig.cameras().iter().map(viewpoint).collect();
     let points = viewpoints.iter().flat_map(Viewpoint::points);
     let place = |point: Point3<f64>| Place {
@@ -270,7 +270,7 @@ impl<'a> Viewpoint<'a> {
         Some(px.unwrap_or(otherwise))
     }
 
-    /// Whether a person of a height fits into the picture around a pixel, upright or across.
+    /// Returns true if a person of a height fits into the picture around a pixel, upright or across.
     fn has_room(&self, centre: &Point2<f64>, px: f64) -> bool {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
         let across = centre.x.min(width - centre.x);

@@ -42,10 +42,10 @@ fn rig(cameras: Vec<Camera>) -> Rig {
 /// How high a person in the middle of the world is in the frames that are chosen, pixels.
 fn in_the_middle(rig: &Rig) -> Vec<f64> {
     let chosen = search_sizes(rig).cameras.into_iter().zip(rig.cameras());
-    let px = chosen.map(|(it, camera)| {
+    let px = chosen.map(|(size, camera)| {
         let half = PERSON_METRES / 2.0;
         let [head, feet] = [half, -half].map(|z| camera.project(&Point3::new(0.0, 0.0, z)));
-        (head.unwrap() - feet.unwrap()).norm() * it.scale
+        (head.unwrap() - feet.unwrap()).norm() * size.scale
     });
     px.collect()
 }
@@ -72,7 +72,7 @@ fn a_person_amid_a_ring_has_a_good_height_whatever_the_cameras() {
             for height in [0.0, 1.5] {
                 let rig = rig(ring(n, size, focal, radius, height));
                 let px = in_the_middle(&rig);
-                let is_good = px.iter().all(|it| (GOOD_PX[0]..=GOOD_PX[1]).contains(it));
+                let is_good = px.iter().all(|px| (GOOD_PX[0]..=GOOD_PX[1]).contains(px));
                 assert!(is_good, "{n} of {size:?} at {radius} m: {px:?}");
                 assert_eq!(search_sizes(&rig).n_sharing, n);
             }
@@ -87,7 +87,7 @@ fn a_ring_has_one_scale_with_an_up_direction_or_without() {
         let unknown = Rig::new(cameras.clone(), None, "planted").unwrap();
         for rig in [rig(cameras), unknown] {
             let chosen = search_sizes(&rig).cameras;
-            assert!(chosen.iter().all(|it| it.scale == chosen[0].scale));
+            assert!(chosen.iter().all(|camera| camera.scale == chosen[0].scale));
             let px = in_the_middle(&rig)[0];
             assert!((GOOD_PX[0]..=GOOD_PX[1]).contains(&px), "{n}: {px}");
         }

@@ -34,13 +34,13 @@ struct Pair {
     sides: f64,
 }
 
-/// What is added up of samples.
+/// Sums over samples.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     n: f64,
     miss: f64,
     along: [f64; 2],
-    /// Of `e^2`, `e (g_a + g_b) / 2` and `g_a g_b`.
+    /// Sum of `e^2`, and below those of `e (g_a + g_b) / 2` and `g_a g_b`.
     squares: f64,
     both: f64,
     movement: f64,
@@ -125,7 +125,7 @@ impl Block {
     /// The offset of every camera; `None` for one without enough movement, and `None` at all if that are all, or if some cameras
     /// cannot be compared with the others.
     pub(super) fn estimates(&self) -> Option<Vec<Option<Estimate>>> {
-        let slopes = self.pairs.iter().filter_map(|it| Some((it.views, it.slope()?)));
+        let slopes = self.pairs.iter().filter_map(|pair| Some((pair.views, pair.slope()?)));
         let slopes: Vec<([usize; 2], Slope)> = slopes.collect();
         let linked = linked(self.n_views, slopes.iter().map(|slope| slope.0))?;
         // Every pair says the difference of its two offsets. What no pair says is kept at 0.
@@ -182,7 +182,7 @@ fn linked(n_views: usize, pairs: impl Iterator<Item = [usize; 2]> + Clone) -> Op
 
 /// The median; of an even number the mean of the two in the middle, so that neither of two cameras counts as the right one.
 fn middle(all: Vec<f64>) -> Option<f64> {
-    let turned = all.iter().map(|it| -it).collect();
+    let turned = all.iter().map(|value| -value).collect();
     Some(0.5 * (median(all)? - median(turned)?))
 }
 
@@ -202,8 +202,8 @@ impl Pair {
         }
         let n = samples.len() as f64;
         let mean = |of: &dyn Fn(&Sample) -> f64| samples.iter().map(of).sum::<f64>() / n;
-        let miss = mean(&|it| it.miss);
-        let along = [0, 1].map(|side| mean(&|it| it.along[side]));
+        let miss = mean(&|sample| sample.miss);
+        let along = [0, 1].map(|side| mean(&|sample| sample.along[side]));
         for it in &samples {
             let it = Sample {
                 miss: it.miss - miss,

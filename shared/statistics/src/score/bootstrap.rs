@@ -14,9 +14,9 @@ pub struct Share {
 impl Share {
     /// From the values of a frame.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
-        let add = |it: Self, value: f64| Self {
-            sum: it.sum + value,
-            n: it.n + 1.0,
+        let add = |share: Self, value: f64| Self {
+            sum: share.sum + value,
+            n: share.n + 1.0,
         };
         values.into_iter().fold(Self::default(), add)
     }

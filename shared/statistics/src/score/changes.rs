@@ -49,7 +49,7 @@ impl Changes {
         let middle = self.bins.len() as f64 / 2.0;
         let edge = move |value: usize| (value as f64 - middle) * self.width;
         let counts = self.bins.iter().enumerate();
-        counts.map(move |(it, &count)| (edge(it), count))
+        counts.map(move |(bin, &count)| (edge(bin), count))
     }
 
     /// Number of improvements.

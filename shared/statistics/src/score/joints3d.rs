@@ -11,7 +11,7 @@ use crate::score::pcp3d::distance;
 pub fn joint_errors(found: &[Option<Point>], truth: &[Option<Point>]) -> Vec<Option<f64>> {
     let error = |(found, truth): (&Option<Point>, &Option<Point>)| {
         let truth = (*truth)?;
-        Some(found.map_or(f64::INFINITY, |it| distance(it, truth)))
+        Some(found.map_or(f64::INFINITY, |joint| distance(joint, truth)))
     };
     found.iter().zip(truth).map(error).collect()
 }
@@ -33,8 +33,8 @@ pub fn aligned(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<Vec<O
         return None;
     }
     let n = both.len() as f64;
-    let centre_found = both.iter().map(|it| it.0).sum::<Vector3<f64>>() / n;
-    let centre_truth = both.iter().map(|it| it.1).sum::<Vector3<f64>>() / n;
+    let centre_found = both.iter().map(|pair| pair.0).sum::<Vector3<f64>>() / n;
+    let centre_truth = both.iter().map(|pair| pair.1).sum::<Vector3<f64>>() / n;
     let mut covariance = Matrix3::zeros();
     let mut spread = 0.0;
     for (found, truth) in &both {
@@ -53,11 +53,11 @@ pub fn aligned(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<Vec<O
     }
     let rotation = u * Matrix3::from_diagonal(&flip) * v_t;
     let scale = svd.singular_values.dot(&flip) / spread;
-    let place = |it: Point| {
-        let it = rotation * (Vector3::from(it) - centre_found) * scale + centre_truth;
-        it.into()
+    let place = |point: Point| {
+        let point = rotation * (Vector3::from(point) - centre_found) * scale + centre_truth;
+        point.into()
     };
-    Some(found.iter().map(|it| it.map(place)).collect())
+    Some(found.iter().map(|point| point.map(place)).collect())
 }
 
 #[cfg(test)]
@@ -135,7 +135,7 @@ mod tests {
             };
             let turn = Rotation3::new(Vector3::from(axis));
             let other = |point: Point| (turn * Vector3::from(point) * scale).into();
-            let others: Vec<Option<Point>> = got.iter().map(|it| it.map(other)).collect();
+            let others: Vec<Option<Point>> = got.iter().map(|joint| joint.map(other)).collect();
             prop_assert!(squares(&got) <= squares(&others) + 1e-9);
         }
     }

@@ -68,12 +68,13 @@ pub fn offsets<'a>(
 ) -> Vec<Offset> {
     let people: Vec<_> = people
         .into_iter()
-        .map(|(found, truth)| found.map(|it| of_person(it, truth)))
+        .map(|(found, truth)| found.map(|found| of_person(found, truth)))
         .collect();
     let row = |(joint, both): &(&'static str, &[usize])| {
         let shares = [0, 1].map(|axis| {
-            let of_person = |it: &Option<[Option<[f64; 2]>; N_JOINTS]>| {
-                let joints = it.iter().flat_map(|it| both.iter().filter_map(|&at| it[at]));
+            let of_person = |person: &Option<[Option<[f64; 2]>; N_JOINTS]>| {
+                let joints =
+                    person.iter().flat_map(|offsets| both.iter().filter_map(|&at| offsets[at]));
                 Share::of(joints.map(|joint| joint[axis]))
             };
             people.iter().map(of_person).collect::<Vec<_>>()
@@ -158,7 +159,7 @@ mod tests {
         ]
     }
 
-    fn of(move_it: impl Fn(&mut [[f64; 2]; N_JOINTS])) -> Vec<Offset> {
+    fn offsets_after(move_it: impl Fn(&mut [[f64; 2]; N_JOINTS])) -> Vec<Offset> {
         let truth = person();
         let mut found = truth;
         move_it(&mut found);
@@ -171,9 +172,9 @@ mod tests {
     #[test]
     fn a_knee_on_the_thigh_has_a_negative_offset_along_its_bone() {
         assert_eq!(height(&person()), 120.0);
-        let rows = of(|it| {
+        let rows = offsets_after(|joints| {
             for knee in [1, 4] {
-                it[knee][1] -= 6.0;
+                joints[knee][1] -= 6.0;
             }
         });
         let knee = rows.iter().find(|row| row.joint == "knee").unwrap();
@@ -186,9 +187,9 @@ mod tests {
 
     #[test]
     fn outwards_is_positive_on_both_sides() {
-        let rows = of(|it| {
-            it[0][0] -= 12.0;
-            it[5][0] += 12.0;
+        let rows = offsets_after(|joints| {
+            joints[0][0] -= 12.0;
+            joints[5][0] += 12.0;
         });
         let ankle = rows.iter().find(|row| row.joint == "ankle").unwrap();
         assert!((ankle.mean[1] - 10.0).abs() < 1e-9 && ankle.mean[0].abs() < 1e-9);
@@ -196,7 +197,7 @@ mod tests {
 
     #[test]
     fn a_joint_far_from_its_mark_was_not_found() {
-        let rows = of(|it| it[6] = [300.0, 300.0]);
+        let rows = offsets_after(|joints| joints[6] = [300.0, 300.0]);
         let wrist = rows.iter().find(|row| row.joint == "wrist").unwrap();
         assert_eq!((wrist.n_found, wrist.mean), (1, [0.0; 2]));
     }

@@ -41,13 +41,14 @@ pub fn joints_found<const N: usize>(
 /// * `truth`: the true box, pixels.
 /// * Returns its index; `None` if no detection covers enough.
 pub fn best_covering(detections: &[(f64, [f64; 4])], truth: [f64; 4], share: f64) -> Option<usize> {
-    let area = |it: [f64; 4]| (it[2] - it[0]).max(0.0) * (it[3] - it[1]).max(0.0);
-    let common = |it: [f64; 4]| {
+    let area =
+        |bounds: [f64; 4]| (bounds[2] - bounds[0]).max(0.0) * (bounds[3] - bounds[1]).max(0.0);
+    let common = |bounds: [f64; 4]| {
         [
-            it[0].max(truth[0]),
-            it[1].max(truth[1]),
-            it[2].min(truth[2]),
-            it[3].min(truth[3]),
+            bounds[0].max(truth[0]),
+            bounds[1].max(truth[1]),
+            bounds[2].min(truth[2]),
+            bounds[3].min(truth[3]),
         ]
     };
     let mut best: Option<usize> = None;

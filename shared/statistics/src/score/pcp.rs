@@ -89,7 +89,7 @@ pub fn sticks_found(
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     PARSE_STICKS.map(|(_, from, to)| {
         let limit = 0.5 * distance(end(truth, from), end(truth, to));
-        let errors = [from, to].map(|it| distance(end(found, it), end(truth, it)));
+        let errors = [from, to].map(|joint| distance(end(found, joint), end(truth, joint)));
         match rule {
             PcpRule::BothEnds => errors.iter().all(|error| *error <= limit),
             PcpRule::MeanOfEnds => f64::midpoint(errors[0], errors[1]) <= limit,

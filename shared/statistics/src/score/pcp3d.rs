@@ -197,7 +197,7 @@ mod tests {
     use super::*;
 
     fn person(set: &JointSet) -> Vec<Option<Point>> {
-        let part = |it: usize| [it as f64, (it * it % 7) as f64, 0.1 * it as f64];
+        let part = |i: usize| [i as f64, (i * i % 7) as f64, 0.1 * i as f64];
         let parts: Vec<Point> = (0..N_PARTS).map(part).collect();
         set.from_parts(&parts).into_iter().map(Some).collect()
     }
@@ -238,7 +238,7 @@ mod tests {
         found[13].as_mut().unwrap()[2] += length;
         let got = segment_errors(&segments, &found, &truth);
         assert!((got[0].unwrap() - 0.5).abs() < 1e-12);
-        assert!(got[1..].iter().all(|it| *it == Some(0.0)));
+        assert!(got[1..].iter().all(|error| *error == Some(0.0)));
     }
 
     #[test]
@@ -263,10 +263,10 @@ mod tests {
             let truth = person(set);
             let add = |a: Point, b: Point| [0, 1, 2].map(|i| a[i] + b[i]);
             let found: Vec<Option<Point>> =
-                truth.iter().zip(&off).map(|(it, off)| it.map(|it| add(it, *off))).collect();
+                truth.iter().zip(&off).map(|(joint, off)| joint.map(|point| add(point, *off))).collect();
             let elsewhere = |all: &[Option<Point>]| -> Vec<Option<Point>> {
                 let place = |point: Point| add(point, shift).map(|value| value * scale);
-                all.iter().map(|it| it.map(place)).collect()
+                all.iter().map(|joint| joint.map(place)).collect()
             };
             let segments = segments(set).unwrap();
             let here = segment_errors(&segments, &found, &truth);

@@ -8,7 +8,7 @@
 pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
     let scores: Vec<f64> = samples.iter().map(|sample| sample.0).collect();
     let ranks = ranks(&scores)?;
-    let positives = samples.iter().zip(&ranks).filter(|it| it.0.1);
+    let positives = samples.iter().zip(&ranks).filter(|sample| sample.0.1);
     let (n, sum) = positives.fold((0.0, 0.0), |(n, sum), it| (n + 1.0, sum + it.1));
     let others = samples.len() as f64 - n;
     (n > 0.0 && others > 0.0).then(|| (sum - n * (n + 1.0) / 2.0) / (n * others))

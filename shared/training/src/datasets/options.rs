@@ -13,7 +13,7 @@ pub struct ReadOptions {
     pub n_joints: Option<usize>,
     /// How far outside the image a joint may lie, pixels. Clicked joints lie up to 2 px outside.
     pub outside_px: f64,
-    /// Whether people with unknown joints are read.
+    /// True if people with unknown joints are read.
     pub unknown_joints: bool,
     /// Kinds of fault that make the whole data set an error; people with other faults are left out.
     pub fatal: Vec<FaultKind>,

@@ -14,7 +14,7 @@ pub struct Person {
     /// The joints, `[x, y]` in pixels, the centre of the top-left pixel at `(0, 0)`. Unknown joints
     /// are NaN; there are none unless [`ReadOptions::unknown_joints`](crate::datasets::ReadOptions) is set.
     pub joints: Vec<[f64; 2]>,
-    /// Whether the joint is visible according to the annotation.
+    /// True if the joint is visible according to the annotation.
     pub visible: Vec<bool>,
 }
 
@@ -72,7 +72,7 @@ pub enum Fault {
     /// More or fewer joints than the skeleton has.
     #[error("{got} {what}, expected {expected}")]
     Count {
-        /// What is counted: joints, or marks of visibility.
+        /// Entries that are counted: joints, or marks of visibility.
         what: &'static str,
         /// The number found.
         got: usize,
@@ -208,7 +208,7 @@ impl FaultKind {
 
     /// The kind of that name, if there is one.
     pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|it| it.name() == name)
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 }
 

@@ -44,7 +44,7 @@ pub enum DatasetError {
     Mat {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Fault of its layout.
         source: MatLayoutError,
     },
     /// The list of images does not fit the people.
@@ -134,7 +134,7 @@ const JOINTS: &str = "joints.mat";
 type ImageOf = Box<dyn Fn(usize) -> PathBuf>;
 
 fn is_called(file: &Path, name: &str) -> bool {
-    file.file_name().is_some_and(|it| it == name)
+    file.file_name().is_some_and(|file_name| file_name == name)
 }
 
 /// The file with the annotations; in a folder the one with a known name.
@@ -143,7 +143,7 @@ fn annotation_file(path: &Path) -> Result<PathBuf, DatasetError> {
         path: path.to_owned(),
     };
     if path.is_dir() {
-        return match [LABELS, JOINTS].map(|it| path.join(it).is_file()) {
+        return match [LABELS, JOINTS].map(|file| path.join(file).is_file()) {
             [true, false] => Ok(path.join(LABELS)),
             [false, true] => Ok(path.join(JOINTS)),
             [true, true] => Err(DatasetError::Ambiguous {

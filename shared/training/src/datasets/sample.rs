@@ -73,7 +73,7 @@ impl Sample {
         let source = self.image.size();
         let (sin, cos) = degrees.to_radians().sin_cos();
         // Quarter turns are exact: remove the rounding error of a sine or cosine of 0.
-        let [sin, cos] = [sin, cos].map(|it| if it.abs() < 1e-12 { 0.0 } else { it });
+        let [sin, cos] = [sin, cos].map(|value| if value.abs() < 1e-12 { 0.0 } else { value });
         let [width, height] = [source.width, source.height].map(|value| value as f64);
         let grown = |value: f64| (value - 1e-6).ceil().max(1.0) as usize;
         let output = Size::new(
@@ -92,8 +92,8 @@ impl Sample {
         Warp::new(source, output, &source_from_output, fill)?.apply(self.image.rgb(), &mut rgb);
         let mut image = Picture::filled(output, [0; 3]);
         image.rgb_mut().copy_from_slice(&rgb);
-        let turned = |it: &[f64; 2]| {
-            let [x, y] = [it[0] - from[0], it[1] - from[1]];
+        let turned = |joint: &[f64; 2]| {
+            let [x, y] = [joint[0] - from[0], joint[1] - from[1]];
             [to[0] + cos * x + sin * y, to[1] - sin * x + cos * y]
         };
         Ok(Self {

@@ -94,7 +94,7 @@ impl Selection {
     /// [`BadRange`](SelectError::BadRange), [`EmptyList`](SelectError::EmptyList).
     pub fn from_list(path: &Path, list: &str) -> Result<Self, SelectError> {
         let mut selection = Self::default();
-        for line in list.lines().map(str::trim).filter(|it| !it.is_empty()) {
+        for line in list.lines().map(str::trim).filter(|line| !line.is_empty()) {
             match ranges(line) {
                 Some(rows) => selection.rows.extend(rows?),
                 None => {
@@ -110,7 +110,7 @@ impl Selection {
         Ok(selection)
     }
 
-    /// Whether a person is selected.
+    /// Returns true if a person is selected.
     ///
     /// * `row`: from 1.
     pub fn contains(&self, row: usize, image: &Path) -> bool {
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     fn rows_of(selection: &Selection) -> Vec<usize> {
-        let meant = |it: &usize| selection.contains(*it, Path::new("images/other.jpg"));
+        let meant = |row: &usize| selection.contains(*row, Path::new("images/other.jpg"));
         (0..200).filter(meant).collect()
     }
 

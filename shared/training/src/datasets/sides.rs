@@ -66,10 +66,10 @@ impl Sides {
     }
 }
 
-/// Whether the right joints lie further right in the picture than the left ones: by the median over all
-/// known pairs, so that crossed hands or feet have no influence.
+/// Returns true if the right joints lie further right in the picture than the left ones: by the median
+/// over all known pairs, so that crossed hands or feet have no influence.
 ///
-/// Of two joints that mirror each other the first one is the right one, as in PARSE and LSP.
+/// The first one of two joints that mirror each other is the right one, as in PARSE and LSP.
 fn is_from_behind(joints: &[[f64; 2]], joint_mirror: &[usize]) -> bool {
     let pairs = joint_mirror.iter().enumerate();
     let ahead: Vec<f64> = pairs

@@ -48,7 +48,7 @@ pub enum TableError {
     /// A list does not have one entry per part or joint.
     #[error("there are {got} {what}, expected {expected}")]
     Length {
-        /// Of what.
+        /// Name of the entries.
         what: &'static str,
         /// Entries there are.
         got: usize,
@@ -257,7 +257,7 @@ fn check_lengths(spec: &SkeletonSpec) -> Result<(), TableError> {
 
 fn check_names(what: &'static str, names: &[String]) -> Result<(), TableError> {
     for (second, name) in names.iter().enumerate() {
-        if let Some(first) = names[..second].iter().position(|it| it == name) {
+        if let Some(first) = names[..second].iter().position(|other| other == name) {
             return Err(TableError::SameName {
                 what,
                 first: first + 1,

@@ -68,7 +68,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
                 // several times as many passes then: right and wrong ones must take turns to settle
                 // the root's bias.
                 random.shuffle(&mut moving);
-                moving.retain(|&it| self.step(it));
+                moving.retain(|&i| self.step(i));
             }
             slopes = self.slopes();
             gap = self.gap_of(&slopes);
@@ -84,7 +84,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
 
     fn slopes(&self) -> Vec<f64> {
         let all = (0..self.entries.len()).into_par_iter();
-        all.map(|it| self.slope(it)).collect()
+        all.map(|i| self.slope(i)).collect()
     }
 
     fn gap_of(&self, slopes: &[f64]) -> Gap {
@@ -97,7 +97,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             n_support += usize::from(entry.share > 0.0);
         }
         let half: f64 = self.solution().iter().map(|solution| 0.5 * solution * solution).sum();
-        let losses = worst.iter().zip(&self.groups).map(|(it, of)| of.cost * it);
+        let losses = worst.iter().zip(&self.groups).map(|(slope, of)| of.cost * slope);
         Gap {
             primal: half + losses.sum::<f64>(),
             dual: dual - half,

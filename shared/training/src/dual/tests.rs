@@ -177,8 +177,8 @@ proptest! {
         let mut machine = filled(&examples);
         solve(&mut machine, Effort { tolerance: 1e-6, max_passes: 2000 });
         let even: Vec<usize> = (0..examples.len()).step_by(2).collect();
-        machine.forget(0.0, 0, |it| it % 2 == 1);
-        let kept: Vec<usize> = machine.entries().map(|entry| *entry.0).filter(|it| it % 2 == 0).collect();
+        machine.forget(0.0, 0, |tag| tag % 2 == 1);
+        let kept: Vec<usize> = machine.entries().map(|entry| *entry.0).filter(|tag| tag % 2 == 0).collect();
         prop_assert_eq!(kept, even);
     }
 }

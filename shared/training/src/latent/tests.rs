@@ -36,7 +36,9 @@ fn overlap(model: &Model, layout: &Layout, pose: &Pose, part: usize) -> f64 {
     let (marked, half) = (marked(None), 6.5);
     let [x, y] = marked.parts[part];
     let other = [x - half, y - half, x + half, y + half];
-    let area = |it: [f64; 4]| (it[2] - it[0] + 1.0).max(0.0) * (it[3] - it[1] + 1.0).max(0.0);
+    let area = |bounds: [f64; 4]| {
+        (bounds[2] - bounds[0] + 1.0).max(0.0) * (bounds[3] - bounds[1] + 1.0).max(0.0)
+    };
     let corner = |k: usize| {
         if k < 2 {
             it[k].max(other[k])

@@ -1,11 +1,11 @@
-//! What computes networks and their gradients: Rust, or `LibTorch`.
+//! Computation of networks and their gradients: Rust, or `LibTorch`.
 
 use crate::networks::lesson::{Cost, Lesson, Running, Shown};
 use crate::networks::ops::Network;
 use crate::networks::parameters::Parameter;
 use crate::networks::settings::{Backend, Precision};
 
-/// What computes, and with which numbers.
+/// A backend and the precision of its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Computer {
     pub(crate) backend: Backend,

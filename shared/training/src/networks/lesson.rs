@@ -1,4 +1,4 @@
-//! What a network is shown while it is trained, and what follows from it.
+//! Inputs of a network in training, and the gradients that follow from them.
 
 use fastrand::Rng;
 
@@ -7,7 +7,7 @@ use crate::networks::parameters::Parameter;
 /// Returns the gradients of a cost by the outputs of a network.
 pub(crate) type Cost<'a> = dyn FnMut(&[Vec<f32>]) -> Vec<Vec<f32>> + 'a;
 
-/// What a network is shown: a batch.
+/// Inputs of a network: a batch.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shown {
     /// Samples.
@@ -20,7 +20,7 @@ pub struct Shown {
 #[derive(Debug, Clone)]
 pub(crate) struct Running<'a> {
     pub(crate) parameters: &'a [Parameter],
-    /// Of every parameter, whether its gradient is wanted.
+    /// For every parameter, true if its gradient is wanted.
     pub(crate) learned: &'a [bool],
     /// For dropout.
     pub(crate) dice: Rng,
@@ -35,10 +35,10 @@ pub(crate) struct Statistics {
     pub(crate) variance: Vec<f32>,
 }
 
-/// What follows from a batch.
+/// Result of a batch.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Lesson {
-    /// Of every parameter; nothing of those that are not learned.
+    /// Gradient of every parameter; `None` for those that are not learned.
     pub(crate) gradients: Vec<Option<Vec<f32>>>,
     pub(crate) statistics: Vec<Statistics>,
 }

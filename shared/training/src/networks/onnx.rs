@@ -16,7 +16,7 @@ pub struct Document {
     pub name: String,
     /// Keys and values that the file carries.
     pub metadata: Vec<(String, String)>,
-    /// Whether weights are stored in half precision.
+    /// True if weights are stored in half precision.
     pub has_half_weights: bool,
     /// Weights of layers, by their names, that are written in place of those that follow from the parameters.
     pub kept: BTreeMap<String, Vec<f32>>,

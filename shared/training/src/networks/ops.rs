@@ -103,7 +103,7 @@ pub trait Ops {
 pub struct Output {
     /// Its name in the ONNX file.
     pub name: &'static str,
-    /// Whether the network gives natural logarithms, whose exponentials the file gives.
+    /// True if the network gives natural logarithms, whose exponentials the file gives.
     pub is_logarithm: bool,
 }
 
@@ -135,7 +135,7 @@ pub(crate) fn grid(columns: usize, rows: usize) -> Vec<f32> {
 pub(crate) struct Along {
     /// Where their centres lie, heights of the input from its centre.
     pub(crate) centres: Vec<f32>,
-    /// What the squared distance from a centre is multiplied with before the exponential.
+    /// Factor of the squared distance from a centre before the exponential.
     pub(crate) factor: f32,
 }
 

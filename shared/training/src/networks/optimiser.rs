@@ -1,4 +1,4 @@
-//! What learning changes, and how a step changes it.
+//! Parameters in training, and the steps that change them.
 
 use serde::{Deserialize, Serialize};
 

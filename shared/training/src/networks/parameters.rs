@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::networks::ops::{Conv, Dims, Network, Ops, Places, Scaling, convolved, joined};
 
-/// What keeps the variance of a positive part of a normal variable: `sqrt(2 / (1 - 1 / pi))`.
+/// Gain that keeps the variance of a positive part of a normal variable: `sqrt(2 / (1 - 1 / pi))`.
 pub(crate) const GAIN_OF_RELU: f32 = 1.712_858_6;
 /// Added to the squared length of a channel of weights before the root is taken.
 pub(crate) const EPSILON_OF_LENGTH: f32 = 1e-8;
@@ -30,7 +30,7 @@ pub struct Parameter {
     pub name: String,
     /// Its dimensions, row-major.
     pub dims: Vec<usize>,
-    /// What it is for.
+    /// Its role in the network.
     pub role: Role,
     /// The numbers.
     pub values: Vec<f32>,

@@ -1,8 +1,8 @@
-//! What the settings of all trainings have in common.
+//! Settings that all trainings have in common.
 
 use serde::{Deserialize, Serialize};
 
-/// What computes.
+/// Library that computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Backend {
@@ -35,7 +35,7 @@ pub struct SettingsError {
     pub setting: &'static str,
     /// Its value.
     pub got: String,
-    /// What is accepted.
+    /// Accepted values.
     pub expected: String,
 }
 

@@ -19,9 +19,9 @@ use crate::networks::settings::{Backend, Precision};
 pub struct Batch<N, T> {
     /// The network, for the size of the inputs of this step.
     pub network: N,
-    /// What it is shown.
+    /// Its inputs.
     pub shown: Shown,
-    /// What it should find.
+    /// The truth for its outputs.
     pub truth: T,
 }
 
@@ -39,7 +39,7 @@ pub struct Costed<C> {
 pub struct Plan {
     /// Its steps.
     pub steps: usize,
-    /// Whether the network is judged after it.
+    /// True if the network is judged after it.
     pub is_judged: bool,
 }
 
@@ -48,13 +48,13 @@ pub trait Kept: Copy + Debug + PartialEq + Serialize + DeserializeOwned {}
 
 impl<T: Copy + Debug + PartialEq + Serialize + DeserializeOwned> Kept for T {}
 
-/// What is learned, from whom, and how: everything that tells one training from another.
+/// Samples, truth, cost and steps of a training: everything that differs between trainings.
 ///
 /// All that it says of a step follows from the number of the step alone.
 pub trait Task: Sync {
     /// The network that learns.
     type Network: Network;
-    /// What it should find in a batch.
+    /// The truth of a batch.
     type Truth;
     /// The cost of a batch.
     type Cost: Kept;
@@ -80,11 +80,11 @@ pub trait Task: Sync {
     fn n_steps(&self) -> usize;
     /// The pass after some steps and passes.
     fn plan(&self, steps: usize, passes: usize) -> Plan;
-    /// Whether the averaged parameters begin a training of their own with a step.
+    /// Returns true if the averaged parameters begin a training of their own with a step.
     fn restarts(&self, _nth: usize) -> bool {
         false
     }
-    /// Of every parameter, whether a step learns it.
+    /// Returns for every parameter true if a step learns it.
     fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool>;
     /// How a step changes the parameters.
     fn step(&self, nth: usize) -> Step;
@@ -100,7 +100,7 @@ pub trait Task: Sync {
     fn rank(&self, _score: &Self::Score) -> Option<f32> {
         None
     }
-    /// Whether a training ends early.
+    /// Returns true if a training ends early.
     ///
     /// * `since`: passes since the best one.
     fn is_enough(&self, _since: usize) -> bool {
@@ -205,7 +205,7 @@ impl<T: Task> Trainer<T> {
         })
     }
 
-    /// What is learned.
+    /// The task that is learned.
     pub fn task(&self) -> &T {
         &self.task
     }
@@ -225,7 +225,7 @@ impl<T: Task> Trainer<T> {
         self.state.best.as_ref().map(|best| best.pass)
     }
 
-    /// Whether the training has finished.
+    /// Returns true if the training has finished.
     pub fn is_done(&self) -> bool {
         let since = self.best().map_or(0, |best| self.passes().len() - 1 - best);
         self.step() >= self.task.n_steps() || self.task.is_enough(since)

@@ -39,7 +39,7 @@ pub enum CheckpointError {
     /// It is damaged.
     #[error("the checkpoint does not fit its own training: {what}")]
     Damaged {
-        /// What is wrong.
+        /// The fault.
         what: &'static str,
     },
     /// Resuming failed.

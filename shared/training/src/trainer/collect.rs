@@ -31,9 +31,9 @@ impl Trainer<'_> {
     ) -> Result<Vec<T>, TrainError> {
         let done = AtomicUsize::new(0);
         all.par_iter()
-            .map(|it| {
+            .map(|item| {
                 self.go_on()?;
-                let seen = visit(it)?;
+                let seen = visit(item)?;
                 let done = 1 + done.fetch_add(1, Ordering::Relaxed);
                 let of = all.len();
                 self.watch.tell(Event::Images { done, of });
@@ -77,8 +77,8 @@ impl Trainer<'_> {
     pub(super) fn nearest(&self) -> Result<Vec<Example>, TrainError> {
         let model = self.model()?;
         let all: Vec<_> = (0..self.plan.n_people()).collect();
-        let placed = self.visit_all(&all, |&it| {
-            let (image, marked) = self.person(it, true)?;
+        let placed = self.visit_all(&all, |&person| {
+            let (image, marked) = self.person(person, true)?;
             Ok(on_pyramid(&model, &image, |pyramid, layout| {
                 let pose = nearest(&model, layout, &marked, self.settings.overlap)?;
                 let map = pyramid.level(usize::from(pose.level));
@@ -122,8 +122,8 @@ impl Trainer<'_> {
     ) -> Result<Vec<Option<(Placed, f64)>>, TrainError> {
         let model = self.model()?;
         let all: Vec<_> = (0..self.plan.n_people()).collect();
-        let placed = self.visit_all(&all, |&it| {
-            let (image, marked) = self.person(it, with_types)?;
+        let placed = self.visit_all(&all, |&person| {
+            let (image, marked) = self.person(person, with_types)?;
             Ok(on_pyramid(&model, &image, |pyramid, layout| {
                 let pose = best_near(&model, pyramid, layout, &marked, self.settings.overlap)?;
                 Some((Placed::of(&pose), f64::from(pose.score)))
@@ -210,19 +210,19 @@ impl Trainer<'_> {
         held: &BTreeSet<&Origin>,
     ) -> Result<Vec<Origin>, TrainError> {
         let confuser = Confuser::new(self.model()?);
-        let found = self.visit_all(people, |&it| {
-            if self.right[it].is_none() {
+        let found = self.visit_all(people, |&person| {
+            if self.right[person].is_none() {
                 return Ok(None);
             }
-            let (image, marked) = self.person(it, false)?;
+            let (image, marked) = self.person(person, false)?;
             let wrong = confuser.worst(&image, &marked, self.settings.pose_margin);
             Ok(wrong.map(|pose| Origin::Mistake {
-                person: it as u32,
+                person: person as u32,
                 pose: Placed::of(&pose),
             }))
         })?;
         let found = found.into_iter().flatten();
-        Ok(found.filter(|it| !held.contains(it)).collect())
+        Ok(found.filter(|origin| !held.contains(origin)).collect())
     }
 
     /// The constraints of all origins.

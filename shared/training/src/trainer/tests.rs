@@ -287,7 +287,7 @@ fn people_stay_in_the_working_set_however_well_they_are_separated() {
     let mut n_idle = 0;
     while trainer.step().unwrap() {
         if trainer.right.iter().any(Option::is_some) {
-            let right = |it: &(&Origin, f64)| matches!(it.0, Origin::Right { .. });
+            let right = |entry: &(&Origin, f64)| matches!(entry.0, Origin::Right { .. });
             let people: Vec<_> = trainer.machine.entries().filter(right).collect();
             assert_eq!(people.len(), album.n_people);
             n_idle += people.iter().filter(|person| person.1 == 0.0).count();
@@ -323,7 +323,7 @@ fn every_background_is_searched_in_every_pass() {
     let (settings, album, watch) = (settings(), figures(), Quiet::endless());
     let plan = plan(&settings);
     let trainer = Trainer::new(&plan, &settings, &album, &watch).unwrap();
-    let learn = |it: &&Step| matches!(it, Step::Learn { .. });
+    let learn = |step: &&Step| matches!(step, Step::Learn { .. });
     assert_eq!(
         trainer.steps().iter().filter(learn).count(),
         2 * 2,

@@ -7,9 +7,9 @@ const PARENTS: [Option<usize>; 3] = [None, Some(0), Some(1)];
 /// People whose second part hangs to the left, below, or to the right, and whose third one always
 /// lies below that.
 fn people() -> Vec<Vec<[f64; 2]>> {
-    let person = |it: usize| {
-        let jitter = 0.1 * (it % 7) as f64;
-        let arm = [[-5.0, 1.0], [0.2, 5.0], [6.0, 0.0], [6.0, 0.0]][it % 4];
+    let person = |i: usize| {
+        let jitter = 0.1 * (i % 7) as f64;
+        let arm = [[-5.0, 1.0], [0.2, 5.0], [6.0, 0.0], [6.0, 0.0]][i % 4];
         let second = [10.0 + arm[0] + jitter, 10.0 + arm[1] - jitter];
         vec![[10.0, 10.0], second, [second[0], second[1] + 4.0]]
     };
@@ -28,7 +28,7 @@ fn settings(n_types: usize, types_by: TypesBy) -> Settings {
 #[test]
 fn clusters_are_found_the_largest_first() {
     let types = cluster(&people(), (&PARENTS, None), &settings(3, TypesBy::Parent));
-    let of_second: Vec<_> = types.of_person.iter().map(|it| it[1]).collect();
+    let of_second: Vec<_> = types.of_person.iter().map(|labels| labels[1]).collect();
     assert_eq!(types.anchors[1][0], [6, 0], "half of the people");
     for (person, label) in of_second.iter().enumerate() {
         assert_eq!(of_second[person % 4], *label, "person {person}");
@@ -51,7 +51,7 @@ fn neighbours_separate_types_that_the_parent_does_not() {
         &settings(3, TypesBy::Neighbours),
     );
     let spread = |types: &Types| {
-        let labels = types.of_person.iter().map(|it| it[1]);
+        let labels = types.of_person.iter().map(|labels| labels[1]);
         labels.collect::<std::collections::BTreeSet<_>>().len()
     };
     assert_eq!(spread(&by_all), 3);
@@ -82,11 +82,11 @@ const SIDES: [usize; 4] = [0, 1, 3, 2];
 
 /// People and their mirror images, arms here and there.
 fn with_mirror_images() -> Vec<Vec<[f64; 2]>> {
-    let person = |it: usize| {
-        let lean = (it % 5) as f64 - 1.5;
-        let right = [[-4.0, 1.0], [-1.0, 5.0], [-3.0, -4.0]][it % 3];
-        let left = [[5.0, 0.5], [1.0, 6.0]][it % 2];
-        let jitter = 0.07 * (it % 11) as f64;
+    let person = |i: usize| {
+        let lean = (i % 5) as f64 - 1.5;
+        let right = [[-4.0, 1.0], [-1.0, 5.0], [-3.0, -4.0]][i % 3];
+        let left = [[5.0, 0.5], [1.0, 6.0]][i % 2];
+        let jitter = 0.07 * (i % 11) as f64;
         vec![
             [0.0, 0.0],
             [lean, 4.0 + jitter],
@@ -96,9 +96,9 @@ fn with_mirror_images() -> Vec<Vec<[f64; 2]>> {
     };
     let plain = (0..60).map(person);
     plain
-        .flat_map(|it| {
-            let mirrored = SIDES.map(|part| [-it[part][0], it[part][1]]).to_vec();
-            [it, mirrored]
+        .flat_map(|person| {
+            let mirrored = SIDES.map(|part| [-person[part][0], person[part][1]]).to_vec();
+            [person, mirrored]
         })
         .collect()
 }
@@ -108,7 +108,7 @@ fn either_side_has_the_mirrored_types_of_the_other() {
     let people = with_mirror_images();
     for by in [TypesBy::Parent, TypesBy::Neighbours] {
         let types = cluster(&people, (&BODY, Some(&SIDES)), &settings(4, by));
-        let flip = |it: &[i32; 2]| [-it[0], it[1]];
+        let flip = |anchor: &[i32; 2]| [-anchor[0], anchor[1]];
         let flipped: Vec<_> = types.anchors[2].iter().map(flip).collect();
         assert_eq!(types.anchors[3], flipped);
         for middle in [0, 1] {
@@ -131,6 +131,6 @@ fn one_type_is_its_own_mirror_image() {
         (&BODY, Some(&SIDES)),
         &settings(1, TypesBy::Parent),
     );
-    assert!(types.of_person.iter().flatten().all(|it| *it == 0));
+    assert!(types.of_person.iter().flatten().all(|label| *label == 0));
     assert_eq!(types.anchors[1], [[0, 4]]);
 }

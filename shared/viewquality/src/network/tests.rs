@@ -199,7 +199,8 @@ fn rejects_truncated_files_and_other_files() {
 
 #[test]
 fn the_fingerprint_depends_on_the_bytes_of_the_file() {
-    let [first, second] = [of_colours(), of_evidence()].map(|it| read(&it).unwrap().fingerprint());
+    let [first, second] =
+        [of_colours(), of_evidence()].map(|network| read(&network).unwrap().fingerprint());
     assert_eq!(first, formats::checksum::fnv1a_32(&of_colours().file()));
     assert_ne!(first, second);
 }

@@ -39,7 +39,7 @@ impl Detector {
         Self { network }
     }
 
-    /// What the picture says about the person of a pose.
+    /// Returns the evidence of the picture about the person of a pose.
     ///
     /// * `bounds`: the pose's box in the frame, `[x1, y1, x2, y2]`, pixels.
     /// * `head`: the middle of its head and neck in the frame, `[x, y]`, pixels.
@@ -57,7 +57,7 @@ impl Detector {
         }
     }
 
-    /// What a tile says: the mean of what it and its mirror image say.
+    /// Returns the evidence of a tile: the mean over it and its mirror image.
     pub fn of_tile(&self, tile: &Tile, workspace: &mut Workspace) -> FrontEvidence {
         let mut look = |mirrored: bool| {
             let crop = Crop {

@@ -1,4 +1,4 @@
-//! What the network is given: gradients and colours of three patches about the head.
+//! Features for the network: gradients and colours of three patches about the head.
 
 use kernels::{HogShape, HogWorkspace, Isa, Planes, Rgb8View, ShrinkWorkspace, hog, resize};
 

@@ -99,7 +99,8 @@ impl Network {
         let [features, hidden, numbers @ ..] = words else {
             return Err(length(8));
         };
-        let [features, hidden] = [features, hidden].map(|it| u32::from_le_bytes(*it) as usize);
+        let [features, hidden] =
+            [features, hidden].map(|bytes| u32::from_le_bytes(*bytes) as usize);
         if features != n_features() {
             return Err(FileError::Features {
                 got: features,

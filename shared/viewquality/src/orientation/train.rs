@@ -11,7 +11,7 @@ use crate::orientation::tile::{Crop, Tile};
 /// A person whose direction is known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
-    /// What the detector looks at.
+    /// Tile that the detector looks at.
     pub tile: Tile,
     /// The direction in which the person faces: towards the right of the picture, towards the camera; of length 1 at
     /// most.
@@ -55,7 +55,7 @@ impl Default for Settings {
 pub struct Pass {
     /// The pass that is done, from 1.
     pub nth: usize,
-    /// Of how many.
+    /// Number of passes.
     pub of: usize,
     /// Mean loss of the pass, nats.
     pub loss: f64,
@@ -215,7 +215,7 @@ impl Trainer {
         for (((sample, crop, seed), sums), of_sums) in batch.iter().zip(&sums).zip(&mut of_sums) {
             let mut kept = vec![1.0; hidden];
             leave_out(&mut kept, UNITS_OUT, seed ^ 0x37);
-            let units: Vec<f32> = sums.iter().zip(&kept).map(|(it, k)| it.max(0.0) * k).collect();
+            let units: Vec<f32> = sums.iter().zip(&kept).map(|(sum, k)| sum.max(0.0) * k).collect();
             let evidence = network.outputs(&units);
             let [right, towards] = sample.front;
             let front = [if crop.mirrored { -right } else { right }, towards];

@@ -1,11 +1,11 @@
-//! Whether people are as high in the frames as the filters know them.
+//! Warnings about people whose height in the frames does not suit the filters.
 
 use std::collections::BTreeSet;
 
 use geometry::search_size::{GOOD_PX, USABLE_PX, better_scale, search_sizes};
 use training::datasets::sequences::Sequence;
 
-/// What to set where people are too high or too low in the frames, once for sequences of the same rig.
+/// Returns warnings about people who are too high or too low in the frames, once for sequences of the same rig.
 ///
 /// * `size`: width and height of the frames, else they are `scale` times the footage.
 pub(super) fn warnings(
@@ -14,24 +14,24 @@ pub(super) fn warnings(
     scale: f64,
 ) -> BTreeSet<String> {
     let each = sequences.iter();
-    each.filter_map(|it| warning(it, size, scale)).collect()
+    each.filter_map(|sequence| warning(sequence, size, scale)).collect()
 }
 
 fn warning(sequence: &Sequence, size: Option<[u32; 2]>, scale: f64) -> Option<String> {
     let sizes = search_sizes(&sequence.rig).cameras;
     let cameras = sizes.iter().zip(sequence.rig.cameras());
     let seen: Vec<[f64; 2]> = cameras
-        .filter(|(it, _)| sequence.views.iter().any(|view| view.camera == it.camera))
-        .filter_map(|(it, camera)| {
+        .filter(|(search, _)| sequence.views.iter().any(|view| view.camera == search.camera))
+        .filter_map(|(search, camera)| {
             let [columns, rows] = camera.intrinsics.size.map(f64::from);
             let scale = size.map_or(scale, |[width, height]| {
                 (f64::from(width) / columns).min(f64::from(height) / rows)
             });
-            Some([scale, scale * it.person_px?])
+            Some([scale, scale * search.person_px?])
         })
         .collect();
     let [least, most] = USABLE_PX;
-    let outside = seen.iter().find(|it| !(least..=most).contains(&it[1]))?;
+    let outside = seen.iter().find(|seen| !(least..=most).contains(&seen[1]))?;
     Some(format!(
         "a person is about {:.0} px high in the frames of {}, where the filters want {} to {}: see --scale {}",
         outside[1],

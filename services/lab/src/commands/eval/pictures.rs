@@ -26,7 +26,7 @@ pub(super) fn run(
     let mut all: Vec<(String, People)> = Vec::new();
     for path in &arguments.sequences {
         let name = pictures::name(path);
-        if all.iter().any(|it| it.0 == name) {
+        if all.iter().any(|known| known.0 == name) {
             let message = format!("{name} is given twice");
             return Err(Failure::new(ExitKind::Usage, message));
         }
@@ -78,7 +78,7 @@ fn refuse_sequence_options(arguments: &Arguments) -> Result<(), Failure> {
         ("--umpm-late", arguments.umpm_late),
         ("--resume", arguments.resume),
     ];
-    match given.iter().find(|it| it.1) {
+    match given.iter().find(|option| option.1) {
         None => Ok(()),
         Some((option, _)) => {
             let message = format!("{option} has no meaning for single pictures");

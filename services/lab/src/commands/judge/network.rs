@@ -38,7 +38,7 @@ pub(super) fn run(
     };
     let people = arguments.people()?;
     let Seen { pictures, errors } = judged_network::judged(&reader, &people, stop, console)?;
-    let expected = Expected::of(&errors);
+    let expected = Expected::new(&errors);
     let [which, _] = Judged::ALL;
     if arguments.json {
         let mut report = json!({
@@ -77,7 +77,7 @@ struct Expected {
 
 impl Expected {
     /// * `people`: the joints of each.
-    fn of(people: &[Vec<JointError>]) -> Self {
+    fn new(people: &[Vec<JointError>]) -> Self {
         let auc = |errors: &[JointError]| {
             let each = errors.iter().map(|error| (error.expected, error.is_far()));
             area_under_roc(&each.collect::<Vec<_>>())
@@ -111,7 +111,7 @@ impl fmt::Display for Expected {
             |(auc, [low, high])| format!("{auc:.3} ({low:.3} to {high:.3})"),
         );
         let number = |value: Option<f64>| {
-            value.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.3}"))
+            value.map_or_else(|| "unknown".to_owned(), |number| format!("{number:.3}"))
         };
         write!(
             to,

@@ -46,7 +46,7 @@ pub(super) fn show(
         });
         if let Some(found) = &found {
             let each = found.iter();
-            let boxes = each.map(|it| json!({ "box": it.outline, "score": it.score }));
+            let boxes = each.map(|person| json!({ "box": person.outline, "score": person.score }));
             value["boxes"] = boxes.collect();
         }
         output::json(&value)?;

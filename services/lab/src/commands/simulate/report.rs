@@ -42,10 +42,10 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     let mean = |service: &str| {
         let is_meant = |name: &str| {
             let rest = name.strip_prefix(service);
-            rest.is_some_and(|it| it.is_empty() || it.starts_with('-'))
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
         };
         let own = spent.iter().filter(|(name, _)| is_meant(name));
-        let all: Vec<f64> = own.filter_map(|it| it.1.as_f64()).collect();
+        let all: Vec<f64> = own.filter_map(|entry| entry.1.as_f64()).collect();
         let sum: f64 = all.iter().sum();
         (!all.is_empty()).then(|| 1e3 * sum / (all.len() as f64 * n_frames))
     };
@@ -75,10 +75,11 @@ fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
     let far = far.filter_map(|value| value["views"].as_array()).flatten();
     let far: Vec<&Value> = far.filter(|far| far["used"].as_f64() > Some(0.0)).collect();
     let over_views = |value: &dyn Fn(&Value) -> Option<f64>| {
-        let all: Vec<f64> = far.iter().filter_map(|it| value(it)).collect();
+        let all: Vec<f64> = far.iter().filter_map(|view| value(view)).collect();
         (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
     };
-    if let Some(bytes) = over_views(&|it| Some(it["bytes"].as_f64()? / it["used"].as_f64()?)) {
+    if let Some(bytes) = over_views(&|view| Some(view["bytes"].as_f64()? / view["used"].as_f64()?))
+    {
         if carries_poses {
             costs.pose_bytes = bytes;
         } else {

@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.map_or(0, usize::from))
-        .thread_name(|it| format!("train-{it}"))
+        .thread_name(|i| format!("train-{i}"))
         .build()
         .or_fail(ExitKind::Run)?;
     let file = (!deployment::is_shipped(&arguments.model)).then_some(arguments.model.as_path());
@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 fn summary(learned: &Learned) -> serde_json::Value {
     let tried = learned.tried.iter();
     let tried =
-        tried.map(|(it, errors)| json!({ "reach": it.reach, "ridge": it.ridge, "errors": errors }));
+        tried.map(|(settings, errors)| json!({ "reach": settings.reach, "ridge": settings.ridge, "errors": errors }));
     json!({
         "event": "summary",
         "learned": learned.file.learned,

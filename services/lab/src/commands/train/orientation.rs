@@ -84,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.map_or(0, usize::from))
-        .thread_name(|it| format!("train-{it}"))
+        .thread_name(|i| format!("train-{i}"))
         .build()
         .or_fail(ExitKind::Run)?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;

@@ -58,7 +58,7 @@ fn fatal(name: &str) -> Result<Fatal, String> {
 }
 
 impl People {
-    /// Whether to train on mirrored images.
+    /// Returns true if mirrored images are trained on.
     pub(super) fn with_mirror(&self) -> bool {
         !self.no_mirror
     }

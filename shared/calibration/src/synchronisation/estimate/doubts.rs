@@ -1,4 +1,4 @@
-//! Whether the answer is to be trusted.
+//! Doubts about the result.
 
 use super::Study;
 use crate::synchronisation::curve::Curve;
@@ -38,7 +38,7 @@ impl Study<'_> {
                 t,
             } = it.clone();
             let known = doubts.iter().flat_map(Doubt::cameras).collect::<Vec<_>>();
-            if group.iter().all(|it| known.contains(it)) {
+            if group.iter().all(|camera| known.contains(camera)) {
                 continue;
             }
             doubts.push(Doubt::Ambiguous {
@@ -128,7 +128,7 @@ impl Study<'_> {
         self.doubt_parts(problem, fit, span, doubts);
     }
 
-    /// Whether both halves of the footage tell the same.
+    /// Adds a doubt if both halves of the footage differ.
     fn doubt_parts(
         &self,
         problem: &Problem<'_>,
@@ -141,8 +141,8 @@ impl Study<'_> {
         let as_they_are = vec![false; fit.clocks.len()];
         let [first, second] = halves.map(|half| problem.refine(&fit.clocks, half, &as_they_are));
         for &camera in self.active {
-            let errors = [&first, &second].map(|it| it.errors[camera][0]);
-            let at_middle = [&first, &second].map(|it| it.clocks[camera].common(middle_s));
+            let errors = [&first, &second].map(|fit| fit.errors[camera][0]);
+            let at_middle = [&first, &second].map(|fit| fit.clocks[camera].common(middle_s));
             let away_s = (at_middle[0] - at_middle[1]).abs();
             let most_s = MOST_APART[0].max(0.5 * self.interval_s)
                 + MOST_APART[1] * errors[0].hypot(errors[1]);
@@ -162,7 +162,7 @@ fn is_close(rival: &Rival) -> bool {
     ratio.is_nan() || *ratio > MOST_RATIO || (*ratio > NO_RIVAL && (t.is_nan() || *t < LEAST_T))
 }
 
-/// Whether a pair that is sure by itself contradicts the offsets of all.
+/// Returns a doubt if a pair that is sure alone contradicts the offsets of all.
 fn doubt_pair(curve: &Curve, offsets_s: &[f64]) -> Option<Doubt> {
     let [a, b] = curve.cameras;
     let (best, value) = peak(curve);

@@ -102,7 +102,7 @@ impl<'a> Sums<'a> {
         scale_s: f64,
         reach_s: f64,
     ) -> Self {
-        let is_known = |it: usize| pieces.iter().any(|piece| piece.cameras.contains(&it));
+        let is_known = |camera: usize| pieces.iter().any(|piece| piece.cameras.contains(&camera));
         let fixed = drifts.iter().enumerate().flat_map(|(camera, drifts)| {
             let fixed = camera == reference || !is_known(camera);
             [fixed, fixed || !drifts]
@@ -164,7 +164,7 @@ impl<'a> Sums<'a> {
                 }
             }
         }
-        for (nth, _) in self.fixed.iter().enumerate().filter(|it| *it.1) {
+        for (nth, _) in self.fixed.iter().enumerate().filter(|parameter| *parameter.1) {
             normal[(nth, nth)] = 1.0;
         }
         (normal, gradient, blocks)
@@ -174,7 +174,8 @@ impl<'a> Sums<'a> {
     pub(super) fn errors(&self, found: &DVector<f64>) -> Vec<[f64; 2]> {
         let size = self.fixed.len();
         let (normal, _, blocks) = self.equations(found, &|_| true);
-        let is_flat = |it: usize| !self.fixed[it] && normal[(it, it)] <= 0.0;
+        let is_flat =
+            |parameter: usize| !self.fixed[parameter] && normal[(parameter, parameter)] <= 0.0;
         let Some(inverse) = normal.clone().cholesky().map(|cholesky| cholesky.inverse()) else {
             return vec![[f64::INFINITY; 2]; size / 2];
         };
@@ -220,12 +221,12 @@ impl<'a> Sums<'a> {
         let without = |part: usize| {
             let [from, to] = [part, part + 1].map(|value| value * blocks.len() / n);
             let left_out = blocks[from]..=blocks[to - 1];
-            self.solve_from(found.clone(), &|it| !left_out.contains(&it))
+            self.solve_from(found.clone(), &|block| !left_out.contains(&block))
         };
         let each: Vec<DVector<f64>> = (0..n).map(without).collect();
         let n = n as f64;
         let mean = each.iter().fold(DVector::zeros(found.len()), |sum, it| sum + it) / n;
-        let squares = each.iter().map(|it| (it - &mean).map(|it| it * it));
+        let squares = each.iter().map(|solution| (solution - &mean).map(|value| value * value));
         let sum = squares.fold(DVector::zeros(found.len()), |sum, it| sum + it);
         // So few parts tell a variance badly.
         Some(sum * ((n - 1.0) / n * (1.0 + 2.0 / n)))

@@ -106,7 +106,7 @@ impl Beginnings {
 
     fn at(&self, hop: i64) -> f64 {
         let nth = usize::try_from(hop - self.first).ok();
-        nth.and_then(|nth| self.values.get(nth)).map_or(0.0, |it| *it)
+        nth.and_then(|nth| self.values.get(nth)).map_or(0.0, |value| *value)
     }
 
     /// From when to when something is recorded, hops.
@@ -121,9 +121,9 @@ impl Beginnings {
         if to - from <= length {
             return [from, to];
         }
-        let n_in = |it: &Self, span: [i64; 2]| {
+        let n_in = |heard: &Self, span: [i64; 2]| {
             let within = |hop: &&i64| (span[0]..span[1]).contains(*hop);
-            it.peaks.iter().filter(within).count()
+            heard.peaks.iter().filter(within).count()
         };
         let starts = (from..=to - length).step_by((length / 6).max(1) as usize);
         let spans = starts.map(|start| [start, start + length]);
@@ -139,7 +139,7 @@ impl Beginnings {
         let [centre, half] = around_s.map(|around_s| (around_s / HOP_S).round() as i64);
         let own: Vec<(i64, f64)> = (span[0]..span[1])
             .map(|hop| (hop, self.at(hop)))
-            .filter(|it| it.1 > 0.0)
+            .filter(|hop| hop.1 > 0.0)
             .collect();
         let mut squares = vec![0.0];
         for value in &other.values {
@@ -150,7 +150,7 @@ impl Beginnings {
                 |value: i64| (value - other.first).clamp(0, other.values.len() as i64) as usize;
             squares[within(to)] - squares[within(from)]
         };
-        let all: f64 = own.iter().map(|it| it.1 * it.1).sum();
+        let all: f64 = own.iter().map(|hop| hop.1 * hop.1).sum();
         let most = energy(other.span());
         let cosine = |offset: i64| {
             let [low, high] = other.span().map(|span| span - offset);
@@ -172,7 +172,7 @@ impl Beginnings {
         let cosines: Vec<f64> = (centre - half..=centre + half).map(cosine).collect();
         let cosines = smooth(&cosines);
         let first_s = (centre - half) as f64 * HOP_S;
-        let mut found = Match::of(first_s, cosines);
+        let mut found = Match::from_cosines(first_s, cosines);
         found.n = self.together(other, span, (found.offset_s / HOP_S).round() as i64);
         found
     }
@@ -189,7 +189,7 @@ impl Beginnings {
 }
 
 impl Match {
-    fn of(first_s: f64, cosines: Vec<f64>) -> Self {
+    fn from_cosines(first_s: f64, cosines: Vec<f64>) -> Self {
         let or_none = |value: &f64| if value.is_finite() { *value } else { 0.0 };
         let known: Vec<f64> = cosines.iter().copied().filter(|cosine| cosine.is_finite()).collect();
         let n = known.len().max(1) as f64;

@@ -101,7 +101,7 @@ pub(super) fn parts(
     let most_s = 2.0 * way_s + SPARE_S;
     let slope = median(slopes(&points));
     let at_zero_s = median(points.iter().map(|point| point[1] - slope * point[0]).collect());
-    let away_s = |it: &[f64; 2]| (it[1] - at_zero_s - slope * it[0]).abs();
+    let away_s = |point: &[f64; 2]| (point[1] - at_zero_s - slope * point[0]).abs();
     let mut far: Vec<f64> = points.iter().map(away_s).filter(|value| *value > most_s).collect();
     let too_many = far.len() as f64 > MOST_AWAY * points.len() as f64;
     far.sort_by(f64::total_cmp);

@@ -19,7 +19,7 @@ struct Room {
 }
 
 impl Room {
-    fn of(seed: u64, length_s: f64, n_sounds: usize) -> (Self, fastrand::Rng) {
+    fn drawn(seed: u64, length_s: f64, n_sounds: usize) -> (Self, fastrand::Rng) {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut within = |low: f64, high: f64| low + (high - low) * random.f64();
         let room = Self {
@@ -35,7 +35,7 @@ impl Room {
         (room, random)
     }
 
-    /// What the cameras record: every sound rises at once and dies away, with an echo, from its own place.
+    /// Returns the recordings of the cameras: every sound rises at once and dies away, with an echo, from its own place.
     fn record(&self, random: &mut fastrand::Rng) -> Vec<Sound> {
         let sources: Vec<(f64, Point3<f64>, f64, u64)> = self
             .sounds_s
@@ -89,7 +89,7 @@ impl Room {
 fn offsets_are_found_as_far_as_the_way_of_the_sound_allows() {
     let mut errors = Vec::new();
     for seed in 0..20 {
-        let (room, mut random) = Room::of(seed, 40.0, 25);
+        let (room, mut random) = Room::drawn(seed, 40.0, 25);
         let sounds = room.record(&mut random);
         let found = estimate_by_sound(&sounds, &room.settings()).unwrap();
         assert_eq!(found.doubts, [], "seed {seed}");
@@ -110,7 +110,7 @@ fn offsets_are_found_as_far_as_the_way_of_the_sound_allows() {
 
 #[test]
 fn a_clock_that_drifts_is_told() {
-    let (mut room, mut random) = Room::of(3, 300.0, 300);
+    let (mut room, mut random) = Room::drawn(3, 300.0, 300);
     room.drifts = vec![0.0, 120e-6, -80e-6, 0.0];
     let sounds = room.record(&mut random);
     let found = estimate_by_sound(&sounds, &room.settings()).unwrap();
@@ -130,8 +130,8 @@ fn a_clock_that_drifts_is_told() {
 
 #[test]
 fn what_tells_nothing_is_refused() {
-    let (room, mut random) = Room::of(5, 30.0, 20);
-    let (other, mut other_random) = Room::of(6, 30.0, 20);
+    let (room, mut random) = Room::drawn(5, 30.0, 20);
+    let (other, mut other_random) = Room::drawn(6, 30.0, 20);
     let settings = room.settings();
     let refused = |sounds: &[Sound]| estimate_by_sound(sounds, &settings).unwrap().doubts;
     let mut sounds = room.record(&mut random);
@@ -153,7 +153,7 @@ fn what_tells_nothing_is_refused() {
         "{doubts:?}"
     );
     // A metronome.
-    let (mut beats, mut random) = Room::of(7, 30.0, 0);
+    let (mut beats, mut random) = Room::drawn(7, 30.0, 0);
     beats.sounds_s = (0..40).map(|i| 8.0 + 0.5 * f64::from(i)).collect();
     let doubts = refused(&beats.record(&mut random));
     assert!(!doubts.is_empty());
@@ -164,7 +164,7 @@ fn what_tells_nothing_is_refused() {
     };
     assert!(!estimate_by_sound(&good, &far).unwrap().doubts.is_empty());
     // Seconds that are missing in the middle.
-    let (long, mut random) = Room::of(8, 240.0, 240);
+    let (long, mut random) = Room::drawn(8, 240.0, 240);
     let mut sounds = long.record(&mut random);
     let n = sounds[1].samples.len();
     sounds[1].samples.drain(n / 2..n / 2 + 2000);
@@ -178,7 +178,7 @@ fn what_tells_nothing_is_refused() {
 #[test]
 fn noise_alone_is_never_taken_for_sounds() {
     for seed in 0..30 {
-        let (room, mut random) = Room::of(seed, 30.0, 0);
+        let (room, mut random) = Room::drawn(seed, 30.0, 0);
         let sounds = room.record(&mut random);
         let found = estimate_by_sound(&sounds, &room.settings()).unwrap();
         assert!(!found.doubts.is_empty(), "seed {seed}");
@@ -188,9 +188,9 @@ fn noise_alone_is_never_taken_for_sounds() {
 #[test]
 fn different_rooms_never_match() {
     for seed in 0..30 {
-        let (room, mut random) = Room::of(seed, 40.0, 5 + seed as usize);
+        let (room, mut random) = Room::drawn(seed, 40.0, 5 + seed as usize);
         let mut sounds = room.record(&mut random);
-        let (other, mut random) = Room::of(seed + 100, 40.0, 5 + seed as usize);
+        let (other, mut random) = Room::drawn(seed + 100, 40.0, 5 + seed as usize);
         sounds[1] = other.record(&mut random).swap_remove(1);
         let found = estimate_by_sound(&sounds, &room.settings()).unwrap();
         assert!(!found.doubts.is_empty(), "seed {seed}");

@@ -1,4 +1,4 @@
-//! What may be wrong with a rig, in numbers and as text.
+//! Likely faults of a rig, in numbers and as text.
 
 use std::fmt;
 
@@ -141,7 +141,7 @@ impl Finding {
         }
     }
 
-    /// Whether a wrong unit of length would explain it.
+    /// Returns true if a wrong unit of length would explain it.
     pub fn is_of_unit(&self) -> bool {
         matches!(
             self,

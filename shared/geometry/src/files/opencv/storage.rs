@@ -7,7 +7,7 @@ use super::ParseError;
 mod xml;
 mod yaml;
 
-/// What is stored under one name.
+/// Value stored under one name.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Entry {
     Nothing,
@@ -111,7 +111,7 @@ impl Storage {
         self.0.get("names")
     }
 
-    /// Whether an entry has the name of a camera as its suffix.
+    /// Returns true if an entry has the name of a camera as its suffix.
     pub(super) fn has_suffixed(&self) -> bool {
         self.0.keys().any(|key| key.starts_with("K_") || key.starts_with("Rot_"))
     }

@@ -9,7 +9,7 @@ const LENSES: ReadOptions = ReadOptions {
     lenses_suffice: true,
 };
 
-/// What `OpenCV`'s calibration program writes of one lens, with invented numbers.
+/// Output of `OpenCV`'s calibration program for one lens, with invented numbers.
 const LENS: &str = "%YAML:1.0\n---\ncalibration_time: \"Mon\"\nimage_width: 1280\nimage_height: 720\nflags: 0\nfisheye_model: 0
 camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 900., 0., 618., 0., 900., 390., 0., 0., 1. ]
 distortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n   data: [ -0.33, 0.046, -0.0043, 0.0041 ]\n";

@@ -32,7 +32,7 @@ pub enum SequenceError {
     NoFootage {
         /// Where it should be.
         path: PathBuf,
-        /// What to do.
+        /// Advice.
         hint: &'static str,
     },
     /// The calibration cannot be read.
@@ -93,7 +93,7 @@ pub enum SequenceError {
         path: PathBuf,
         /// Line, from 1; 0 for the whole file.
         line: usize,
-        /// What is wrong.
+        /// Fault of the line.
         what: String,
     },
     /// The streams of a trial cannot be synchronised.

@@ -115,7 +115,7 @@ impl<'a> Columns<'a> {
         };
         let mut of_marker: Vec<(String, Vec<[f64; 3]>)> = Vec::new();
         for name in table.markers() {
-            if of_marker.iter().any(|it| it.0 == name) {
+            if of_marker.iter().any(|known| known.0 == name) {
                 continue;
             }
             let index = trial.marker(name).ok_or_else(|| MotionError::NoMarker {
@@ -149,10 +149,10 @@ impl<'a> Columns<'a> {
             joint: joint.to_owned(),
         };
         let weights = table.joint(joint).ok_or_else(no_joint)?;
-        let n = self.of_marker.first().map_or(0, |it| it.1.len());
+        let n = self.of_marker.first().map_or(0, |marker| marker.1.len());
         let mut sum = vec![[0.0; 3]; n];
         for (name, weight) in weights {
-            let column = self.of_marker.iter().find(|it| it.0 == *name);
+            let column = self.of_marker.iter().find(|marker| marker.0 == *name);
             let (_, points) = column.ok_or_else(no_joint)?;
             for (into, point) in sum.iter_mut().zip(points) {
                 for axis in 0..3 {

@@ -132,7 +132,7 @@ fn truth_lines() -> Vec<String> {
         serde_json::json!({ "frame": nth, "seconds": 0.0, "joints": joints, "views": [] })
     };
     let frames = (0..3).map(frame);
-    std::iter::once(header).chain(frames).map(|it| it.to_string()).collect()
+    std::iter::once(header).chain(frames).map(|line| line.to_string()).collect()
 }
 
 #[test]

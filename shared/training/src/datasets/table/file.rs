@@ -163,5 +163,5 @@ fn joint_mirror(joints: &[String], pairs: &[[String; 2]]) -> Result<Vec<usize>, 
 }
 
 fn index_of(names: &[String], name: &str) -> Option<usize> {
-    names.iter().position(|it| it == name)
+    names.iter().position(|known| known == name)
 }

@@ -51,7 +51,7 @@ fn the_upper_body_file_agrees_with_the_published_skeleton() {
         weights
     };
     for (part, name) in upper.names().iter().enumerate() {
-        let same = published.names().iter().position(|it| it == name).unwrap();
+        let same = published.names().iter().position(|other| other == name).unwrap();
         let parent = |table: &SkeletonTable, part: usize| {
             table.parent()[part].map(|folder| table.names()[folder].clone())
         };
@@ -63,61 +63,61 @@ fn the_upper_body_file_agrees_with_the_published_skeleton() {
 #[test]
 fn errors_of_invalid_skeletons_have_name_and_number() {
     let cases: [(&str, Change); 12] = [
-        ("the skeleton has 0 parts, expected 1 to 64", |it| {
-            it.names.clear();
+        ("the skeleton has 0 parts, expected 1 to 64", |table| {
+            table.names.clear();
         }),
-        ("there are 25 parents, expected 26", |it| {
-            it.parent.pop();
+        ("there are 25 parents, expected 26", |table| {
+            table.parent.pop();
         }),
-        ("parts 1 and 3 are both called \"head\"", |it| {
-            it.names[2] = "head".to_owned();
+        ("parts 1 and 3 are both called \"head\"", |table| {
+            table.names[2] = "head".to_owned();
         }),
         (
             "part 1 (head) has a parent: the first part and only the first is the root",
-            |it| it.parent[0] = Some(1),
+            |table| table.parent[0] = Some(1),
         ),
         (
             "part 3 (right shoulder) has no parent: the first part and only the first is the root",
-            |it| it.parent[2] = None,
+            |table| table.parent[2] = None,
         ),
         (
             "part 3 (right shoulder) has part 3 as its parent, which does not come before it",
-            |it| it.parent[2] = Some(2),
+            |table| table.parent[2] = Some(2),
         ),
         (
             "the mirror of part 15 (left shoulder) is 3, but not the other way round or not there",
-            |it| it.mirror[2] = 2,
+            |table| table.mirror[2] = 2,
         ),
         (
             "the mirror of joint 14 (head) is 100, but not the other way round or not there",
-            |it| it.joint_mirror[13] = 99,
+            |table| table.joint_mirror[13] = 99,
         ),
         (
             "the mirror of part 4 (right upper arm) hangs on another part than the mirror of its parent",
-            |it| {
-                it.mirror[2] = 2;
-                it.mirror[14] = 14;
-                it.weights[2] = vec![(12, 1.0)];
-                it.weights[14] = vec![(12, 1.0)];
+            |table| {
+                table.mirror[2] = 2;
+                table.mirror[14] = 14;
+                table.weights[2] = vec![(12, 1.0)];
+                table.weights[14] = vec![(12, 1.0)];
             },
         ),
         (
             "part 4 (right upper arm) and its mirror image left upper arm do not lie between the same joints of \
              either side",
-            |it| it.weights[3] = vec![(8, 0.4), (7, 0.6)],
+            |table| table.weights[3] = vec![(8, 0.4), (7, 0.6)],
         ),
-        ("part 2 (neck) names joint 15, but there are 14", |it| {
-            it.weights[1] = vec![(14, 1.0)];
+        ("part 2 (neck) names joint 15, but there are 14", |table| {
+            table.weights[1] = vec![(14, 1.0)];
         }),
         (
             "the weights of part 2 (neck) add up to 0.9, expected 1",
-            |it| it.weights[1] = vec![(12, 0.9)],
+            |table| table.weights[1] = vec![(12, 0.9)],
         ),
     ];
     for (expected, change) in cases {
         assert_eq!(error_after(change), expected);
     }
-    assert!(error_after(|it| it.weights[1] = vec![(12, f64::NAN)]).contains("add up to NaN"));
+    assert!(error_after(|table| table.weights[1] = vec![(12, f64::NAN)]).contains("add up to NaN"));
 }
 
 #[test]
@@ -173,7 +173,7 @@ proptest! {
     ) {
         for table in [SkeletonTable::published(), upper_body()] {
             let joints: Vec<[f64; 2]> = joints.iter().map(|&(x, y)| [x, y]).collect();
-            let flipped = |it: [f64; 2]| [-it[0], it[1]];
+            let flipped = |joint: [f64; 2]| [-joint[0], joint[1]];
             let mirrored: Vec<_> = table.joint_mirror().iter().map(|&joint_mirror| flipped(joints[joint_mirror])).collect();
             let parts = table.parts_of(&joints);
             let expected: Vec<_> = table.mirror().iter().map(|&mirror| flipped(parts[mirror])).collect();

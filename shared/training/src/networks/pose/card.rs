@@ -6,14 +6,14 @@ use super::network::{ERROR, EXTRAS, FRONT, MAPS, PICTURE, Shape};
 use super::score::Score;
 use super::vary::{DEVIATION, FILL, MARGIN, MEAN};
 
-/// What a card tells beside how the network is used.
+/// Further contents of a card, beside how the network is used.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct About {
     /// People learned from, and kept apart.
     pub people: [usize; 2],
     /// Samples that the network was shown.
     pub samples: usize,
-    /// Whether it went on from a network that was trained before.
+    /// True if it went on from a network that was trained before.
     pub goes_on: bool,
     /// Set where it learned the extra keypoints alone.
     pub extras_alone: bool,

@@ -9,10 +9,10 @@ use super::peak;
 const LOGARITHMS: core::ops::RangeInclusive<f32> = -8.0..=2.0;
 /// How much more a cell of heat 1 counts than one of heat 0.
 const HEAT: f32 = 9.0;
-/// What all cells of a map without heat count, about.
+/// Weight of all cells of a map without heat together, about.
 const CELLS: f32 = 40.0;
 
-/// What should be found in a batch.
+/// The truth of a batch.
 #[derive(Debug, Clone, Default)]
 pub struct Truth {
     /// Columns and rows of the maps.
@@ -30,11 +30,11 @@ pub struct Truth {
 /// The parts of the cost of a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Of the maps.
+    /// Cost of the maps.
     pub maps: f32,
-    /// Of the direction, nats a person of certain direction.
+    /// Cost of the direction, nats a person of certain direction.
     pub front: f32,
-    /// Of the expected errors.
+    /// Cost of the expected errors.
     pub error: f32,
 }
 

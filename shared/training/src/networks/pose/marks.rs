@@ -1,4 +1,4 @@
-//! What should be found of a person, by the marks of an annotator and by a teacher: another network.
+//! Keypoints to learn of a person, by the marks of an annotator and by a teacher: another network.
 
 use super::person::Target;
 use super::{MIRROR, N_JOINTS, N_KEYPOINTS};
@@ -28,8 +28,8 @@ const BESIDE: [usize; N_KEYPOINTS - N_JOINTS] = [12, 5, 0, 5, 0];
 /// Both legs, both arms.
 const LIMBS: [[usize; 6]; 2] = [[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]];
 
-/// What is known of the keypoints of a person, as [`Person::targets`](super::Person::targets) are ordered; not finite where nothing
-/// is.
+/// Keypoints of a person, in the order of [`Person::targets`](super::Person::targets), by annotator and teacher; not finite where
+/// unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marks {
     /// By the annotator, left and right as the person would call them, pixels.
@@ -100,7 +100,7 @@ impl Marks {
         }
     }
 
-    /// Whether a teacher finds the joint beside an extra keypoint at its mark.
+    /// Returns true if a teacher finds the joint beside an extra keypoint at its mark.
     fn is_beside(&self, keypoint: usize, taught: &[([f32; 2], f32); N_KEYPOINTS]) -> bool {
         let beside = BESIDE[keypoint - N_JOINTS];
         distance(self.marked[beside], taught[beside].0) < AGREED_BESIDE * self.trunk
@@ -112,7 +112,7 @@ impl Marks {
         self.taught = exchange_sides(&self.taught);
     }
 
-    /// What the network should find.
+    /// Returns the keypoints that the network should find.
     ///
     /// The mean of both where they agree; both places where they differ and the teacher is sure; the teacher's, weighted by its
     /// peak, where nothing is marked. An extra keypoint that is not marked is the teacher's, if the teacher is sure of it and finds

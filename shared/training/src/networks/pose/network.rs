@@ -31,7 +31,7 @@ pub(crate) const OF_EXTRAS: &str = "extra_";
 /// Pixels of the input for a cell of the maps.
 pub const STRIDE: usize = 4;
 
-/// What sides of the input must be multiples of.
+/// The sides of the input must be multiples of this.
 pub(crate) const MULTIPLE: usize = 32;
 
 /// How much the logits of a map are sharpened where features are looked up at its maximum.

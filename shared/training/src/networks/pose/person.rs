@@ -18,7 +18,7 @@ pub enum Source {
     Scene,
 }
 
-/// What the network should find of a keypoint.
+/// Target of the network for a keypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Where it is, pixels; not finite if nobody knows.
@@ -27,7 +27,7 @@ pub struct Target {
     pub or: Option<[f32; 2]>,
     /// How much it counts, 0 to 1.
     pub weight: f32,
-    /// Whether it was marked, is exact, or is an extra keypoint that the teacher is sure of.
+    /// True if it was marked, is exact, or is an extra keypoint that the teacher is sure of.
     pub is_marked: bool,
 }
 
@@ -36,7 +36,7 @@ pub struct Target {
 pub struct Person {
     /// Where it comes from.
     pub source: Source,
-    /// What it is called in messages.
+    /// Name in messages.
     pub name: String,
     /// The picture: [`SIDE`] pixels square, red first.
     pub rgb: Vec<u8>,

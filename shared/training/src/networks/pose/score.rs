@@ -21,7 +21,7 @@ const STICKS: [(&[usize], &[usize]); 10] = [
 /// Neck and top of the head.
 const HEAD: [usize; 2] = [12, 13];
 
-/// What was found of one person.
+/// Keypoints found of one person, and their truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
     /// Where the keypoints were found, cells.

@@ -34,9 +34,9 @@ pub struct Settings {
     pub averaged: f32,
     /// Learn the extra keypoints alone: everything else stays in the file as it is in the network that the training goes on from.
     pub extras_alone: bool,
-    /// What the direction counts beside the maps.
+    /// Weight of the direction beside the maps.
     pub front: f32,
-    /// What the expected error counts beside the maps.
+    /// Weight of the expected error beside the maps.
     pub error: f32,
     /// How samples are varied.
     pub vary: Vary,

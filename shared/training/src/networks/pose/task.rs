@@ -52,7 +52,7 @@ fn document(metadata: &[(String, String)]) -> Document {
     }
 }
 
-/// What the network finds in pictures.
+/// Outputs of the network for pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Found {
     /// Log-odds: `[n, keypoints, rows, columns]`.
@@ -162,7 +162,7 @@ impl<'a> PoseTask<'a> {
         }
     }
 
-    /// Whether a step learns the expected error alone.
+    /// Returns true if a step learns the expected error alone.
     fn is_for_error(&self, nth: usize) -> bool {
         nth >= self.settings.steps
     }
@@ -224,7 +224,7 @@ impl Task for PoseTask<'_> {
         self.settings.steps + self.settings.error_steps
     }
 
-    /// What learns everything and what learns the expected error alone have passes of their own, both judged at the end.
+    /// Ends a pass where the expected error alone begins to be learned; that pass and the last one are judged.
     fn plan(&self, steps: usize, passes: usize) -> Plan {
         let end = if self.is_for_error(steps) {
             self.n_steps()
@@ -342,7 +342,7 @@ impl Trainer<PoseTask<'_>> {
         )
     }
 
-    /// What the trained network finds in pictures, `[n, 3, height, width]`.
+    /// Returns the outputs of the trained network for pictures, `[n, 3, height, width]`.
     pub fn find_in(&self, n: usize, pictures: &[f32]) -> Found {
         let inputs = vec![pictures.to_vec()];
         Found::new(self.find(&Shown { n, inputs }))

@@ -1,4 +1,4 @@
-//! What the network is shown of a person, and what it should find.
+//! Varied pictures of a person for the network, and the keypoints in them.
 
 use fastrand::Rng;
 
@@ -14,14 +14,14 @@ pub const MARGIN: f32 = 1.25;
 const BEYOND: f32 = 0.05;
 /// Where there is no picture.
 pub const FILL: f32 = 110.0;
-/// What is subtracted from a colour, and what it is divided by then.
+/// Subtracted from a colour, which is then divided by [`DEVIATION`].
 pub const MEAN: f32 = 110.0;
 /// See [`MEAN`].
 pub const DEVIATION: f32 = 60.0;
 /// Longest shift that is made, deviations.
 const MOST: f32 = 2.5;
 
-/// What the network is shown, and what it should find.
+/// A picture for the network, and its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkSample {
     /// `[3, height, width]`

@@ -69,7 +69,7 @@ impl Kind {
         }
     }
 
-    /// Whether it uses the evidence.
+    /// Returns true if it uses the evidence.
     pub fn sees_evidence(self) -> bool {
         self != Self::Vgg16
     }

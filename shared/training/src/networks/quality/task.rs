@@ -190,7 +190,7 @@ impl<'a> QualityTask<'a> {
     }
 }
 
-/// What the network should give for the parts of a sample.
+/// Returns the true outputs for the parts of a sample.
 fn labels(settings: &Settings, height_px: f32, errors_px: &[f32]) -> Vec<f32> {
     let unit: viewquality::Unit = settings.unit.into();
     let label = |px: &f32| unit.label(f64::from(*px), f64::from(height_px)) as f32;
@@ -353,7 +353,7 @@ impl Trainer<QualityTask<'_>> {
     }
 }
 
-/// Whether a sample is validated on: by its group alone.
+/// Returns true if a sample is validated on: by its group alone.
 fn is_validated(sample: &Sample, settings: &Settings) -> bool {
     let seed = settings.seed.to_le_bytes();
     let hash = formats::checksum::fnv1a_of(sample.group.bytes().chain(seed));

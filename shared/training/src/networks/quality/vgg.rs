@@ -34,7 +34,7 @@ pub enum VggError {
         dtype: String,
         /// Its sizes.
         got: Vec<usize>,
-        /// What they should be.
+        /// The expected sizes.
         expected: Vec<usize>,
     },
 }

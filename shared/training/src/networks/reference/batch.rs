@@ -12,7 +12,7 @@ struct Normalisation {
     cells: usize,
     /// Means of the channels.
     means: Vec<f32>,
-    /// What channels are multiplied with to have the deviation 1.
+    /// Factors of the channels that give deviation 1.
     inverse: Vec<f32>,
 }
 

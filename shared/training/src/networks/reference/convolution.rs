@@ -25,7 +25,7 @@ pub(super) struct Sizes {
 pub(super) struct Gradients {
     pub(super) weights: Vec<f32>,
     pub(super) bias: Vec<f32>,
-    /// Of the input; empty where it was not asked for.
+    /// Gradient by the input; empty where it was not asked for.
     pub(super) map: Vec<f32>,
 }
 
@@ -60,7 +60,7 @@ impl Sizes {
         self.to[1] * self.to[2]
     }
 
-    /// Whether the columns of patches are the map itself.
+    /// Returns true if the columns of patches are the map itself.
     fn is_pointwise(&self) -> bool {
         self.kernel == 1 && self.stride == 1
     }

@@ -124,13 +124,13 @@ impl<'a> Record<'a> {
         &self.parameters[at].values
     }
 
-    /// Whether the gradient of one of some parameters is wanted.
+    /// Returns true if the gradient of one of some parameters is wanted.
     pub(super) fn learns(&self, parameters: &[usize]) -> bool {
         let is_learned = |at: &usize| self.learned.get(*at).copied().unwrap_or(false);
         parameters.iter().any(is_learned)
     }
 
-    /// Whether something is learned through a value.
+    /// Returns true if something is learned through a value.
     pub(super) fn leads(&self, At(at): At) -> bool {
         self.values[at].back.is_some()
     }

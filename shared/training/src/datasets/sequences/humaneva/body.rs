@@ -76,7 +76,7 @@ impl Measures {
         let [left, right] = ["LSHO", "RSHO"].map(|name| still.point(name));
         let (left, right) = (left?, right?);
         let width = |frame: usize| {
-            let [left, right] = [left, right].map(|it| seen(still, frame, it));
+            let [left, right] = [left, right].map(|marker| seen(still, frame, marker));
             Some((left? - right?).norm())
         };
         let widths: Vec<f64> = (0..still.n_frames()).filter_map(width).collect();
@@ -147,7 +147,8 @@ impl<'a> Body<'a> {
             return None;
         }
         let (low, high) = (at.floor() as usize - 1, at.ceil() as usize - 1);
-        let is_seen = |&it: &usize| [low, high].iter().all(|f| seen(self.trial, *f, it).is_some());
+        let is_seen =
+            |&marker: &usize| [low, high].iter().all(|f| seen(self.trial, *f, marker).is_some());
         if !self.markers.iter().all(is_seen) {
             return None;
         }
@@ -262,7 +263,7 @@ impl Pose<'_> {
         let [o, x, y, z] = ["O", "A", "L", "P"].map(|name| self.points(&format!("{axes}{name}")));
         let (o, x, y, z) = (o?, x?, y?, z?);
         let turn = |frame: usize| {
-            let columns = [x, y, z].map(|it| (it[frame] - o[frame]).try_normalize(1e-9));
+            let columns = [x, y, z].map(|points| (points[frame] - o[frame]).try_normalize(1e-9));
             let [Some(x), Some(y), Some(z)] = columns else {
                 return None;
             };

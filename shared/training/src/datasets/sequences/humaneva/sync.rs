@@ -143,7 +143,7 @@ mod tests {
             motion in 1.0..1000.0_f64,
             other in 1.0..500.0_f64,
         ) {
-            let got = Sync::new(&[image, other].map(|it| Some(offset(it, motion, 2.0)))).unwrap();
+            let got = Sync::new(&[image, other].map(|image| Some(offset(image, motion, 2.0)))).unwrap();
             for (first, image_frame) in got.image_first.iter().zip([image, other]) {
                 // The frame of the trial at which this camera shows frame `image_frame`.
                 let frame = image_frame - first.unwrap() as f64 + 1.0;

@@ -23,7 +23,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     let joint = |frame: &[[f64; 3]; 14], it: usize| Vector3::from(frame[it]);
     let all = || motion.joints.iter();
     let length = |frame, [hip, knee, ankle]: [usize; 3]| {
-        let [hip, knee, ankle] = [hip, knee, ankle].map(|it| joint(frame, it));
+        let [hip, knee, ankle] = [hip, knee, ankle].map(|i| joint(frame, i));
         (knee - hip).norm() + (ankle - knee).norm()
     };
     let leg = median(all().flat_map(|frame| LEGS.map(|leg| length(frame, leg))));

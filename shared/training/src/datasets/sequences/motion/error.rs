@@ -69,7 +69,7 @@ pub enum MotionError {
     Table {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         what: String,
     },
     /// No preset has markers of these names.
@@ -123,7 +123,7 @@ pub enum MotionError {
     Implausible {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and a likely cause.
+        /// The fault and a likely cause.
         what: String,
     },
 }

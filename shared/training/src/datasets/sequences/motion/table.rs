@@ -76,13 +76,13 @@ impl MarkerTable {
             Some(unit) => Some(metres_per(unit).ok_or(format!("unit {unit:?} is not known"))?),
         };
         let known = PARSE14.joints.iter().map(|joint| joint.name);
-        let missing = known.clone().find(|it| !file.joints.contains_key(*it));
+        let missing = known.clone().find(|joint| !file.joints.contains_key(*joint));
         if let Some(joint) = missing {
             return Err(format!("nothing makes the joint {joint:?}"));
         }
         let mut joints = BTreeMap::new();
         for (joint, markers) in file.joints {
-            if !known.clone().chain(TOES).any(|it| it == joint) {
+            if !known.clone().chain(TOES).any(|known| known == joint) {
                 return Err(format!("{joint:?} is no joint"));
             }
             let weights = weights(markers).map_err(|error| format!("{joint:?}: {error}"))?;

@@ -112,7 +112,7 @@ fn read_by(
 /// The message without the folder.
 fn refused(got: Result<Motion, MotionError>) -> String {
     let text = got.unwrap_err().to_string();
-    text.split_once("a.").map_or(text.clone(), |it| it.1.to_owned())
+    text.split_once("a.").map_or(text.clone(), |parts| parts.1.to_owned())
 }
 
 fn assert_near(got: &[f64; 3], expected: &[f64; 3], tolerance: f64) {
@@ -157,7 +157,7 @@ fn joints_of_a_trc_file_are_read_with_z_up() {
 fn c3d(unit: &str, per_metre: f64) -> Vec<u8> {
     let frame = |frame: usize| {
         let points = posture(frame).into_iter().take(14);
-        points.map(|it| Some(it.map(|value| value * per_metre))).collect()
+        points.map(|point| Some(point.map(|value| value * per_metre))).collect()
     };
     let trial = Written {
         rate_hz: 120.0,
@@ -319,7 +319,7 @@ proptest! {
         seen in prop::collection::vec(prop::option::weighted(0.6, -5.0..5.0_f64), 1..60),
         longest in 0_usize..8,
     ) {
-        let points: Vec<Option<[f64; 3]>> = seen.iter().map(|it| it.map(|x| [x, 2.0 * x, 1.0])).collect();
+        let points: Vec<Option<[f64; 3]>> = seen.iter().map(|point| point.map(|x| [x, 2.0 * x, 1.0])).collect();
         let gaps: Vec<usize> = points.split(Option::is_some).map(<[_]>::len).collect();
         let is_fine = seen.iter().any(Option::is_some) && gaps.iter().all(|gap| *gap <= longest);
         match interpolated(&points, longest as f64) {

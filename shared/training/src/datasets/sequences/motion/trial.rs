@@ -89,7 +89,7 @@ impl Trial {
     /// Index of a marker in a frame.
     pub(super) fn marker(&self, name: &str) -> Option<usize> {
         let n_points = self.frames.first().map_or(0, Vec::len);
-        let place = self.names.iter().position(|it| it == name);
+        let place = self.names.iter().position(|known| known == name);
         place.filter(|place| *place < n_points)
     }
 
