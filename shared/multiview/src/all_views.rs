@@ -26,7 +26,7 @@ pub struct AllViewsInput<'a> {
 pub struct AllViewsStart<'a> {
     /// Candidate of every view.
     pub candidates: &'a [usize],
-    /// Whether left and right of a view are exchanged with respect to the first view.
+    /// For every view true if its left and right are exchanged with respect to the first view.
     pub exchanged: &'a [bool],
 }
 
@@ -37,7 +37,7 @@ pub struct AllViewsEstimate {
     pub energy: f64,
     /// The solutions, in order; their targets are indices into the views.
     pub iterations: Vec<Iteration>,
-    /// Whether the poses had converged at the end.
+    /// True if the poses had converged at the end.
     pub converged: bool,
     /// Share of the consistency terms that were switched on, over all pairs and parts.
     pub active: f64,

@@ -92,10 +92,11 @@ impl Bodies {
         for (joint, place) in set.joints.iter().zip(&mut joints) {
             let of_joint: Vec<&Change> =
                 same_parts(joint).map(|same_part| &changes[same_part]).collect();
-            if of_joint.iter().any(|it| it.is_dropped) {
+            if of_joint.iter().any(|change| change.is_dropped) {
                 *place = Err(NoJoint::Implausible);
             } else if let Ok(place) = place {
-                let moved: Vec<_> = of_joint.iter().filter_map(|it| it.moved.as_ref()).collect();
+                let moved: Vec<_> =
+                    of_joint.iter().filter_map(|change| change.moved.as_ref()).collect();
                 if !moved.is_empty() {
                     let sum: Vector3<f64> = moved.iter().map(|moved| moved.0).sum();
                     place.in_world += sum / moved.len() as f64;
@@ -118,7 +119,7 @@ impl Bodies {
 fn same_parts(joint: &Joint) -> impl Iterator<Item = usize> {
     let of_body = PARSE14.joints.iter().enumerate();
     let same = of_body.filter(|(_, it)| it.parts.iter().any(|part| joint.parts.contains(part)));
-    same.map(|it| it.0)
+    same.map(|joint| joint.0)
 }
 
 fn places(joints: &[Result<Triangulated, TriangulateError>]) -> (Joints, Covariances) {

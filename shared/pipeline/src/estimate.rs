@@ -168,7 +168,7 @@ impl Estimator {
         Estimate {
             answers,
             start,
-            scopes: estimates.iter().map(|it| Some(it.as_ref()?.scope)).collect(),
+            scopes: estimates.iter().map(|estimate| Some(estimate.as_ref()?.scope)).collect(),
             pairs,
             all_views,
             skeleton,

@@ -102,9 +102,9 @@ impl Following {
         let first = people().next().map(|person| person.0);
         let chosen = match self.follow {
             Follow::Clearest => first,
-            Follow::Largest => {
-                people().max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px)).map(|it| it.0)
-            }
+            Follow::Largest => people()
+                .max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px))
+                .map(|person| person.0),
             Follow::Last => return self.nearest(&found.people),
         };
         if let Some(chosen) = chosen {
@@ -121,7 +121,7 @@ impl Following {
         let near = self.last.and_then(|last| {
             let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
             let each = people.iter().map(|person| (person.place - last).norm()).enumerate();
-            each.filter(|it| it.1 <= reach).min_by(|a, b| a.1.total_cmp(&b.1))
+            each.filter(|candidate| candidate.1 <= reach).min_by(|a, b| a.1.total_cmp(&b.1))
         });
         if let Some((chosen, _)) = near {
             self.patience = (self.patience + 1).min(MOST_PATIENCE);
@@ -195,7 +195,7 @@ mod tests {
         let n = MOST_PATIENCE as usize;
         let frames = [vec![both; n + 10], vec![one; n], vec![both; 2]].concat();
         let got = chosen(Follow::Last, &frames);
-        assert!(got[..n + 10].iter().all(|it| *it == Some(-1.0)));
+        assert!(got[..n + 10].iter().all(|place| *place == Some(-1.0)));
         // The other one, two metres away, is out of reach for ten frames.
         assert!(got[n + 10..n + 20].iter().all(Option::is_none));
         assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");

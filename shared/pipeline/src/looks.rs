@@ -37,7 +37,7 @@ pub(crate) struct Looks<'a> {
 fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     let sure = maps.peaks().iter().flatten();
     let sure = sure.filter(|sure| sure.score >= SURE).map(|sure| sure.at);
-    outline_of(sure).is_some_and(|it| overlap(it, outline) < SAME)
+    outline_of(sure).is_some_and(|other| overlap(other, outline) < SAME)
 }
 
 impl Looks<'_> {
@@ -214,7 +214,7 @@ impl Looks<'_> {
         let boxes = [track.outline, wider(track.outline), around];
         let what = (self.image, &boxes[..]);
         let best = self.looker.best_of(what, track.turn, look, &mut seen.maps)?;
-        if let Some(best) = best.filter(|it| it.score >= track.usual_score - self.most_lost) {
+        if let Some(best) = best.filter(|best| best.score >= track.usual_score - self.most_lost) {
             self.keep_look(&best, Some(track.usual_score), memory);
         }
         Ok(())

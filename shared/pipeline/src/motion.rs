@@ -92,7 +92,9 @@ impl Motion {
         let height_px = height(&points);
         let velocities = self.velocities(view, instant_s + taken_s, points, height_px);
         let by = |velocity: Option<Velocity>| {
-            velocity.and_then(|it| it.shift(skew_s)).unwrap_or_else(Vector2::zeros)
+            velocity
+                .and_then(|velocity| velocity.shift(skew_s))
+                .unwrap_or_else(Vector2::zeros)
         };
         Some(velocities.into_iter().map(by).collect())
     }

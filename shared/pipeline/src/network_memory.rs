@@ -118,7 +118,7 @@ impl NetworkMemory {
     pub fn begin(&mut self, frame: u64, most_apart: Option<f64>) {
         let apart = self.last.map(|last| frame.saturating_sub(last));
         let share = apart.zip(most_apart);
-        let share = share.map(|(it, most)| it as f64 / most);
+        let share = share.map(|(apart, most)| apart as f64 / most);
         self.is_soon = share.is_some_and(|share| share <= SOON);
         self.hold = apart.zip(most_apart).map(|(gap, most)| Hold {
             gap,

@@ -197,9 +197,9 @@ fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let mut kept: Vec<Person> = Vec::new();
     for person in found {
-        let best = kept.first().map_or(0.0, |it| it.strength);
+        let best = kept.first().map_or(0.0, |first| first.strength);
         if person.strength >= MIN_STRENGTH * best
-            && kept.iter().all(|it| differ(views, it, &person))
+            && kept.iter().all(|other| differ(views, other, &person))
         {
             kept.push(person);
         }

@@ -83,7 +83,7 @@ pub(crate) fn of_set(
 ) -> Vec<Result<Triangulated, TriangulateError>> {
     let mean = |joint: &Joint| {
         let of_part = |part: &usize| {
-            let own = |it: &&Joint| it.parts.contains(part);
+            let own = |joint: &&Joint| joint.parts.contains(part);
             let index = PARSE14.joints.iter().position(|joint| own(&joint));
             let missing = TriangulateError::TooFewViews {
                 views: 0,

@@ -400,7 +400,7 @@ impl<'a> Sight<'a> {
         let name = name?;
         let names = self.network.outputs.iter().zip(self.outputs);
         // Behind those of the codec.
-        names.rev().find(|it| it.0.as_str() == name).map(|name| name.1)
+        names.rev().find(|output| output.0.as_str() == name).map(|name| name.1)
     }
 
     /// Whether what it tells beside the keypoints has the shape that the card says, and is finite.

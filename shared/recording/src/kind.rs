@@ -58,10 +58,10 @@ impl Kind {
 
     /// The message type of a topic; none for an unknown one.
     pub fn of_topic(name: &str) -> Option<Self> {
-        let family = |name: &str| name.rsplit_once('/').map(|it| it.0.to_owned());
+        let family = |name: &str| name.rsplit_once('/').map(|parts| parts.0.to_owned());
         Self::ALL.into_iter().find(|kind| match kind {
             Self::People | Self::Skeletons => name == kind.example(),
-            _ => family(name).is_some_and(|it| Some(it) == family(&kind.example())),
+            _ => family(name).is_some_and(|own| Some(own) == family(&kind.example())),
         })
     }
 

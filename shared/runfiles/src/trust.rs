@@ -221,13 +221,16 @@ mod tests {
     fn good_results_raise_no_doubt_and_each_limit_raises_one() {
         assert_eq!(good().doubts(), []);
         let cases: [(Spoil, &str); 7] = [
-            (|it| it.reprojection = Some(0.2), "joints are 20 %"),
-            (|it| it.bone_scatter_m = Some(0.0163), "by 2.6 cm together"),
-            (|it| it.jumps = 0.087, "jumps in 8.7 %"),
-            (|it| it.implausible = 0.4, "40 % of what was found"),
-            (|it| it.joints_implausible = 0.3, "30 % of the joints"),
-            (|it| it.body_deviation = Some(3.0), "bones are 3.0"),
-            (|it| it.sides_unsure = 0.5, "unsure in 50 %"),
+            (|trust| trust.reprojection = Some(0.2), "joints are 20 %"),
+            (
+                |trust| trust.bone_scatter_m = Some(0.0163),
+                "by 2.6 cm together",
+            ),
+            (|trust| trust.jumps = 0.087, "jumps in 8.7 %"),
+            (|trust| trust.implausible = 0.4, "40 % of what was found"),
+            (|trust| trust.joints_implausible = 0.3, "30 % of the joints"),
+            (|trust| trust.body_deviation = Some(3.0), "bones are 3.0"),
+            (|trust| trust.sides_unsure = 0.5, "unsure in 50 %"),
         ];
         for (spoil, said) in cases {
             let mut trust = good();

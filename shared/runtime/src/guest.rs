@@ -265,7 +265,7 @@ impl Guest {
     fn absent(&self, topic: &str) -> GuestError {
         let name = self.namespace.name();
         let (ours, all) = (parts_of(topic), self.topics());
-        let theirs = all.iter().filter_map(|it| parts_of(it));
+        let theirs = all.iter().filter_map(|other| parts_of(other));
         let other = ours.and_then(|ours| {
             // One of the same version was made since this one was not there.
             let mut others = theirs
@@ -361,7 +361,7 @@ impl<E: Message, H: Header> Seen<E, H> {
 /// [`LockError`].
 pub fn running_deployments() -> Result<Vec<String>, LockError> {
     let all = deployments(&Namespace::usual_base())?.into_iter();
-    let running = all.filter(|it| it.supervisor.is_some());
+    let running = all.filter(|deployment| deployment.supervisor.is_some());
     Ok(running.map(|running| running.namespace.name().to_owned()).collect())
 }
 

@@ -70,7 +70,7 @@ impl Action {
 
     /// The action of that name, if there is one.
     pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|it| it.name() == name)
+        Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 

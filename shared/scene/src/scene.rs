@@ -368,8 +368,8 @@ impl View {
             figure: &scene.figure,
             frames: &frames,
         };
-        let others = others.iter().map(|(it, frames)| Person {
-            figure: &it.figure,
+        let others = others.iter().map(|(other, frames)| Person {
+            figure: &other.figure,
             frames,
         });
         let people: Vec<Person<'_>> = core::iter::once(subject).chain(others).collect();

@@ -287,7 +287,7 @@ impl std::fmt::Display for Address {
             write!(out, "&skew-ms={}", all.join(","))?;
         }
         for name in Flaws::NAMES {
-            if let Some(value) = flaws.by_name_mut(name).filter(|it| **it != 0.0) {
+            if let Some(value) = flaws.by_name_mut(name).filter(|value| **value != 0.0) {
                 write!(out, "&{name}={value}")?;
             }
         }

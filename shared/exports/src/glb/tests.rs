@@ -43,7 +43,7 @@ impl Read {
         bytes.iter().map(|byte| f64::from(f32::from_le_bytes(*byte))).collect()
     }
 
-    /// What a node has in a frame: its animated value, else its own.
+    /// Returns the value of a node in a frame: its animated value, else its own.
     fn value(&self, node: usize, path: &str, frame: usize, default: &[f64]) -> Vec<f64> {
         let animation = &self.json["animations"][0];
         let channels = animation["channels"].as_array().unwrap();
@@ -56,8 +56,8 @@ impl Read {
             return all[frame * default.len()..(frame + 1) * default.len()].to_vec();
         }
         let own = self.json["nodes"][node][path].as_array();
-        own.map_or(default.to_vec(), |it| {
-            it.iter().map(|it| it.as_f64().unwrap()).collect()
+        own.map_or(default.to_vec(), |values| {
+            values.iter().map(|value| value.as_f64().unwrap()).collect()
         })
     }
 

@@ -71,7 +71,7 @@ impl Bumps {
             let at = camera.project(&Point3::from(joint)).unwrap();
             Some([at.x, at.y])
         });
-        let maxima = at.map(|at| at.map_or_else(Vec::new, |it| vec![(it, 1.02_f32.ln())]));
+        let maxima = at.map(|at| at.map_or_else(Vec::new, |point| vec![(point, 1.02_f32.ln())]));
         Self {
             at,
             maxima: maxima.to_vec(),
@@ -123,7 +123,7 @@ fn solved_by<E: JointEvidence>(
 fn worst(found: &SpacePose) -> f64 {
     let errors = found.joints.iter().zip(STANDING);
     errors
-        .filter_map(|(it, truth)| Some(((*it)? - Point3::from(truth)).norm()))
+        .filter_map(|(joint, truth)| Some(((*joint)? - Point3::from(truth)).norm()))
         .fold(0.0, f64::max)
 }
 
@@ -353,7 +353,7 @@ impl EitherLeg {
 
 impl JointEvidence for EitherLeg {
     fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
-        let heat = |it: usize| self.0.at(it, point).exp() - EPS as f32;
+        let heat = |joint: usize| self.0.at(joint, point).exp() - EPS as f32;
         match joint {
             0 | 5 => (heat(5).max(0.8 * heat(0)) + EPS as f32).ln(),
             1 | 4 => (heat(4).max(0.8 * heat(1)) + EPS as f32).ln(),

@@ -203,7 +203,7 @@ pub fn video_devices() -> io::Result<Vec<PathBuf>> {
         found.extend(number.map(|number| (number, Path::new("/dev").join(name))));
     }
     found.sort();
-    Ok(found.into_iter().map(|it| it.1).collect())
+    Ok(found.into_iter().map(|device| device.1).collect())
 }
 
 #[cfg(test)]
