@@ -18,7 +18,7 @@ pub enum NoJoint {
     Implausible,
 }
 
-/// What a skeleton is as a body.
+/// Skeleton, judged as a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {
     /// Standing height by the lengths of the bones, metres; `None` with too few bones.
@@ -40,7 +40,7 @@ pub(crate) struct Bodies {
 /// After so many frames without a body, the next one is somebody else's.
 const FORGET_AFTER: u32 = 30;
 
-/// What becomes of each of the 14 joints.
+/// Changes of each of the 14 joints.
 struct Change {
     is_dropped: bool,
     /// How far it moves, and its covariance then.

@@ -25,7 +25,7 @@ const NOISE_SHARE: f64 = 0.5;
 pub(crate) struct FoundByViews<'a> {
     pub(crate) plans: &'a [Arc<ViewPlan>],
     pub(crate) answers: &'a [Option<Sightings>],
-    /// Whether a view has a part in the result.
+    /// For every view true if it has a part in the result.
     pub(crate) takes_part: &'a [bool],
     /// Heat of half of the joints of a candidate of a view without a part in the result, for which the view counts as one that sees the
     /// person elsewhere.

@@ -181,7 +181,7 @@ impl Match {
         }
     }
 
-    /// Whether what the view calls left is the right side of the person, by two pairs of joints.
+    /// Returns true if the view's left is the right side of the person, by two pairs of joints.
     fn is_exchanged(&self, sides: &[[usize; 2]; 2]) -> bool {
         let [own, fused] = &self.joints;
         let distance = |a: usize, b: usize| distance(own[a], fused[b]);

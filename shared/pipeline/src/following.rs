@@ -71,7 +71,7 @@ impl Others {
         self.own.get(view).copied().flatten()
     }
 
-    /// Whether a view sees others, but not the one who is followed: it has no part in the frame.
+    /// Returns true if a view sees others, but not the one who is followed: it has no part in the frame.
     pub fn only(&self, view: usize) -> bool {
         self.without >> view & 1 == 1
     }

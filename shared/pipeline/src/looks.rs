@@ -32,7 +32,7 @@ pub(crate) struct Looks<'a> {
     pub(crate) most_lost: f32,
 }
 
-/// Whether the joints that are seen in a box lie in quite another one: that of a person who moved fast, or of whom the last frame is long
+/// Returns true if the joints that are seen in a box lie in quite another one: the person moved fast, or the last frame is long
 /// ago. The box then shows only some of the person, and that near its edge.
 fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     let sure = maps.peaks().iter().flatten();
@@ -274,7 +274,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Whether there is room for the person in a box, and nobody is known there.
+    /// Returns true if there is room for the person in a box, and nobody is known there.
     fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
         let is_known = |seen: &Seen| overlap(seen.outline, outline) > SAME;
         memory.n_seen < self.n_most && !memory.people().iter().any(is_known)

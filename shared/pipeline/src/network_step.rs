@@ -18,7 +18,7 @@ use crate::sighting::Sighting;
 use crate::tracks::{MUCH_WORSE, Track};
 use crate::view_result::ExtraKeypoint;
 
-/// What tells where the joints of people are.
+/// Source of the places of people's joints.
 #[derive(Debug)]
 pub enum Eyes {
     /// A network that looks into boxes, and the detector of people that finds these.

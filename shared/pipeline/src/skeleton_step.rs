@@ -37,7 +37,7 @@ pub enum Kept {
 pub struct Skeleton {
     /// The joints of the joint set, each with its position or the reason why there is none.
     pub joints: Vec<Result<Triangulated, NoJoint>>,
-    /// What they are as a body; `None` where that was not asked, or nothing was found.
+    /// The joints as a body; `None` where that was not asked, or nothing was found.
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
@@ -48,18 +48,18 @@ pub struct Skeleton {
     /// Energy of the chosen assumption about which views see the person from the same side minus that of
     /// the best other one.
     pub facing_margin: f64,
-    /// Whether left and right are to be exchanged in all views; `None` where that is not decided.
+    /// Exchange of left and right in all views; `None` where that is not decided.
     pub sides: Option<Sides>,
     /// Which poses the joints were triangulated from.
     pub kept: Kept,
 }
 
-/// What a skeleton is made of.
+/// Inputs of a skeleton.
 #[derive(Clone, Copy)]
 struct Frame<'a> {
     answers: &'a [Option<ViewResult>],
     fused: &'a Fused<'a>,
-    /// Whether the person is the only one that the views could mean.
+    /// True if the person is the only one that the views could mean.
     is_alone: bool,
 }
 

@@ -68,7 +68,7 @@ pub struct JointMaps {
     values: Vec<f32>,
     rows: usize,
     columns: usize,
-    /// Of the network's own maps every n-th row and column is kept.
+    /// Interval at which rows and columns of the network's own maps are kept.
     every: usize,
     /// Pixels of the input between two cells, across and down; the first cell lies on the first pixel.
     step: [f64; 2],

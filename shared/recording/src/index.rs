@@ -37,7 +37,7 @@ pub struct Extent {
     pub file_bytes: u64,
     /// End of the last complete record.
     pub whole_bytes: u64,
-    /// Whether the file is complete.
+    /// True if the file is complete.
     pub is_complete: bool,
     /// Damaged positions; the first thousand.
     pub damage: Vec<Damage>,
@@ -52,7 +52,7 @@ pub struct Extent {
 pub struct Damage {
     /// Offset, bytes from the start.
     pub offset: u64,
-    /// What is wrong.
+    /// Description of the damage.
     pub what: &'static str,
 }
 

@@ -65,7 +65,7 @@ impl Kind {
         })
     }
 
-    /// Whether a topic is of this kind in another version.
+    /// Returns true if a topic is of this kind in another version.
     pub fn is_of_another_version(self, name: &str) -> bool {
         let base = |name: &str| name.split('/').next().map(str::to_owned);
         Self::of_topic(name).is_none() && base(&self.example()) == base(name)

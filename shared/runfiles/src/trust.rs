@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::nullable::nullable;
 
-/// What the results say about their own quality. Shares are from 0 to 1.
+/// Statements of the results about their own quality. Shares are from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trust {
     /// Median over the skeletons: root mean square deviation of the bones' lengths from those of people, standard deviations.
@@ -64,8 +64,8 @@ impl Kind {
         Self::Sides,
     ];
 
-    /// What is tolerated. Chosen so that single persons who are seen whole by calibrated cameras stay below: balancing and
-    /// synthetic people reach two thirds of each at most.
+    /// Returns the limit of what is tolerated. Chosen so that single persons who are seen whole by calibrated cameras stay below:
+    /// balancing and synthetic people reach two thirds of each at most.
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,
@@ -76,7 +76,7 @@ impl Kind {
         }
     }
 
-    /// What cannot be, however few the results are.
+    /// Returns the least value that is impossible, however few the results are.
     fn impossible(self) -> f64 {
         match self {
             Self::Reprojection => 0.25,
@@ -150,7 +150,7 @@ impl Trust {
 }
 
 impl Doubt {
-    /// Whether it is the same reason, whatever the numbers.
+    /// Returns true if it is the same reason, whatever the numbers.
     pub fn is_like(&self, other: &Self) -> bool {
         self.kind == other.kind
     }

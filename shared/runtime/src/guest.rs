@@ -71,7 +71,7 @@ pub enum GuestError {
     Version {
         /// Its name.
         name: String,
-        /// What is sent, without the version.
+        /// Topic without the version.
         topic: String,
         /// The version of the deployment.
         theirs: String,
@@ -108,7 +108,7 @@ pub enum GuestError {
     Transport {
         /// Its name.
         name: String,
-        /// What failed, and why.
+        /// Action that failed, and the reason.
         what: String,
     },
 }
@@ -201,7 +201,7 @@ impl Guest {
         &self.namespace
     }
 
-    /// Whether the deployment is ending: everything that came of this guest has to be dropped.
+    /// Returns true if the deployment is ending: everything that came of this guest has to be dropped.
     pub fn is_over(&self) -> bool {
         running_supervisor(&self.namespace) != Some(self.supervisor)
     }

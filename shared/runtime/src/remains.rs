@@ -18,7 +18,7 @@ use crate::{BusError, LockError, Namespace, beneath, private};
 pub struct Remains {
     /// Its location.
     pub namespace: Namespace,
-    /// Whether its directory has the marker file. Other directories are never removed.
+    /// True if its directory has the marker file. Other directories are never removed.
     pub is_marked: bool,
     /// The process id of its supervisor; none if it does not run.
     pub supervisor: Option<u32>,

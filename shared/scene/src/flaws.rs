@@ -95,7 +95,7 @@ impl Flaws {
         Ok(())
     }
 
-    /// Whether a camera's frame is dropped. The first never is.
+    /// Returns true if a camera's frame is dropped. The first never is.
     pub(crate) fn drops(&self, random: Random, camera: usize, frame: u64) -> bool {
         frame > 0 && random.fork("drop").nth(camera as u64).nth(frame).chance(self.drop)
     }

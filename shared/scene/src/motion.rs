@@ -12,7 +12,7 @@ use crate::room::Block;
 use crate::subject::Subject;
 use stance::Stance;
 
-/// What the person does.
+/// Action of the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Action {
     /// Around the middle of the room.

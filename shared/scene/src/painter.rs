@@ -139,7 +139,7 @@ impl Painter {
         }
     }
 
-    /// Whether a sample sees the subject.
+    /// Returns true if a sample sees the subject.
     pub(crate) fn sees_subject(&self, sample: usize) -> bool {
         let end = self.bodies.get(1).map_or(usize::MAX, |body| body.first_triangle);
         let triangle = self.samples.triangle[sample];

@@ -219,7 +219,7 @@ trait OrX {
 }
 
 impl OrX for Vector3<f64> {
-    /// Of length 1; x for a vector of no length.
+    /// Returns a vector of length 1; x for a vector of no length.
     fn normalize_or_x(self) -> Self {
         self.try_normalize(1e-9).unwrap_or(Self::x())
     }

@@ -39,7 +39,7 @@ pub enum SceneError {
     /// No such camera.
     #[error("there is no camera {name:?}, only {}", known.join(", "))]
     NoCamera {
-        /// What was asked for.
+        /// Name that was asked for.
         name: String,
         /// Names of the rig.
         known: Vec<String>,
@@ -140,12 +140,12 @@ impl Scene {
         })
     }
 
-    /// What it was made of.
+    /// Returns the settings that the scene was made of.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// What the person does: the name of the action, or of the recording.
+    /// Returns the name of the person's action, or of the recording.
     pub fn action(&self) -> &str {
         &self.performance.name
     }
@@ -417,7 +417,7 @@ impl View {
         }
     }
 
-    /// Whether nothing occludes a joint but the body around it.
+    /// Returns true if nothing occludes a joint but the body around it.
     fn is_visible(&self, joint: usize, at: &Point3<f64>, pixel: Option<[f64; 2]>) -> bool {
         let Some([x, y]) = pixel else { return false };
         let samples = &self.painter.samples;

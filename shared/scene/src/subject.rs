@@ -35,7 +35,7 @@ pub(crate) struct Hair {
     pub(crate) beard: bool,
 }
 
-/// What covers the trunk.
+/// Clothing of the trunk.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Top {
     pub(crate) fabric: Fabric,
@@ -47,7 +47,7 @@ pub(crate) struct Top {
     pub(crate) slack: f32,
 }
 
-/// What covers the legs.
+/// Clothing of the legs.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bottom {
     pub(crate) fabric: Fabric,

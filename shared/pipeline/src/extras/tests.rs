@@ -32,7 +32,7 @@ const JOINTS: [[f64; 3]; 14] = [
 ];
 const EXTRAS: [[f64; 3]; 3] = [[0.1, 0.0, 1.62], [0.1, 0.13, 0.02], [0.3, -0.13, 0.02]];
 
-/// What all views found, and the step.
+/// Sightings of all views, and the step.
 struct Scene {
     step: ExtrasStep,
     skeleton: Skeleton,

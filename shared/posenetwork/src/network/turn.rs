@@ -49,7 +49,7 @@ impl Turn {
         all.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(self)
     }
 
-    /// Whether columns become rows.
+    /// Returns true if columns become rows.
     pub(super) fn is_sideways(self) -> bool {
         matches!(self, Self::Right | Self::Left)
     }

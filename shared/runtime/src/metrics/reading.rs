@@ -94,9 +94,9 @@ pub struct Reading {
     pub n_people: Option<u32>,
     /// Its view, if it works for one.
     pub view: Option<ViewName>,
-    /// Whether it has received the end of stream and sent it on.
+    /// True if it has received the end of stream and sent it on.
     pub is_finished: bool,
-    /// What became of the pictures of its live camera, if it has one.
+    /// Counts of the pictures of its live camera, if it has one.
     pub camera: Option<CameraCounts>,
     /// Durations by stage and view.
     pub times: Vec<Timed>,

@@ -1,4 +1,4 @@
-//! What a device offers: formats, sizes, rates, controls.
+//! Capabilities of a device: formats, sizes, rates, controls.
 
 use super::device::{rate_hz, text};
 use super::raw::{self, QueryControl};
@@ -77,12 +77,12 @@ pub struct VideoControl {
     pub value: Option<i32>,
     /// The choices of a menu: number and name.
     pub choices: Vec<(u32, String)>,
-    /// Whether it cannot be set, now or ever.
+    /// True if it cannot be set, now or ever.
     pub is_fixed: bool,
 }
 
 impl VideoControl {
-    /// What it takes, for people.
+    /// Returns the values that it takes, for people.
     pub fn takes(&self) -> String {
         if self.choices.is_empty() {
             let [least, most, step] = self.range;

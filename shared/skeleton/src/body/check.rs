@@ -1,4 +1,4 @@
-//! Whether a skeleton can be a person, and which of its joints cannot.
+//! Check that a skeleton can be a person, and search for the joints that cannot belong to one.
 
 use crate::body::bone::{self, BONES, SIDES, clean, joints_of};
 use crate::body::lengths::{Learned, Lengths};
@@ -75,7 +75,7 @@ pub fn check(joints: &Joints, covariances: &Covariances, lengths: Option<&Length
     }
 }
 
-/// What is expected of a bone.
+/// Expected length of a bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Expected {
     pub(crate) metres: f64,

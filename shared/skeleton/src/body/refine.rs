@@ -85,7 +85,7 @@ struct About {
     linear: [Option<Linear>; N_ROWS],
     /// Covariance times derivatives: how the joints follow a row.
     follow: [[Vector3<f64>; N_JOINTS]; N_ROWS],
-    /// Of `J C Jᵀ + variances`.
+    /// Factorisation of `J C Jᵀ + variances`.
     normal: Normal,
 }
 
@@ -133,7 +133,7 @@ impl Problem {
         }
     }
 
-    /// What is minimised.
+    /// Returns the cost that is minimised.
     fn cost(&self, state: &State) -> f64 {
         let off = (state.stature - self.measured.stature).powi(2) / STATURE_VARIANCE;
         let joints = state.joints.iter().zip(&self.measured.joints);

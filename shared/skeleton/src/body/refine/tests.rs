@@ -3,7 +3,7 @@
 use super::*;
 use crate::body::testing::{self, NO_COVARIANCES, POSTURES};
 
-/// Of the noise: 5 cm along x, 1 cm across.
+/// Returns covariances of the noise: 5 cm along x, 1 cm across.
 fn depth_noise() -> Covariances {
     [Some(Matrix3::from_diagonal(&Vector3::new(25e-4, 1e-4, 1e-4))); N_JOINTS]
 }
