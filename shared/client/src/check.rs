@@ -11,8 +11,7 @@ pub(crate) fn stamp(stamp: &Stamp, running: &Running, view: usize) -> bool {
     stamp.session == running.session && stamp.view as usize == view
 }
 
-/// Returns true if the counts of skeletons are those of the deployment, every identity belongs to one person, and all numbers are
-/// finite.
+/// Returns true if the counts of skeletons are the deployment's, every identity is that of one person, and numbers are finite.
 pub(crate) fn skeletons(message: &Skeletons, running: &Running) -> bool {
     let n_people = message.n_people as usize;
     let people = message.listed();

@@ -22,7 +22,7 @@ use store::Store;
 
 /// Length at rest of a bone that was never seen, metres.
 const UNSEEN_M: f64 = 0.2;
-/// Length of a bone that is drawn for a shorter one, metres: matrices divide by it.
+/// Length up to which a bone is not drawn, metres: matrices divide by it.
 const SHORTEST_M: f64 = 1e-4;
 /// Size of a keypoint's mark, metres.
 const MARK_M: f64 = 0.02;
@@ -61,7 +61,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut store = Store::default();
     let mesh = mesh(&pieces).store(&mut store);
     let skin = skin(&mut store, &rest, &pieces);
-    let tracks = Tracks::of(trial, &lengths, &pieces);
+    let tracks = Tracks::new(trial, &lengths, &pieces);
     let times: Vec<f32> = (0..trial.slots.len())
         .map(|slot| trial.time_s(slot).unwrap_or(slot as f64 / rate_hz) as f32)
         .collect();
@@ -258,7 +258,7 @@ struct Tracks {
 }
 
 impl Tracks {
-    fn of(trial: &Trial, lengths: &[Option<f64>; N_NODES], pieces: &[Piece]) -> Self {
+    fn new(trial: &Trial, lengths: &[Option<f64>; N_NODES], pieces: &[Piece]) -> Self {
         let mut tracks = Self {
             turns: vec![Vec::new(); N_NODES],
             places: vec![Vec::new(); N_NODES],

@@ -38,8 +38,7 @@ struct Line {
     is_detailed: bool,
 }
 
-/// Returns true if an event comes from the link between hosts. Its warnings are details, because the bridge itself reports their
-/// meaning for a run.
+/// Returns true if an event comes from the link between hosts: its warnings are details, the bridge reports their meaning.
 fn is_of_link(event: &Event<'_>) -> bool {
     let about = event.metadata();
     about.target().starts_with("zenoh") && *about.level() != Level::ERROR

@@ -65,8 +65,7 @@ impl SenderClock {
         Ok(clock)
     }
 
-    /// Returns the time of the camera's clock at time 0 of its stream, nanoseconds since 1970 began; `None` before the camera has
-    /// sent it.
+    /// Returns the camera's clock at time 0 of its stream, nanoseconds since 1970 began; `None` before it is known.
     pub(crate) fn offset_nanos(&self) -> Option<i64> {
         Some(self.0.load(Ordering::Relaxed)).filter(|offset| *offset != UNKNOWN)
     }

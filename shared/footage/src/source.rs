@@ -55,8 +55,7 @@ pub struct SourceInfo {
     pub frame_rate_hz: Option<f64>,
     /// Kind of footage.
     pub kind: SourceKind,
-    /// Turn that the tag of the first image or of the video asks for, whether it is done or not; see
-    /// [`Rotation`](crate::Rotation).
+    /// Turn in the tag of the first image or of the video, whether it is done or not; see [`Rotation`](crate::Rotation).
     pub tag: Turn,
     /// How many bits images with 16 use, where these are fewer: they are scaled by that.
     pub depth: Option<Depth>,
@@ -134,7 +133,7 @@ impl Source {
                 (path, Reader::Video(video))
             }
         };
-        let clock = Clock::of(&reader, spec);
+        let clock = Clock::new(&reader, spec);
         let info = reader.info(clock.rate_hz.map(|rate_hz| rate_hz / spec.step as f64));
         let Size { width, height } = info.size;
         let as_stored = Size::new(width * info.shrink, height * info.shrink);
@@ -305,7 +304,7 @@ struct Clock {
 }
 
 impl Clock {
-    fn of(reader: &Reader, spec: &SourceSpec) -> Self {
+    fn new(reader: &Reader, spec: &SourceSpec) -> Self {
         let (own_hz, times_s) = match reader {
             Reader::Video(video) => (video.probe.rate_hz, video.probe.times_s.clone()),
             Reader::Still(_) | Reader::Images(_) => (None, None),

@@ -122,7 +122,7 @@ impl Recorded {
         move |joint, at| is_some_sure && others[joint].is_some() && self.sides[at] == Sides::Unsure
     }
 
-    /// Returns the fates of instants with uncertain sides where nothing decides them: kept, exchanged, left out.
+    /// Counts the instants with uncertain sides where nothing decides them: kept, exchanged, left out.
     pub(crate) fn unsure(&self) -> [usize; 3] {
         let n = self.sides.iter().filter(|side| **side == Sides::Unsure).count();
         if self.sides.contains(&Sides::Sure) {

@@ -154,7 +154,7 @@ fn distinct(
             |kind: &&mut Kind| (kind.first[0] - point[0]).hypot(kind.first[1] - point[1]) <= reach;
         match kinds.iter_mut().find(is_near) {
             Some(kind) => kind.add(point),
-            None => kinds.push(Kind::of(point)),
+            None => kinds.push(Kind::new(point)),
         }
     }
     let choice = |kind: &Kind| {
@@ -178,7 +178,7 @@ struct Kind {
 }
 
 impl Kind {
-    fn of(first: [f64; 2]) -> Self {
+    fn new(first: [f64; 2]) -> Self {
         let mut kind = Self {
             first,
             sum: [0.0; 2],

@@ -90,8 +90,7 @@ impl Bodies {
         };
         let changes: [Change; N_JOINTS] = core::array::from_fn(change);
         for (joint, place) in set.joints.iter().zip(&mut joints) {
-            let of_joint: Vec<&Change> =
-                same_parts(joint).map(|same_part| &changes[same_part]).collect();
+            let of_joint: Vec<&Change> = same_parts(joint).map(|part| &changes[part]).collect();
             if of_joint.iter().any(|change| change.is_dropped) {
                 *place = Err(NoJoint::Implausible);
             } else if let Ok(place) = place {

@@ -51,7 +51,7 @@ pub struct Others {
 }
 
 impl Others {
-    fn of(found: &Found, followed: Option<usize>) -> Self {
+    fn new(found: &Found, followed: Option<usize>) -> Self {
         Self {
             of_views: found.others(followed),
             without: followed.map_or(0, |followed| found.without(followed)),
@@ -93,7 +93,7 @@ impl Following {
         let cameras: Vec<&Camera> = plans.iter().map(|plan| plan.camera()).collect();
         let found = find(&cameras, views.collect());
         let followed = self.choose(&found);
-        Others::of(&found, followed)
+        Others::new(&found, followed)
     }
 
     /// The one who is followed; `None` if that is none of those who were found.
@@ -181,10 +181,10 @@ mod tests {
         let cameras: Vec<_> = (0..4).map(camera).collect();
         let found = found(&cameras, people);
         let followed = Following::new(Follow::Clearest).choose(&found);
-        let others = Others::of(&found, followed);
+        let others = Others::new(&found, followed);
         let own: Vec<Option<usize>> = (0..4).map(|view| others.own(view)).collect();
         assert_eq!(own, [Some(0), Some(1), Some(0), Some(1)]);
-        let nobody = Others::of(&found, None);
+        let nobody = Others::new(&found, None);
         assert_eq!(nobody.own(0), None);
     }
 

@@ -37,8 +37,7 @@ pub struct Bump {
 }
 
 impl Bump {
-    /// Returns true if it is a bump that [`bumps`] can give: finite, positive definite, neither wider nor narrower than it makes
-    /// them.
+    /// Returns true if [`bumps`] can give it: finite, positive definite, neither wider nor narrower than it makes them.
     pub fn is_sound(&self) -> bool {
         let [xx, xy, yy] = self.precision.map(f64::from);
         let numbers = [self.at[0], self.at[1], self.heat];

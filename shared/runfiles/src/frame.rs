@@ -54,8 +54,8 @@ pub struct PersonLine {
     /// Poses that the skeleton is made of: those that fusion solved for, or those that it started from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kept: Option<Kept>,
-    /// Keypoints that networks name beside the joints (face, feet, hands), by name; each is triangulated by itself. None without
-    /// such networks.
+    /// Keypoints of networks beside the joints (face, feet, hands), by name, each triangulated alone. Empty without such
+    /// networks.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub keypoints: BTreeMap<String, JointLine>,
     /// Pairs of views that have a part in the skeleton.

@@ -80,7 +80,7 @@ impl Scene {
             name: settings.action.name().to_owned(),
             course: Course::Acted(Box::new(motion)),
         };
-        Self::of(settings, &subject, performance)
+        Self::build(settings, &subject, performance)
     }
 
     /// Makes a scene of a recording: the subject does what was recorded, in the middle of the room, scaled to the
@@ -104,10 +104,10 @@ impl Scene {
             height,
             name: recording.name.clone(),
         };
-        Self::of(settings, &subject, performance)
+        Self::build(settings, &subject, performance)
     }
 
-    fn of(
+    fn build(
         settings: &Settings,
         subject: &Subject,
         performance: Performance,

@@ -157,8 +157,7 @@ fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
 }
 
 impl Probe {
-    /// Returns true if fewer frames are shown than are stored, by the duration of what is shown: MP4 and its relatives have edit
-    /// lists.
+    /// Returns true if fewer frames are shown than are stored, by the duration shown: MP4 and its relatives have edit lists.
     fn is_trimmed(&self, stream: &Value, format: &Value) -> bool {
         let names = format["format_name"].as_str().unwrap_or_default();
         let has_edits = names.split(',').any(|part| part == "mov" || part == "mp4");

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use crate::FootageError;
 
-/// Returns the options that ffmpeg needs to read a file: JPEG pictures one behind the other are a video, whatever the name of the
-/// file.
+/// Returns the options that ffmpeg needs to read a file: JPEG pictures one behind the other are a video, whatever its name.
 pub(crate) fn input_options(path: &Path) -> &'static [&'static str] {
     use std::io::Read as _;
     let mut head = [0; 3];

@@ -164,8 +164,7 @@ impl Video {
         Ok(filled == rgb.len())
     }
 
-    /// Returns true if a frame is not made of one that could not be decoded: after such a one, from the next that stands alone
-    /// on.
+    /// Returns true if a frame depends on no frame that failed to decode: after one, from the next key frame on.
     ///
     /// * `next`: the frame that follows the one before it.
     fn is_whole(&mut self, index: u64, next: u64) -> Result<bool, FootageError> {

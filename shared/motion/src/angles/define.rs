@@ -15,8 +15,7 @@ pub enum Angle {
     TrunkForwards,
     /// The same to the person's right.
     TrunkSideways,
-    /// Turn of the line of the shoulders about the trunk, from that of the hips, positive with the right shoulder forwards (to
-    /// the left).
+    /// Turn of the line of the shoulders about the trunk from that of the hips, positive to the left (right shoulder forwards).
     TrunkRotation,
     /// Angle of the trunk from the plane perpendicular to the line of the hips: bent towards the right.
     TrunkBend,

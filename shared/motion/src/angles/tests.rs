@@ -45,14 +45,14 @@ fn estimates(pose: &[(Role, Vector3<f64>)], sd_m: f64) -> Vec<(Role, Estimate)> 
     pose.iter().map(|pose| (pose.0, estimate(pose.1))).collect()
 }
 
-fn of(pose: &[(Role, Vector3<f64>)], angle: Angle) -> Result<Value, Unknown> {
+fn value_of(pose: &[(Role, Vector3<f64>)], angle: Angle) -> Result<Value, Unknown> {
     let all = angles(&estimates(pose, 0.002), Some(Vector3::z_axis()));
     all.into_iter().find(|entry| entry.0 == angle).unwrap().1
 }
 
 #[track_caller]
 fn is(pose: &[(Role, Vector3<f64>)], angle: Angle, degrees: f64) {
-    let got = of(pose, angle).unwrap().degrees;
+    let got = value_of(pose, angle).unwrap().degrees;
     assert!(
         (got - degrees).abs() < 1e-6,
         "{angle}: {got}, expected {degrees}"
@@ -73,7 +73,7 @@ fn standing_upright_is_zero_and_what_a_straight_limb_does_not_tell_is_nothing() 
             Angle::ShoulderPlane(side),
             Angle::ShoulderRotation(side),
         ] {
-            assert_eq!(of(&pose, angle), Err(Unknown::Undefined), "{angle}");
+            assert_eq!(value_of(&pose, angle), Err(Unknown::Undefined), "{angle}");
         }
     }
 }
@@ -175,7 +175,7 @@ fn without_feet_or_a_vertical_their_angles_are_missing() {
     let no_feet: Vec<_> =
         pose.iter().filter(|pose| !matches!(pose.0, Role::Heel(_))).copied().collect();
     assert_eq!(
-        of(&no_feet, Angle::AnkleDorsiflexion(Left)),
+        value_of(&no_feet, Angle::AnkleDorsiflexion(Left)),
         Err(Unknown::Missing)
     );
     let all = angles(&estimates(&pose, 0.01), None);
