@@ -26,7 +26,7 @@ fn main() -> Result<(), ClientError> {
             continue;
         };
         let found = moment.followed().and_then(|person| person.joint(&joint));
-        match found.map(|it| it.found) {
+        match found.map(|joint| joint.found) {
             Some(Ok(place)) => {
                 let [x, y, z] = place.in_world;
                 let share = f64::midpoint(x / REACH_M, 1.0).clamp(0.0, 1.0);

@@ -43,7 +43,7 @@ struct ViewPorts {
     pictures: Option<GuestPort<u8, FrameHeader>>,
 }
 
-/// What became of the pictures of a turn.
+/// Outcome of taking the pictures of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Turn {
     /// All that was there was taken.
@@ -87,7 +87,7 @@ impl Connection {
         self.views.iter().map(|view| view.view)
     }
 
-    /// Whether the deployment is ending.
+    /// Returns true if the deployment is ending.
     pub(crate) fn is_over(&self) -> bool {
         self.guest.is_over()
     }

@@ -39,12 +39,12 @@ pub enum ClientError {
 }
 
 impl ClientError {
-    /// Whether it is only that the deployment does not run.
+    /// Returns true if the only reason is that the deployment does not run.
     pub fn is_not_running(&self) -> bool {
         matches!(self, Self::Guest(GuestError::NotRunning { .. }))
     }
 
-    /// What may be tried.
+    /// Returns a remedy to try, if one is known.
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Guest(error) => failure::Fault::hint(error),

@@ -1,4 +1,4 @@
-//! What a program is given: everything about one frame.
+//! A moment, as a program receives it: everything about one frame.
 
 use std::sync::{Arc, Mutex};
 
@@ -11,7 +11,7 @@ use crate::lock::lock;
 /// Everything about one frame that was asked for and is there.
 #[derive(Debug)]
 pub struct Moment {
-    /// What the deployment says about itself: names of joints and cameras.
+    /// Description of the deployment by itself: names of joints and cameras.
     pub running: Arc<Running>,
     /// Number of the frame, the same in all views.
     pub frame: u64,
@@ -21,20 +21,20 @@ pub struct Moment {
     pub skeletons: Option<Skeletons>,
     /// The views that were asked for, in the order of the deployment.
     pub views: Vec<ViewMoment>,
-    /// Whether all that was asked for is there.
+    /// True if everything that was asked for is there.
     pub is_complete: bool,
     /// Frames between this moment and the one given before that were not given: skipped by the pipeline, lost with a process, or
     /// passed over because newer ones were there. 0 for the first of a run.
     pub n_missed: u64,
 }
 
-/// What there is of one view.
+/// Parts of a moment that belong to one view.
 #[derive(Debug)]
 pub struct ViewMoment {
     /// Number of the view.
     pub view: usize,
-    /// What was found in it alone: the message, which holds positions in cells of the pyramid. Positions in pixels after fusion
-    /// are in [`Skeleton::centres_px`].
+    /// Poses that the view found alone: the message, which holds positions in cells of the pyramid. Positions in pixels after
+    /// fusion are in [`Skeleton::centres_px`].
     pub pose: Option<Box<ViewPose>>,
     /// Its picture.
     pub picture: Option<Picture>,
@@ -135,7 +135,7 @@ impl<'a> Skeleton<'a> {
         self.joints().find(|joint| joint.name == name)
     }
 
-    /// What networks name beside the joints.
+    /// Iterates over the keypoints that networks name beside the joints.
     pub fn keypoints(self) -> impl Iterator<Item = Joint<'a>> {
         let names = self.running.keypoints.iter();
         names.zip(self.message.listed_keypoints()).map(named)
@@ -242,7 +242,7 @@ impl Picture {
         }
     }
 
-    /// Whether it lies where its sender wrote it.
+    /// Returns true if the pixels lie where the sender wrote them.
     pub fn is_in_place(&self) -> bool {
         matches!(self.pixels, Pixels::InPlace(_))
     }
@@ -262,7 +262,7 @@ impl Moment {
         self.skeletons.as_ref()?.followed()
     }
 
-    /// Whether any of its pictures lies where its sender wrote it.
+    /// Returns true if any picture of the moment lies where its sender wrote it.
     pub(crate) fn is_in_place(&self) -> bool {
         let mut pictures = self.views.iter().filter_map(|view| view.picture.as_ref());
         pictures.any(Picture::is_in_place)

@@ -33,7 +33,7 @@ pub struct Client {
     last: Option<(u64, u64)>,
 }
 
-/// Whether the deployment is there.
+/// Connection to the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// It runs, and is read.
@@ -42,7 +42,7 @@ pub enum State {
     Waiting,
 }
 
-/// What was not given to the caller.
+/// Counts of what was not given to the caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Losses {
     /// Messages of another run, or with counts or numbers that cannot be.
@@ -144,7 +144,7 @@ impl Client {
         drop(inner);
         let step = moment.running.frame_step.max(1);
         let session = moment.running.session;
-        let before = self.last.filter(|it| it.0 == session).map(|it| it.1);
+        let before = self.last.filter(|last| last.0 == session).map(|last| last.1);
         moment.n_missed = before.map_or(0, |before| {
             (moment.frame.saturating_sub(before) / step).saturating_sub(1)
         });
@@ -152,17 +152,17 @@ impl Client {
         Ok(Some(moment))
     }
 
-    /// Whether the deployment is there.
+    /// Returns the state of the connection to the deployment.
     pub fn state(&self) -> State {
         lock(&self.shared.inner).state
     }
 
-    /// What the deployment says about itself; none before the first has run, and that of the last run after it.
+    /// Returns the deployment's description of itself; `None` before the first has run, and that of the last run after it.
     pub fn running(&self) -> Option<Arc<Running>> {
         lock(&self.shared.inner).running.clone()
     }
 
-    /// What was not given, since the client was made.
+    /// Returns the losses since the client was made.
     pub fn losses(&self) -> Losses {
         lock(&self.shared.inner).losses
     }
@@ -281,7 +281,7 @@ impl Reader {
         inner.state = State::Waiting;
         // Pictures in place would keep the deployment from ending.
         let n_ready = inner.ready.len();
-        inner.ready.retain(|it| !it.is_in_place());
+        inner.ready.retain(|moment| !moment.is_in_place());
         inner.losses.passed_over += (n_ready - inner.ready.len()) as u64;
     }
 }

@@ -1,8 +1,8 @@
-//! What a program wants of a deployment.
+//! Wishes of a program: the parts of a deployment's frames that it takes.
 
 use core::time::Duration;
 
-/// What a client takes of every frame, and which frames it is given.
+/// Parts of every frame that a client takes, and choice of the frames that it is given.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Wish {
     pub(crate) skeletons: bool,
@@ -81,12 +81,12 @@ impl Wish {
         self
     }
 
-    /// Whether anything of single views is asked for.
+    /// Returns true if anything of single views is asked for.
     pub(crate) fn has_views(&self) -> bool {
         self.poses || self.pictures
     }
 
-    /// Whether only the newest moment is given.
+    /// Returns true if only the newest moment is given.
     pub(crate) fn newest_wins(&self) -> bool {
         self.waiting == 1
     }

@@ -97,7 +97,7 @@ pub enum CameraClock {
     Arrival,
 }
 
-/// What happens when a stage is slower than its input.
+/// Behaviour of a stage that is slower than its input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
@@ -111,7 +111,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Whether senders wait for their receivers.
+    /// Returns true if senders wait for their receivers.
     pub fn is_lossless(self) -> bool {
         self != Self::Realtime
     }

@@ -43,13 +43,13 @@ type Edit = (Range<usize>, String);
 /// [`ClocksError`].
 pub fn with_clocks(text: &str, clocks: &[ClockKeys]) -> Result<String, ClocksError> {
     let document = DeTable::parse(text).map_err(|_odd| ClocksError::Syntax)?;
-    let cameras = document.get_ref().iter().find(|it| it.0.get_ref() == "camera");
+    let cameras = document.get_ref().iter().find(|entry| entry.0.get_ref() == "camera");
     let cameras = cameras.and_then(|camera| camera.1.get_ref().as_array());
     let mut edits: Vec<Edit> = Vec::new();
     for clock in clocks {
         let mut tables = cameras.into_iter().flatten();
-        let table = tables.find_map(|it| {
-            let table = it.get_ref().as_table()?;
+        let table = tables.find_map(|camera| {
+            let table = camera.get_ref().as_table()?;
             (text_of(table, "name")?.1 == clock.name).then_some(table)
         });
         let table = table.ok_or_else(|| ClocksError::NoCamera {
@@ -71,7 +71,7 @@ pub fn with_clocks(text: &str, clocks: &[ClockKeys]) -> Result<String, ClocksErr
 
 /// A value that is text, and where it stands.
 fn text_of<'a>(table: &'a DeTable<'_>, key: &str) -> Option<(Range<usize>, &'a str)> {
-    let (_, value) = table.iter().find(|it| it.0.get_ref() == key)?;
+    let (_, value) = table.iter().find(|entry| entry.0.get_ref() == key)?;
     match value.get_ref() {
         DeValue::String(text) => Some((value.span(), text)),
         _ => None,
@@ -83,8 +83,8 @@ fn edits_of(text: &str, table: &DeTable<'_>, clock: &ClockKeys) -> Vec<Edit> {
     let mut added = Vec::new();
     let drift = clock.drift_ppm;
     for (key, value) in [("offset_ms", Some(clock.offset_ms)), ("drift_ppm", drift)] {
-        let known = table.iter().find(|it| it.0.get_ref() == key);
-        let known = known.map(|it| it.1.span());
+        let known = table.iter().find(|entry| entry.0.get_ref() == key);
+        let known = known.map(|entry| entry.1.span());
         match (known, value) {
             (Some(span), value) => edits.push((span, number(value.unwrap_or(0.0)))),
             (None, Some(value)) => added.push(format!("{key} = {}", number(value))),
@@ -93,16 +93,16 @@ fn edits_of(text: &str, table: &DeTable<'_>, clock: &ClockKeys) -> Vec<Edit> {
     }
     if let Some((name, _)) = text_of(table, "name").filter(|_| !added.is_empty()) {
         let rest = &text[name.end..];
-        let line = rest.find('\n').map_or(rest, |it| &rest[..it]);
+        let line = rest.find('\n').map_or(rest, |end| &rest[..end]);
         let is_alone = line.trim().is_empty() || line.trim_start().starts_with('#');
         if is_alone {
             let end = name.end + line.len();
             let end_of_line = if line.ends_with('\r') { "\r\n" } else { "\n" };
             let end = if line.ends_with('\r') { end - 1 } else { end };
-            let lines = added.iter().flat_map(|it| [end_of_line, it]);
+            let lines = added.iter().flat_map(|entry| [end_of_line, entry]);
             edits.push((end..end, lines.collect()));
         } else {
-            let entries = added.iter().flat_map(|it| [", ", it]);
+            let entries = added.iter().flat_map(|entry| [", ", entry]);
             edits.push((name.end..name.end, entries.collect()));
         }
     }
@@ -125,7 +125,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Whether the changed text says the same but for the clocks.
+/// Returns true if the changed text says the same but for the clocks.
 fn is_as_meant(text: &str, changed: &str, clocks: &[ClockKeys]) -> bool {
     let read = |text: &str| text.parse::<Table>().ok();
     let (Some(mut before), Some(mut after)) = (read(text), read(changed)) else {
@@ -146,7 +146,7 @@ fn is_as_meant(text: &str, changed: &str, clocks: &[ClockKeys]) -> bool {
             values.push((offset, drift.filter(|drift| *drift != 0.0)));
         }
         let as_written = |value: f64| number(value).parse::<f64>().ok();
-        let wanted = clock.drift_ppm.and_then(as_written).filter(|it| *it != 0.0);
+        let wanted = clock.drift_ppm.and_then(as_written).filter(|ppm| *ppm != 0.0);
         if values[1] != (as_written(clock.offset_ms), wanted) {
             return false;
         }

@@ -1,4 +1,4 @@
-//! What is wrong with the value of a key, and the kinds of value that are asked for.
+//! Complaints about the value of a key, and the kinds of value that are asked for.
 
 use core::fmt::Display;
 
@@ -12,7 +12,7 @@ pub struct Complaint {
     pub key: String,
     /// Its value.
     pub got: String,
-    /// What would do.
+    /// Description of the values that are accepted.
     pub expected: String,
 }
 

@@ -36,7 +36,7 @@ pub struct Entry {
     pub value: Option<Value>,
     /// Who said it.
     pub origin: Origin,
-    /// What it means.
+    /// Meaning of the key.
     pub meaning: String,
 }
 
@@ -52,8 +52,8 @@ impl Entry {
 fn change_texts(value: &mut Value, change: impl Fn(&str) -> String + Copy) {
     match value {
         Value::String(text) => *text = change(text),
-        Value::Array(all) => all.iter_mut().for_each(|it| change_texts(it, change)),
-        Value::Table(table) => table.iter_mut().for_each(|it| change_texts(it.1, change)),
+        Value::Array(all) => all.iter_mut().for_each(|entry| change_texts(entry, change)),
+        Value::Table(table) => table.iter_mut().for_each(|entry| change_texts(entry.1, change)),
         _ => {}
     }
 }

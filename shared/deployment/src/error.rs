@@ -18,7 +18,7 @@ pub enum ConfigError {
     Malformed {
         /// File and line, or the option of the command line.
         place: String,
-        /// What is wrong.
+        /// Reason why it is malformed.
         message: String,
     },
     /// A value that cannot be.
@@ -30,7 +30,7 @@ pub enum ConfigError {
         key: String,
         /// Its value.
         got: String,
-        /// What would do.
+        /// Description of the values that are accepted.
         expected: String,
     },
 }
@@ -80,7 +80,7 @@ fn of_cameras(key: &str) -> &'static str {
     }
 }
 
-/// What a deployment or a camera needs at least.
+/// Describes the keys that a deployment or a camera needs at least.
 fn of_what_is_missing(key: &str) -> &'static str {
     match key {
         "rig" | "output" | "camera" | "name" => {
@@ -94,7 +94,7 @@ fn of_what_is_missing(key: &str) -> &'static str {
 fn hint(key: &str, known: &[&str]) -> String {
     let nearest = known
         .iter()
-        .map(|it| (strsim::damerau_levenshtein(key, it), it))
+        .map(|name| (strsim::damerau_levenshtein(key, name), name))
         .filter(|(distance, it)| *distance <= 2.max(it.len() / 3))
         .min();
     nearest.map_or_else(

@@ -74,7 +74,7 @@ pub struct FaultError {
 ///
 /// ```
 /// let faults: deployment::capture::Faults = "freeze@30+20".parse()?;
-/// assert_eq!(faults.at(49).map(|it| it.kind), Some(deployment::capture::FaultKind::Freeze));
+/// assert_eq!(faults.at(49).map(|fault| fault.kind), Some(deployment::capture::FaultKind::Freeze));
 /// assert_eq!(faults.at(50), None);
 /// # Ok::<(), deployment::capture::FaultError>(())
 /// ```
@@ -83,7 +83,7 @@ pub struct FaultError {
 pub struct Faults(Vec<Fault>);
 
 impl Faults {
-    /// Whether there are no faults.
+    /// Returns true if there are no faults.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -111,7 +111,7 @@ impl FromStr for Fault {
             let (name, rest) = text.trim().split_once('@')?;
             let (from, count) = rest.split_once('+')?;
             let kind = FaultKind::ALL.iter().find(|fault_kind| fault_kind.1 == name)?.0;
-            let [from, count] = [from, count].map(|it| it.parse().ok());
+            let [from, count] = [from, count].map(|text| text.parse().ok());
             Some(Self {
                 kind,
                 from: from?,
@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn a_fault_lasts_for_its_number_of_frames() {
         let faults: Faults = "freeze@3+2, slow@4+9".parse().unwrap();
-        let at = |frame| faults.at(frame).map(|it| it.kind.name());
+        let at = |frame| faults.at(frame).map(|fault| fault.kind.name());
         assert_eq!(
             [2, 3, 4, 5, 12, 13].map(at),
             [

@@ -25,7 +25,7 @@ pub struct Host {
     pub address: Option<String>,
 }
 
-/// What crosses from a host with cameras to the one that fuses.
+/// Data that cross from a host with cameras to the one that fuses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Carry {
@@ -86,7 +86,7 @@ impl Deployment {
     pub fn views_of(&self, host: &Host) -> Vec<usize> {
         let cameras = self.cameras.iter().enumerate();
         let own = cameras.filter(|(_, camera)| host.views.contains(&camera.name));
-        own.map(|it| it.0).collect()
+        own.map(|camera| camera.0).collect()
     }
 
     /// The host that a view belongs to.
@@ -95,7 +95,7 @@ impl Deployment {
         self.hosts.iter().find(|host| host.views.contains(name))
     }
 
-    /// Whether the maps of networks cross between hosts with the poses, as Gaussians.
+    /// Returns true if the maps of networks cross between hosts with the poses, as Gaussians.
     pub fn maps_cross(&self) -> bool {
         self.link.carry == Carry::Poses && self.has_maps()
     }

@@ -106,7 +106,7 @@ mod tests {
         assert_eq!(names[..3], ["name", "rig", "unit"]);
         assert_eq!(names.last().unwrap(), "runtime.lock_memory");
         let sections: Vec<&str> =
-            names.iter().filter_map(|it| Some(it.split_once('.')?.0)).collect();
+            names.iter().filter_map(|name| Some(name.split_once('.')?.0)).collect();
         let mut unique = sections.clone();
         unique.dedup();
         assert_eq!(unique, SECTIONS.map(|section| section.0));

@@ -148,7 +148,7 @@ impl Default for Supervision {
 }
 
 impl Deployment {
-    /// Whether the method is the network's, which works on maps of the joints.
+    /// Returns true if the method is the network's, which works on maps of the joints.
     pub fn has_maps(&self) -> bool {
         self.method == Method::Network
     }
@@ -172,13 +172,13 @@ impl Deployment {
         networks
     }
 
-    /// Whether expected errors are predicted from the frames.
+    /// Returns true if expected errors are predicted from the frames.
     pub fn predicts_errors(&self) -> bool {
         let errors = self.paper.errors.as_ref();
         errors.is_some_and(|errors| errors.network().is_some())
     }
 
-    /// Whether there are processes that send expected errors.
+    /// Returns true if there are processes that send expected errors.
     pub fn has_quality(&self) -> bool {
         self.paper.errors.is_some()
     }

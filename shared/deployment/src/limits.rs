@@ -60,7 +60,7 @@ fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
 }
 
 impl Deployment {
-    /// What can be, but is hardly meant: with its number and what to try.
+    /// Returns doubts about settings that are possible but hardly meant: each with its number and a remedy to try.
     ///
     /// * `n_cores`: of the machine, where that is known.
     pub fn doubts(&self, n_cores: Option<usize>) -> Vec<String> {

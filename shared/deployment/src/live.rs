@@ -1,4 +1,4 @@
-//! What a live camera means for a deployment: nothing waits, and nothing is read again.
+//! Rules of a deployment with live cameras: nothing waits, and nothing is read again.
 
 use toml::Table;
 

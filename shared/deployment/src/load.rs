@@ -11,11 +11,11 @@ use crate::{Complaint, ConfigError, Deployment, Machine, live, method, rules};
 /// A deployment, and what of it was said by whom.
 #[derive(Debug)]
 pub struct Loaded {
-    /// What it says, paths resolved, defaults filled in.
+    /// The deployment, paths resolved, defaults filled in.
     pub deployment: Deployment,
-    /// What the file says, as it stands there.
+    /// Content of the file, as it stands there.
     pub in_file: Table,
-    /// What the command line says.
+    /// Settings of the command line.
     pub on_command_line: Table,
 }
 
@@ -117,7 +117,7 @@ impl Loaded {
     }
 }
 
-/// What stands in the place of a file that only the defaults are asked of.
+/// Text that stands for a file when only the defaults are asked for.
 const NO_FILE: &str = "name = \"\"\nrig = \"\"\noutput = \"\"\ncamera = []\n";
 
 impl Loaded {
@@ -140,7 +140,7 @@ impl Loaded {
     }
 }
 
-/// What `--set section.key=value` says, as a table.
+/// Returns the options `--set section.key=value` as a table.
 ///
 /// A value that is not TOML is taken as text, so that `--set paper.energy=released` needs no quotes.
 fn overrides(set: &[String]) -> Result<Table, ConfigError> {

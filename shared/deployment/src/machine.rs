@@ -1,4 +1,4 @@
-//! What the machine must be asked, so that this crate need not touch it.
+//! Questions to the machine, so that this crate need not touch it.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ pub trait Machine {
     /// is: the run refuses it.
     fn footage(&self, named: &str, base: &Path) -> String;
 
-    /// Whether footage is a live camera.
+    /// Returns true if footage is a live camera.
     ///
     /// * `named`: as [`Self::footage`] returned it.
     fn is_live(&self, named: &str) -> bool;

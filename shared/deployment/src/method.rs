@@ -35,7 +35,7 @@ impl Method {
         }
     }
 
-    /// Whether a key, with its section, is one that this method uses.
+    /// Returns true if this method uses a key, given with its section.
     pub fn has(self, key: &str) -> bool {
         key.split('.').next() != Some(self.other().name())
     }
@@ -44,7 +44,7 @@ impl Method {
 /// Most cameras that the paper's method solves at once.
 pub(crate) const MOST_AT_ONCE: usize = 8;
 
-/// What the views of a frame are solved in.
+/// Unit in which the views of a frame are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Views {
     /// Pairs, whose poses are then combined: the paper's method.
@@ -56,7 +56,7 @@ pub enum Views {
 }
 
 impl Deployment {
-    /// What the views of a frame are solved in.
+    /// Returns the unit in which the views of a frame are solved.
     pub fn views(&self) -> Views {
         match (self.method, self.paper.views) {
             (Method::Network, _) => Views::Space,

@@ -127,7 +127,7 @@ pub enum Search {
     Tracked,
 }
 
-/// What the paper's method solves at once.
+/// Views that the paper's method solves at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Views {
@@ -156,7 +156,7 @@ pub enum Energy {
     /// The paper's.
     #[default]
     Paper,
-    /// What the authors' program computes.
+    /// The energy that the authors' program computes.
     Released,
 }
 

@@ -22,7 +22,7 @@ pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
     let mut table = document.into_inner();
     let mut found = None;
     for name in key.split('.') {
-        let (name, value) = table.into_iter().find(|(it, _)| it.get_ref() == name)?;
+        let (name, value) = table.into_iter().find(|(known, _)| known.get_ref() == name)?;
         found = Some(name.span());
         match value.into_inner() {
             DeValue::Table(inner) => table = inner,
@@ -32,7 +32,7 @@ pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
     found
 }
 
-/// What is wrong with the text of a file, with its line and its key.
+/// Returns the error of a text of a file, with its line and its key.
 pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> ConfigError {
     let place = place(file, text, error.span());
     let at = error.span();
@@ -55,7 +55,7 @@ pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> Con
     ConfigError::explain(place, error.message(), key.as_deref())
 }
 
-/// What is wrong with an option `--set`, with its key.
+/// Returns the error of an option `--set`, with its key.
 pub(super) fn of_set(error: &toml::de::Error) -> ConfigError {
     let said = error.to_string();
     let key = said.split("in `").nth(1).and_then(|part| part.split('`').next());

@@ -63,8 +63,8 @@ fn begin(text: &mut String, title: &str) {
 }
 
 fn row(text: &mut String, name: &str, key: &Key, default: Option<String>) {
-    let default = default.map_or(String::new(), |it| format!("`{it}`"));
-    let [takes, meaning] = [&key.takes, &key.meaning].map(|it| it.replace('|', "\\|"));
+    let default = default.map_or(String::new(), |value| format!("`{value}`"));
+    let [takes, meaning] = [&key.takes, &key.meaning].map(|cell| cell.replace('|', "\\|"));
     // Writing to a string cannot fail.
     let _infallible = writeln!(text, "| `{name}` | {takes} | {default} | {meaning} |");
 }

@@ -1,4 +1,4 @@
-//! What must hold of a deployment before anything is started.
+//! Conditions that a deployment must meet before anything is started.
 
 use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::method::MOST_AT_ONCE;
@@ -92,7 +92,7 @@ fn is_path(key: &str, path: &str) -> Result<(), Complaint> {
     )
 }
 
-/// What a camera sees: footage, keypoints, or both.
+/// Checks the input of a camera: footage, keypoints, or both.
 fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
     demand(
         !camera.source.is_empty() || camera.keypoints.is_some(),
@@ -305,7 +305,7 @@ fn runtime(deployment: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// Whether a name is that of a service, or of a process of the deployment.
+/// Checks that a name is that of a service, or of a process of the deployment.
 fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Complaint> {
     let services = services(deployment);
     let is_one = services.iter().any(|&(service, n)| {

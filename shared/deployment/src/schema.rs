@@ -77,9 +77,9 @@ fn as_written(number: f64) -> Value {
 pub struct Key {
     /// Its name with its section: `paper.workers`.
     pub name: String,
-    /// What it means: the documentation of its field.
+    /// Meaning of the key: the documentation of its field.
     pub meaning: String,
-    /// What it takes, as TOML: `whole number`, `"paper" or "released"`.
+    /// Values that it takes, as TOML: `whole number`, `"paper" or "released"`.
     pub takes: String,
 }
 
@@ -112,7 +112,7 @@ impl Shapes {
         }
     }
 
-    /// What a reference refers to; anything else is itself.
+    /// Follows a reference; returns any other schema unchanged.
     fn resolved<'a>(&'a self, schema: &'a Value) -> &'a Value {
         let Some(reference) = schema["$ref"].as_str() else {
             return schema;
@@ -121,13 +121,13 @@ impl Shapes {
         &self.0["$defs"][name]
     }
 
-    /// What values a schema takes, in words.
+    /// Returns the values that a schema takes, in words.
     fn takes(&self, schema: &Value) -> String {
         let schema = self.resolved(schema);
         for choice in ["anyOf", "oneOf"] {
             if let Some(choices) = schema[choice].as_array() {
                 let all = choices.iter().filter(|choice| choice["type"] != "null");
-                return all.map(|it| self.takes(it)).collect::<Vec<_>>().join(" or ");
+                return all.map(|choice| self.takes(choice)).collect::<Vec<_>>().join(" or ");
             }
         }
         if let Some(values) = schema["enum"].as_array() {
@@ -237,7 +237,8 @@ mod tests {
                 continue; // the length of the list
             }
             for value in [least, most] {
-                let said = read(key, value).map_or_else(|it| it.to_string(), |_| String::new());
+                let said =
+                    read(key, value).map_or_else(|error| error.to_string(), |_| String::new());
                 assert_eq!(said, "", "{key} = {value}");
             }
             for value in [least - 1.0, most + 1.0] {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// The word that stands for a file that ships, where a file can be named; `./shipped` is a file of that name.
 pub const SHIPPED: &str = "shipped";
 
-/// Whether a name is that of a file that ships.
+/// Returns true if a name is that of a file that ships.
 pub fn is_shipped(file: &Path) -> bool {
     file == Path::new(SHIPPED)
 }
@@ -13,7 +13,7 @@ pub fn is_shipped(file: &Path) -> bool {
 /// The word that stands for no file, where there is one without it; `./none` is a file of that name.
 pub const NONE: &str = "none";
 
-/// Whether a name stands for no file.
+/// Returns true if a name stands for no file.
 pub fn is_none(file: &Path) -> bool {
     file == Path::new(NONE)
 }

@@ -1,6 +1,6 @@
-//! What people write that TOML reads otherwise, and files of other programs in the place of a deployment.
+//! Texts that TOML reads otherwise than meant, and files of other programs in the place of a deployment.
 
-/// What is to be said of a whole text that is none of a deployment; none where it may be one.
+/// Returns the message for a whole text that is not a deployment; `None` where it may be one.
 pub(super) fn other_file(text: &str) -> Option<&'static str> {
     let begins =
         |head: &str| text.lines().any(|line| line.trim_end() == head || line.starts_with(head));
@@ -24,9 +24,9 @@ pub(super) fn other_file(text: &str) -> Option<&'static str> {
     )
 }
 
-/// What is to be said of a line that the reader refuses; none where it is nothing usual.
+/// Returns the message for a line that the reader refuses; `None` where the mistake is not a usual one.
 pub(super) fn of_line(line: &str) -> Option<&'static str> {
-    let value = line.split_once('=').map_or(line, |it| it.1).trim();
+    let value = line.split_once('=').map_or(line, |parts| parts.1).trim();
     if value.starts_with('"') && value.contains('\\') {
         return Some(ESCAPE);
     }
@@ -37,7 +37,7 @@ pub(super) fn of_line(line: &str) -> Option<&'static str> {
     has_no_commas.then_some("the numbers of a list need commas between them: [0, 0, 1]")
 }
 
-/// What is to be said of a path with characters that a backslash has made.
+/// Message for a path with characters that a backslash has made.
 pub(super) const ESCAPE: &str = "a backslash in \"...\" begins a special character: write / in its place, as in \"C:/videos/a.mp4\", or put the \
     path in single quotes, 'C:\\videos\\a.mp4'";
 
@@ -64,7 +64,7 @@ mod tests {
     fn files_of_others_are_told() {
         let pose2sim =
             "[project]\nmulti_person = false\n[pose]\n[synchronization]\n[triangulation]\n";
-        assert!(other_file(pose2sim).is_some_and(|it| it.contains("Pose2Sim")));
+        assert!(other_file(pose2sim).is_some_and(|hint| hint.contains("Pose2Sim")));
         assert_eq!(other_file("[pose]\nthreads = 2\n[[camera]]\n"), None);
     }
 }

@@ -9,7 +9,7 @@ use crate::Deployment;
 pub struct OwnClock {
     /// Frames per second, by its own clock.
     pub rate_hz: f64,
-    /// What is added to its times at its first frame, seconds.
+    /// Offset that is added to its times at its first frame, seconds.
     pub offset_s: f64,
     /// By how much a second of it is too long, as a share.
     pub drift: f64,
@@ -84,7 +84,7 @@ impl Timeline {
 }
 
 impl Deployment {
-    /// Whether the footage of a camera has an offset or a drift, so that frames are brought to common instants.
+    /// Returns true if the footage of a camera has an offset or a drift, so that frames are brought to common instants.
     pub fn has_clocks(&self) -> bool {
         let mut cameras = self.cameras.iter();
         cameras.any(|camera| {

@@ -55,7 +55,7 @@ impl Stage {
 
     /// The stage of that name.
     pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|it| it.name() == name)
+        Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 
@@ -89,16 +89,16 @@ pub(crate) fn process_name(service: &str, index: Option<usize>) -> String {
 pub struct RecordingPlan {
     /// Its name, absolute.
     pub file: PathBuf,
-    /// Whether the pixels of frames are left out.
+    /// True if the pixels of frames are left out.
     pub without_pixels: bool,
-    /// Whether evidence is left out.
+    /// True if evidence is left out.
     pub without_evidence: bool,
     /// Bytes that may wait to be written, in millions.
     pub queue_mb: u64,
     /// Views whose live cameras' pictures are kept as they came, ascending.
     #[serde(default)]
     pub pictures: Vec<usize>,
-    /// Whether what Foxglove shows is left out.
+    /// True if the messages for Foxglove are left out.
     #[serde(default)]
     pub without_foxglove: bool,
 }
@@ -114,7 +114,7 @@ pub struct Replay {
     pub speed: Option<f64>,
 }
 
-/// What the run does when a process is lost.
+/// Reaction of the run to the loss of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The run fails.
@@ -130,13 +130,13 @@ pub enum Role {
 pub struct Process {
     /// Its name in the deployment: `pose-1`.
     pub name: String,
-    /// What it is: a stage, `results`, `record` or `bridge`.
+    /// Service that it runs: a stage, `results`, `record` or `bridge`.
     pub service: &'static str,
     /// The view or the worker, where there is one process for each.
     pub index: Option<usize>,
-    /// What the run does when it is lost.
+    /// Reaction of the run when it is lost.
     pub role: Role,
-    /// Whether it does not run, and its messages of a recording are sent in its place.
+    /// True if it does not run, and its messages of a recording are sent in its place.
     pub is_replayed: bool,
     /// Topics that it subscribes to.
     pub inputs: Vec<String>,
@@ -151,7 +151,7 @@ pub struct Topology {
     pairs: Vec<[usize; 2]>,
     n_workers: usize,
     n_views: usize,
-    /// Whether people are found by networks or keypoints, and solved in space.
+    /// True if people are found by networks or keypoints, and solved in space.
     has_maps: bool,
 }
 
@@ -208,18 +208,19 @@ impl Topology {
 
     /// The processes that send to another: each publishes a topic that it subscribes to.
     pub fn senders_to<'a>(&'a self, receiver: &'a Process) -> impl Iterator<Item = &'a Process> {
-        let sends = |it: &&Process| it.outputs.iter().any(|out| receiver.inputs.contains(out));
+        let sends =
+            |process: &&Process| process.outputs.iter().any(|out| receiver.inputs.contains(out));
         self.processes.iter().filter(sends)
     }
 
     /// How many processes subscribe to a topic.
     pub fn receivers_of(&self, topic: &str) -> usize {
-        self.count(|it| it.inputs.iter().any(|input| input == topic))
+        self.count(|process| process.inputs.iter().any(|input| input == topic))
     }
 
     /// Processes that take everything that leaves the pipeline: `results`, and `record` if there is one.
     pub fn n_recorders(&self) -> usize {
-        self.count(|it| [RESULTS, RECORD].contains(&it.service))
+        self.count(|process| [RESULTS, RECORD].contains(&process.service))
     }
 
     /// Views, and so processes of every service that has one for each view.
@@ -232,7 +233,7 @@ impl Topology {
         self.n_workers
     }
 
-    /// Whether people are found by networks or keypoints: `fuse` sends who is who, and `triangulate` reads the evidence.
+    /// Returns true if people are found by networks or keypoints: `fuse` sends who is who, and `triangulate` reads the evidence.
     pub fn has_maps(&self) -> bool {
         self.has_maps
     }
@@ -273,7 +274,7 @@ impl Topology {
     }
 }
 
-/// What decides the inputs and outputs of the processes.
+/// Facts that decide the inputs and outputs of the processes.
 struct Builder<'a> {
     topology: &'a Topology,
     has_quality: bool,

@@ -41,8 +41,10 @@ fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
 
 /// Draws a person; returns the upper left corner of what the view sees of it.
 fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) -> Option<[f64; 2]> {
-    let seen: Vec<Option<Seen>> =
-        trial.points(slot).map(|point| point.and_then(|it| view.see(it))).collect();
+    let seen: Vec<Option<Seen>> = trial
+        .points(slot)
+        .map(|point| point.and_then(|point| view.see(point)))
+        .collect();
     let names: Vec<&str> = trial.names().collect();
     let n_joints = trial.joints.joints.len();
     let width = line_width(canvas.size());
@@ -52,7 +54,7 @@ fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) ->
         }
     }
     let places: Vec<[f64; 2]> =
-        seen.iter().map(|it| it.map_or([f64::NAN; 2], |it| it.at)).collect();
+        seen.iter().map(|point| point.map_or([f64::NAN; 2], |seen| seen.at)).collect();
     draw_limbs(canvas, &places, &limbs(trial));
     for (name, at) in names.iter().zip(&places).skip(n_joints) {
         canvas.disc(*at, width, side_of(name).colour());
@@ -95,7 +97,9 @@ pub(crate) fn side_of(name: &str) -> Side {
             rest.next() == Some(of) && rest.next().is_some_and(char::is_uppercase)
         };
         name.starts_with(side)
-            || ["upper", "lower"].iter().any(|it| name.strip_prefix(it).is_some_and(own))
+            || ["upper", "lower"]
+                .iter()
+                .any(|prefix| name.strip_prefix(prefix).is_some_and(own))
     };
     if is("right", 'R') {
         Side::Right

@@ -195,8 +195,8 @@ fn notes(
             held.n_whole
         ));
     }
-    let missing = NODES.iter().enumerate().filter(|it| !is_there[it.0]);
-    let missing: Vec<&str> = missing.filter_map(|it| it.1.landmark).collect();
+    let missing = NODES.iter().enumerate().filter(|node| !is_there[node.0]);
+    let missing: Vec<&str> = missing.filter_map(|node| node.1.landmark).collect();
     if !missing.is_empty() {
         notes.push(format!(
             "never seen with what they hang on, and left out: {}",
@@ -206,7 +206,7 @@ fn notes(
     if !trial.extras.is_empty() {
         notes.push("keypoints beside the joints are left out: they hang on nothing".to_owned());
     }
-    let known = lengths.iter().zip(NODES).filter_map(|it| Some((it.1.name, (*it.0)?)));
+    let known = lengths.iter().zip(NODES).filter_map(|bone| Some((bone.1.name, (*bone.0)?)));
     let known = known.map(|(name, length)| format!("{name} {:.1}", CM * length));
     notes.push(format!(
         "fixed lengths of the bones that end in each joint (medians), cm: {}",

@@ -5,7 +5,7 @@ use std::io;
 use crate::sink::{Notes, Sink};
 use crate::{Trial, bvh, glb, points, tables};
 
-/// What a format needs to know of a run.
+/// Facts of a run that a format needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Needs {
     /// How many frames a second there are.
@@ -19,17 +19,17 @@ pub struct Needs {
 pub struct FileFormat {
     /// Its name in commands.
     pub name: &'static str,
-    /// What its files are called after the name of the trial.
+    /// Suffix of its files after the name of the trial.
     pub suffix: &'static str,
     /// Its unit.
     pub unit: &'static str,
     /// Its axes.
     pub axes: &'static str,
-    /// What a gap is in it.
+    /// Representation of a gap in the format.
     pub gaps: &'static str,
     /// How it holds uncertainty.
     pub uncertainty: &'static str,
-    /// What it needs to know of a run.
+    /// Facts of a run that it needs.
     pub needs: Needs,
     /// Writes a trial.
     ///

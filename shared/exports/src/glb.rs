@@ -22,14 +22,14 @@ use store::Store;
 
 /// Length at rest of a bone that was never seen, metres.
 const UNSEEN_M: f64 = 0.2;
-/// What a shorter bone has no extent to show by, metres: matrices divide by it.
+/// Length up to which a bone is not drawn, metres: matrices divide by it.
 const SHORTEST_M: f64 = 1e-4;
 /// Size of a keypoint's mark, metres.
 const MARK_M: f64 = 0.02;
 
 /// A piece of the skin, on a node of its own.
 struct Piece {
-    /// Of the bone: the node where it ends. Of a keypoint: its index among the points.
+    /// For a bone the node where it ends; for a keypoint its index among the points.
     of: Of,
     name: String,
     /// The node that carries it, of the file.
@@ -61,7 +61,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut store = Store::default();
     let mesh = mesh(&pieces).store(&mut store);
     let skin = skin(&mut store, &rest, &pieces);
-    let tracks = Tracks::of(trial, &lengths, &pieces);
+    let tracks = Tracks::new(trial, &lengths, &pieces);
     let times: Vec<f32> = (0..trial.slots.len())
         .map(|slot| trial.time_s(slot).unwrap_or(slot as f64 / rate_hz) as f32)
         .collect();
@@ -173,8 +173,8 @@ fn mesh(pieces: &[Piece]) -> Mesh {
             Of::Keypoint(_) => (&piece.name[..], mesh::mark(MARK_M)),
         };
         let side = crate::annotate::side_of(name);
-        let to_scene = |it: [f64; 3]| {
-            piece.in_scene * Point3::from(Vector3::from(it).component_mul(&piece.scale))
+        let to_scene = |point: [f64; 3]| {
+            piece.in_scene * Point3::from(Vector3::from(point).component_mul(&piece.scale))
         };
         mesh.add(&shape, to_scene, N_NODES + nth, side.colour());
     }
@@ -183,14 +183,14 @@ fn mesh(pieces: &[Piece]) -> Mesh {
 
 /// The skin: all nodes of the tree, then those of the pieces.
 fn skin(store: &mut Store, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Value {
-    let of_tree = rest.iter().map(|it| Matrix4::new_translation(&-it));
+    let of_tree = rest.iter().map(|place| Matrix4::new_translation(&-place));
     let of_pieces = pieces.iter().map(|piece| {
         let shrink = Matrix4::new_nonuniform_scaling(&piece.scale.map(|side| 1.0 / side));
         shrink * piece.in_scene.inverse().to_homogeneous()
     });
     let matrices: Vec<f32> = of_tree
         .chain(of_pieces)
-        .flat_map(|it| it.as_slice().iter().map(|value| *value as f32).collect::<Vec<_>>())
+        .flat_map(|matrix| matrix.as_slice().iter().map(|value| *value as f32).collect::<Vec<_>>())
         .collect();
     let joints: Vec<usize> = (0..N_NODES + pieces.len()).map(in_file).collect();
     json!({
@@ -211,10 +211,10 @@ fn nodes(trial: &Trial, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Vec
         let of_tree = NODES
             .iter()
             .enumerate()
-            .filter(|it| it.1.parent.map_or(0, in_file) == file_node);
-        let of_pieces = pieces.iter().enumerate().filter(|it| it.1.parent == file_node);
-        let of_pieces = of_pieces.map(|it| in_file(N_NODES + it.0));
-        of_tree.map(|it| in_file(it.0)).chain(of_pieces).collect()
+            .filter(|node| node.1.parent.map_or(0, in_file) == file_node);
+        let of_pieces = pieces.iter().enumerate().filter(|piece| piece.1.parent == file_node);
+        let of_pieces = of_pieces.map(|piece| in_file(N_NODES + piece.0));
+        of_tree.map(|node| in_file(node.0)).chain(of_pieces).collect()
     };
     let mut nodes = vec![json!({ "name": trial.name, "children": children(0) })];
     for (index, node) in NODES.iter().enumerate() {
@@ -246,19 +246,19 @@ fn real4(it: &UnitQuaternion<f64>) -> [f32; 4] {
     [it.i as f32, it.j as f32, it.k as f32, it.w as f32]
 }
 
-/// What moves, frame by frame.
+/// Values that change from frame to frame.
 struct Tracks {
-    /// Of every node of the tree.
+    /// Turns of every node of the tree.
     turns: Vec<Vec<f32>>,
     places: Vec<Vec<f32>>,
-    /// Of every piece.
+    /// Scales of every piece.
     scales: Vec<Vec<f32>>,
-    /// Of every piece that is a keypoint; empty for others.
+    /// Marks of every piece that is a keypoint; empty for other pieces.
     marks: Vec<Vec<f32>>,
 }
 
 impl Tracks {
-    fn of(trial: &Trial, lengths: &[Option<f64>; N_NODES], pieces: &[Piece]) -> Self {
+    fn new(trial: &Trial, lengths: &[Option<f64>; N_NODES], pieces: &[Piece]) -> Self {
         let mut tracks = Self {
             turns: vec![Vec::new(); N_NODES],
             places: vec![Vec::new(); N_NODES],
@@ -289,7 +289,8 @@ impl Tracks {
                         tracks.scales[nth].extend(real3(scale.unwrap_or_default()));
                     }
                     Of::Keypoint(point) => {
-                        let place = trial.point(slot, point).map(|it| (world * it.in_world).coords);
+                        let place =
+                            trial.point(slot, point).map(|found| (world * found.in_world).coords);
                         let n = tracks.marks[nth].len();
                         let held = tracks.marks[nth].get(n.wrapping_sub(3)..).map(<[f32]>::to_vec);
                         let rest = || real3(piece.rest.translation.vector).to_vec();
@@ -358,7 +359,7 @@ fn extras(trial: &Trial) -> Value {
     let of_point = |(nth, label): (usize, String)| {
         let deviations: Vec<Option<f64>> = (0..trial.slots.len())
             .map(|slot| trial.point(slot, nth).and_then(Point::deviation_m))
-            .map(|it| it.map(|value| (value * 1e5).round() / 1e5))
+            .map(|deviation| deviation.map(|value| (value * 1e5).round() / 1e5))
             .collect();
         let value = json!({ "standard_deviation_m": deviations, "gaps": trial.gaps(nth), "filled": trial.filled(nth) });
         (label, value)
@@ -374,8 +375,9 @@ fn chunks(out: &mut Sink<'_>, document: &Value, binary: &[u8]) -> io::Result<()>
     text.resize(text.len().next_multiple_of(4), b' ');
     let padding = binary.len().next_multiple_of(4) - binary.len();
     let length = 12 + 8 + text.len() + 8 + binary.len() + padding;
-    let size = |it: usize| {
-        u32::try_from(it).map_err(|_error| io::Error::other("GLB has no room for more than 4 GB"))
+    let size = |length: usize| {
+        u32::try_from(length)
+            .map_err(|_error| io::Error::other("GLB has no room for more than 4 GB"))
     };
     out.write_all(b"glTF")?;
     for word in [2, size(length)?, size(text.len())?] {

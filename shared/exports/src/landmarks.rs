@@ -1,4 +1,4 @@
-//! What the joints of every set are called in the body: the same names, whatever the set.
+//! Landmarks of the body by the names of the joints of every set: the same names, whatever the set.
 
 use nalgebra::Point3;
 
@@ -13,7 +13,7 @@ pub(crate) struct Landmarks {
 
 impl Landmarks {
     pub(crate) fn of(trial: &Trial) -> Self {
-        let at = |name: &str| trial.names().position(|it| it == name);
+        let at = |name: &str| trial.names().position(|known| known == name);
         let points = LANDMARKS.map(|(landmark, names)| {
             let one = names.iter().find_map(|name| at(name));
             (landmark, one.into_iter().collect())
@@ -32,7 +32,7 @@ impl Landmarks {
     /// The points whose mean is the landmark; none where there is none.
     pub(crate) fn points_of(&self, landmark: &str) -> &[usize] {
         let found = self.points.iter().find(|point| point.0 == landmark);
-        found.map_or(&[], |it| &it.1)
+        found.map_or(&[], |entry| &entry.1)
     }
 
     /// Where the landmark is, in the world; none in a gap.

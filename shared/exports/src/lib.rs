@@ -1,4 +1,4 @@
-//! What was found, for others: a run in the files of other tools, one module for each format, and pages ([`report`]).
+//! Results for other programs: a run in the files of other tools, one module for each format, and pages ([`report`]).
 //!
 //! [`Gathering`] takes the lines of a run one by one, and makes a [`Trial`] of them: every frame in its place on the grid of the
 //! frame rate, gaps included. [`FILES`] is the table of formats that are one file each; two formats have a file for every view and

@@ -1,4 +1,4 @@
-//! What points are called in the files.
+//! Names of points in the files.
 
 /// A landmark of the body, and the joints of the sets that are it: the first that a set has.
 pub(crate) const LANDMARKS: [(&str, &[&str]); 15] = [
@@ -26,7 +26,7 @@ fn plain_name(joint: &str) -> &str {
         .iter()
         .filter(|_| is_humaneva)
         .find(|landmark| landmark.1.contains(&joint));
-    found.map_or(joint, |it| it.0)
+    found.map_or(joint, |landmark| landmark.0)
 }
 
 /// Names of the points in the files.
@@ -60,7 +60,7 @@ fn opensim(name: &str) -> String {
     }
     let capital = |word: &str| {
         let mut rest = word.chars();
-        let first = rest.next().map(|it| it.to_uppercase().to_string());
+        let first = rest.next().map(|letter| letter.to_uppercase().to_string());
         first.unwrap_or_default() + rest.as_str()
     };
     words.into_iter().map(capital).collect()
@@ -111,7 +111,7 @@ mod tests {
                 halpe_26
             }
         });
-        assert_eq!(own.map(|it| Naming::OpenSim.apply(it)), due);
+        assert_eq!(own.map(|name| Naming::OpenSim.apply(name)), due);
     }
 
     #[test]

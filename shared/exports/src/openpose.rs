@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::landmarks::Landmarks;
 use crate::{Seen, Trial, ViewCamera};
 
-/// What files of a frame end in.
+/// Suffix of the file of a frame.
 pub const SUFFIX: &str = "_keypoints.json";
 
 /// The file of a view and a frame; whoever was not found is not in it. `person_id` is -1 in a run of one person.
@@ -60,7 +60,7 @@ fn keypoint(
     name: &str,
 ) -> Option<(Seen, f64)> {
     let points = match landmarks.points_of(name) {
-        [] => vec![trial.names().position(|it| it == name)?],
+        [] => vec![trial.names().position(|known| known == name)?],
         points => points.to_vec(),
     };
     let all: Option<Vec<_>> = points.iter().map(|&point| trial.point(slot, point)).collect();
@@ -76,12 +76,12 @@ fn keypoint(
         mean.views = all.iter().fold(u32::MAX, |both, it| both & it.views);
     }
     let share = f64::from(mean.views.count_ones()) / trial.views.len().max(1) as f64;
-    let seen = view.see(&mean).filter(|it| view.holds(it.at))?;
+    let seen = view.see(&mean).filter(|seen| view.holds(seen.at))?;
     // A joint of no view that is known is found nevertheless; zero would mean that it is not.
     Some((seen, share.clamp(0.01, 1.0)))
 }
 
-/// What files of a frame are called: `cam01_000000000012_keypoints.json`.
+/// Returns the name of the file of a frame: `cam01_000000000012_keypoints.json`.
 pub fn file_name(view: &str, frame: u64) -> String {
     format!("{view}_{frame:012}{SUFFIX}")
 }
@@ -99,7 +99,7 @@ mod tests {
         let text = frame(core::slice::from_ref(&trial), 1, &view);
         let read = openpose::parse(text.as_bytes(), None).unwrap().people;
         assert_eq!(read.len(), 1);
-        let knee = BODY_25.iter().position(|it| *it == "left knee").unwrap();
+        let knee = BODY_25.iter().position(|name| *name == "left knee").unwrap();
         let index = trial.names().position(|name| name == "left knee").unwrap();
         let due = view.see(trial.point(1, index).unwrap()).unwrap();
         let found = read[0].keypoints[knee].unwrap();

@@ -73,7 +73,7 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
             &mut group,
             places.iter().map(|place| names[place.1].clone()),
         )?;
-        let point = |it: &(usize, usize)| trial.point(it.0, it.1);
+        let point = |place: &(usize, usize)| trial.point(place.0, place.1);
         for axis in 0..3 {
             numbers(
                 &mut group,
@@ -123,8 +123,9 @@ fn numbers<W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     all: impl Iterator<Item = Option<f64>>,
 ) -> Result<(), ParquetError> {
-    let all: Vec<Option<f64>> = all.map(|it| it.filter(|value| value.is_finite())).collect();
-    let levels: Vec<i16> = all.iter().map(|it| i16::from(it.is_some())).collect();
+    let all: Vec<Option<f64>> =
+        all.map(|number| number.filter(|value| value.is_finite())).collect();
+    let levels: Vec<i16> = all.iter().map(|value| i16::from(value.is_some())).collect();
     let values: Vec<f64> = all.into_iter().flatten().collect();
     column::<DoubleType, _>(group, &values, Some(&levels))
 }
@@ -133,7 +134,7 @@ fn texts<W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     all: impl Iterator<Item = String>,
 ) -> Result<(), ParquetError> {
-    let values: Vec<ByteArray> = all.map(|it| ByteArray::from(it.into_bytes())).collect();
+    let values: Vec<ByteArray> = all.map(|text| ByteArray::from(text.into_bytes())).collect();
     column::<ByteArrayType, _>(group, &values, None)
 }
 

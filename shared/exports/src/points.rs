@@ -84,7 +84,9 @@ pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     write!(out, "{heading}")?;
     let turn = trial.y_up_from_world();
     for slot in 0..trial.slots.len() {
-        let points = trial.points(slot).map(|point| point.map(|it| (turn * it.in_world).into()));
+        let points = trial
+            .points(slot)
+            .map(|point| point.map(|point| (turn * point.in_world).into()));
         let time_s = trial.time_s(slot).unwrap_or(0.0);
         out.write_all(formats::trc::row(slot as u64 + 1, time_s, points).as_bytes())?;
     }

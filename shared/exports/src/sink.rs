@@ -5,5 +5,5 @@ use std::io::Write;
 /// Where a format is written.
 pub type Sink<'a> = dyn Write + Send + 'a;
 
-/// What a format cannot say in itself, for the user.
+/// Notes for the user on what a format cannot express.
 pub type Notes = Vec<String>;

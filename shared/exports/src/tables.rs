@@ -43,7 +43,7 @@ pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     let mut head = ["frame", "time_s", "person", "status"].map(str::to_owned).to_vec();
     for name in trial.labels() {
-        head.extend(["x_m", "y_m", "z_m", "sd_m"].map(|it| format!("{name}_{it}")));
+        head.extend(["x_m", "y_m", "z_m", "sd_m"].map(|column| format!("{name}_{column}")));
     }
     table.write_record(&head)?;
     for slot in 0..trial.slots.len() {
@@ -89,13 +89,13 @@ fn person(trial: &Trial, slot: usize) -> String {
     id.map_or(String::new(), |id| id.to_string())
 }
 
-/// What became of a frame.
+/// Returns the status of a frame.
 fn status(trial: &Trial, slot: usize) -> &str {
     let status = &trial.slots[slot].status;
     if status.is_empty() { "no line" } else { status }
 }
 
-/// What became of a point: `ok`, `filled`, or why it has no position.
+/// Returns the state of a point: `ok`, `filled`, or the reason why it has no position.
 pub(crate) fn state(trial: &Trial, slot: usize, point: usize) -> &str {
     match trial.slots[slot].points.get(point) {
         Some(Ok(point)) if point.is_filled => "filled",
@@ -109,5 +109,5 @@ pub(crate) fn state(trial: &Trial, slot: usize, point: usize) -> &str {
 pub(crate) fn views(trial: &Trial, point: &Point) -> String {
     let named = trial.views.iter().enumerate();
     let seen = named.filter(|named| named.0 < 32 && point.views >> named.0 & 1 == 1);
-    seen.map(|it| it.1.as_str()).collect::<Vec<_>>().join("+")
+    seen.map(|view| view.1.as_str()).collect::<Vec<_>>().join("+")
 }

@@ -49,7 +49,7 @@ pub(crate) fn line(frame: u64, rate_hz: Option<f64>) -> FrameLine {
     };
     let person = PersonLine {
         id: 1,
-        joints: PARSE14.joints.iter().map(|it| joint(it.name)).collect(),
+        joints: PARSE14.joints.iter().map(|entry| joint(entry.name)).collect(),
         pairs: 1,
         status: FrameLine::OK.to_owned(),
         ..PersonLine::default()

@@ -14,7 +14,7 @@ use crate::landmarks::Landmarks;
 pub(crate) struct Node {
     pub(crate) name: &'static str,
     pub(crate) parent: Option<usize>,
-    /// What it lies at; a node without lies where its parent is.
+    /// Landmark at which it lies; a node without one lies where its parent is.
     pub(crate) landmark: Option<&'static str>,
     /// Direction from the parent at rest; zero without a landmark.
     pub(crate) rest: [f64; 3],
@@ -102,9 +102,9 @@ pub(crate) struct Posed {
     pub(crate) seen: [Option<Point3<f64>>; N_NODES],
     /// The turn of every node against its parent.
     pub(crate) turn: [UnitQuaternion<f64>; N_NODES],
-    /// Of every node, its place in its parent's frame, as seen; where it was not seen, as last time.
+    /// Place of every node in its parent's frame, as seen; where it was not seen, as last time.
     pub(crate) place: [Vector3<f64>; N_NODES],
-    /// Whether the turn follows from what was seen in this frame; true of nodes that never turn.
+    /// True for a node whose turn follows from what was seen in this frame, and for nodes that never turn.
     pub(crate) is_turn_seen: [bool; N_NODES],
 }
 
@@ -193,7 +193,7 @@ fn towards(
 /// How the hips are turned: x from the right hip to the left one, y as near as it can to the neck, or to up where that is not seen.
 fn facing(seen: &[Option<Point3<f64>>; N_NODES]) -> Option<UnitQuaternion<f64>> {
     let [left, right] = [seen[14]?, seen[18]?];
-    let spine = seen[2].zip(seen[0]).map(|it| it.0 - it.1);
+    let spine = seen[2].zip(seen[0]).map(|ends| ends.0 - ends.1);
     let x = Unit::try_new(left - right, 1e-9)?;
     let z = Unit::try_new(x.cross(&spine.unwrap_or_else(Vector3::y)), 1e-9)?;
     let axes = Matrix3::from_columns(&[*x, z.cross(&x), *z]);

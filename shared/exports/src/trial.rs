@@ -1,4 +1,4 @@
-//! What a run found, every frame in its place on the grid of the frame rate.
+//! Results of a run, every frame in its place on the grid of the frame rate.
 
 use std::collections::BTreeSet;
 
@@ -28,7 +28,7 @@ pub struct Point {
     pub reprojection_px: Option<f64>,
     /// Bit `v` is set if it was triangulated from view `v` of [`Trial::views`].
     pub views: u32,
-    /// Whether it was not measured in this frame: smoothing has filled it in.
+    /// True if it was not measured in this frame: smoothing has filled it in.
     pub is_filled: bool,
 }
 
@@ -65,12 +65,12 @@ pub struct Slot {
 /// One person of a run. The trials of a run have the same places, in which whoever is not there has no point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
-    /// What the files call the run.
+    /// Name of the run in the files.
     pub name: String,
     /// Identities of the person within the run, ascending: more than one where never two people were there, and whoever was followed had
     /// one after the other.
     pub ids: Vec<u64>,
-    /// What the files call the points.
+    /// Naming of the points in the files.
     pub naming: Naming,
     /// The joints.
     pub joints: &'static JointSet,
@@ -156,7 +156,7 @@ impl Trial {
 
     /// The same of frames in which it was filled in by smoothing.
     pub fn filled(&self, point: usize) -> Vec<[u64; 2]> {
-        self.runs(|slot| self.point(slot, point).is_some_and(|it| it.is_filled))
+        self.runs(|slot| self.point(slot, point).is_some_and(|found| found.is_filled))
     }
 
     fn runs(&self, is_in: impl Fn(usize) -> bool) -> Vec<[u64; 2]> {
@@ -236,7 +236,7 @@ pub struct Gathering {
 struct Gathered {
     frame: u64,
     time_s: Option<f64>,
-    /// What whoever is not in the line has for a status.
+    /// Status of the people who are not in the line.
     status: Box<str>,
     people: Vec<(u64, Slot)>,
 }

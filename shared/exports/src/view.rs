@@ -42,14 +42,14 @@ impl ViewCamera {
         let [[a, b, c], [d, e, f]] = self.picture_from_camera;
         let at = [a * pixel.x + b * pixel.y + c, d * pixel.x + e * pixel.y + f];
         let jacobian = Matrix2::new(a, b, d, e) * jacobian;
-        let covariance = point.covariance().map(|it| {
-            let it = jacobian * it * jacobian.transpose();
-            [it[(0, 0)], it[(0, 1)], it[(1, 1)]]
+        let covariance = point.covariance().map(|covariance| {
+            let covariance = jacobian * covariance * jacobian.transpose();
+            [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]]
         });
         at.iter().all(|value| value.is_finite()).then_some(Seen { at, covariance })
     }
 
-    /// Whether a pixel lies in the picture.
+    /// Returns true if a pixel lies in the picture.
     pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
         let [width, height] = self.size.map(f64::from);
         (-0.5..width - 0.5).contains(&x) && (-0.5..height - 0.5).contains(&y)

@@ -27,7 +27,7 @@ pub trait Console: Debug + Send + Sync {
     /// The output cannot be written.
     fn result(&self, text: &str) -> Result<(), Failure>;
 
-    /// Whether the progress bar shows the steps, so that no messages about them are needed.
+    /// Returns true if the progress bar shows the steps, so that no messages about them are needed.
     fn shows_bar(&self) -> bool;
 
     /// Begins the bar again, at 0.

@@ -72,7 +72,7 @@ impl ExitKind {
         Self::ALL.into_iter().find(|kind| i32::from(kind.status()) == status)
     }
 
-    /// Whether the process would fail again in the same way, because its input is wrong.
+    /// Returns true if the process would fail again in the same way, because its input is wrong.
     pub fn is_permanent(self) -> bool {
         matches!(
             self,
@@ -124,7 +124,7 @@ impl Failure {
         self.kind
     }
 
-    /// What happened.
+    /// Returns the error that happened.
     pub fn source(&self) -> &(dyn Error + 'static) {
         self.source.as_ref()
     }
@@ -167,7 +167,7 @@ pub trait Fault: Error + Send + Sync + 'static {
         ExitKind::Run
     }
 
-    /// What the user may try.
+    /// Returns a remedy that the user may try, if one is known.
     fn hint(&self) -> Option<String> {
         None
     }

@@ -1,5 +1,5 @@
-//! What every program does around its work: exit codes and errors with hints, the stop request, log lines, progress, and the
-//! set-up of the process. No transport.
+//! Frame of every program's work: exit codes and errors with hints, the stop request, log lines, progress, and the set-up of the
+//! process. No transport.
 
 mod claim;
 mod clock;

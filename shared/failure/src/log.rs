@@ -34,11 +34,11 @@ pub fn init_logging(process: &str, level: Level) {
 /// `2026-01-31T12:00:00.000000Z WARN pose-2: message key=value`.
 struct Line {
     process: Arc<str>,
-    /// Whether details are logged.
+    /// True if details are logged.
     is_detailed: bool,
 }
 
-/// Whether an event is of the link between hosts, whose warnings are details: what they mean for a run the bridge says itself.
+/// Returns true if an event comes from the link between hosts: its warnings are details, the bridge reports their meaning.
 fn is_of_link(event: &Event<'_>) -> bool {
     let about = event.metadata();
     about.target().starts_with("zenoh") && *about.level() != Level::ERROR

@@ -133,7 +133,7 @@ impl Stop {
         self.inner.wake();
     }
 
-    /// Whether stop was requested.
+    /// Returns true if stop was requested.
     pub fn is_requested(&self) -> bool {
         self.inner.requested.load(Ordering::Acquire)
     }
@@ -180,7 +180,7 @@ impl Inner {
         rustix::io::write(&self.writer, &[1]).ok();
     }
 
-    /// Whether an earlier signal is old enough for this one to be a separate request.
+    /// Returns true if an earlier signal is old enough for this one to be a separate request.
     fn is_repeated(&self) -> bool {
         let now = now_nanos();
         let first = &self.first_at_nanos;

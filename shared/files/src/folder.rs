@@ -223,7 +223,7 @@ impl Folder {
     }
 }
 
-/// What lies under a name.
+/// Kind of file under a name.
 struct Kind {
     mode: u32,
     owner: u32,

@@ -85,12 +85,12 @@ impl Bounds {
 pub(crate) struct Upper {
     /// The bound.
     pub(crate) most: f64,
-    /// What it allows for rounding.
+    /// Allowance for rounding.
     rounding: f64,
 }
 
 impl Upper {
-    /// Whether no pose on the level scores as much as `lowest`; false for a bound that is NaN.
+    /// Returns true if no pose on the level scores as much as `lowest`; false for a bound that is NaN.
     pub(crate) fn is_below(&self, lowest: f32) -> bool {
         self.most < f64::from(lowest)
     }

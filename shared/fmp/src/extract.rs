@@ -199,7 +199,7 @@ impl Extractor {
         if end - start > 1 {
             let half = self.work(source, part) / 2;
             let heavy =
-                |it: &usize| self.work(source, &cut(start..*it, part.panels.clone())) >= half;
+                |end: &usize| self.work(source, &cut(start..*end, part.panels.clone())) >= half;
             let middle = (start + 1..end - 1).find(heavy).unwrap_or(end - 1);
             let panels = part.panels.clone();
             return Some([cut(start..middle, panels.clone()), cut(middle..end, panels)]);

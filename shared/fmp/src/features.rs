@@ -28,7 +28,7 @@ pub(crate) struct Features {
 struct Chain {
     /// Padded where the image ends; empty outside of the scope.
     maps: OnceLock<Maps>,
-    /// What they are made in.
+    /// Spare maps, in which new ones are made.
     spare: Mutex<Maps>,
 }
 

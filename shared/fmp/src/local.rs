@@ -36,7 +36,7 @@ pub fn local_scores(model: &Model, evidence: &Responses<'_>, pose: &Pose) -> Vec
         let own = usize::from(place.mixture);
         let at = |filter: usize| evidence.map(level, filter)[row * window.cols + col];
         let response = at(filters[own]);
-        let others = filters.iter().enumerate().filter(|it| it.0 != own);
+        let others = filters.iter().enumerate().filter(|other| other.0 != own);
         let best_other = others.map(|other| at(*other.1)).reduce(f32::max);
         let map = evidence.map(level, filters[own]);
         let (mut sum, mut count) = (0.0, 0.0);

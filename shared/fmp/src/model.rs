@@ -49,7 +49,7 @@ pub struct Edge {
 /// One part of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartSpec {
-    /// What it is called in tables and pictures.
+    /// Name in tables and pictures.
     pub name: String,
     /// Index of the filter of every type; its length is the number of types.
     pub filter_of_type: Vec<usize>,
@@ -204,7 +204,7 @@ impl Model {
         Ok(Self(spec))
     }
 
-    /// What the model is made of.
+    /// Returns the specification that the model is made of.
     pub fn spec(&self) -> &ModelSpec {
         &self.0
     }
@@ -233,8 +233,8 @@ impl Model {
     pub fn max_filter(&self) -> [usize; 2] {
         let largest = |side: fn(&Filter) -> usize| self.0.filters.iter().map(side).max();
         [
-            largest(|it| it.rows).unwrap_or(0),
-            largest(|it| it.cols).unwrap_or(0),
+            largest(|filter| filter.rows).unwrap_or(0),
+            largest(|filter| filter.cols).unwrap_or(0),
         ]
     }
 

@@ -39,7 +39,7 @@ impl<T: Default> Pool<T> {
     }
 }
 
-/// Whether the caller runs inside a rayon pool, and so has asked for its threads to be used.
+/// Returns true if the caller runs inside a rayon pool, and so has asked for its threads to be used.
 pub(crate) fn in_pool() -> bool {
     rayon::current_thread_index().is_some()
 }

@@ -210,7 +210,7 @@ pub fn best(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Option<Refer
         let responses = responses(model, it, &features(model, layout, image));
         let solved = solve(model, &responses, [it.rows, it.cols]);
         let (score, cell, mixture) = solved.best();
-        if best.as_ref().is_none_or(|it| score > it.score) {
+        if best.as_ref().is_none_or(|best| score > best.score) {
             best = Some(ReferencePose {
                 score,
                 level,

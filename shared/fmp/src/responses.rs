@@ -98,7 +98,7 @@ impl<'a> Responses<'a> {
         self.layout.window(&self.scope, level)
     }
 
-    /// Whether every part of a pose lies where there are values.
+    /// Returns true if every part of a pose lies where there are values.
     pub fn covers(&self, pose: &Pose) -> bool {
         self.levels.binary_search(&pose.level).is_ok()
             && self.window(usize::from(pose.level)).contains_all(pose)

@@ -183,7 +183,7 @@ struct Axis {
     n_cells: usize,
     pad: usize,
     filter: usize,
-    /// Of the image, pixels.
+    /// Side of the image, pixels.
     side: usize,
 }
 
@@ -208,14 +208,14 @@ impl Axis {
 }
 
 impl Window {
-    /// Whether a placement is one of these cells.
+    /// Returns true if a placement is one of these cells.
     pub fn contains(&self, at: Placement) -> bool {
         let (y, x) = (usize::from(at.y), usize::from(at.x));
         (self.top..self.top + self.rows).contains(&y)
             && (self.left..self.left + self.cols).contains(&x)
     }
 
-    /// Whether all parts of a pose of the level lie on these cells.
+    /// Returns true if all parts of a pose of the level lie on these cells.
     pub fn contains_all(&self, pose: &Pose) -> bool {
         pose.parts.iter().all(|part| self.contains(*part))
     }

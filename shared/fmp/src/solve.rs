@@ -313,14 +313,14 @@ impl Search<'_> {
     /// The score of the best root so far.
     fn score(&self) -> f32 {
         let best = lock(&self.best);
-        best.as_ref().map_or(f32::NEG_INFINITY, |it| it.0.score)
+        best.as_ref().map_or(f32::NEG_INFINITY, |best| best.0.score)
     }
 
-    /// Whether a root of this score on this level would be the best so far.
+    /// Returns true if a root of this score on this level would be the best so far.
     fn wins(&self, score: f32, level: u16) -> bool {
         let best = lock(&self.best);
-        let beats = |(it, _): &(Root, Workspace)| {
-            score > it.score || (score == it.score && level < it.level)
+        let beats = |(root, _): &(Root, Workspace)| {
+            score > root.score || (score == root.score && level < root.level)
         };
         score > f32::NEG_INFINITY && best.as_ref().is_none_or(beats)
     }
@@ -350,9 +350,9 @@ impl Search<'_> {
             return put_back(level, workspace);
         };
         let mut best = lock(&self.best);
-        let beaten = |(it, _): &(Root, Workspace)| root.best_first(it).is_lt();
+        let beaten = |(best, _): &(Root, Workspace)| root.best_first(best).is_lt();
         let loser = if best.as_ref().is_none_or(beaten) {
-            best.replace((root, workspace)).map(|(it, of)| (it.level, of))
+            best.replace((root, workspace)).map(|(root, of)| (root.level, of))
         } else {
             Some((level, workspace))
         };

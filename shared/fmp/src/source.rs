@@ -1,10 +1,10 @@
-//! What the features of an image are computed from.
+//! Inputs from which the features of an image are computed.
 
 use kernels::{HogShape, Isa, Rgb8View};
 
 use crate::{Layout, Scope};
 
-/// The inputs of the features.
+/// Inputs of the features.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Source<'a> {
     pub(crate) isa: Isa,

@@ -113,8 +113,8 @@ impl Tracker {
         near().unwrap_or_else(|| Scope::whole(layout))
     }
 
-    /// Whether the result near the last pose is unreliable, so that the frame is to be searched in
-    /// full: no pose was found, or its score has fallen since the last full search.
+    /// Returns true if the result near the last pose is unreliable, so that the frame is to be searched in full: no pose was
+    /// found, or its score has fallen since the last full search.
     ///
     /// * `scope`: as returned by [`Self::scope`].
     /// * `best`: the best pose found there, if there is one.
@@ -123,7 +123,7 @@ impl Tracker {
             return false;
         };
         let least = last.full.score - settings.max_drop;
-        *scope != Scope::whole(layout) && best.is_none_or(|it| it.score < least)
+        *scope != Scope::whole(layout) && best.is_none_or(|best| best.score < least)
     }
 
     /// Updates the tracker with the result of a frame.
@@ -138,7 +138,7 @@ impl Tracker {
         best: Option<&Pose>,
     ) {
         let at = at.into();
-        let before = self.last.map(|it| it.full);
+        let before = self.last.map(|last| last.full);
         self.last = best.map(|pose| {
             let here = Full {
                 at,
@@ -155,7 +155,7 @@ impl Tracker {
 }
 
 impl Last {
-    /// Whether a frame may be searched near this frame's pose only.
+    /// Returns true if a frame may be searched only near this frame's pose.
     fn allows_tracking_to(&self, settings: &TrackSettings, at: FrameTime) -> bool {
         let step = at.frame.checked_sub(self.at.frame).filter(|difference| *difference > 0);
         let age = at.frame.saturating_sub(self.full.at.frame);

@@ -125,7 +125,7 @@ impl VideoWriter {
         }
     }
 
-    /// What the encoder said, else `why`.
+    /// Returns the encoder's message, else `why`.
     fn failed(&mut self, why: &str) -> FootageError {
         drop(self.stdin.take());
         let said = self.log.finish();

@@ -19,9 +19,9 @@ pub enum FootageError {
     Live {
         /// As the user wrote it.
         path: String,
-        /// What it is.
+        /// Kind of source.
         what: &'static str,
-        /// What to do instead.
+        /// Remedy: the input to use instead.
         instead: String,
     },
     /// The name is empty.
@@ -53,7 +53,7 @@ pub enum FootageError {
     /// The operating system reports an error.
     #[error("cannot read {}", path.display())]
     Io {
-        /// What could not be read.
+        /// Path that could not be read.
         path: PathBuf,
         /// Why.
         source: std::io::Error,
@@ -139,7 +139,7 @@ pub enum FootageError {
         executable.display(), path.display()
     )]
     FfmpegMissing {
-        /// What was looked for.
+        /// Executable that was looked for.
         executable: PathBuf,
         /// The video that needs it.
         path: PathBuf,
@@ -151,7 +151,7 @@ pub enum FootageError {
     Encode {
         /// Which.
         path: PathBuf,
-        /// What the encoder said.
+        /// Message of the encoder.
         message: String,
     },
     /// Not a video, or damaged.

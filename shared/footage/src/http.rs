@@ -1,4 +1,4 @@
-//! What an HTTP camera answers, where a decoder finds no pictures in it.
+//! Answers of an HTTP camera in which a decoder finds no pictures.
 
 use std::io::{BufReader, Read as _, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
@@ -9,7 +9,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Longest head of an answer, bytes.
 const MAX_HEAD: u64 = 16 << 10;
 
-/// What came.
+/// Kind of answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Answer {
     /// One picture, and no stream.
@@ -19,7 +19,7 @@ pub(crate) enum Answer {
 }
 
 impl Answer {
-    /// What is said of it.
+    /// Returns the message for the answer.
     pub(crate) fn complaint(self) -> String {
         match self {
             Self::Picture => {
@@ -44,7 +44,7 @@ pub(crate) fn ask(address: &str) -> Option<Answer> {
     if !scheme.eq_ignore_ascii_case("http") || host.contains('@') {
         return None;
     }
-    let has_port = host.rsplit_once(':').is_some_and(|it| it.1.parse::<u16>().is_ok());
+    let has_port = host.rsplit_once(':').is_some_and(|parts| parts.1.parse::<u16>().is_ok());
     let with_port = if has_port {
         host.to_owned()
     } else {
@@ -83,7 +83,7 @@ fn of_head(head: &str) -> Option<Answer> {
         return field("content-length").map(|_| Answer::Picture);
     }
     let is_stream = ["multipart/", "video/", "audio/", "application/"];
-    (!is_stream.iter().any(|it| kind.starts_with(it))).then_some(Answer::Other(kind))
+    (!is_stream.iter().any(|prefix| kind.starts_with(prefix))).then_some(Answer::Other(kind))
 }
 
 #[cfg(test)]

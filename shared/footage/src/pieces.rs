@@ -10,7 +10,7 @@ const MAX_WAITING: usize = 128;
 /// Longest element that is believed, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// What a piece of a stream is.
+/// Kind of a piece of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PieceKind {
     /// The head, which says how to decode what follows. It stands before every picture that needs no other.
@@ -24,7 +24,7 @@ pub enum PieceKind {
 /// A piece of a stream. A head and the pictures after it, one after the other, are a Matroska file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Piece {
-    /// What it is.
+    /// Kind of the piece.
     pub kind: PieceKind,
     /// Time of its picture in the stream, nanoseconds in whole milliseconds; 0 for a head.
     pub nanos: u64,
@@ -179,7 +179,7 @@ impl<R: Read> Cutter<R> {
 fn number(bytes: &[u8]) -> Option<u64> {
     let all = bytes.iter().fold(0_u64, |sum, it| sum << 8 | u64::from(*it));
     let mask = (1_u64 << (7 * bytes.len())) - 1;
-    Some(all & mask).filter(|it| *it != mask)
+    Some(all & mask).filter(|value| *value != mask)
 }
 
 /// One element of a slice: its id, what it holds, and what follows.

@@ -50,7 +50,7 @@ impl PixelFormat {
     /// The format of four letters; `JPEG` is one for JPEG files too.
     pub fn of_letters(letters: [u8; 4]) -> Option<Self> {
         let is_jpeg = letters == *b"JPEG";
-        let of = |it: &Self| it.letters() == letters || (is_jpeg && *it == Self::Jpeg);
+        let of = |known: &Self| known.letters() == letters || (is_jpeg && *known == Self::Jpeg);
         Self::ALL.into_iter().find(of)
     }
 

@@ -38,7 +38,7 @@ pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result
         child.kill()?;
         child.wait()?;
     }
-    let [stdout, stderr] = [stdout?, stderr?].map(|it| it.join().unwrap_or_default());
+    let [stdout, stderr] = [stdout?, stderr?].map(|reader| reader.join().unwrap_or_default());
     Ok(status.map(|status| Output {
         status,
         stdout,

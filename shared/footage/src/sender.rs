@@ -16,7 +16,7 @@ const N_EQUAL: usize = 16;
 const EQUAL_NANOS: i64 = 1_100_000;
 /// Seconds from 1900, where NTP begins, to 1970.
 const NTP_TO_UNIX_S: i64 = 2_208_988_800;
-/// What stands for an offset that is not known.
+/// Value that stands for an unknown offset.
 const UNKNOWN: i64 = i64::MIN;
 /// Longest boxes that are believed, bytes.
 const MAX_HEAD: u64 = 1 << 20;
@@ -41,7 +41,7 @@ pub(crate) fn inherited_pipe() -> io::Result<(PipeReader, PipeWriter)> {
     Ok((reader, writer))
 }
 
-/// What is to be known of the clock of a camera, while its stream is read.
+/// Clock of a camera, as it is known while its stream is read.
 #[derive(Debug, Clone)]
 pub(crate) struct SenderClock(Arc<AtomicI64>);
 
@@ -65,9 +65,9 @@ impl SenderClock {
         Ok(clock)
     }
 
-    /// What the camera's clock showed at time 0 of its stream, nanoseconds since 1970 began; none before it told.
+    /// Returns the camera's clock at time 0 of its stream, nanoseconds since 1970 began; `None` before it is known.
     pub(crate) fn offset_nanos(&self) -> Option<i64> {
-        Some(self.0.load(Ordering::Relaxed)).filter(|it| *it != UNKNOWN)
+        Some(self.0.load(Ordering::Relaxed)).filter(|offset| *offset != UNKNOWN)
     }
 }
 
@@ -176,7 +176,7 @@ fn bytes<const N: usize>(of: &[u8], at: usize) -> Option<[u8; N]> {
     of.get(at..)?.first_chunk().copied()
 }
 
-/// Of the boxes one after the other in `of` the body of the first of a kind.
+/// Returns the body of the first box of a kind among the consecutive boxes in `of`.
 fn inside(mut of: &[u8], kind: [u8; 4]) -> Option<&[u8]> {
     loop {
         let length = u32::from_be_bytes(bytes(of, 0)?) as usize;
@@ -196,7 +196,7 @@ fn units_per_s(moov: &[u8]) -> Option<u32> {
     bytes(head, if is_long { 20 } else { 12 }).map(u32::from_be_bytes)
 }
 
-/// What a `prft` box tells.
+/// Reads a `prft` box.
 fn told(body: &[u8], units_per_s: u32) -> Option<Told> {
     let is_long = *body.first()? == 1;
     let ntp = u64::from_be_bytes(bytes(body, 8)?);
@@ -292,7 +292,7 @@ mod tests {
         assert!((last - MS / 3).abs() < MS / 10, "{last}");
     }
 
-    /// What the real program writes of packets that come all at once.
+    /// Checks the output of the real program for packets that arrive all at once.
     #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
     #[test]
     fn every_picture_of_the_real_program_has_a_time() {

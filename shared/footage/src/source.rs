@@ -42,7 +42,7 @@ pub enum SourceKind {
     Video,
 }
 
-/// What is known of footage before its first frame is read.
+/// Facts about footage that are known before its first frame is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceInfo {
     /// Size of every frame, as it is handed out.
@@ -55,11 +55,11 @@ pub struct SourceInfo {
     pub frame_rate_hz: Option<f64>,
     /// Kind of footage.
     pub kind: SourceKind,
-    /// What the tag of the first image or of the video asks, whether it is done or not; see [`Rotation`](crate::Rotation).
+    /// Turn in the tag of the first image or of the video, whether it is done or not; see [`Rotation`](crate::Rotation).
     pub tag: Turn,
     /// How many bits images with 16 use, where these are fewer: they are scaled by that.
     pub depth: Option<Depth>,
-    /// Whether every picture of a video is two, of different moments, line by line.
+    /// True if every picture of a video holds two of different moments, line by line.
     pub is_interlaced: bool,
 }
 
@@ -133,7 +133,7 @@ impl Source {
                 (path, Reader::Video(video))
             }
         };
-        let clock = Clock::of(&reader, spec);
+        let clock = Clock::new(&reader, spec);
         let info = reader.info(clock.rate_hz.map(|rate_hz| rate_hz / spec.step as f64));
         let Size { width, height } = info.size;
         let as_stored = Size::new(width * info.shrink, height * info.shrink);
@@ -147,7 +147,7 @@ impl Source {
         })
     }
 
-    /// What is known before the first frame is read.
+    /// Returns the facts that are known before the first frame is read.
     pub fn info(&self) -> &SourceInfo {
         &self.info
     }
@@ -196,7 +196,7 @@ impl Source {
         Ok(read.map(|(index, time_s)| FrameView { index, time_s, rgb }))
     }
 
-    /// What the decoder of a video has complained about so far; nothing for images.
+    /// Returns the complaints of a video's decoder so far; none for images.
     pub fn complaints(&self) -> Complaints {
         match &self.reader {
             Reader::Video(video) => video.complaints(),
@@ -304,7 +304,7 @@ struct Clock {
 }
 
 impl Clock {
-    fn of(reader: &Reader, spec: &SourceSpec) -> Self {
+    fn new(reader: &Reader, spec: &SourceSpec) -> Self {
         let (own_hz, times_s) = match reader {
             Reader::Video(video) => (video.probe.rate_hz, video.probe.times_s.clone()),
             Reader::Still(_) | Reader::Images(_) => (None, None),

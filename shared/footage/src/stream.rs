@@ -28,7 +28,7 @@ const SILENCE_S: u64 = 5;
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Slowest and fastest rate that a header is believed, frames per second.
 const RATES_HZ: [f64; 2] = [1.0, 1000.0];
-/// What the decoder says the size of a frame by: rows of the eighth part of the picture in grey.
+/// Fraction by which the decoder reports the size of a frame: rows of the eighth part of the picture in grey.
 pub(crate) const SHARE: usize = 8;
 /// The packets as they came, every picture a cluster of its own, to the pipe in place of the standard input.
 const AS_IT_CAME: [&str; 14] = [
@@ -68,17 +68,17 @@ pub struct StreamSpec {
     pub ffmpeg: PathBuf,
     /// The `ffprobe` executable.
     pub ffprobe: PathBuf,
-    /// Whether the packets are wanted as they came, beside the pictures.
+    /// True if the packets are wanted as they came, beside the pictures.
     pub keeps: bool,
     /// HTTP: whether JPEG pictures come without a boundary in front of the first.
     pub is_bare: bool,
 }
 
-/// What is known of a stream from its first packets.
+/// Facts about a stream from its first packets.
 struct Asked {
     size: Size,
     rate_hz: Option<f64>,
-    /// Whether it can be a single picture.
+    /// True if it can be a single picture.
     may_be_picture: bool,
 }
 
@@ -225,7 +225,7 @@ impl StreamSpec {
             .arg(&self.address)
             .args(outputs(&version))
             .args(to_keep.iter().flat_map(|_| AS_IT_CAME))
-            .args(to_tell.iter().flat_map(|it| times_of_sender(it)))
+            .args(to_tell.iter().flat_map(|pipe| times_of_sender(pipe)))
             .stdin(to_keep.map_or_else(Stdio::null, Stdio::from))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -275,7 +275,7 @@ impl StreamSpec {
         self.is("http") || self.is("https")
     }
 
-    /// Whether the frames have times of their own: those of JPEG pictures over HTTP are made up by the decoder.
+    /// Returns true if the frames have times of their own: those of JPEG pictures over HTTP are made up by the decoder.
     fn has_times(&self) -> bool {
         !self.is_http()
     }
@@ -345,7 +345,7 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
     all.concat().into_iter().map(str::to_owned).collect()
 }
 
-/// What is said of a stream that ends without a word of its decoder.
+/// Returns the message for a stream that ends without a message of its decoder.
 fn ended(error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::UnexpectedEof => "the stream has ended".to_owned(),
@@ -405,7 +405,7 @@ impl LiveStream {
         Ok(StreamFrame {
             label_nanos: nanos,
             presented_nanos: presented,
-            unix_nanos: presented.zip(offset).map(|it| it.0.saturating_add(it.1)),
+            unix_nanos: presented.zip(offset).map(|times| times.0.saturating_add(times.1)),
         })
     }
 
@@ -467,7 +467,7 @@ mod tests {
             };
             let all = spec.input_options();
             all.into_iter()
-                .filter_map(|it| it.into_string().ok())
+                .filter_map(|argument| argument.into_string().ok())
                 .collect::<Vec<_>>()
                 .join(" ")
         };

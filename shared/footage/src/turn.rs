@@ -33,7 +33,7 @@ pub enum Rotation {
 }
 
 impl Rotation {
-    /// What is done to a picture with a tag.
+    /// Returns the turn that is applied to a picture with a tag.
     pub fn turn(self, tag: Turn) -> Turn {
         match self {
             Self::Stored => Turn::default(),
@@ -116,12 +116,12 @@ impl Turn {
         })
     }
 
-    /// Whether the pixels are stored upright.
+    /// Returns true if the pixels are stored upright.
     pub fn is_none(self) -> bool {
         self.0 == Orientation::NoTransforms
     }
 
-    /// Whether rows become columns.
+    /// Returns true if rows become columns.
     pub fn swaps_sides(self) -> bool {
         matches!(
             self.0,
@@ -154,7 +154,7 @@ impl Turn {
 
     /// The filters of `ffmpeg` that turn a picture in RGB; none where nothing is to be done.
     pub(crate) fn filters(self) -> Option<String> {
-        let known = KNOWN.iter().find(|it| it.0 == self.0)?;
+        let known = KNOWN.iter().find(|known| known.0 == self.0)?;
         // In RGB, so that every pixel is the stored one at another place.
         (!known.2.is_empty()).then(|| format!("format=rgb24,{}", known.2))
     }
@@ -162,8 +162,8 @@ impl Turn {
 
 impl fmt::Display for Turn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let known = KNOWN.iter().find(|it| it.0 == self.0);
-        f.write_str(known.map_or("", |it| it.1))
+        let known = KNOWN.iter().find(|known| known.0 == self.0);
+        f.write_str(known.map_or("", |known| known.1))
     }
 }
 
@@ -177,7 +177,7 @@ mod tests {
         let mut rgb = vec![0; size.rgb_bytes()];
         rgb[3 * (y * 3 + x)] = 255;
         let (turned, rgb) = turn.apply(size, rgb);
-        let at = rgb.iter().position(|it| *it == 255).unwrap() / 3;
+        let at = rgb.iter().position(|byte| *byte == 255).unwrap() / 3;
         [at % turned.width, at / turned.width]
     }
 

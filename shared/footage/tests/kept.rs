@@ -65,7 +65,7 @@ fn live() -> (Vec<(i64, Vec<u8>)>, Vec<Piece>) {
     server.unwrap().join().unwrap();
     let pieces = live.pieces().unwrap();
     let mut all: Vec<Piece> = Vec::new();
-    let n_all = |all: &[Piece]| all.iter().filter(|it| it.kind != PieceKind::Head).count();
+    let n_all = |all: &[Piece]| all.iter().filter(|piece| piece.kind != PieceKind::Head).count();
     for _ in 0..2000 {
         all.extend(core::iter::from_fn(|| pieces.next()));
         if n_all(&all) >= pictures.len() {
@@ -94,13 +94,13 @@ fn a_stream_that_was_kept_gives_the_same_pictures_again() {
         .iter()
         .enumerate()
         .filter(|(nth, it)| is_first_head(*nth, it))
-        .map(|it| it.1.bytes.clone())
+        .map(|piece| piece.1.bytes.clone())
         .collect();
     let mut again = RemadeStream::open("kept", bytes.into_iter(), SIZE).unwrap();
     let mut rgb = vec![0; SIZE.rgb_bytes()];
     let mut n_same = 0;
     while let Some(label) = again.next_into(&mut rgb).unwrap() {
-        let is_it = |it: &&(i64, Vec<u8>)| it.0.abs_diff(label) <= 1_000_000;
+        let is_it = |frame: &&(i64, Vec<u8>)| frame.0.abs_diff(label) <= 1_000_000;
         if let Some((_, expected)) = pictures.iter().find(is_it) {
             assert!(rgb == *expected, "the picture at {label}");
             n_same += 1;

@@ -159,8 +159,9 @@ fn a_composed_sheet_contains_every_picture() {
     });
     for n_columns in 1..6 {
         let sheet = compose(&tiles, n_columns);
-        let count =
-            |colour| sheet.rgb().as_chunks::<3>().0.iter().filter(|it| **it == colour).count();
+        let count = |colour| {
+            sheet.rgb().as_chunks::<3>().0.iter().filter(|pixel| **pixel == colour).count()
+        };
         for colour in colours {
             assert_eq!(
                 count(colour),

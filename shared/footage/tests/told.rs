@@ -1,4 +1,4 @@
-//! What files say of themselves: turns, trims, rates, covers, numbers, depths, and what a decoder says of them.
+//! Statements of files about themselves: turns, trims, rates, covers, numbers, depths, and a decoder's messages about them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ fn frames(spec: &SourceSpec) -> (SourceInfo, Vec<(u64, Vec<u8>)>) {
 }
 
 fn indices(spec: &SourceSpec) -> Vec<u64> {
-    frames(spec).1.into_iter().map(|it| it.0).collect()
+    frames(spec).1.into_iter().map(|frame| frame.0).collect()
 }
 
 /// Replaces bytes behind the name of a box.
@@ -43,7 +43,7 @@ fn patch(from: &Path, to: &str, (name, skipped): (&[u8; 4], usize), bytes: &[u8]
 
 /// With a display matrix.
 fn turned(from: &Path, to: &str, [a, b, c, d]: [i32; 4]) -> PathBuf {
-    let rows = [a, b, 0, c, d, 0].map(|it| (it << 16).to_be_bytes());
+    let rows = [a, b, 0, c, d, 0].map(|number| (number << 16).to_be_bytes());
     patch(from, to, (b"tkhd", 40), rows.as_flattened())
 }
 

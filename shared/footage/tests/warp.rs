@@ -126,7 +126,7 @@ fn pixels_outside_are_black_or_the_nearest() {
     assert_eq!(at(&black, output, 0, 0), [0; 3]);
     assert_eq!(at(&black, output, 20, 20), [200; 3]);
     let replicated = warp(source, &rgb, output, &map, Fill::Replicate);
-    assert!(replicated.iter().all(|&it| it == 200));
+    assert!(replicated.iter().all(|&grey| grey == 200));
 }
 
 #[test]
@@ -173,7 +173,7 @@ proptest! {
         let rgb = vec![value; source.rgb_bytes()];
         let out = warp(source, &rgb, output, &map, Fill::Replicate);
         // The area is rounded to f32, which does not change the grey level.
-        prop_assert!(out.iter().all(|&it| it == value));
+        prop_assert!(out.iter().all(|&grey| grey == value));
     }
 
     #[test]

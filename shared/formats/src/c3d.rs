@@ -118,7 +118,7 @@ impl C3d {
     /// Index of a point by its full name, or by its name without the subject (`LFWT` of `S1:LFWT`).
     pub fn point(&self, name: &str) -> Option<usize> {
         let is_named = |label: &String| {
-            let own = label.rsplit_once(':').map_or(label.as_str(), |it| it.1);
+            let own = label.rsplit_once(':').map_or(label.as_str(), |parts| parts.1);
             label == name || own == name
         };
         self.labels.iter().position(is_named)

@@ -59,7 +59,7 @@ impl Structs<'_> {
         self.elements.len()
     }
 
-    /// Whether there is no element.
+    /// Returns true if there is no element.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
@@ -68,7 +68,7 @@ impl Structs<'_> {
 impl<'a> Structs<'a> {
     /// A field of an element (from 0); `None` if the element or the field does not exist.
     pub fn get(&self, element: usize, field: &str) -> Option<&Value<'a>> {
-        let field = self.fields.iter().position(|it| it == field)?;
+        let field = self.fields.iter().position(|name| name == field)?;
         self.elements.get(element)?.get(field)
     }
 }
@@ -89,19 +89,19 @@ impl Numbers<'_> {
         match self.storage {
             MI_INT8 => self.each(|[byte]: [u8; 1]| f64::from(byte as i8)),
             MI_UINT8 => self.each(|[byte]: [u8; 1]| f64::from(byte)),
-            MI_INT16 => self.each(|it| f64::from(i16::from_le_bytes(it))),
-            MI_UINT16 => self.each(|it| f64::from(u16::from_le_bytes(it))),
-            MI_INT32 => self.each(|it| f64::from(i32::from_le_bytes(it))),
-            MI_UINT32 => self.each(|it| f64::from(u32::from_le_bytes(it))),
-            MI_SINGLE => self.each(|it| f64::from(f32::from_le_bytes(it))),
-            MI_INT64 => self.each(|it| i64::from_le_bytes(it) as f64),
-            MI_UINT64 => self.each(|it| u64::from_le_bytes(it) as f64),
+            MI_INT16 => self.each(|bytes| f64::from(i16::from_le_bytes(bytes))),
+            MI_UINT16 => self.each(|bytes| f64::from(u16::from_le_bytes(bytes))),
+            MI_INT32 => self.each(|bytes| f64::from(i32::from_le_bytes(bytes))),
+            MI_UINT32 => self.each(|bytes| f64::from(u32::from_le_bytes(bytes))),
+            MI_SINGLE => self.each(|bytes| f64::from(f32::from_le_bytes(bytes))),
+            MI_INT64 => self.each(|bytes| i64::from_le_bytes(bytes) as f64),
+            MI_UINT64 => self.each(|bytes| u64::from_le_bytes(bytes) as f64),
             _ => self.each(f64::from_le_bytes),
         }
     }
 
     fn each<const N: usize>(&self, value: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-        self.bytes.as_chunks().0.iter().map(|&it| value(it)).collect()
+        self.bytes.as_chunks().0.iter().map(|&bytes| value(bytes)).collect()
     }
 }
 
@@ -227,7 +227,8 @@ fn matrix<'a>(
         return Ok((String::new(), Value::Other));
     }
     let sizes = rest.typed("an array's sizes", &[MI_INT32], "5 (int32)")?;
-    let sizes: Vec<i32> = sizes.as_chunks().0.iter().map(|&it| i32::from_le_bytes(it)).collect();
+    let sizes: Vec<i32> =
+        sizes.as_chunks().0.iter().map(|&bytes| i32::from_le_bytes(bytes)).collect();
     let name = rest.typed("an array's name", &[MI_INT8], "1 (int8)")?;
     let name = String::from_utf8_lossy(name).into_owned();
     let value = match class {
@@ -317,7 +318,7 @@ fn structs<'a>(
     let fields: Vec<String> = names
         .chunks(length)
         .map(|name| {
-            let end = name.iter().position(|&it| it == 0).unwrap_or(name.len());
+            let end = name.iter().position(|&byte| byte == 0).unwrap_or(name.len());
             String::from_utf8_lossy(&name[..end]).into_owned()
         })
         .collect();

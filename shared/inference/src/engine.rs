@@ -25,14 +25,14 @@ pub struct Port {
 /// A side of a tensor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Side {
-    /// Of this size.
+    /// A fixed size.
     Fixed(usize),
     /// Any size; the name of the dimension.
     Named(String),
 }
 
 impl Side {
-    /// Whether it accepts a size.
+    /// Returns true if the side accepts a size.
     pub fn may_be(&self, size: usize) -> bool {
         match self {
             Self::Fixed(n) => *n == size,

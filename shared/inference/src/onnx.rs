@@ -212,12 +212,18 @@ fn attribute(name: &str, value: &Attribute) -> Message {
 
 fn constant(constant: &Constant) -> Message {
     let (kind, bytes): (i64, Vec<u8>) = match &constant.values {
-        Values::F32(all) => (FLOAT, all.iter().flat_map(|it| it.to_le_bytes()).collect()),
+        Values::F32(all) => (
+            FLOAT,
+            all.iter().flat_map(|value| value.to_le_bytes()).collect(),
+        ),
         Values::F16(all) => (
             FLOAT16,
-            all.iter().flat_map(|it| it.to_le_bytes()).collect(),
+            all.iter().flat_map(|value| value.to_le_bytes()).collect(),
         ),
-        Values::I64(all) => (INT64, all.iter().flat_map(|it| it.to_le_bytes()).collect()),
+        Values::I64(all) => (
+            INT64,
+            all.iter().flat_map(|value| value.to_le_bytes()).collect(),
+        ),
     };
     Message::default()
         .each(&constant.shape, |message, side| {

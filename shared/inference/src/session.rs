@@ -104,7 +104,7 @@ impl Session {
         &self.by
     }
 
-    /// What it takes and gives.
+    /// Returns the description of its inputs and outputs.
     pub fn description(&self) -> &Description {
         &self.description
     }

@@ -50,7 +50,7 @@ pub(crate) struct TooLarge {
 
 /// Checks all nodes of a file; one that cannot be read is left to the library.
 pub(crate) fn check(file: &[u8]) -> Result<(), TooLarge> {
-    let graph = ModelProto::parse_buf(file).ok().and_then(|it| it.graph);
+    let graph = ModelProto::parse_buf(file).ok().and_then(|model| model.graph);
     graph.map_or(Ok(()), |graph| check_graph(&graph, DEEPEST))
 }
 
@@ -60,8 +60,8 @@ fn check_graph(graph: &GraphProto, deep: usize) -> Result<(), TooLarge> {
         constants.insert(tensor.name.as_deref().unwrap_or_default(), whole(tensor));
     }
     for node in &graph.node {
-        let value = node.attribute.iter().find_map(|it| it.t.as_ref());
-        let ints = node.attribute.iter().find(|it| !it.ints.is_empty());
+        let value = node.attribute.iter().find_map(|attribute| attribute.t.as_ref());
+        let ints = node.attribute.iter().find(|attribute| !attribute.ints.is_empty());
         if let ("Constant", Some(name)) = (op(node), node.output.first()) {
             let numbers = value.map(whole).or(ints.map(|int| int.ints.clone()));
             constants.insert(name, numbers.unwrap_or_default());

@@ -100,7 +100,7 @@ impl CardText {
         })
     }
 
-    /// What it says that it is; `None` if it says neither.
+    /// Returns the kind that the card declares; `None` if it declares none.
     pub(crate) fn kind(&self) -> Option<CardKind> {
         CardKind::of(&self.text)
     }
@@ -133,7 +133,7 @@ pub fn card_beside(network: &Path) -> Option<PathBuf> {
     places.into_iter().find(|place| place.is_file())
 }
 
-/// What is said of a network that does not fit its card.
+/// Returns the failure of a network that does not fit its card.
 pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'static)) -> Failure {
     let message = format!(
         "{} does not fit its card ({place}): {}",

@@ -39,7 +39,7 @@ impl DetectorFile {
         })
     }
 
-    /// What it takes and gives.
+    /// Returns the description of its inputs and outputs.
     pub fn description(&self) -> &Description {
         self.session.description()
     }

@@ -23,7 +23,7 @@ pub fn listed(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         for entry in fs::read_dir(path).map_err(wrong)? {
             inside.push(entry.map_err(wrong)?.path());
         }
-        inside.retain(|it| has_image_name(it));
+        inside.retain(|path| has_image_name(path));
         inside.sort();
         if inside.is_empty() {
             let message = format!("{}: no image (png, jpg, jpeg, bmp) in it", path.display());
@@ -34,7 +34,7 @@ pub fn listed(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(images)
 }
 
-/// Whether a file has an image's name.
+/// Returns true if a file has an image's name.
 pub fn has_image_name(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg", "bmp"]

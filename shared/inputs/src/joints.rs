@@ -29,8 +29,8 @@ impl Joints {
     ///
     /// A file cannot be read, or the one that is named was learned with another model.
     pub fn of(file: &Path, model: Option<&Path>) -> Result<Self, Failure> {
-        let chosen = |it| Self {
-            file: it,
+        let chosen = |joint_file| Self {
+            file: joint_file,
             from: file.to_owned(),
         };
         if is_none(file) {

@@ -306,7 +306,7 @@ pub fn quality_network(
 
 /// The failure for a network that cannot be used, with the cause that the library reports.
 fn unusable(file: &Path, error: &NetworkError) -> Failure {
-    let cause = std::error::Error::source(error).map(|it| format!(": {it}"));
+    let cause = std::error::Error::source(error).map(|cause| format!(": {cause}"));
     let message = format!("{}: {error}{}", file.display(), cause.unwrap_or_default());
     Failure::new(ExitKind::Input, message)
 }

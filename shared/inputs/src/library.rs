@@ -1,4 +1,4 @@
-//! What runs networks.
+//! Libraries that run networks.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use inference::{Provider, Session};
 
 use crate::refused::refused;
 
-/// What runs networks.
+/// Library that runs networks.
 #[derive(Debug, Default)]
 pub enum Library {
     /// The library that is built in.

@@ -1,8 +1,8 @@
-//! Whether there is memory for the search of an image.
+//! Check that there is memory for the search of an image.
 
 use fmp::Layout;
 
-/// What a search takes in all, per byte of the responses: 1.53 where it was measured.
+/// Memory of a whole search per byte of the responses: 1.53 where it was measured.
 const SHARE_OF_RESPONSES: f64 = 1.6;
 
 /// A search that this machine has no memory for.

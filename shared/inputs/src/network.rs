@@ -78,7 +78,7 @@ impl NetworkFile {
         })
     }
 
-    /// What it takes and gives.
+    /// Returns the description of its inputs and outputs.
     pub fn description(&self) -> &Description {
         self.session.description()
     }
@@ -118,7 +118,7 @@ impl NetworkFile {
     }
 }
 
-/// What a network sees in a box of a picture: left, top, right, bottom, pixels.
+/// Looks at a box of a picture with a network: left, top, right, bottom, pixels.
 ///
 /// * `turn`: how the picture is turned for the network.
 ///
@@ -168,7 +168,7 @@ pub fn closest(
     let outlines = &[outline][..];
     let seen = looker.best_of((image, outlines), Turn::Up, memory, &mut maps);
     let seen = seen.map_err(|error| refused(&picture.path, &error))?;
-    Ok(seen.map_or(as_it_is, |it| (it.outline, it.turn)))
+    Ok(seen.map_or(as_it_is, |seen| (seen.outline, seen.turn)))
 }
 
 /// Returns the keypoints with their names, pixels of the picture, as JSON.

@@ -84,12 +84,12 @@ impl Pictures {
             Self::Video(path, source) => {
                 let (size, turn) = (source.info().size, source.info().tag);
                 let frame = source.next_frame().or_fail(ExitKind::Input)?;
-                Ok(frame.map(|it| Picture {
+                Ok(frame.map(|frame| Picture {
                     path: path.clone(),
-                    frame: Some(it.index),
+                    frame: Some(frame.index),
                     turn,
                     size,
-                    rgb: it.rgb.to_vec(),
+                    rgb: frame.rgb.to_vec(),
                 }))
             }
         }
@@ -125,7 +125,7 @@ pub fn count(path: &Path, frames: Frames) -> usize {
     source.map_or(1, |source| source.info().n_frames as usize)
 }
 
-/// What is searched of a picture.
+/// Part of a picture that is searched.
 #[derive(Debug)]
 pub struct Searched {
     /// The pyramid of it.

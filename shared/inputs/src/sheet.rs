@@ -13,7 +13,7 @@ const N_TILES: usize = 40;
 /// Longer side of a thumbnail, pixels.
 const SIDE_PX: usize = 220;
 
-/// What is drawn on a thumbnail.
+/// Skeleton that is drawn on a thumbnail.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
     /// Pixels of the image.
@@ -89,7 +89,7 @@ impl Sheet {
         let caption = match found {
             None => format!("{name} -"),
             Some(skeleton) => {
-                let smaller = |it: &[f64; 2]| it.map(|value| (value + 0.5) * scale - 0.5);
+                let smaller = |point: &[f64; 2]| point.map(|value| (value + 0.5) * scale - 0.5);
                 let points: Vec<_> = skeleton.points.iter().map(smaller).collect();
                 draw_limbs(&mut canvas, &points, &skeleton.limbs);
                 format!("{name} {:.2}", skeleton.score)

@@ -79,7 +79,7 @@ impl Shipped {
 
     /// The file with the given unique name.
     pub fn of_name(name: &Path) -> Option<Self> {
-        Self::ALL.into_iter().find(|it| it.name() == name)
+        Self::ALL.into_iter().find(|known| known.name() == name)
     }
 
     /// Reads a file of this kind; `shipped` stands for the shipped one.

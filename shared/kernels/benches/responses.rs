@@ -58,7 +58,7 @@ fn sizes([width, height]: [usize; 2], side: usize) -> Vec<[usize; 2]> {
 /// Values in 0..1 that look random.
 fn noise(n: usize) -> Vec<f32> {
     let hash = |value: usize| (value as u32).wrapping_mul(2654435761).rotate_left(13);
-    let value = |it| hash(it).wrapping_mul(2246822519) as f32 / u32::MAX as f32;
+    let value = |i| hash(i).wrapping_mul(2246822519) as f32 / u32::MAX as f32;
     (0..n).map(value).collect()
 }
 

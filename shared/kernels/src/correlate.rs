@@ -147,7 +147,7 @@ impl FilterBank {
     pub fn filters(&self, panels: Range<usize>) -> Range<usize> {
         let panels = &self.panels[panels];
         let first = panels.first().map_or(0, |panel| panel.filters.start);
-        first..panels.last().map_or(0, |it| it.filters.end)
+        first..panels.last().map_or(0, |panel| panel.filters.end)
     }
 
     /// Makes room for levels of up to `cols` placements across: [`Self::correlate`] allocates nothing
@@ -300,7 +300,7 @@ const TRANSFORMS: usize = 10;
 
 struct Correlate<'a, I> {
     panels: &'a [Panel],
-    /// Of all panels.
+    /// Number of filters of all panels.
     n_filters: usize,
     levels: I,
     out: &'a mut [f32],

@@ -189,7 +189,7 @@ mod tests {
             let wanted = one.best_reference(from.iter().copied(), &spring);
             for isa in Isa::available() {
                 let got = one.best(isa, from.iter().copied(), &spring);
-                let bits = |it: &(usize, f64)| (it.0, it.1.to_bits());
+                let bits = |best: &(usize, f64)| (best.0, best.1.to_bits());
                 assert!(got.iter().map(bits).eq(wanted.iter().map(bits)), "{n}");
             }
         }

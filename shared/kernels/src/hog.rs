@@ -285,7 +285,7 @@ mod tests {
         let cols = SHAPE.map_size(24, 24)[1];
         let cell = &map[((3 + 2) * cols + 4 + 2) * N_CHANNELS..][..N_CHANNELS];
         assert!(cell[0] > 0.3 && cell[18] > 0.3, "{cell:?}");
-        assert!(cell[1..18].iter().all(|&it| it == 0.0), "{cell:?}");
+        assert!(cell[1..18].iter().all(|&value| value == 0.0), "{cell:?}");
     }
 
     #[test]
@@ -307,7 +307,7 @@ mod tests {
             let inside = (3..rows - 3).contains(&y) && (4..cols - 4).contains(&x);
             let expected = if inside { 0.0 } else { 1.0 };
             assert_eq!(cell[31], expected);
-            assert!(cell[..31].iter().all(|&it| it == 0.0));
+            assert!(cell[..31].iter().all(|&value| value == 0.0));
         }
     }
 }

@@ -43,7 +43,7 @@ impl Isa {
         self.0 == Kind::Portable
     }
 
-    /// What it is called.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self.0 {
             Kind::Portable => "portable",

@@ -60,7 +60,7 @@ impl Grid {
         MARGIN * self.stride()
     }
 
-    /// Whether there are no cells.
+    /// Returns true if there are no cells.
     pub fn is_empty(&self) -> bool {
         self.rows == 0 || self.cols == 0
     }

@@ -50,7 +50,7 @@ impl Planes {
         let (n, plane) = (self.width, self.width * self.height);
         let (first, rest) = self.data.split_at_mut(plane);
         let (second, third) = rest.split_at_mut(plane);
-        [first, second, third].map(|it| &mut it[y * n..][..n])
+        [first, second, third].map(|values| &mut values[y * n..][..n])
     }
 
     fn row_mut(&mut self, plane: usize, y: usize) -> &mut [f64] {

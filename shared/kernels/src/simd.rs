@@ -176,7 +176,7 @@ mod tests {
             ] {
                 let mut to = [0.0; ROW];
                 simd.store(value, &mut to);
-                assert!(to[..S::LANES].iter().all(|it| *it == to[0]));
+                assert!(to[..S::LANES].iter().all(|lane| *lane == to[0]));
                 self.0.push(to[0]);
             }
         }

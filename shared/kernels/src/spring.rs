@@ -58,7 +58,7 @@ impl Spring {
 }
 
 impl Axis {
-    /// What the spring adds to the score when the child lies `offset` cells after its parent.
+    /// Returns the score that the spring adds when the child lies `offset` cells after its parent.
     ///
     /// Computed in double and rounded once, so that every caller adds the same number.
     #[inline(always)]
@@ -171,7 +171,7 @@ mod tests {
                 let window = window.start as isize - p as isize..window.end as isize - p as isize;
                 prop_assert!(offsets.start <= window.start && window.end <= offsets.end);
             }
-            let [first, last] = [block.start, block.end - 1].map(|it| it as isize);
+            let [first, last] = [block.start, block.end - 1].map(|cell| cell as isize);
             prop_assert!(offsets.start >= -last && offsets.end <= n as isize - first);
         }
     }

@@ -1,4 +1,4 @@
-//! What a network takes and gives, as a TOML file says it.
+//! Inputs and outputs of a network, as a TOML file describes them.
 
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ pub struct Card {
     pub format: String,
     /// 1.
     pub version: u32,
-    /// What the network is called.
+    /// Name of the network.
     pub name: String,
     /// Where its weights come from.
     #[serde(default)]
@@ -34,21 +34,21 @@ pub struct Card {
     /// The licence of the weights.
     #[serde(default)]
     pub licence: String,
-    /// What it takes.
+    /// Input of the network.
     pub input: Input,
     /// How the box around a person becomes its input.
     #[serde(default)]
     pub crop: Crop,
-    /// What it gives.
+    /// Output of the network.
     pub output: Codec,
-    /// What its keypoints are.
+    /// Keypoints of the network.
     pub keypoints: KeypointNames,
-    /// What it tells beside them.
+    /// Outputs beside the keypoints.
     #[serde(default, skip_serializing_if = "Also::is_empty")]
     pub also: Also,
 }
 
-/// What a network tells beside its keypoints.
+/// Outputs of a network beside its keypoints.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Also {
@@ -65,7 +65,7 @@ impl Also {
     }
 }
 
-/// What a network takes: one picture.
+/// Input of a network: one picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
@@ -163,7 +163,7 @@ pub enum Fit {
     Stretch,
 }
 
-/// What a network gives, and how it is read.
+/// Output of a network, and the way to read it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Codec {
@@ -177,17 +177,17 @@ pub enum Codec {
         /// Maps after those of the keypoints that are not read: the background, fields between joints.
         #[serde(default)]
         further: usize,
-        /// Whether the corner cells lie on the corner pixels, and these on the corners of the box (UDP: Huang et al. 2020; see
+        /// True if the corner cells lie on the corner pixels, and these on the corners of the box (UDP: Huang et al. 2020; see
         /// [`Window`](crate::Window)); else a cell covers a whole number of pixels from the corner of the input on.
         #[serde(default)]
         udp: bool,
-        /// Whether each cell lies in the middle of the pixels that it covers; else on the first of them. Not with `udp`.
+        /// True if each cell lies in the middle of the pixels that it covers; else on the first of them. Not with `udp`.
         #[serde(default)]
         centred: bool,
         /// How a maximum is refined.
         #[serde(default)]
         refine: Refine,
-        /// What a score is.
+        /// Meaning of a score.
         #[serde(default)]
         score: Score,
     },
@@ -207,12 +207,12 @@ pub enum Codec {
     Keypoints {
         /// The output; left out: the only one.
         list: Option<String>,
-        /// What the numbers of a keypoint are, in order.
+        /// Meaning of the numbers of a keypoint, in order.
         fields: Vec<ListField>,
         /// Unit of positions.
         #[serde(default)]
         unit: ListUnit,
-        /// What a score is.
+        /// Meaning of a score.
         #[serde(default)]
         score: Score,
     },
@@ -243,7 +243,7 @@ pub enum ListUnit {
     Share,
 }
 
-/// What the keypoints of a network are.
+/// Names of a network's keypoints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeypointNames {
@@ -251,12 +251,12 @@ pub struct KeypointNames {
     pub set: Option<String>,
     /// Their names, in the order of the output, in place of a set.
     pub names: Option<Vec<String>>,
-    /// What left and right mean.
+    /// Meaning of left and right.
     #[serde(default)]
     pub sides: Sides,
 }
 
-/// What left and right mean.
+/// Meaning of left and right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
@@ -302,7 +302,7 @@ pub enum CardError {
         key: &'static str,
         /// The value.
         got: String,
-        /// What is accepted.
+        /// Description of the values that are accepted.
         expected: String,
     },
 }
@@ -336,8 +336,8 @@ impl Card {
     /// The names of its keypoints, in the order of the output.
     pub fn names(&self) -> Vec<String> {
         let of_set = |set: &String| {
-            let known = SETS.iter().find(|it| it.0 == set)?;
-            Some(known.1.iter().map(|&it| it.to_owned()).collect())
+            let known = SETS.iter().find(|known| known.0 == set)?;
+            Some(known.1.iter().map(|&name| name.to_owned()).collect())
         };
         let named = self.keypoints.names.clone();
         named

@@ -1,4 +1,4 @@
-//! What the output of a network means.
+//! Decoding of a network's output.
 
 use crate::card::{Layout, ListField, ListUnit, Refine, Score};
 
@@ -19,7 +19,7 @@ pub enum OutputError {
     Shape {
         /// The shape.
         got: Vec<usize>,
-        /// What the card asks for.
+        /// Shape that the card asks for.
         expected: String,
     },
     /// A value is not a finite number.
@@ -27,7 +27,7 @@ pub enum OutputError {
     NotANumber {
         /// Which.
         index: usize,
-        /// What it is.
+        /// Value in the output.
         value: f32,
     },
 }
@@ -268,7 +268,7 @@ impl<'a> SimCc<'a> {
                 )
             });
             Keypoint {
-                at: best.map(|it| it.0 as f64 / bins_per_pixel),
+                at: best.map(|best| best.0 as f64 / bins_per_pixel),
                 score: f64::from(best[0].1.min(best[1].1)),
             }
         };
@@ -320,10 +320,10 @@ impl<'a> List<'a> {
                 let place = self.fields.iter().position(|field| *field == wanted)?;
                 Some(f64::from(values[place]))
             };
-            let [x, y] = [ListField::X, ListField::Y].map(|it| get(it).unwrap_or(0.0));
+            let [x, y] = [ListField::X, ListField::Y].map(|field| get(field).unwrap_or(0.0));
             Keypoint {
                 at: [x * scale[0], y * scale[1]],
-                score: get(ListField::Score).map_or(1.0, |it| score.of(it)),
+                score: get(ListField::Score).map_or(1.0, |value| score.of(value)),
             }
         };
         let each = self.values.chunks_exact(self.fields.len().max(1));

@@ -19,7 +19,7 @@ pub struct DetectorCard {
     pub format: String,
     /// 1.
     pub version: u32,
-    /// What the network is called.
+    /// Name of the network.
     pub name: String,
     /// Where its weights come from.
     #[serde(default)]
@@ -27,22 +27,22 @@ pub struct DetectorCard {
     /// The licence of the weights.
     #[serde(default)]
     pub licence: String,
-    /// What it takes.
+    /// Input of the network.
     pub input: Input,
     /// The colour beyond the picture, 0 to 255.
     #[serde(default = "grey")]
     pub fill: u8,
-    /// What it gives.
+    /// Output of the network.
     pub output: Boxes,
     /// Boxes with a lower score are dropped.
     #[serde(default = "least_score")]
     pub least_score: f64,
-    /// Of two boxes that share more than this of their union the worse is dropped.
+    /// Largest overlap: of two boxes that share more than this of their union the worse is dropped.
     #[serde(default = "most_overlap")]
     pub most_overlap: f64,
 }
 
-/// What a detector gives, and how it is read.
+/// Output of a detector, and the way to read it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Boxes {
@@ -57,7 +57,7 @@ pub enum Boxes {
         /// The number of the class of people.
         #[serde(default)]
         person: usize,
-        /// Whether positions and sizes are in pixels of the input already.
+        /// True if positions and sizes are in pixels of the input already.
         #[serde(default)]
         decoded: bool,
     },
@@ -170,7 +170,9 @@ impl DetectorCard {
                 values.chunks_exact(5).map(one).collect()
             }
         };
-        found.retain(|it| it.score >= self.least_score && area(&it.outline) > 0.0);
+        found.retain(|candidate| {
+            candidate.score >= self.least_score && area(&candidate.outline) > 0.0
+        });
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut kept: Vec<PersonBox> = Vec::new();
         for it in found {
@@ -325,7 +327,7 @@ fn area([left, top, right, bottom]: &[f64; 4]) -> f64 {
     (right - left).max(0.0) * (bottom - top).max(0.0)
 }
 
-/// What two boxes share, as a share of their union.
+/// Returns the area that two boxes share, as a share of their union.
 fn overlap(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     let shared = area(&[
         a[0].max(b[0]),
@@ -360,7 +362,7 @@ output = { codec = "yolox", strides = [16, 32] }
         set(9, [0.5, 0.5, 0.0, 0.0, 0.5, 0.9, 0.0]);
         set(2, [0.5, 0.5, 0.0, 0.0, 0.9, 0.1, 0.9]);
         let found = card.boxes(&values, &[1, 10, 7]).unwrap();
-        let outlines: Vec<[f64; 4]> = found.iter().map(|it| it.outline).collect();
+        let outlines: Vec<[f64; 4]> = found.iter().map(|candidate| candidate.outline).collect();
         assert_eq!(found.len(), 2, "{found:?}");
         let near = |a: [f64; 4], b: [f64; 4]| (0..4).all(|i| (a[i] - b[i]).abs() < 1e-4);
         assert!(near(outlines[0], [16.0, 8.0, 32.0, 40.0]), "{outlines:?}");

@@ -10,8 +10,8 @@
 //! | `simcc` | a distribution over columns and one over rows for every keypoint (Li et al. 2022) | [`SimCc`] |
 //! | `keypoints` | positions and scores | [`List`] |
 //!
-//! Coordinates of the network's input have pixel centres at integers, column first. [`Window`] maps them to the picture.
-//! What other programs found is read from their files by [`files`].
+//! Coordinates of the network's input have pixel centres at integers, column first. [`Window`] maps them to the picture. Results
+//! of other programs are read from their files by [`files`].
 //!
 //! Nothing here opens a file or runs a network.
 #![forbid(unsafe_code)]

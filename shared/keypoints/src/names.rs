@@ -1,4 +1,4 @@
-//! What keypoints are called, and how the joints of the skeleton follow from them.
+//! Names of keypoints, and the rules by which the joints of the skeleton follow from them.
 
 use skeleton::PARSE14;
 
@@ -293,7 +293,7 @@ pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
     ways.map(|ways| Some(ways.into_iter().next()?.row)).collect()
 }
 
-/// Whether a keypoint is a joint of `skeleton::PARSE14` by its name; all others are extra keypoints.
+/// Returns true if a keypoint is a joint of `skeleton::PARSE14` by its name; all others are extra keypoints.
 pub fn is_joint(name: &str) -> bool {
     name == "head top" || PARSE14.joints.iter().any(|joint| joint.name == name)
 }
@@ -399,8 +399,8 @@ mod tests {
     #[test]
     fn a_joint_that_no_keypoint_tells_is_missing() {
         let rows = joint_rows(&owned(&["left hip", "nose"]));
-        let known = PARSE14.joints.iter().zip(&rows).filter(|it| it.1.is_some());
-        let known: Vec<&str> = known.map(|it| it.0.name).collect();
+        let known = PARSE14.joints.iter().zip(&rows).filter(|joint| joint.1.is_some());
+        let known: Vec<&str> = known.map(|joint| joint.0.name).collect();
         assert_eq!(known, ["left hip"]);
     }
 }

@@ -164,7 +164,7 @@ impl Window {
     }
 }
 
-/// Whether the network was trained with unbiased data processing.
+/// Returns true if the network was trained with unbiased data processing.
 fn is_unbiased(card: &Card) -> bool {
     matches!(card.output, Codec::HeatMap { udp: true, .. })
 }

@@ -65,13 +65,13 @@ pub struct Metrics {
     pub n_rows: u32,
     /// Number of people in the last result, or [`NO_PEOPLE`].
     pub n_people: u32,
-    /// What became of the pictures of its live camera; all 0 without one.
+    /// Counts of the pictures of its live camera; all 0 without one.
     pub camera: CameraCounts,
     /// Durations, at most one row for each span and view.
     pub rows: [MetricsRow; MAX_ROWS],
 }
 
-/// What became of the pictures of a live camera since the process began.
+/// Counts of the pictures of a live camera since the process began.
 ///
 /// Every picture that the camera made is lost by it or delivered; every one that was delivered is used, surplus, overtaken
 /// or refused, but for those under way.
@@ -83,11 +83,11 @@ pub struct CameraCounts {
     pub n_connections: u64,
     /// Pictures that the camera made: by its own numbers, or by its times where it has none.
     pub n_made: u64,
-    /// Of these, those that it never delivered.
+    /// Pictures among them that the camera never delivered.
     pub n_lost: u64,
-    /// Of these, those that it delivered.
+    /// Pictures among them that the camera delivered.
     pub n_delivered: u64,
-    /// Of the delivered, those that were sent on.
+    /// Delivered pictures that were sent on.
     pub n_used: u64,
     /// Those for which there was no place in the grid of common instants.
     pub n_surplus: u64,
@@ -107,11 +107,11 @@ pub struct CameraCounts {
     /// The shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds; [`UNMEASURED`]
     /// where it does not tell.
     pub delay_nanos: i64,
-    /// What says when the last picture was taken.
+    /// Source of the time at which the last picture was taken.
     pub timed_by: TimedBy,
 }
 
-/// What says when the pictures of a camera were taken. A transparent number, as [`Status`](crate::Status).
+/// Source of the times at which the pictures of a camera were taken. A transparent number, as [`Status`](crate::Status).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("TimedBy.v1")]
 #[repr(C)]
@@ -142,7 +142,7 @@ impl TimedBy {
         }
     }
 
-    /// Whether pictures count as taken when they came.
+    /// Returns true if pictures count as taken when they came.
     #[must_use]
     pub fn is_arrival(self) -> bool {
         matches!(self, Self::ARRIVAL | Self::DISBELIEVED)
@@ -200,7 +200,7 @@ pub struct MetricsRow {
     pub max_nanos: u64,
 }
 
-/// What a duration measures. A transparent number, as [`Status`](crate::Status).
+/// Span that a duration measures. A transparent number, as [`Status`](crate::Status).
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, ZeroCopySend, Pod, Zeroable,
 )]

@@ -30,7 +30,7 @@ pub struct People {
     pub stamp: Stamp,
     /// When it was received and sent.
     pub timing: Timing,
-    /// Whether there is anybody.
+    /// Tells that there is at least one person, or why not.
     pub status: Status,
     /// Number of valid people.
     pub n_people: u32,

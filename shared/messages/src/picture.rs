@@ -25,9 +25,9 @@ pub struct PictureHeader {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Whether there is a picture: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
+    /// Tells that there is a picture, or why not: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
     pub status: Status,
-    /// What the bytes are, four letters: those of Linux (`MJPG`, `YUYV`), `MKV0` for the head of a Matroska stream, `MKV1` for a
+    /// Format of the bytes, four letters: those of Linux (`MJPG`, `YUYV`), `MKV0` for the head of a Matroska stream, `MKV1` for a
     /// cluster of it with one picture.
     pub format: [u8; 4],
     /// The number that the camera gave it, or [`NO_SEQUENCE`].

@@ -72,7 +72,7 @@ pub struct ViewPose {
     pub stamp: Stamp,
     /// When it was received and sent.
     pub timing: Timing,
-    /// Whether there is a candidate.
+    /// Tells that there is a candidate, or why not.
     pub status: Status,
     /// Number of valid candidates.
     pub n_candidates: u32,
@@ -84,7 +84,7 @@ pub struct ViewPose {
     pub evidence_bytes: u64,
     /// How long after the instant of the frame the picture was taken ([`FrameHeader`](crate::FrameHeader)), nanoseconds.
     pub skew_nanos: i64,
-    /// What was searched.
+    /// Region that was searched.
     pub searched: Searched,
     /// Number of extra keypoints of a candidate, as many as all views of the deployment know together.
     pub n_keypoints: u32,
@@ -94,9 +94,8 @@ pub struct ViewPose {
     pub joints: [[[f32; 2]; MAX_JOINTS]; MAX_CANDIDATES],
     /// Local scores of the parts of the first candidate.
     pub local: [LocalMessage; MAX_PARTS],
-    /// What the picture says about the direction in which the person of every candidate faces:
-    /// `multiview::FrontEvidence`, `[towards the right of the picture, towards the camera]`; zeros where
-    /// there is no evidence.
+    /// Evidence of the picture about the direction in which the person of every candidate faces: `multiview::FrontEvidence`,
+    /// `[towards the right of the picture, towards the camera]`; zeros where there is no evidence.
     pub front: [[f32; 2]; MAX_CANDIDATES],
     /// How sure the network is of every joint of every candidate, 0 to 1: 0 for one that is not seen; zeros of filters.
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
@@ -147,7 +146,7 @@ pub struct PairPose {
     pub stamp: Stamp,
     /// When it was received and sent.
     pub timing: Timing,
-    /// Whether there is a hypothesis.
+    /// Tells that there is a hypothesis, or why not.
     pub status: Status,
     /// Number of valid hypotheses.
     pub n_hypotheses: u32,

@@ -20,7 +20,7 @@ pub struct Joint3d {
     pub reprojection_px: f64,
     /// Bit `v` is set if view `v` was used.
     pub views_used: u32,
-    /// Whether there is a position.
+    /// Tells that there is a position, or why not.
     pub status: Status,
 }
 
@@ -33,7 +33,7 @@ pub struct FusedView {
     pub energy: f64,
     /// Pairs that were averaged; 0 if the pose is the view's own, or if there is none.
     pub n_pairs: u32,
-    /// Whether there is a pose.
+    /// Tells that there is a pose, or why not.
     pub status: Status,
     /// 1 if the view sees the person from behind, and left and right have been exchanged.
     pub exchanged: u32,
@@ -45,7 +45,7 @@ pub struct FusedView {
     pub single_score: f64,
 }
 
-/// Whether left and right of a skeleton are decided. A transparent number, as [`Status`].
+/// Certainty of left and right of a skeleton. A transparent number, as [`Status`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Sides.v1")]
 #[repr(C)]
@@ -113,9 +113,9 @@ pub struct SkeletonMessage {
     pub views_used: u32,
     /// Number of pairs of views with a part in the skeleton.
     pub n_pairs: u32,
-    /// Whether the margin of the sides is enough.
+    /// Certainty of left and right, by the margin of the decision.
     pub sides: Sides,
-    /// Whether the poses are those that fusion solved for.
+    /// Poses from which the skeleton was triangulated.
     pub kept: Kept,
     /// How certain it is which views see the person from the same side: energy of the chosen assignment
     /// minus that of the best other one.
@@ -130,7 +130,7 @@ pub struct SkeletonMessage {
     pub joints: [Joint3d; MAX_JOINTS],
     /// The views.
     pub views: [FusedView; MAX_VIEWS],
-    /// What networks name beside the joints, as the deployment numbers it; nothing holds them together.
+    /// Keypoints that networks name beside the joints, as the deployment numbers them; nothing holds them together.
     pub keypoints: [Joint3d; MAX_KEYPOINTS],
 }
 

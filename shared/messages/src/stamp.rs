@@ -3,7 +3,7 @@
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// What a message belongs to. Stages join by (session, frame), never by time of arrival.
+/// Run, frame and times to which a message belongs. Stages join by (session, frame), never by time of arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Stamp.v1")]
 #[repr(C)]
@@ -21,7 +21,7 @@ pub struct Stamp {
     pub epoch: u32,
 }
 
-/// Whether a message carries a result, or why not.
+/// State of a message: it carries a result, or the reason why not.
 ///
 /// A transparent number rather than an enum: any received bit pattern is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]

@@ -51,7 +51,7 @@ pub struct Value {
     pub degrees: f64,
     /// Standard deviation, degrees; `None` where a covariance is not known.
     pub sd_degrees: Option<f64>,
-    /// What the least certain of its joints stands on.
+    /// State of the least certain of its joints.
     pub state: State,
 }
 
@@ -83,17 +83,19 @@ fn value(
         return Err(Unknown::Missing);
     }
     let up = up.unwrap_or_else(Vector3::z_axis);
-    let places: Vec<Place> =
-        found.iter().map(|it| (it.position, it.covariance.filter(is_finite))).collect();
-    let points: Vec<Vector3<f64>> = found.iter().map(|it| it.position).collect();
+    let places: Vec<Place> = found
+        .iter()
+        .map(|estimate| (estimate.position, estimate.covariance.filter(is_finite)))
+        .collect();
+    let points: Vec<Vector3<f64>> = found.iter().map(|estimate| estimate.position).collect();
     let degrees = angle.degrees(&points, &up).ok_or(Unknown::Undefined)?;
     let sd_degrees = spread::sd(degrees, &places, |points| angle.degrees(points, &up))?;
     if sd_degrees.is_some_and(|sd_degree| sd_degree > MOST_SD_DEGREES) {
         return Err(Unknown::Uncertain);
     }
-    let is_any = |state: State| found.iter().any(|it| it.state == state);
+    let is_any = |state: State| found.iter().any(|estimate| estimate.state == state);
     let order = [State::Rejected, State::Filled, State::Exchanged];
-    let state = order.into_iter().find(|it| is_any(*it));
+    let state = order.into_iter().find(|state| is_any(*state));
     Ok(Value {
         degrees,
         sd_degrees,

@@ -32,7 +32,9 @@ pub(crate) fn constant(
         let (Some(a), Some(b)) = (at_role(a), at_role(b)) else {
             continue;
         };
-        let measured = |smoothed: &Smoothed| smoothed.ok().filter(|it| it.state == State::Measured);
+        let measured = |smoothed: &Smoothed| {
+            smoothed.ok().filter(|estimate| estimate.state == State::Measured)
+        };
         let lengths: Vec<f64> = tracks[a]
             .iter()
             .zip(&tracks[b])
@@ -61,7 +63,7 @@ fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)])
         })
         .copied()
         .collect();
-    let mut joints: Vec<usize> = here.iter().flat_map(|it| it.0).collect();
+    let mut joints: Vec<usize> = here.iter().flat_map(|bone| bone.0).collect();
     joints.sort_unstable();
     joints.dedup();
     let found: Vec<Estimate> = joints.iter().filter_map(|&joint| tracks[joint][at].ok()).collect();
@@ -97,8 +99,8 @@ fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projecte
     let n = found.len();
     let unknown = Matrix3::identity() * UNKNOWN_SD_M.powi(2);
     let covariances: Vec<Matrix3<f64>> =
-        found.iter().map(|it| it.covariance.unwrap_or(unknown)).collect();
-    let mut positions: Vec<Vector3<f64>> = found.iter().map(|it| it.position).collect();
+        found.iter().map(|estimate| estimate.covariance.unwrap_or(unknown)).collect();
+    let mut positions: Vec<Vector3<f64>> = found.iter().map(|estimate| estimate.position).collect();
     let mut last = None;
     for _ in 0..N_STEPS {
         // P J': a column for every bone, which moves two joints.

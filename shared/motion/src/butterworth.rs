@@ -22,7 +22,7 @@ const TWICE: f64 = 0.802;
 pub struct CutoffError {
     /// The cutoff.
     pub cutoff_hz: f64,
-    /// Of the instants.
+    /// Rate of the instants.
     pub rate_hz: f64,
 }
 
@@ -105,7 +105,7 @@ fn pieces<'a>(
     let step = median(times.windows(2).map(|pair| pair[1] - pair[0]).collect());
     let goes_on = |a: &(usize, Vector3<f64>), b: &(usize, Vector3<f64>)| {
         let is_near = times[b.0] - times[a.0] <= fill_s.max(1.5 * step);
-        is_near && !breaks.iter().any(|it| (a.0 + 1..=b.0).contains(it))
+        is_near && !breaks.iter().any(|index| (a.0 + 1..=b.0).contains(index))
     };
     known.chunk_by(goes_on).collect()
 }
@@ -160,7 +160,7 @@ fn fill(
 
 /// The value at a time of the cubic curve through all values, with slopes from the neighbours (Catmull & Rom 1974).
 fn cubic(times: &[f64], values: &[f64], time: f64) -> f64 {
-    let after = times.partition_point(|it| *it <= time);
+    let after = times.partition_point(|known| *known <= time);
     if after == 0 || times.len() < 2 {
         return values.first().copied().unwrap_or(f64::NAN);
     }

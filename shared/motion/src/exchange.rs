@@ -5,7 +5,7 @@ use crate::recorded::{Recorded, Sides};
 use crate::rts::{GATE, Usable, distance2};
 use crate::track::usable;
 
-/// What speaks for one of two sides must be this much likelier, natural logarithm of the odds.
+/// Least odds that make one of two sides believed, natural logarithm.
 const LEAST_ODDS: f64 = 3.0;
 /// A measurement contradicts what others say by at most this: it may be wrong for many reasons.
 const MOST_DISTANCE2: f64 = 40.0;
@@ -59,7 +59,7 @@ fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
     }
     let of_a = away(&tracks[a], at, &tracks[b].used[at]);
     let of_b = away(&tracks[b], at, &tracks[a].used[at]);
-    let fits = |it: Option<f64>| it.is_some_and(|value| value <= GATE);
+    let fits = |distance: Option<f64>| distance.is_some_and(|value| value <= GATE);
     if !fits(of_a) || !fits(of_b) {
         return false;
     }

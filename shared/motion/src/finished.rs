@@ -1,7 +1,7 @@
 //! A finished run smoothed: `pose3d-smooth.jsonl`, `smooth.json`, `angles.csv`.
 //!
-//! What was measured is read line by line, and read again as the result is written, so that the memory that is needed
-//! does not grow with what else stands in a line.
+//! Smoothing of a finished run. The measurements are read line by line, and read again as the result is written, so that the
+//! memory that is needed does not grow with the other entries of a line.
 
 mod folder;
 mod settings;
@@ -25,7 +25,7 @@ const NOTHING_MEASURED: &str = "no joint was measured in any frame";
 /// The files that are written beside the results.
 pub const FILES: [&str; 3] = ["pose3d-smooth.jsonl", "angles.csv", "smooth.json"];
 
-/// What is asked for.
+/// Request to smooth a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The results of a run.
@@ -38,12 +38,12 @@ pub struct Request {
     pub up: Option<UnitVector3<f64>>,
 }
 
-/// What became of it.
+/// Outcome of the request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// What `smooth.json` holds.
+    /// Content of `smooth.json`.
     pub report: SmoothReport,
-    /// Whether a vertical was known for angles with it.
+    /// True if a vertical was known for angles with it.
     pub has_up: bool,
 }
 
@@ -155,7 +155,7 @@ fn person_report(person: &Person, frames: &[u64], found: &Report) -> SmoothedPer
     }
 }
 
-/// What speaks against trusting the result; of several people with the number of the person.
+/// Returns the reasons to doubt the result; of several people with the number of the person.
 fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
     let mut doubts = Vec::new();
     doubts.extend(run.cut.clone());
@@ -204,11 +204,11 @@ pub fn totals(report: &SmoothReport) -> BTreeMap<&'static str, usize> {
     let joints = || report.people.iter().flat_map(|person| person.joints.values());
     let sum = |of: fn(&SmoothedJoint) -> usize| joints().map(of).sum::<usize>();
     [
-        ("measured", sum(|it| it.measured)),
-        ("exchanged", sum(|it| it.exchanged)),
-        ("filled", sum(|it| it.filled)),
-        ("rejected", sum(|it| it.rejected)),
-        ("absent", sum(|it| it.absent)),
+        ("measured", sum(|joint| joint.measured)),
+        ("exchanged", sum(|joint| joint.exchanged)),
+        ("filled", sum(|joint| joint.filled)),
+        ("rejected", sum(|joint| joint.rejected)),
+        ("absent", sum(|joint| joint.absent)),
     ]
     .into()
 }

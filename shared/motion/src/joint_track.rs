@@ -8,14 +8,14 @@ use crate::tune;
 /// A joint on its way.
 #[derive(Debug)]
 pub(crate) struct Track {
-    /// What is used of every instant.
+    /// Usable measurement at every instant.
     pub(crate) used: Vec<Usable>,
     /// The measurement is that of the other side.
     pub(crate) is_exchanged: Vec<bool>,
     /// There is a measurement.
     pub(crate) is_measured: Vec<bool>,
     pub(crate) noise: Noise,
-    /// What everything says; none outside stretches.
+    /// Knowledge from all measurements at every instant; `None` outside stretches.
     pub(crate) known: Vec<Option<Known>>,
     /// The weight of the measurement.
     pub(crate) weights: Vec<f64>,

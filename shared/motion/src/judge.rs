@@ -8,7 +8,7 @@ pub type Path = [Option<Vector3<f64>>];
 /// A sum and the number of its values.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sum {
-    /// Of the values.
+    /// Sum of the values.
     pub sum: f64,
     /// How many.
     pub n: f64,
@@ -36,9 +36,9 @@ impl Sum {
 pub struct Errors {
     /// Distance from the true position, metres.
     pub position_m: Sum,
-    /// Of the velocity by central differences, m/s.
+    /// Errors of the velocity by central differences, m/s.
     pub velocity_m_s: Sum,
-    /// Of the acceleration by second differences, m/s².
+    /// Errors of the acceleration by second differences, m/s².
     pub acceleration_m_s2: Sum,
     /// By how much the error changes from one instant to the next, metres.
     pub jitter_m: Sum,

@@ -6,7 +6,7 @@ use runfiles::{FrameLine, JointLine, PersonLine, PlacedJoint};
 use crate::recorded::Sides;
 use crate::track::{Estimate, Measured, Smoothed};
 
-/// What was measured of a joint; `None` if it has no position.
+/// Returns the measurement of a joint; `None` if it has no position.
 pub fn measured(line: &JointLine) -> Option<Measured> {
     let it = line.placed()?;
     let [xx, xy, xz, yy, yz, zz] = it.covariance_m2;
@@ -16,8 +16,8 @@ pub fn measured(line: &JointLine) -> Option<Measured> {
     })
 }
 
-/// Whether the sides of a person are certain: all but those that are said not to be. Sides as seen in the pictures are not
-/// decided either, but are the same in all frames of a run.
+/// Returns the certainty of the sides of a person: certain unless the line says that they are not. Sides as seen in the pictures
+/// are not decided either, but are the same in all frames of a run.
 pub fn sides(person: &PersonLine) -> Sides {
     if person.sides == Some(runfiles::Sides::Unsure) {
         Sides::Unsure

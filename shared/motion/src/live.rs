@@ -16,7 +16,7 @@ pub const FILL_S: f64 = 0.25;
 #[derive(Debug)]
 pub struct Smoother {
     joints: Vec<Models>,
-    /// Of every joint, whether it has a side.
+    /// True for every joint that has a side.
     is_sided: Vec<bool>,
     fill_s: f64,
     delay: Delay,

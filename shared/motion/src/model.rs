@@ -15,7 +15,7 @@ type Matrix9x3 = SMatrix<f64, 9, 3>;
 /// Standard deviation of the velocity (m/s) and acceleration (m/s²) of a person's joint that nothing is known of.
 const START_SD: [f64; 2] = [2.0, 15.0];
 
-/// What is known of a joint at one instant.
+/// Knowledge of a joint at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Belief {
     pub(crate) mean: Vector9,
@@ -60,7 +60,7 @@ impl Belief {
         self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
-    /// What is known of the instant `dt` seconds later.
+    /// Returns the knowledge of the instant `dt` seconds later.
     pub(crate) fn after(&self, dt: f64, jerk: f64) -> Self {
         let mut mean = self.mean;
         for i in 0..3 {
@@ -106,7 +106,7 @@ impl Belief {
         })
     }
 
-    /// What is known after a measurement; unchanged if the numbers do not allow to use it.
+    /// Returns the knowledge after a measurement; unchanged if the numbers do not allow its use.
     #[must_use]
     pub(crate) fn with(&self, position: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         let total = self.position_covariance() + covariance;
@@ -121,7 +121,7 @@ impl Belief {
         Self { mean, covariance }
     }
 
-    /// What is known with everything later (Rauch, Tung & Striebel 1965).
+    /// Returns the knowledge with everything later (Rauch, Tung & Striebel 1965).
     ///
     /// * `self`: with everything up to its own instant.
     /// * `predicted`: [`Self::after`] of it at the next instant.

@@ -5,11 +5,11 @@
 pub struct Noise {
     /// Spectral density of the jerk, m²/s⁵: the restlessness of the joint.
     pub jerk: f64,
-    /// What covariances are multiplied by: 1 where they are right, above where they are too small.
+    /// Factor of the covariances: 1 where they are right, above where they are too small.
     pub scale: f64,
 }
 
-/// What is expected of the jerk density of a joint before anything is measured.
+/// Expected jerk density of a joint before anything is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Mean of the common logarithm of the density in m²/s⁵.

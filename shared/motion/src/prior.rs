@@ -3,7 +3,7 @@
 use crate::noise::Prior;
 use crate::role::Role;
 
-/// What is expected of a joint by its role.
+/// Returns the expectation for a joint by its role.
 ///
 /// Our own, rounded: what the likelihood alone finds in the ten synthetic actions of seed 1, which nothing is judged by. The spread is
 /// wide: a run of some seconds outweighs it.

@@ -6,7 +6,7 @@ use crate::noise::Noise;
 use crate::role::{Role, mirrored_name};
 use crate::track::{Absent, Measured, Smoothed, State, usable};
 
-/// Whether left and right of a measured skeleton are certain.
+/// Certainty of left and right of a measured skeleton.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sides {
     /// They are, or nothing says otherwise.
@@ -21,16 +21,16 @@ pub enum Sides {
 pub struct Joint {
     /// Its name.
     pub name: String,
-    /// What it is; `None` for a keypoint that has no role here.
+    /// Role of the joint; `None` for a keypoint that has no role here.
     pub role: Option<Role>,
-    /// Of every instant what was measured.
+    /// Measurement at every instant.
     pub measured: Vec<Option<Measured>>,
 }
 
 impl Joint {
     /// Where it was measured, if at all.
     pub(crate) fn position(&self, at: usize) -> Option<Vector3<f64>> {
-        usable(self.measured[at].as_ref()?).map(|it| it.0)
+        usable(self.measured[at].as_ref()?).map(|measured| measured.0)
     }
 
     /// Why there is no position where nothing was filled.
@@ -48,7 +48,7 @@ impl Joint {
 pub struct Recorded {
     /// The instants, seconds, ascending.
     pub times: Vec<f64>,
-    /// Of every instant whether its sides are certain.
+    /// Certainty of the sides at every instant.
     pub sides: Vec<Sides>,
     /// The joints.
     pub joints: Vec<Joint>,
@@ -122,7 +122,7 @@ impl Recorded {
         move |joint, at| is_some_sure && others[joint].is_some() && self.sides[at] == Sides::Unsure
     }
 
-    /// What becomes of instants whose sides are not certain where nothing decides them: kept, exchanged, left out.
+    /// Counts the instants with uncertain sides where nothing decides them: kept, exchanged, left out.
     pub(crate) fn unsure(&self) -> [usize; 3] {
         let n = self.sides.iter().filter(|side| **side == Sides::Unsure).count();
         if self.sides.contains(&Sides::Sure) {
@@ -132,7 +132,7 @@ impl Recorded {
         }
     }
 
-    /// Of every joint the index of that on the other side.
+    /// Returns for every joint the index of that on the other side.
     pub(crate) fn other_sides(&self) -> Vec<Option<usize>> {
         let at = |name: &str| self.joints.iter().position(|joint| joint.name == name);
         let other = |joint: &Joint| mirrored_name(&joint.name).and_then(|name| at(&name));
@@ -169,8 +169,8 @@ impl Recorded {
         let points: Vec<Vector3<f64>> = self
             .joints
             .iter()
-            .filter_map(|it| Some(it.measured[at]?.position))
-            .filter(|it| it.iter().all(|x| x.is_finite()))
+            .filter_map(|joint| Some(joint.measured[at]?.position))
+            .filter(|position| position.iter().all(|x| x.is_finite()))
             .collect();
         let is_enough = points.len() * 2 >= self.joints.len().min(14) && !points.is_empty();
         is_enough.then(|| {
@@ -187,18 +187,18 @@ pub(crate) fn median(values: Vec<f64>) -> f64 {
 /// A person over time, smoothed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Motion {
-    /// Of every joint, in the order of [`Recorded::joints`], every instant.
+    /// Smoothed positions of every joint, in the order of [`Recorded::joints`], at every instant.
     pub joints: Vec<Vec<Smoothed>>,
-    /// What was found out.
+    /// Findings about the person.
     pub report: Report,
 }
 
-/// What was found out about a person over time.
+/// Findings about a person over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
-    /// Of every joint its noise; `None` where the method does not ask, or nothing was measured.
+    /// Noise of every joint; `None` where the method does not ask, or nothing was measured.
     pub noise: Vec<Option<Noise>>,
-    /// Of every joint how many of its instants are what.
+    /// Counts of the states of every joint's instants.
     pub counts: Vec<Counts>,
     /// Instants at which somebody else began.
     pub breaks: Vec<usize>,
@@ -231,7 +231,7 @@ impl Counts {
     pub(crate) fn of(track: &[Smoothed]) -> Self {
         let mut counts = Self::default();
         for it in track {
-            let count = match it.map(|it| it.state) {
+            let count = match it.map(|estimate| estimate.state) {
                 Ok(State::Measured) => &mut counts.measured,
                 Ok(State::Exchanged) => &mut counts.exchanged,
                 Ok(State::Filled) => &mut counts.filled,

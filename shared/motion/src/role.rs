@@ -1,4 +1,4 @@
-//! What a joint is, by its name in the results.
+//! Role of a joint, by its name in the results.
 
 /// A side of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,7 +29,7 @@ impl Side {
     }
 }
 
-/// What a joint is.
+/// Role of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "the names of joints")]
 pub enum Role {
@@ -74,7 +74,7 @@ const NAMES: [(&str, Role); 19] = [
 impl Role {
     /// The role of a joint by its name; `None` for what has none here, as a finger.
     pub fn of(name: &str) -> Option<Self> {
-        let whole = NAMES.iter().find(|it| it.0 == name);
+        let whole = NAMES.iter().find(|known| known.0 == name);
         if let Some((_, role)) = whole {
             return Some(*role);
         }
@@ -82,7 +82,7 @@ impl Role {
             return Some(Self::Ankle(Side::Right));
         }
         let (side, joint) = name.split_once(' ')?;
-        let side = Side::BOTH.into_iter().find(|it| it.name() == side)?;
+        let side = Side::BOTH.into_iter().find(|known| known.name() == side)?;
         let role = match joint {
             "shoulder" => Self::Shoulder(side),
             "elbow" => Self::Elbow(side),
@@ -123,7 +123,9 @@ pub fn mirrored_name(name: &str) -> Option<String> {
     if let Some(rest) = name.strip_prefix("right ") {
         return Some(format!("left {rest}"));
     }
-    let limb = ["upper", "lower"].iter().find_map(|it| Some((*it, name.strip_prefix(*it)?)));
+    let limb = ["upper", "lower"]
+        .iter()
+        .find_map(|prefix| Some((*prefix, name.strip_prefix(*prefix)?)));
     let (part, rest) = limb?;
     if let Some(rest) = rest.strip_prefix('L') {
         return Some(format!("{part}R{rest}"));

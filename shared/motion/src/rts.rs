@@ -25,12 +25,12 @@ pub(crate) struct Known {
     pub(crate) covariance: Matrix3<f64>,
 }
 
-/// What everything says of the instants of a stretch.
+/// Knowledge from all measurements at the instants of a stretch.
 #[derive(Debug)]
 pub(crate) struct Stretch {
     /// At every instant; none if there is no measurement.
     pub(crate) known: Vec<Known>,
-    /// Of every instant the weight that its measurement has, 0..1; 0 where it is rejected or there is none.
+    /// Weight of the measurement at every instant, 0..1; 0 where it is rejected or there is none.
     pub(crate) weights: Vec<f64>,
 }
 
@@ -156,7 +156,7 @@ pub(crate) fn smooth(times: &[f64], measured: &[Usable], noise: Noise) -> Stretc
                 next[at] = if is_out { 0.0 } else { weight(distance2) };
             }
         }
-        if next.iter().all(|it| *it == 0.0) {
+        if next.iter().all(|value| *value == 0.0) {
             break; // Nothing would be left.
         }
         weights = next;

@@ -91,7 +91,7 @@ fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> V
     for at in (0..used.len()).filter(|&at| used[at].is_some()) {
         let goes_on = stretches.last().is_some_and(|&[_, end]| {
             let is_near = times[at] - times[end - 1] <= SPLIT_S.max(fill_s);
-            is_near && !breaks.iter().any(|it| (end..=at).contains(it))
+            is_near && !breaks.iter().any(|index| (end..=at).contains(index))
         });
         match stretches.last_mut() {
             Some(last) if goes_on => last[1] = at + 1,
@@ -101,13 +101,16 @@ fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> V
     stretches
 }
 
-/// What was measured, as it is: joints with a side too where sides are not certain.
+/// Returns the measurements unchanged: also joints with a side where sides are not certain.
 pub fn as_measured(recorded: &Recorded) -> Motion {
-    let estimate = |it: &Option<Measured>| -> Smoothed {
-        let it = it.as_ref().filter(|it| usable(it).is_some()).ok_or(Absent::Gap)?;
+    let estimate = |measured: &Option<Measured>| -> Smoothed {
+        let measured = measured
+            .as_ref()
+            .filter(|measured| usable(measured).is_some())
+            .ok_or(Absent::Gap)?;
         Ok(Estimate {
-            position: it.position,
-            covariance: it.covariance,
+            position: measured.position,
+            covariance: measured.covariance,
             state: State::Measured,
         })
     };

@@ -7,11 +7,11 @@ use nalgebra::{Matrix3, Vector3};
 pub struct Measured {
     /// In the world, metres.
     pub position: Vector3<f64>,
-    /// Of the position, square metres; none where it is not known.
+    /// Covariance of the position, square metres; `None` where it is not known.
     pub covariance: Option<Matrix3<f64>>,
 }
 
-/// What a position of a smoothed track stands on.
+/// Basis of a position of a smoothed track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// A measurement, and those around it.
@@ -41,9 +41,9 @@ impl State {
 pub struct Estimate {
     /// In the world, metres.
     pub position: Vector3<f64>,
-    /// Of the position, square metres; none where the method does not tell.
+    /// Covariance of the position, square metres; `None` where the method does not give it.
     pub covariance: Option<Matrix3<f64>>,
-    /// What it stands on.
+    /// Basis of the position.
     pub state: State,
 }
 

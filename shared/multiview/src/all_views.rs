@@ -26,7 +26,7 @@ pub struct AllViewsInput<'a> {
 pub struct AllViewsStart<'a> {
     /// Candidate of every view.
     pub candidates: &'a [usize],
-    /// Whether left and right of a view are exchanged with respect to the first view.
+    /// For every view true if its left and right are exchanged with respect to the first view.
     pub exchanged: &'a [bool],
 }
 
@@ -37,7 +37,7 @@ pub struct AllViewsEstimate {
     pub energy: f64,
     /// The solutions, in order; their targets are indices into the views.
     pub iterations: Vec<Iteration>,
-    /// Whether the poses had converged at the end.
+    /// True if the poses had converged at the end.
     pub converged: bool,
     /// Share of the consistency terms that were switched on, over all pairs and parts.
     pub active: f64,
@@ -104,7 +104,7 @@ pub fn estimate_all_views(
         evidence.iter().map(|evidence| solver.incremental(evidence)).collect();
     let mut term_keys: Vec<TermKeys> = vec![TermKeys::default(); n_views];
     let (mut iterations, mut converged) = (Vec::new(), n_views < 2);
-    let mut convergence = Convergence::of(n_views);
+    let mut convergence = Convergence::new(n_views);
     let most = (settings.max_iterations * n_views).div_ceil(2);
     for &target in order.iter().cycle().take(if converged { 0 } else { most }) {
         let supports = pairs.supports(target, &state.poses, &mut term_keys[target]);
@@ -149,7 +149,7 @@ struct Convergence {
 }
 
 impl Convergence {
-    fn of(n_views: usize) -> Self {
+    fn new(n_views: usize) -> Self {
         Self {
             n_views,
             n_still: 0,
@@ -212,7 +212,7 @@ impl<'a> Pairs<'a> {
     }
 
     /// The terms of two views, and the index of the first given view among the two.
-    fn of(&self, view: usize, other: usize) -> (&PairTerms<'a>, usize) {
+    fn terms_of(&self, view: usize, other: usize) -> (&PairTerms<'a>, usize) {
         let (first, second) = (view.min(other), view.max(other));
         (
             &self.terms[first][second - first - 1],
@@ -222,7 +222,7 @@ impl<'a> Pairs<'a> {
 
     /// The consistency sums of a pose of one view and a pose of another.
     fn between(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
-        match self.of(view, other) {
+        match self.terms_of(view, other) {
             (terms, 0) => terms.between(pose, others),
             (terms, _) => terms.between(others, pose),
         }
@@ -230,7 +230,7 @@ impl<'a> Pairs<'a> {
 
     /// As [`Self::between`], with the terms that are switched on while `view` is solved.
     fn for_target(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
-        match self.of(view, other) {
+        match self.terms_of(view, other) {
             (terms, 0) => terms.for_target(0, pose, others),
             (terms, side) => terms.for_target(side, others, pose),
         }
@@ -245,7 +245,7 @@ impl<'a> Pairs<'a> {
     ) -> Supports<'b> {
         let others = (0..poses.len()).filter(|other| *other != target);
         let one = |other: usize| {
-            let (terms, side) = self.of(target, other);
+            let (terms, side) = self.terms_of(target, other);
             Consistency::new(terms, side, &poses[other])
         };
         let each: Vec<Consistency<'b>> = others.map(one).collect();

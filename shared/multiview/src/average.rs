@@ -31,7 +31,7 @@ pub fn average(candidates: &[(f64, &[[f64; 2]])]) -> Option<FusedPose> {
     }
     let n = candidates.len() as f64;
     Some(FusedPose {
-        centres_px: sum.iter().map(|it| it.map(|sum| sum / n)).collect(),
+        centres_px: sum.iter().map(|centre| centre.map(|sum| sum / n)).collect(),
         n_pairs: candidates.len(),
         energy: candidates.iter().map(|candidate| candidate.0).sum(),
     })

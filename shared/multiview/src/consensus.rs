@@ -68,7 +68,7 @@ pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<O
     workspace.agree(settings, views).collect()
 }
 
-/// What [`consensus()`] is computed in: lists that are used again from part to part.
+/// Workspace of [`consensus()`]: lists that are used again from part to part.
 #[derive(Debug, Clone, Default)]
 pub struct ConsensusWorkspace {
     /// By view.
@@ -151,10 +151,10 @@ fn distinct(
     let reach = settings.same_sigmas * view.sigma_px;
     for &point in &view.points_px {
         let is_near =
-            |it: &&mut Kind| (it.first[0] - point[0]).hypot(it.first[1] - point[1]) <= reach;
+            |kind: &&mut Kind| (kind.first[0] - point[0]).hypot(kind.first[1] - point[1]) <= reach;
         match kinds.iter_mut().find(is_near) {
             Some(kind) => kind.add(point),
-            None => kinds.push(Kind::of(point)),
+            None => kinds.push(Kind::new(point)),
         }
     }
     let choice = |kind: &Kind| {
@@ -178,7 +178,7 @@ struct Kind {
 }
 
 impl Kind {
-    fn of(first: [f64; 2]) -> Self {
+    fn new(first: [f64; 2]) -> Self {
         let mut kind = Self {
             first,
             sum: [0.0; 2],
@@ -225,7 +225,7 @@ fn best(
                     continue;
                 };
                 let cost = judge(settings, views, choices, &point);
-                if best.as_ref().is_none_or(|it| cost < it.0) {
+                if best.as_ref().is_none_or(|best| cost < best.0) {
                     best = Some((cost, point));
                 }
             }
@@ -234,7 +234,7 @@ fn best(
     best
 }
 
-/// What a point of the world costs in all views.
+/// Returns the cost of a point of the world in all views.
 fn judge(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],

@@ -123,7 +123,7 @@ impl<'a> PairTerms<'a> {
         self.counterpart[part]
     }
 
-    /// Whether the terms of `part` of view `view` are on while view `target` is solved.
+    /// Returns true if the terms of `part` of view `view` are on while view `target` is solved.
     fn is_active(&self, [view, target]: [usize; 2], part: usize) -> bool {
         self.active[target][if view == 0 {
             part

@@ -59,7 +59,7 @@ pub fn rank_facing(
     ranked
 }
 
-/// Whether a view is exchanged.
+/// Returns true if a view is exchanged.
 pub fn is_exchanged(exchanges: Exchanges, view: usize) -> bool {
     exchanges >> view & 1 == 1
 }
@@ -141,7 +141,7 @@ impl FacingFilter {
         };
         let all = scored.iter().enumerate();
         let (hypothesis, top) = all.fold((0, f64::NEG_INFINITY), better);
-        let others = scored.iter().enumerate().filter(|it| it.0 != hypothesis);
+        let others = scored.iter().enumerate().filter(|other| other.0 != hypothesis);
         let runner_up = others.map(|other| other.1.1).fold(f64::NEG_INFINITY, f64::max);
         self.scores = scored.iter().map(|scored| (scored.0, scored.1 - top)).collect();
         Facing {

@@ -10,7 +10,7 @@ pub(crate) const R_SHOULDER: usize = 8;
 pub(crate) const L_SHOULDER: usize = 9;
 pub(crate) const NECK: usize = 12;
 
-/// What the picture of one view says about the direction in which the person faces.
+/// Evidence of the picture of one view about the direction in which the person faces.
 ///
 /// `[towards the right of the picture, towards the camera]`. For a unit vector `n` with these two
 /// components, `2 e n` is the logarithm of the likelihood of facing `n` over that of facing `-n`: the
@@ -50,7 +50,7 @@ pub fn front_in_view(camera: &Camera, place: &Point3<f64>, front: &Vector3<f64>)
     };
     let right = Vector3::x() - ray * ray.x;
     let front = camera.camera_from_world.rotation * front;
-    let right = right.try_normalize(1e-9).map_or(0.0, |it| it.dot(&front));
+    let right = right.try_normalize(1e-9).map_or(0.0, |right| right.dot(&front));
     [right, -ray.dot(&front)]
 }
 

@@ -255,7 +255,7 @@ mod tests {
         ) {
             let map = heat_map(ends, [64, 48], rows, cols);
             prop_assert_eq!(map.len(), rows * cols);
-            prop_assert!(map.iter().all(|it| (0.0..=1.0).contains(it)));
+            prop_assert!(map.iter().all(|value| (0.0..=1.0).contains(value)));
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::{EnergyKind, PairInput, Settings, ViewPlan};
 pub struct PairStart {
     /// Candidate of either view.
     pub candidates: [usize; 2],
-    /// Whether left and right of the second view are exchanged with respect to the first.
+    /// True if left and right of the second view are exchanged with respect to the first.
     pub exchanged: bool,
 }
 
@@ -37,10 +37,10 @@ pub struct PairEstimate {
     pub energy: f64,
     /// The solutions, in order.
     pub iterations: Vec<Iteration>,
-    /// Whether the poses had converged at the end.
+    /// True if the poses had converged at the end.
     pub converged: bool,
-    /// Whether the consistency terms of each part of the first view were switched on; `Released`:
-    /// while the first view was the support, which does not describe the second view as a support.
+    /// For each part of the first view true if its consistency terms were switched on; `Released`: while the first view was the
+    /// support, which does not describe the second view as a support.
     pub active: Vec<bool>,
     /// The pose in the first and in the second view; parts are named by the model, not exchanged.
     pub poses: [Pose; 2],
@@ -186,8 +186,7 @@ fn released_pair(
     }
 }
 
-/// Whether the shortcuts gave the exact result; always true with bounds that are not those of the
-/// evidence.
+/// Returns true if the shortcuts gave the exact result; always true with bounds that are not those of the evidence.
 pub(crate) fn is_best(
     solver: &Solver,
     evidence: &Responses<'_>,

@@ -34,11 +34,11 @@ impl Default for SidesSettings {
 /// The decision of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides {
-    /// Whether left and right are to be exchanged in all views.
+    /// True if left and right are to be exchanged in all views.
     pub exchange: bool,
     /// Log-odds of the decision, nats; not negative.
     pub margin: f64,
-    /// Whether the margin is too small to rely on.
+    /// True if the margin is too small to rely on.
     pub unsure: bool,
 }
 
@@ -81,7 +81,7 @@ impl SidesFilter {
     }
 }
 
-/// What the log-odds of the last frame's labels say of this frame's.
+/// Returns the log-odds of this frame's labels that follow from those of the last frame's.
 ///
 /// * `cosine`: of the angle between the two directions. Someone who seems to have turned by a right
 ///   angle may have turned either way.

@@ -12,7 +12,7 @@ use crate::space_places::Choices;
 use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
 use crate::space_view::{LIMBS, N};
 
-/// What it costs that the pairs of a limb lie near each other.
+/// Returns the cost of the nearness of the pairs of a limb.
 fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -> f64 {
     let of_pair = |[right, left]: &[usize; 2]| match (&joints[*right], &joints[*left]) {
         (Some(right), Some(left)) => cost(right, left, settings),

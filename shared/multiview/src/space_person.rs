@@ -261,7 +261,7 @@ const MOST: f64 = 0.75;
 fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
     let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
         let named = view.named(joint);
-        let best = view.evidence.maxima(named).iter().map(|it| it.1);
+        let best = view.evidence.maxima(named).iter().map(|maximum| maximum.1);
         let best = f64::from(best.fold(view.evidence.floor(), f32::max));
         Some(best - view.at(named, &(*at)?))
     };

@@ -27,7 +27,7 @@ pub(crate) struct Used {
 #[derive(Default)]
 struct Points {
     at: Vec<Point3<f64>>,
-    /// Of every point the evidence of every view, for the name of the first view's joint and for that of its other side.
+    /// Evidence of every view for every point, for the name of the first view's joint and for that of its other side.
     evidence: Vec<[f64; 2]>,
 }
 

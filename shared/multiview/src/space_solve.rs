@@ -55,7 +55,7 @@ pub(crate) fn solve_in_space(
 /// Number of times that every joint is moved between the places of the finest grid.
 const N_SWEEPS: usize = 2;
 
-/// What holds a joint besides the views.
+/// Constraints that hold a joint besides the views.
 struct Held<'a> {
     lengths: &'a [BoneLength; N - 1],
     occupied: &'a Occupied,

@@ -50,11 +50,11 @@ pub struct SpaceSettings {
     pub springs: f64,
     /// Most that a bone costs: half the square of so many standard deviations.
     pub cap: f64,
-    /// What it costs that the right and the left of a pair of joints lie at one place.
+    /// Cost of a right and a left joint of a pair that lie at one place.
     pub apart: f64,
     /// From so far apart on, a pair costs nothing, metres.
     pub least_apart_m: f64,
-    /// Whether left and right follow the picture: every view may have them exchanged, whatever the others say.
+    /// True if left and right follow the picture: every view may have them exchanged, whatever the others say.
     pub as_seen: bool,
     /// By how much exchanged sides must fit a view better.
     pub margin: f64,
@@ -145,7 +145,7 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
 /// Where each joint must not be: at that of the other side. `None` for joints that are not kept away from anything.
 pub(crate) type Occupied = [Option<Point3<f64>>; N];
 
-/// What it costs that a joint lies near the other one of its pair.
+/// Returns the cost of a joint that lies near the other one of its pair.
 pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettings) -> f64 {
     let share = (at - other).norm() / settings.least_apart_m;
     settings.apart * (1.0 - share).max(0.0)

@@ -18,7 +18,7 @@ pub(crate) fn other_side(joint: usize) -> usize {
     pair.map_or(joint, |[right, left]| right + left - joint)
 }
 
-/// What a view calls a joint of the body.
+/// Returns the name of a joint of the body in a view.
 pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
     let limbs = LIMBS.iter().zip(exchanged);
     let mut exchanged = limbs.filter(|(_, is_exchanged)| *is_exchanged);
@@ -35,7 +35,7 @@ pub trait JointEvidence {
     fn at(&self, joint: usize, point: [f64; 2]) -> f32;
     /// Where a joint may be, pixels of the picture, the best first, each with its evidence.
     fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
-    /// What is known of a joint where the view shows nothing of it: the floor of its evidence.
+    /// Returns the evidence of a joint where the view shows nothing of it: the floor.
     fn floor(&self) -> f32;
 }
 
@@ -44,11 +44,11 @@ pub trait JointEvidence {
 pub struct SpaceView<'a> {
     /// Its camera.
     pub camera: &'a Camera,
-    /// What it shows.
+    /// Evidence that the view shows.
     pub evidence: &'a dyn JointEvidence,
-    /// Whether left and right are exchanged in its evidence, of the arms and of the legs.
+    /// For the arms and for the legs true if left and right are exchanged in its evidence.
     pub exchanged: [bool; 2],
-    /// What the picture says about the direction in which the person faces; zeros say nothing.
+    /// Evidence of the picture about the direction in which the person faces; zeros say nothing.
     pub front: FrontEvidence,
 }
 
@@ -71,7 +71,7 @@ impl SpaceView<'_> {
         maxima.filter_map(|(at, _)| self.camera.ray(&(*at).into())).collect()
     }
 
-    /// What the view calls a joint.
+    /// Returns the view's name of a joint.
     pub(crate) fn named(&self, joint: usize) -> usize {
         name(joint, self.exchanged)
     }

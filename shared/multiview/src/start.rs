@@ -15,7 +15,7 @@ const MAX_FREE: usize = 6;
 pub struct Start {
     /// Candidate of every view.
     pub candidates: Vec<usize>,
-    /// Whether left and right of a view are exchanged with respect to the first view.
+    /// For every view true if left and right are exchanged with respect to the first view.
     pub exchanged: Vec<bool>,
     /// Sum over all pairs of their joint energy (eq. 3) at the start.
     pub energy: f64,
@@ -142,7 +142,7 @@ fn states(settings: &Settings, view_input: &ViewInput<'_>, view: usize) -> Vec<S
 /// The candidates of a view that may be the start: the best ones that are not somebody else.
 fn tried(settings: &Settings, view_input: &ViewInput<'_>) -> impl Iterator<Item = usize> {
     let all = 0..view_input.candidates.len();
-    let own = all.filter(|it| !view_input.is_other(*it));
+    let own = all.filter(|candidate| !view_input.is_other(*candidate));
     own.take(settings.n_candidates.max(1))
 }
 

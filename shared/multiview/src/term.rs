@@ -71,8 +71,7 @@ impl Term {
         })
     }
 
-    /// Whether the term is the same at every target position: the lens model has no solution for
-    /// the support.
+    /// Returns true if the term is the same at every target position: the lens model has no solution for the support.
     pub(crate) fn is_constant(&self) -> bool {
         self.inverse_norm2.is_nan()
     }

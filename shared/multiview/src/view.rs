@@ -148,7 +148,7 @@ pub struct ViewInput<'a> {
 }
 
 impl ViewInput<'_> {
-    /// Whether a candidate is somebody else.
+    /// Returns true if a candidate is another person.
     pub(crate) fn is_other(&self, candidate: usize) -> bool {
         candidate < u64::BITS as usize && self.others >> candidate & 1 == 1
     }
@@ -156,7 +156,7 @@ impl ViewInput<'_> {
     /// The best candidate that is not somebody else.
     pub(crate) fn best(&self) -> Option<&Pose> {
         let mut each = self.candidates.iter().enumerate();
-        each.find(|it| !self.is_other(it.0)).map(|it| it.1)
+        each.find(|candidate| !self.is_other(candidate.0)).map(|candidate| candidate.1)
     }
 
     /// Expected error and threshold of a part, if it has both.

@@ -49,7 +49,9 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
                     let exchanged = as_seen.then(|| apart(both, |joint| MIRROR[joint])).flatten();
                     as_named.into_iter().chain(exchanged).reduce(f64::min)
                 };
-                let near = by_size(theirs).into_iter().filter_map(|it| Some((distance(&it)?, it)));
+                let near = by_size(theirs)
+                    .into_iter()
+                    .filter_map(|candidate| Some((distance(&candidate)?, candidate)));
                 let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
                 if let Some((_, it)) = nearest.filter(|nearest| nearest.0 < SAME_M) {
                     chosen[other] = Some(it);

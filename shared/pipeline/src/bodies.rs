@@ -18,7 +18,7 @@ pub enum NoJoint {
     Implausible,
 }
 
-/// What a skeleton is as a body.
+/// Skeleton, judged as a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {
     /// Standing height by the lengths of the bones, metres; `None` with too few bones.
@@ -40,7 +40,7 @@ pub(crate) struct Bodies {
 /// After so many frames without a body, the next one is somebody else's.
 const FORGET_AFTER: u32 = 30;
 
-/// What becomes of each of the 14 joints.
+/// Changes of each of the 14 joints.
 struct Change {
     is_dropped: bool,
     /// How far it moves, and its covariance then.
@@ -90,12 +90,12 @@ impl Bodies {
         };
         let changes: [Change; N_JOINTS] = core::array::from_fn(change);
         for (joint, place) in set.joints.iter().zip(&mut joints) {
-            let of_joint: Vec<&Change> =
-                same_parts(joint).map(|same_part| &changes[same_part]).collect();
-            if of_joint.iter().any(|it| it.is_dropped) {
+            let of_joint: Vec<&Change> = same_parts(joint).map(|part| &changes[part]).collect();
+            if of_joint.iter().any(|change| change.is_dropped) {
                 *place = Err(NoJoint::Implausible);
             } else if let Ok(place) = place {
-                let moved: Vec<_> = of_joint.iter().filter_map(|it| it.moved.as_ref()).collect();
+                let moved: Vec<_> =
+                    of_joint.iter().filter_map(|change| change.moved.as_ref()).collect();
                 if !moved.is_empty() {
                     let sum: Vector3<f64> = moved.iter().map(|moved| moved.0).sum();
                     place.in_world += sum / moved.len() as f64;
@@ -118,7 +118,7 @@ impl Bodies {
 fn same_parts(joint: &Joint) -> impl Iterator<Item = usize> {
     let of_body = PARSE14.joints.iter().enumerate();
     let same = of_body.filter(|(_, it)| it.parts.iter().any(|part| joint.parts.contains(part)));
-    same.map(|it| it.0)
+    same.map(|joint| joint.0)
 }
 
 fn places(joints: &[Result<Triangulated, TriangulateError>]) -> (Joints, Covariances) {

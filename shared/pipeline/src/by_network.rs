@@ -30,7 +30,7 @@ pub struct NetworkEstimatorSettings {
 /// A view of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewFrame<'a> {
-    /// What there is of it.
+    /// Content of the view.
     pub content: ViewContent<'a>,
     /// How long after the instant of the frame the picture was taken, seconds.
     pub skew_s: f64,

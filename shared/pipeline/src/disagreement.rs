@@ -25,7 +25,7 @@ const NOISE_SHARE: f64 = 0.5;
 pub(crate) struct FoundByViews<'a> {
     pub(crate) plans: &'a [Arc<ViewPlan>],
     pub(crate) answers: &'a [Option<Sightings>],
-    /// Whether a view has a part in the result.
+    /// For every view true if it has a part in the result.
     pub(crate) takes_part: &'a [bool],
     /// Heat of half of the joints of a candidate of a view without a part in the result, for which the view counts as one that sees the
     /// person elsewhere.
@@ -62,8 +62,8 @@ pub(crate) fn measure(
         found.push((view, is_same, distances_px));
     }
     // A result on which no two views agree is judged by all of them.
-    let has_agreed = found.iter().filter(|it| it.1).count() >= 2;
-    for (view, _, distances_px) in found.iter().filter(|it| it.1 || !has_agreed) {
+    let has_agreed = found.iter().filter(|view| view.1).count() >= 2;
+    for (view, _, distances_px) in found.iter().filter(|view| view.1 || !has_agreed) {
         for (joint, px) in joints.iter_mut().zip(distances_px) {
             if let Ok(joint) = joint {
                 joint.residuals_px[*view] = *px;
@@ -74,7 +74,7 @@ pub(crate) fn measure(
         if let Ok(joint) = joint {
             joint.covariance = widened(&joint.covariance, disagreements_m);
             let known = joint.residuals_px.iter().filter(|residuals_px| residuals_px.is_finite());
-            let squares: Vec<f64> = known.map(|it| it * it).collect();
+            let squares: Vec<f64> = known.map(|residual| residual * residual).collect();
             if !squares.is_empty() {
                 let mean = squares.iter().sum::<f64>() / squares.len() as f64;
                 joint.reprojection_px = mean.sqrt();
@@ -128,7 +128,7 @@ fn in_metres(
         Some(px * depth_m / camera.intrinsics.fx)
     };
     let each = joints.iter().zip(distances_px);
-    each.map(|it| metres(it).unwrap_or(f64::NAN)).collect()
+    each.map(|joint| metres(joint).unwrap_or(f64::NAN)).collect()
 }
 
 /// The covariance of a joint on which views disagree.

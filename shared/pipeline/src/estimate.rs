@@ -168,7 +168,7 @@ impl Estimator {
         Estimate {
             answers,
             start,
-            scopes: estimates.iter().map(|it| Some(it.as_ref()?.scope)).collect(),
+            scopes: estimates.iter().map(|estimate| Some(estimate.as_ref()?.scope)).collect(),
             pairs,
             all_views,
             skeleton,
@@ -210,17 +210,17 @@ fn search(
 /// Settings of all steps.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EstimatorSettings {
-    /// Of the single-view step.
+    /// Settings of the single-view step.
     pub view: ViewSettings,
-    /// Whether views are solved in pairs or all at once.
+    /// Unit in which views are solved: pairs, or all at once.
     pub views: Views,
     /// Which of several people is followed.
     pub follow: Follow,
-    /// Of the fusion step.
+    /// Settings of the fusion step.
     pub fuse: Settings,
     /// Part-type tables.
     pub tables: PairTables,
-    /// Of the skeleton step.
+    /// Settings of the skeleton step.
     pub skeleton: SkeletonSettings,
 }
 

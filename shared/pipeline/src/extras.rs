@@ -65,9 +65,9 @@ impl ExtrasStep {
     ///
     /// * `names`: of the keypoints, as every view numbers them.
     pub fn new(names: &[String], cameras: Vec<Camera>, triangulation: Settings) -> Self {
-        let number = |name: &String| names.iter().position(|it| it == name);
+        let number = |name: &String| names.iter().position(|known| known == name);
         let extra = |(own, name): (usize, &String)| Extra {
-            mirror: mirrored(name).and_then(|it| number(&it)).unwrap_or(own),
+            mirror: mirrored(name).and_then(|mirror| number(&mirror)).unwrap_or(own),
             sides: sides_of(name),
         };
         Self {
@@ -106,7 +106,7 @@ impl ExtrasStep {
             let found = self.triangulate(extra, &matches)?;
             let mut known = skeleton.joints.iter().flatten();
             let is_near =
-                known.any(|it| (it.in_world - found.in_world).norm() < MOST_FROM_JOINTS_M);
+                known.any(|joint| (joint.in_world - found.in_world).norm() < MOST_FROM_JOINTS_M);
             is_near.then_some(found).ok_or(NoJoint::Implausible)
         };
         (0..self.extras.len()).map(of_extra).collect()
@@ -172,7 +172,7 @@ impl Match {
     /// Moves the keypoints of a picture that was taken at another time.
     fn move_to_instant(&mut self, skew_s: f64, motion: &mut Motion) {
         let points = self.extras.iter();
-        let points = points.map(|point| point.map(|it| Point2::from(it.0))).collect();
+        let points = points.map(|point| point.map(|found| Point2::from(found.0))).collect();
         let moved = motion.since_instant(self.view, [skew_s; 2], points);
         for (extra, by) in self.extras.iter_mut().zip(moved.into_iter().flatten()) {
             if let Some((at, _)) = extra {
@@ -181,7 +181,7 @@ impl Match {
         }
     }
 
-    /// Whether what the view calls left is the right side of the person, by two pairs of joints.
+    /// Returns true if the view's left is the right side of the person, by two pairs of joints.
     fn is_exchanged(&self, sides: &[[usize; 2]; 2]) -> bool {
         let [own, fused] = &self.joints;
         let distance = |a: usize, b: usize| distance(own[a], fused[b]);

@@ -51,7 +51,7 @@ pub struct Others {
 }
 
 impl Others {
-    fn of(found: &Found, followed: Option<usize>) -> Self {
+    fn new(found: &Found, followed: Option<usize>) -> Self {
         Self {
             of_views: found.others(followed),
             without: followed.map_or(0, |followed| found.without(followed)),
@@ -71,7 +71,7 @@ impl Others {
         self.own.get(view).copied().flatten()
     }
 
-    /// Whether a view sees others, but not the one who is followed: it has no part in the frame.
+    /// Returns true if a view sees others, but not the one who is followed: it has no part in the frame.
     pub fn only(&self, view: usize) -> bool {
         self.without >> view & 1 == 1
     }
@@ -93,7 +93,7 @@ impl Following {
         let cameras: Vec<&Camera> = plans.iter().map(|plan| plan.camera()).collect();
         let found = find(&cameras, views.collect());
         let followed = self.choose(&found);
-        Others::of(&found, followed)
+        Others::new(&found, followed)
     }
 
     /// The one who is followed; `None` if that is none of those who were found.
@@ -102,9 +102,9 @@ impl Following {
         let first = people().next().map(|person| person.0);
         let chosen = match self.follow {
             Follow::Clearest => first,
-            Follow::Largest => {
-                people().max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px)).map(|it| it.0)
-            }
+            Follow::Largest => people()
+                .max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px))
+                .map(|person| person.0),
             Follow::Last => return self.nearest(&found.people),
         };
         if let Some(chosen) = chosen {
@@ -121,7 +121,7 @@ impl Following {
         let near = self.last.and_then(|last| {
             let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
             let each = people.iter().map(|person| (person.place - last).norm()).enumerate();
-            each.filter(|it| it.1 <= reach).min_by(|a, b| a.1.total_cmp(&b.1))
+            each.filter(|candidate| candidate.1 <= reach).min_by(|a, b| a.1.total_cmp(&b.1))
         });
         if let Some((chosen, _)) = near {
             self.patience = (self.patience + 1).min(MOST_PATIENCE);
@@ -181,10 +181,10 @@ mod tests {
         let cameras: Vec<_> = (0..4).map(camera).collect();
         let found = found(&cameras, people);
         let followed = Following::new(Follow::Clearest).choose(&found);
-        let others = Others::of(&found, followed);
+        let others = Others::new(&found, followed);
         let own: Vec<Option<usize>> = (0..4).map(|view| others.own(view)).collect();
         assert_eq!(own, [Some(0), Some(1), Some(0), Some(1)]);
-        let nobody = Others::of(&found, None);
+        let nobody = Others::new(&found, None);
         assert_eq!(nobody.own(0), None);
     }
 
@@ -195,7 +195,7 @@ mod tests {
         let n = MOST_PATIENCE as usize;
         let frames = [vec![both; n + 10], vec![one; n], vec![both; 2]].concat();
         let got = chosen(Follow::Last, &frames);
-        assert!(got[..n + 10].iter().all(|it| *it == Some(-1.0)));
+        assert!(got[..n + 10].iter().all(|place| *place == Some(-1.0)));
         // The other one, two metres away, is out of reach for ten frames.
         assert!(got[n + 10..n + 20].iter().all(Option::is_none));
         assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");

@@ -19,9 +19,9 @@ use crate::view_result::ViewResult;
 /// The part-type tables of a rig.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PairTables {
-    /// Of pairs `(first, second)` of views with `first < second`.
+    /// Tables of pairs `(first, second)` of views with `first < second`.
     pub of_pairs: Vec<(usize, usize, TypeTables)>,
-    /// Of all other pairs, by the angle between the views at the person.
+    /// Tables of all other pairs, by the angle between the views at the person.
     pub by_angle: Option<Arc<AngleTables>>,
 }
 
@@ -51,7 +51,7 @@ const N_RANKED: usize = 32;
 /// has room for as many.
 const N_STARTS: usize = 2;
 
-/// Whether the views of a frame are solved in pairs or all at once.
+/// Unit in which the views of a frame are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Views {
     /// In pairs, whose poses are then combined: the paper's method.
@@ -82,8 +82,7 @@ pub struct AllViewsResult {
 /// The result of all views at once under one assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsHypothesis {
-    /// Whether left and right of each view were assumed to be exchanged with respect to the first
-    /// view.
+    /// For each view true if its left and right were assumed to be exchanged with respect to the first view.
     pub exchanged: Vec<bool>,
     /// The candidate of each view from which it started.
     pub candidates: Vec<usize>,

@@ -8,7 +8,7 @@ use multiview::{Exchanges, FusedPose, ViewPlan, average, is_exchanged};
 pub struct FusedView {
     /// The pose combined from its pairs; parts are named by the side of the body.
     pub pose: FusedPose,
-    /// Whether the view sees the person from behind.
+    /// True if the view sees the person from behind.
     pub exchanged: bool,
     /// Mean cell size of the levels on which it was fused, pixels of the frame.
     pub cell_px: f64,

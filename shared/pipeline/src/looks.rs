@@ -32,12 +32,12 @@ pub(crate) struct Looks<'a> {
     pub(crate) most_lost: f32,
 }
 
-/// Whether the joints that are seen in a box lie in quite another one: that of a person who moved fast, or of whom the last frame is long
+/// Returns true if the joints that are seen in a box lie in quite another one: the person moved fast, or the last frame is long
 /// ago. The box then shows only some of the person, and that near its edge.
 fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     let sure = maps.peaks().iter().flatten();
     let sure = sure.filter(|sure| sure.score >= SURE).map(|sure| sure.at);
-    outline_of(sure).is_some_and(|it| overlap(it, outline) < SAME)
+    outline_of(sure).is_some_and(|other| overlap(other, outline) < SAME)
 }
 
 impl Looks<'_> {
@@ -214,7 +214,7 @@ impl Looks<'_> {
         let boxes = [track.outline, wider(track.outline), around];
         let what = (self.image, &boxes[..]);
         let best = self.looker.best_of(what, track.turn, look, &mut seen.maps)?;
-        if let Some(best) = best.filter(|it| it.score >= track.usual_score - self.most_lost) {
+        if let Some(best) = best.filter(|best| best.score >= track.usual_score - self.most_lost) {
             self.keep_look(&best, Some(track.usual_score), memory);
         }
         Ok(())
@@ -274,7 +274,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Whether there is room for the person in a box, and nobody is known there.
+    /// Returns true if there is room for the person in a box, and nobody is known there.
     fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
         let is_known = |seen: &Seen| overlap(seen.outline, outline) > SAME;
         memory.n_seen < self.n_most && !memory.people().iter().any(is_known)

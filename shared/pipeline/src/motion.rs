@@ -14,7 +14,7 @@ type Points = Vec<Option<Point2<f64>>>;
 #[derive(Debug, Clone)]
 pub(crate) struct AtInstant {
     pub(crate) views: Vec<Option<FusedView>>,
-    /// What is to be added to the deviations of their parts, pixels.
+    /// Additions to the deviations of their parts, pixels.
     pub(crate) more_px: Vec<Vec<f64>>,
 }
 
@@ -22,7 +22,7 @@ pub(crate) struct AtInstant {
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
     views: Vec<Tracks>,
-    /// Of the frame, seconds.
+    /// Instant of the frame, seconds.
     instant_s: Option<f64>,
 }
 
@@ -92,7 +92,9 @@ impl Motion {
         let height_px = height(&points);
         let velocities = self.velocities(view, instant_s + taken_s, points, height_px);
         let by = |velocity: Option<Velocity>| {
-            velocity.and_then(|it| it.shift(skew_s)).unwrap_or_else(Vector2::zeros)
+            velocity
+                .and_then(|velocity| velocity.shift(skew_s))
+                .unwrap_or_else(Vector2::zeros)
         };
         Some(velocities.into_iter().map(by).collect())
     }

@@ -1,4 +1,4 @@
-//! What the step with a network keeps from frame to frame.
+//! Memory of the step with a network from frame to frame.
 
 use multiview::FrontEvidence;
 use posenetwork::{Bar, JointMaps, LookMemory, Turn};
@@ -19,7 +19,7 @@ const HELD: f64 = 1.0 / 3.0;
 /// After so many times that time (2 s) a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
-/// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
+/// State of the step from frame to frame: memory that is used again, and the boxes of the people it sees.
 #[derive(Debug, Default)]
 pub struct NetworkMemory {
     pub(crate) look: LookMemory,
@@ -37,7 +37,7 @@ pub struct NetworkMemory {
     pub(crate) until: Option<u64>,
     /// The number of the last frame, where it is told ([`Self::begin`]).
     last: Option<u64>,
-    /// Whether the last frame is so short a time ago that nobody has left their box.
+    /// True if the last frame is so short a time ago that nobody has left their box.
     pub(crate) is_soon: bool,
     /// Frames from the last one to this one, and most frames for which a person who stands still is not looked at; `None` where the
     /// frames' rate is not known.
@@ -45,7 +45,7 @@ pub struct NetworkMemory {
     /// How many times the longest time for which people are followed without a frame has passed since the last frame, where it is more
     /// than once: people are looked for around their boxes first.
     pub(crate) apart: Option<f64>,
-    /// Whether they were looked for in this frame.
+    /// True if people were looked for in this frame.
     pub(crate) has_searched: bool,
 }
 
@@ -83,7 +83,7 @@ impl NetworkMemory {
         &self.seen[..self.n_seen]
     }
 
-    /// What the network tells of the people of this frame, the largest and best seen first.
+    /// Iterates over the network's maps of the people of this frame, the largest and best seen first.
     pub fn maps(&self) -> impl Iterator<Item = &JointMaps> {
         self.people().iter().map(|person| &person.maps)
     }
@@ -118,7 +118,7 @@ impl NetworkMemory {
     pub fn begin(&mut self, frame: u64, most_apart: Option<f64>) {
         let apart = self.last.map(|last| frame.saturating_sub(last));
         let share = apart.zip(most_apart);
-        let share = share.map(|(it, most)| it as f64 / most);
+        let share = share.map(|(apart, most)| apart as f64 / most);
         self.is_soon = share.is_some_and(|share| share <= SOON);
         self.hold = apart.zip(most_apart).map(|(gap, most)| Hold {
             gap,
@@ -132,12 +132,12 @@ impl NetworkMemory {
         self.last = Some(frame);
     }
 
-    /// Whether boxes are to be looked for in this frame, whoever is seen.
+    /// Returns true if boxes are to be looked for in this frame, whoever is seen.
     pub(crate) fn is_due(&self) -> bool {
         self.until.is_none_or(|until| until == 0)
     }
 
-    /// Whether boxes were looked for in this frame.
+    /// Returns true if boxes were looked for in this frame.
     pub fn has_searched(&self) -> bool {
         self.has_searched
     }
@@ -154,7 +154,7 @@ impl Seen {
     }
 }
 
-/// Whether the person after the first `n` is one of these: two boxes can be of one person.
+/// Returns true if the person after the first `n` is one of these: two boxes can be of one person.
 pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     let (before, last) = seen[..=n].split_at(n);
     before.iter().any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)

@@ -18,7 +18,7 @@ use crate::sighting::Sighting;
 use crate::tracks::{MUCH_WORSE, Track};
 use crate::view_result::ExtraKeypoint;
 
-/// What tells where the joints of people are.
+/// Source of the places of people's joints.
 #[derive(Debug)]
 pub enum Eyes {
     /// A network that looks into boxes, and the detector of people that finds these.
@@ -253,8 +253,8 @@ impl NetworkStep {
     /// The extra keypoints of a person.
     fn extras_of(&self, maps: &JointMaps) -> impl Iterator<Item = ExtraKeypoint> {
         let each = self.extras.iter();
-        each.map(|it| {
-            let (found, sigma_px) = it.and_then(|it| maps.keypoint(it))?;
+        each.map(|extra| {
+            let (found, sigma_px) = extra.and_then(|joint| maps.keypoint(joint))?;
             let is_seen = found.score >= LEAST_SCORE;
             is_seen.then_some((found.at, sigma_px))
         })

@@ -10,7 +10,7 @@ use crate::view_result::ViewResult;
 /// not depend on which side is called left.
 const LINE: [[usize; 2]; N_POINTS] = [[0, 0], [1, 1], [9, 21], [11, 23], [13, 25]];
 const N_POINTS: usize = 5;
-/// Of the neck and of the hips in `LINE`.
+/// Indices of the neck and of the hips in `LINE`.
 const NECK: usize = 1;
 const HIPS: usize = 2;
 /// Shortest and longest distance of successive points, metres: wide enough for a child of three years and a tall man. The
@@ -91,7 +91,7 @@ impl FoundBody {
         [0, 1].map(|axis| f64::midpoint(neck[axis], hips[axis]))
     }
 
-    /// Whether it lies on the middle line of a person in the picture.
+    /// Returns true if the body lies on the middle line of a person in the picture.
     fn is_on(&self, line: &Line) -> bool {
         let middle = self.middle();
         let mut bones = line.array_windows();
@@ -197,9 +197,9 @@ fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let mut kept: Vec<Person> = Vec::new();
     for person in found {
-        let best = kept.first().map_or(0.0, |it| it.strength);
+        let best = kept.first().map_or(0.0, |first| first.strength);
         if person.strength >= MIN_STRENGTH * best
-            && kept.iter().all(|it| differ(views, it, &person))
+            && kept.iter().all(|other| differ(views, other, &person))
         {
             kept.push(person);
         }
@@ -207,7 +207,7 @@ fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     kept
 }
 
-/// Whether two are different people: apart in space, and sharing a place in at most one picture.
+/// Returns true if two people are different: apart in space, and sharing a place in at most one picture.
 fn differ(views: &[Vec<FoundBody>], one: &Person, other: &Person) -> bool {
     let shared = views.iter().enumerate().filter(|(view, sightings)| {
         let line = one.lines_px[*view].as_ref();
@@ -219,7 +219,7 @@ fn differ(views: &[Vec<FoundBody>], one: &Person, other: &Person) -> bool {
     (one.place - other.place).norm() >= APART_M && n_shared <= 1 && own >= 2
 }
 
-/// Whether the rays to the necks pass each other so near, and those to the hips, that the two may be one person.
+/// Returns true if the rays to the necks, and those to the hips, pass each other so near that the two may be one person.
 fn may_meet(one: &FoundBody, other: &FoundBody) -> bool {
     [NECK, HIPS].into_iter().all(|point| {
         let (Some(a), Some(b)) = (&one.rays[point], &other.rays[point]) else {

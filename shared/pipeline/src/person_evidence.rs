@@ -1,4 +1,4 @@
-//! What a view shows of one person: the maps of a network near the joints that were seen, as evidence for joints.
+//! Evidence of a view for the joints of one person: the maps of a network near the joints that were seen.
 
 use multiview::JointEvidence;
 use nalgebra::Vector2;

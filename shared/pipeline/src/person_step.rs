@@ -28,7 +28,7 @@ const WELL_SEEN: usize = 7;
 /// Least number of joints that a view sees of a person in which it has a part.
 const SEEN: usize = 3;
 
-/// What does not change from frame to frame.
+/// Data that do not change from frame to frame.
 #[derive(Debug)]
 pub(crate) struct Rig {
     pub(crate) plans: Vec<Arc<ViewPlan>>,
@@ -36,7 +36,7 @@ pub(crate) struct Rig {
     pub(crate) settings: SpaceStepSettings,
 }
 
-/// What there is of a frame.
+/// Sightings and maps of a frame.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameViews<'f, 'a> {
     /// By view.
@@ -247,7 +247,7 @@ impl PersonStep {
         }
     }
 
-    /// Whether enough joints of a solution are seen well by two views.
+    /// Returns true if enough joints of a solution are seen well by two views.
     fn is_well_seen(&self, found: &SolvedPerson, views: &[PartView<'_>]) -> bool {
         let is_seen = |joint: &usize| {
             let heats = views.iter().map(|view| self.heat_of(*joint, found, view));
@@ -265,8 +265,8 @@ impl PersonStep {
         })
     }
 
-    /// Whether a view shows the person of a solution at all. One that looks at something else had nothing to say of it, and its pixels
-    /// are not those of the person.
+    /// Returns true if a view shows the person of a solution at all. A view of something else has no evidence of the person, and
+    /// its pixels are not those of the person.
     fn shows(&self, found: &SolvedPerson, view: &PartView<'_>) -> bool {
         let heats = (0..N).map(|joint| self.heat_of(joint, found, view));
         let seen = heats.filter(|heat| *heat >= self.rig.settings.least_heat / 2.0);
@@ -302,7 +302,7 @@ impl PersonStep {
     }
 }
 
-/// What a view says of the direction in which a person faces.
+/// Returns the evidence of a view about the direction in which a person faces.
 fn front_seen(sighting: &Sighting) -> FrontEvidence {
     if !sighting.front.iter().all(|number| number.is_finite()) {
         return FrontEvidence::default();

@@ -19,7 +19,7 @@ pub(crate) type Places = [Option<Point3<f64>>; N];
 pub(crate) struct PartView<'a> {
     /// Its number in the rig.
     pub(crate) view: usize,
-    /// What it shows, with the names of its sides as the solution has them.
+    /// Evidence that it shows, with the names of its sides as the solution has them.
     pub(crate) shown: SpaceView<'a>,
     /// Height of the window of a network about the person, pixels.
     pub(crate) window_px: f64,
@@ -83,7 +83,7 @@ pub(crate) fn of_set(
 ) -> Vec<Result<Triangulated, TriangulateError>> {
     let mean = |joint: &Joint| {
         let of_part = |part: &usize| {
-            let own = |it: &&Joint| it.parts.contains(part);
+            let own = |joint: &&Joint| joint.parts.contains(part);
             let index = PARSE14.joints.iter().position(|joint| own(&joint));
             let missing = TriangulateError::TooFewViews {
                 views: 0,

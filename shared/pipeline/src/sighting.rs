@@ -20,7 +20,7 @@ pub struct Sighting {
     pub heats: [f32; N],
     /// Evidence of all joints, summed ([`posenetwork::JointMaps::score`]).
     pub score: f32,
-    /// What the picture says about the direction in which the person faces; zeros say nothing.
+    /// Evidence of the picture about the direction in which the person faces; zeros say nothing.
     pub front: FrontEvidence,
     /// The extra keypoints.
     pub extras: Vec<ExtraKeypoint>,
@@ -53,7 +53,7 @@ impl Sighting {
         }
     }
 
-    /// Whether half of the joints are seen well: what networks see in an empty room has fewer.
+    /// Returns true if half of the joints are seen well: sightings of networks in an empty room have fewer.
     ///
     /// * `least_heat`: of a joint that is seen well, 0 to 1.
     pub fn is_clear(&self, least_heat: f64) -> bool {

@@ -15,7 +15,7 @@ pub enum Combine {
     Consensus,
 }
 
-/// What is known of bodies, and what it is used for.
+/// Uses of the knowledge of bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodySettings {
     /// Leave out joints, and skeletons, that no body has.
@@ -69,7 +69,7 @@ pub struct SkeletonSettings {
     /// How the views agree on a part. The decision about facing always uses the consensus: a mean
     /// of poses with different limbs is consistent under no assumption about left and right.
     pub consensus: ConsensusSettings,
-    /// What bodies are like.
+    /// Uses of the knowledge of bodies.
     pub body: BodySettings,
     /// Decide which views see the person from behind.
     pub facing: bool,

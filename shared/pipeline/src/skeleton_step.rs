@@ -37,7 +37,7 @@ pub enum Kept {
 pub struct Skeleton {
     /// The joints of the joint set, each with its position or the reason why there is none.
     pub joints: Vec<Result<Triangulated, NoJoint>>,
-    /// What they are as a body; `None` where that was not asked, or nothing was found.
+    /// The joints as a body; `None` where that was not asked, or nothing was found.
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
@@ -48,18 +48,18 @@ pub struct Skeleton {
     /// Energy of the chosen assumption about which views see the person from the same side minus that of
     /// the best other one.
     pub facing_margin: f64,
-    /// Whether left and right are to be exchanged in all views; `None` where that is not decided.
+    /// Exchange of left and right in all views; `None` where that is not decided.
     pub sides: Option<Sides>,
     /// Which poses the joints were triangulated from.
     pub kept: Kept,
 }
 
-/// What a skeleton is made of.
+/// Inputs of a skeleton.
 #[derive(Clone, Copy)]
 struct Frame<'a> {
     answers: &'a [Option<ViewResult>],
     fused: &'a Fused<'a>,
-    /// Whether the person is the only one that the views could mean.
+    /// True if the person is the only one that the views could mean.
     is_alone: bool,
 }
 
@@ -227,7 +227,7 @@ impl SkeletonStep {
                 sigma * self.space.settings.error_weight
             };
             // The second number is only there because `anatomical` and `from_parts` take points.
-            let of_parts: Vec<[f64; 2]> = of_parts.map(|it| [weighed(it), 0.0]).collect();
+            let of_parts: Vec<[f64; 2]> = of_parts.map(|part| [weighed(part), 0.0]).collect();
             let of_parts = anatomical(&of_parts, self.space.mirror(view, exchanged));
             let of_joints = joints.from_parts(&of_parts).into_iter();
             Some(of_joints.map(|[sigma, _]| sigma).collect())
@@ -289,7 +289,8 @@ impl SkeletonStep {
             let parts = self.space.triangulate(views, n_parts, Cow::from, &[]);
             self.space.agreement(views, &parts)
         };
-        let cells: Vec<Option<f64>> = solved.iter().map(|it| Some(it.as_ref()?.cell_px)).collect();
+        let cells: Vec<Option<f64>> =
+            solved.iter().map(|pose| Some(pose.as_ref()?.cell_px)).collect();
         let set = |views: &mut [Option<FusedView>], cells: &[Option<f64>]| {
             for (view, cell_px) in views.iter_mut().zip(cells) {
                 if let (Some(view), Some(cell_px)) = (view, cell_px) {
@@ -298,7 +299,7 @@ impl SkeletonStep {
             }
         };
         let of_start: Vec<Option<f64>> =
-            start.iter().map(|it| Some(it.as_ref()?.cell_px)).collect();
+            start.iter().map(|pose| Some(pose.as_ref()?.cell_px)).collect();
         set(&mut solved, &of_start);
         let is_better = agreement(&start) > agreement(&solved);
         set(&mut solved, &cells);
@@ -374,7 +375,7 @@ impl SkeletonStep {
             for (sightings, candidates) in sightings.iter_mut().zip(candidates) {
                 let all = candidates.iter().flat_map(|candidate| &candidate.poses);
                 sightings.points_px.clear();
-                sightings.points_px.extend(all.map(|it| it.centres_px[part]));
+                sightings.points_px.extend(all.map(|pose| pose.centres_px[part]));
             }
             let agreed = workspace.agree(&self.space.settings.consensus, &sightings);
             for (view, agreed) in views.iter_mut().zip(agreed) {

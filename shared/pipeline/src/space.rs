@@ -63,7 +63,7 @@ impl Space {
         self.plans.first().is_some_and(has_sides)
     }
 
-    /// What speaks for the sides of a skeleton: the evidence of the views about its front, and how it bends.
+    /// Returns the evidence for the sides of a skeleton: that of the views about its front, and how it bends.
     fn seen(
         &self,
         answers: &[Option<ViewResult>],
@@ -209,11 +209,11 @@ pub(crate) fn trunk_upward(centres_px: &[[f64; 2]]) -> f64 {
 pub(crate) struct Judged {
     /// The agreement of the views, and how likely what they see of the front is; adds to the energy of fusion.
     pub(crate) score: f64,
-    /// What it says about the sides of the whole body.
+    /// Evidence about the sides of the whole body.
     pub(crate) seen: Seen,
 }
 
-/// What speaks for the sides of a skeleton.
+/// Evidence for the sides of a skeleton.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
     /// The direction in which it faces as it is labelled.

@@ -24,7 +24,7 @@ pub struct PersonSkeleton {
     pub skeleton: Skeleton,
 }
 
-/// What is kept of a person.
+/// Memory of a person.
 #[derive(Debug)]
 struct Remembered {
     id: u64,

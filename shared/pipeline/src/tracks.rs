@@ -27,7 +27,7 @@ pub(crate) struct Track {
     pub(crate) turn: Turn,
     /// The score that the person's poses usually have.
     pub(crate) usual_score: f32,
-    /// Whether this frame's is so much lower that the box may not fit.
+    /// True if this frame's score is so much lower that the box may not fit.
     pub(crate) is_doubtful: bool,
     /// Index of the person among those of the frame.
     pub(crate) index: usize,
@@ -75,7 +75,7 @@ impl Track {
         }
     }
 
-    /// Whether the person has hardly moved since the last look.
+    /// Returns true if the person has hardly moved since the last look.
     ///
     /// * `n_frames`: from the last look to this frame.
     pub(crate) fn is_still(&self, n_frames: u64) -> bool {

@@ -1,4 +1,4 @@
-//! What one view found in a frame.
+//! Result of one view for a frame.
 
 use fmp::{Pose, Responses};
 use multiview::FrontEvidence;
@@ -12,8 +12,7 @@ pub type ExtraKeypoint = Option<([f64; 2], f64)>;
 pub struct ViewResult {
     /// Distinct poses, best first; never empty.
     pub candidates: Vec<Pose>,
-    /// What the picture says about the direction in which the person of every candidate faces; empty
-    /// without a detector of it.
+    /// Evidence of the picture about the direction in which the person of every candidate faces; empty without a detector of it.
     pub front: Vec<FrontEvidence>,
     /// Expected error of every part, pixels of the frame, if there is a prediction.
     pub sigma_px: Option<Vec<f32>>,
@@ -25,8 +24,8 @@ pub struct ViewResult {
 }
 
 impl ViewResult {
-    /// Whether all its poses lie where there is evidence. They may not: a restarted process can
-    /// repeat a frame with another search window than the process whose evidence arrived before.
+    /// Returns true if all its poses lie where there is evidence. They may not: a restarted process can repeat a frame with
+    /// another search window than the process whose evidence arrived before.
     pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
         self.candidates.iter().all(|pose| evidence.covers(pose))
     }

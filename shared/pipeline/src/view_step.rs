@@ -48,7 +48,7 @@ pub struct ViewSettings {
     pub min_separation: f64,
     /// How poses are tracked from frame to frame; without it every frame is searched in full.
     pub track: Option<TrackSettings>,
-    /// What tells in which direction a person faces; without it nothing does.
+    /// Detector of the direction in which a person faces; without it the direction is unknown.
     pub orientation: Option<Arc<Detector>>,
 }
 
@@ -69,8 +69,7 @@ impl Default for ViewSettings {
 pub struct ViewEstimate {
     /// Distinct poses, best first.
     pub candidates: Vec<Pose>,
-    /// What the picture says about the direction in which the person of every candidate faces; empty: nothing was
-    /// asked.
+    /// Evidence of the picture about the direction in which the person of every candidate faces; empty: nothing was asked.
     pub front: Vec<FrontEvidence>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
@@ -254,8 +253,8 @@ impl ViewStep {
         candidates.iter().map(&mut of_candidate).collect()
     }
 
-    /// Whether the result near the last pose is unreliable, so that the frame must be searched in
-    /// full; see [`Tracker::needs_full_search`].
+    /// Returns true if the result near the last pose is unreliable, so that the frame must be searched in full; see
+    /// [`Tracker::needs_full_search`].
     pub fn needs_full_search(&self, tracker: &Tracker, found: &ViewEstimate) -> bool {
         tracker.needs_full_search(&self.layout, &found.scope, found.candidates.first())
     }

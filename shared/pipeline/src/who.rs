@@ -36,7 +36,7 @@ pub struct FramePeople {
 pub struct WhoSettings {
     /// Which of several people comes first.
     pub follow: Follow,
-    /// Whether left and right follow the picture, so that two views may have them exchanged.
+    /// True if left and right follow the picture, so that two views may have them exchanged.
     pub as_seen: bool,
     /// Heat that half of the joints of somebody new have in two views, 0 to 1.
     pub least_heat: f64,
@@ -178,7 +178,7 @@ fn longer_px(sighting: &Sighting) -> f64 {
     (right - left).max(bottom - top)
 }
 
-/// What a view saw, as detections with their deviations.
+/// Converts the sightings of a view to detections with their deviations.
 fn view(seen: Option<&Sightings>) -> View {
     let detection = |sighting: &Sighting| {
         let window_px = WINDOW * longer_px(sighting);

@@ -65,7 +65,7 @@ impl JointMaps {
         outline_of(seen.map(|peak| peak.at))
     }
 
-    /// Whether the maps cover any pixel of a picture.
+    /// Returns true if the maps cover any pixel of a picture.
     ///
     /// * `size`: width and height of the picture.
     pub fn overlaps(&self, size: [usize; 2]) -> bool {

@@ -9,7 +9,7 @@ use crate::maps::JointMaps;
 const SURE: f64 = 0.2;
 /// Half the width of a limb, share of the longer side of the box around the person.
 const HALF_WIDTH: f64 = 0.0375;
-/// Of the head, which reaches from the neck to its top, likewise.
+/// Half the width of the head, which reaches from the neck to its top, likewise.
 const HALF_HEAD: f64 = 0.06;
 /// The edges and diagonals of the trunk: hips and shoulders by their places in [`PARSE14`].
 const TRUNK: [(usize, usize); 6] = [(2, 8), (3, 9), (8, 9), (2, 3), (2, 9), (3, 8)];

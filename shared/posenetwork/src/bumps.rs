@@ -16,7 +16,7 @@ const SWEEPS: usize = 6;
 pub const MOST_OF_A_JOINT: usize = 8;
 /// Cells on each side of a maximum that its Gaussian is fitted to.
 const REACH: i64 = 2;
-/// Of these cells, those that have at least this share of the maximum.
+/// Least share of the maximum in the cells that a Gaussian is fitted to.
 const SHARE: f64 = 0.5;
 /// Least and largest standard deviation along any axis, cells.
 const SIGMAS: [f64; 2] = [0.4, 12.0];
@@ -37,7 +37,7 @@ pub struct Bump {
 }
 
 impl Bump {
-    /// Whether it is one that [`bumps`] can give: finite, positive definite, neither wider nor narrower than it makes them.
+    /// Returns true if [`bumps`] can give it: finite, positive definite, neither wider nor narrower than it makes them.
     pub fn is_sound(&self) -> bool {
         let [xx, xy, yy] = self.precision.map(f64::from);
         let numbers = [self.at[0], self.at[1], self.heat];

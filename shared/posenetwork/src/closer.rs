@@ -13,7 +13,7 @@ const FAINTER: f64 = 0.1;
 /// Most looks at one person beside the first.
 const MOST_MORE: usize = 2;
 
-/// What looks at the people of a picture.
+/// Network and settings with which the people of a picture are looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Looker<'a> {
     /// The network.
@@ -26,11 +26,11 @@ pub struct Looker<'a> {
 #[derive(Debug, Default)]
 pub struct LookMemory {
     workspace: Workspace,
-    /// What is seen in a box that may turn out the better one.
+    /// Maps of a box that may turn out the better one.
     other: JointMaps,
 }
 
-/// What was seen in a box, beside the maps.
+/// Result of a look at a box, beside the maps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
     /// The box: left, top, right, bottom, pixels of the picture.

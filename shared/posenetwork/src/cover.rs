@@ -12,7 +12,7 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// Whether a point lies in it.
+    /// Returns true if a point lies in it.
     pub(crate) fn holds(&self, at: [f64; 2]) -> bool {
         let [from, to] = self.ends;
         let along = [to[0] - from[0], to[1] - from[1]];

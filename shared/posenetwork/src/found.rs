@@ -1,4 +1,4 @@
-//! What a network found, from the numbers of its output: joints made of keypoints, and how sure it is of them.
+//! Joints that a network found, from the numbers of its output: joints made of keypoints, and how sure it is of them.
 
 use keypoints::{Codec, Keypoint, Score};
 
@@ -26,7 +26,7 @@ pub(crate) fn scored(
     }
 }
 
-/// What a row without keypoints would be.
+/// Value for a row without keypoints.
 pub(crate) const NOWHERE: Keypoint = Keypoint {
     at: [0.0; 2],
     score: 0.0,

@@ -68,7 +68,7 @@ pub struct JointMaps {
     values: Vec<f32>,
     rows: usize,
     columns: usize,
-    /// Of the network's own maps every n-th row and column is kept.
+    /// Interval at which rows and columns of the network's own maps are kept.
     every: usize,
     /// Pixels of the input between two cells, across and down; the first cell lies on the first pixel.
     step: [f64; 2],
@@ -152,7 +152,7 @@ impl JointMaps {
         if let Some(errors) = sight.errors() {
             self.errors.extend(errors);
             let of_row = |row: &Vec<(usize, f64)>| {
-                row.iter().map(|(it, share)| share.abs() * self.errors[*it]).sum()
+                row.iter().map(|(source, share)| share.abs() * self.errors[*source]).sum()
             };
             self.told.extend(rows.iter().map(|row| row.as_ref().map(of_row)));
         }
@@ -193,8 +193,8 @@ impl JointMaps {
     ) -> bool {
         self.floor = settings.floor();
         self.step = [1.0; 2];
-        self.window =
-            keypoints::outline(keypoints).and_then(|it| Window::grid(it, BOX_MARGIN, MOST_ROWS));
+        self.window = keypoints::outline(keypoints)
+            .and_then(|outline| Window::grid(outline, BOX_MARGIN, MOST_ROWS));
         [self.columns, self.rows] = self.window.map_or([0, 0], |window| window.input());
         let n_values = N_JOINTS * self.rows * self.columns;
         self.values.clear();

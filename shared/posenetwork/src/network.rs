@@ -39,11 +39,11 @@ pub struct Workspace {
     whole: Vec<i32>,
     bytes: Vec<u8>,
     outputs: Vec<Tensor>,
-    /// What is seen in the mirror image.
+    /// Outputs for the mirror image.
     mirrored: Vec<Tensor>,
-    /// Of the input, while it is turned.
+    /// Values of the input, while it is turned.
     turned: Vec<f32>,
-    /// What is painted over.
+    /// Bars that are painted over.
     covers: Vec<Bar>,
 }
 
@@ -76,7 +76,7 @@ impl Tensor {
     }
 }
 
-/// What a network sees in a window of a picture.
+/// Output of a network for a window of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Sight<'a> {
     network: &'a PoseNetwork,
@@ -176,7 +176,7 @@ impl PoseNetwork {
         [self.card.input.width, self.card.input.height]
     }
 
-    /// Whether it can look at turned pictures: it gives maps or distributions.
+    /// Returns true if the network can look at turned pictures: it gives maps or distributions.
     pub fn may_turn(&self) -> bool {
         !matches!(self.card.output, Codec::Keypoints { .. })
     }
@@ -289,7 +289,7 @@ impl PoseNetwork {
         Ok(())
     }
 
-    /// What the outputs of a workspace say, checked.
+    /// Checks the outputs of a workspace.
     fn sight<'a>(
         &'a self,
         window: Window,
@@ -380,8 +380,8 @@ impl<'a> Sight<'a> {
         })
     }
 
-    /// What it tells of the direction in which the trunk faces: towards the right of the picture, towards the camera; `None` if it
-    /// tells nothing of it. See [`keypoints::Also::front`].
+    /// Returns the direction in which the trunk faces: towards the right of the picture, towards the camera; `None` if the
+    /// network does not give it. See [`keypoints::Also::front`].
     pub fn front(&self) -> Option<[f32; 2]> {
         let at = self.also(self.network.card.also.front.as_deref())?;
         at.values.as_slice().try_into().ok()
@@ -400,10 +400,10 @@ impl<'a> Sight<'a> {
         let name = name?;
         let names = self.network.outputs.iter().zip(self.outputs);
         // Behind those of the codec.
-        names.rev().find(|it| it.0.as_str() == name).map(|name| name.1)
+        names.rev().find(|output| output.0.as_str() == name).map(|name| name.1)
     }
 
-    /// Whether what it tells beside the keypoints has the shape that the card says, and is finite.
+    /// Checks that the outputs beside the keypoints have the shape that the card says, and are finite.
     fn check_also(&self) -> Result<(), LookError> {
         let also = &self.network.card.also;
         for (name, n) in [(&also.front, 2), (&also.error, self.network.names.len())] {

@@ -27,7 +27,8 @@ pub fn outline_of(joints: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 4]
 /// The share of two boxes that both cover: the intersection over the union, 0 to 1.
 pub fn overlap(a: [f64; 4], b: [f64; 4]) -> f64 {
     let side = |axis: usize| (a[axis + 2].min(b[axis + 2]) - a[axis].max(b[axis])).max(0.0);
-    let area = |it: [f64; 4]| (it[2] - it[0]).max(0.0) * (it[3] - it[1]).max(0.0);
+    let area =
+        |outline: [f64; 4]| (outline[2] - outline[0]).max(0.0) * (outline[3] - outline[1]).max(0.0);
     let both = side(0) * side(1);
     let either = area(a) + area(b) - both;
     if either > 0.0 { both / either } else { 0.0 }

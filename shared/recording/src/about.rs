@@ -9,7 +9,7 @@ pub(crate) const TOPICS: &str = "parallax.topics";
 /// Version of the format that this crate writes, and the only one that it reads.
 const FORMAT: &str = "3";
 
-/// What was left out on purpose.
+/// Data that were left out on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Without {
     /// Frames are recorded without pixels.
@@ -29,7 +29,7 @@ pub struct About {
     pub began_unix_nanos: u64,
     /// The settings of the run, as JSON.
     pub settings: String,
-    /// What was left out on purpose.
+    /// Data that were left out on purpose.
     pub without: Without,
 }
 
@@ -44,13 +44,13 @@ pub enum AboutError {
     Value {
         /// Which.
         key: &'static str,
-        /// What stands there.
+        /// Value in the file.
         got: String,
     },
     /// It was written by another version.
     #[error("the recording has format {got:?}, this program reads format {FORMAT}")]
     Format {
-        /// What stands there.
+        /// Format in the file.
         got: String,
     },
 }

@@ -78,7 +78,8 @@ impl Contents {
         let mut tracks = BTreeMap::new();
         for (channel, name) in &self.channels {
             let name = name.as_ref();
-            let Some((name, kind)) = name.and_then(|it| Some((it, Kind::of_topic(it)?))) else {
+            let Some((name, kind)) = name.and_then(|name| Some((name, Kind::of_topic(name)?)))
+            else {
                 continue;
             };
             let mut entries = self.messages.remove(channel).unwrap_or_default();

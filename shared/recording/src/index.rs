@@ -37,7 +37,7 @@ pub struct Extent {
     pub file_bytes: u64,
     /// End of the last complete record.
     pub whole_bytes: u64,
-    /// Whether the file is complete.
+    /// True if the file is complete.
     pub is_complete: bool,
     /// Damaged positions; the first thousand.
     pub damage: Vec<Damage>,
@@ -52,7 +52,7 @@ pub struct Extent {
 pub struct Damage {
     /// Offset, bytes from the start.
     pub offset: u64,
-    /// What is wrong.
+    /// Description of the damage.
     pub what: &'static str,
 }
 
@@ -89,9 +89,9 @@ impl Recording {
 
     /// When the first and the last message with a time were sent, without heartbeats and pictures of cameras.
     pub fn span(&self) -> Option<[u64; 2]> {
-        let is_stamped = |it: &&Track| !matches!(it.kind, Kind::Health | Kind::Picture);
+        let is_stamped = |track: &&Track| !matches!(track.kind, Kind::Health | Kind::Picture);
         let stamped = self.tracks.values().filter(is_stamped);
-        let times = stamped.flat_map(|it| &it.entries).map(|entry| entry.publish_time);
+        let times = stamped.flat_map(|track| &track.entries).map(|entry| entry.publish_time);
         let times = times.filter(|time| *time > 0);
         times.fold(None, |span, it| {
             let [first, last] = span.unwrap_or([it; 2]);
@@ -150,7 +150,7 @@ mod tests {
             let order = in_order(&[&track(&first, 0), &track(&second, 1000)]);
             prop_assert_eq!(order.len(), first.len() + second.len());
             for pair in order.windows(2) {
-                let key = |it: &(usize, Entry)| (it.1.publish_time, it.1.offset);
+                let key = |entry: &(usize, Entry)| (entry.1.publish_time, entry.1.offset);
                 prop_assert!(key(&pair[0]) < key(&pair[1]));
             }
         }

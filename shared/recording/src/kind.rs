@@ -58,14 +58,14 @@ impl Kind {
 
     /// The message type of a topic; none for an unknown one.
     pub fn of_topic(name: &str) -> Option<Self> {
-        let family = |name: &str| name.rsplit_once('/').map(|it| it.0.to_owned());
+        let family = |name: &str| name.rsplit_once('/').map(|parts| parts.0.to_owned());
         Self::ALL.into_iter().find(|kind| match kind {
             Self::People | Self::Skeletons => name == kind.example(),
-            _ => family(name).is_some_and(|it| Some(it) == family(&kind.example())),
+            _ => family(name).is_some_and(|own| Some(own) == family(&kind.example())),
         })
     }
 
-    /// Whether a topic is of this kind in another version.
+    /// Returns true if a topic is of this kind in another version.
     pub fn is_of_another_version(self, name: &str) -> bool {
         let base = |name: &str| name.split('/').next().map(str::to_owned);
         Self::of_topic(name).is_none() && base(&self.example()) == base(name)

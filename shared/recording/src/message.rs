@@ -137,7 +137,7 @@ pub struct Envelope {
     pub stamp: Stamp,
     /// Its times.
     pub timing: Timing,
-    /// Whether it contains a result.
+    /// Tells that the message contains a result, or why not.
     pub status: Status,
 }
 

@@ -249,14 +249,14 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(false)
     }
 
-    /// Whether the head of a whole chunk stands here. Its lengths say so in three places.
+    /// Returns true if the head of a whole chunk stands here. Its lengths say so in three places.
     fn is_chunk(&self, bytes: &[u8], begin: u64) -> bool {
         let chunk = bytes.first_chunk().and_then(Chunk::read);
         let head = begin + HEAD_BYTES as u64;
         chunk.is_some_and(|chunk| head + chunk.n_bytes <= self.cursor.end())
     }
 
-    /// Whether undamaged metadata stands here.
+    /// Returns true if undamaged metadata stands here.
     fn is_metadata(&mut self, begin: u64) -> io::Result<bool> {
         self.cursor.go(begin)?;
         let Some((_, len)) = or_io(self.cursor.record_head())? else {
@@ -276,7 +276,7 @@ impl<R: Read + Seek> Scan<'_, R> {
     }
 }
 
-/// Whether metadata that this program writes may begin here.
+/// Returns true if metadata that this program writes may begin here.
 fn is_ours(bytes: &[u8]) -> bool {
     let name = bytes.get(NAME_AT..);
     name.is_some_and(|name| name.starts_with(about::NAME.as_bytes()))

@@ -70,7 +70,7 @@ fn held(recording: &Recording, file: &[u8], sent: &[Sent]) -> usize {
         let entries = recording.tracks.get(name).map(|track| &track.entries[..]);
         found.extend(entries.unwrap_or_default().iter().map(|entry| (nth, *entry)));
     }
-    found.sort_by_key(|it| it.1.offset);
+    found.sort_by_key(|entry| entry.1.offset);
     let mut buffer = Buffer::default();
     for ((topic, entry), it) in found.iter().zip(sent) {
         let message = read(&mut Cursor::new(file), kind(*topic), entry, &mut buffer).unwrap();
@@ -216,13 +216,13 @@ fn a_full_disk_is_an_error_with_the_size_and_the_file_stays_readable() {
     };
     let mut writer = Writer::begin(disk.clone(), &about(), &topics()).unwrap();
     let sent: Vec<Sent> = (0..90).map(|nth| (0, nth, vec![nth as u8; 1000])).collect();
-    let failed = sent.iter().try_for_each(|it| {
+    let failed = sent.iter().try_for_each(|message| {
         let entry = Entry {
-            log_time: it.1 + 1,
-            publish_time: it.1,
+            log_time: message.1 + 1,
+            publish_time: message.1,
             ..Entry::default()
         };
-        writer.write(0, &entry, &data(it))?;
+        writer.write(0, &entry, &data(message))?;
         writer.flush(&[0; 3])
     });
     let error = failed.unwrap_err();
@@ -277,7 +277,7 @@ proptest! {
         [begin, end, other] in any::<[prop::sample::Index; 3]>(),
     ) {
         let whole = written(&sent, flush_every);
-        let [begin, end, other] = [begin, end, other].map(|it| it.index(whole.len()));
+        let [begin, end, other] = [begin, end, other].map(|place| place.index(whole.len()));
         let mut file = whole.clone();
         file.splice(begin.min(end)..begin.max(end), whole[other..].iter().copied().take(9));
         check_damaged(&whole, &file)?;
@@ -374,7 +374,9 @@ fn one_changed_byte_loses_only_its_chunk_whose_messages_are_named() {
     let mut buffer = Buffer::default();
     let refused = read(&mut Cursor::new(&file), Kind::Frame, &entry, &mut buffer);
     assert!(matches!(refused, Err(ReadError::Checksum { offset }) if offset == entry.chunk));
-    let other = check(&mut Cursor::new(&file), &recording, |it| it != "frame/v1/0");
+    let other = check(&mut Cursor::new(&file), &recording, |topic| {
+        topic != "frame/v1/0"
+    });
     assert!(other.unwrap().is_empty());
 }
 

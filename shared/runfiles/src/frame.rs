@@ -51,21 +51,22 @@ pub struct PersonLine {
     pub id: u64,
     /// The joints, by name.
     pub joints: BTreeMap<String, JointLine>,
-    /// Whether the skeleton is made of the poses that fusion solved for, or of those that it started from.
+    /// Poses that the skeleton is made of: those that fusion solved for, or those that it started from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kept: Option<Kept>,
-    /// What networks name beside the joints (face, feet, hands), by name; each is triangulated by itself. None without such networks.
+    /// Keypoints of networks beside the joints (face, feet, hands), by name, each triangulated alone. Empty without such
+    /// networks.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub keypoints: BTreeMap<String, JointLine>,
     /// Pairs of views that have a part in the skeleton.
     pub pairs: u32,
-    /// Whether left and right are certain.
+    /// Certainty of left and right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sides: Option<Sides>,
     /// Log-odds that left and right are not exchanged in all views, nats.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sides_margin: Option<f64>,
-    /// Of every joint and keypoint with a position what it stands on: `measured`, `exchanged`, `filled` or `rejected`; only in
+    /// State of every joint and keypoint with a position: `measured`, `exchanged`, `filled` or `rejected`; only in
     /// `pose3d-smooth.jsonl`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub states: BTreeMap<String, String>,
@@ -87,12 +88,12 @@ impl FrameLine {
     /// Status of a frame without a result.
     pub const NO_RESULT: &'static str = "no result";
 
-    /// Whether there is a result, with a skeleton or without.
+    /// Returns true if there is a result, with a skeleton or without.
     pub fn has_result(&self) -> bool {
         self.status != Self::NO_RESULT
     }
 
-    /// Whether anybody has a skeleton.
+    /// Returns true if anybody has a skeleton.
     pub fn has_pose(&self) -> bool {
         self.status == Self::OK
     }
@@ -122,7 +123,7 @@ fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Erro
     Ok(people)
 }
 
-/// Whether left and right of a skeleton are certain.
+/// Certainty of left and right of a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {

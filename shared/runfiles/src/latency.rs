@@ -23,7 +23,7 @@ pub struct Percentiles {
     pub p99_ms: f64,
 }
 
-/// What became of the time, over all frames.
+/// Use of the time, over all frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LatencyReport {
     /// From capture to the result.

@@ -42,7 +42,7 @@ impl Missing {
         }
     }
 
-    /// Whether the view has answered, without a pose.
+    /// Returns true if the view has answered, without a pose.
     pub fn is_answer(&self) -> bool {
         matches!(self, Self::Other(_))
     }

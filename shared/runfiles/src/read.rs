@@ -33,7 +33,7 @@ pub struct ReadError {
     pub column: usize,
     /// The field and those that it lies in, such as `summary.frames`; empty for the whole text.
     pub field: String,
-    /// What was found, and what was expected.
+    /// Content that was found, and content that was expected.
     pub problem: String,
 }
 

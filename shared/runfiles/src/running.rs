@@ -1,10 +1,10 @@
-//! What a running deployment says about itself to other programs.
+//! Description of a running deployment for other programs.
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// What a running deployment says about itself: the entry [`Running::KEY`] of the file `deployment.json` beside its sockets.
+/// Description of a running deployment by itself: the entry [`Running::KEY`] of the file `deployment.json` beside its sockets.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Running {
     /// Version of this description, [`Running::VERSION`].
@@ -17,7 +17,7 @@ pub struct Running {
     pub keypoints: Vec<String>,
     /// Pairs of joints that are connected, by their numbers.
     pub limbs: Vec<[usize; 2]>,
-    /// Whether senders wait for slow receivers, so that no frame is lost in the pipeline.
+    /// True if senders wait for slow receivers, so that no frame is lost in the pipeline.
     pub lossless: bool,
     /// Name of the deployment.
     pub name: String,

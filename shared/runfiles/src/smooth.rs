@@ -14,7 +14,7 @@ pub struct SmoothReport {
     pub cutoff_hz: Option<f64>,
     /// By how much the positions are late, milliseconds; 0 for methods that look ahead.
     pub delay_ms: f64,
-    /// What speaks against trusting the result, in words; none is good.
+    /// Reasons to doubt the result, in words; an empty list is good.
     pub doubts: Vec<String>,
     /// The longest time between measurements that was filled, seconds.
     pub fill_s: f64,
@@ -47,7 +47,7 @@ pub struct SmoothedPerson {
     pub unsure: Unsure,
 }
 
-/// What became of frames whose left and right were not certain.
+/// Counts of frames whose left and right were not certain, by their treatment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Unsure {
     /// Exchanged: that fits what is before and after.
@@ -63,7 +63,7 @@ pub struct Unsure {
 pub struct SmoothedJoint {
     /// Frames without a position.
     pub absent: usize,
-    /// What its covariances were multiplied by; none where the method does not ask.
+    /// Factor of its covariances; `None` where the method does not estimate it.
     pub covariance_scale: Option<f64>,
     /// Frames in which it was measured as the joint of the other side.
     pub exchanged: usize,

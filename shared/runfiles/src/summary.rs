@@ -22,9 +22,9 @@ pub struct RunSummary {
     pub schema_version: u64,
     /// The run.
     pub session: u64,
-    /// What was seen and what was missed.
+    /// Counts of what was seen and what was missed.
     pub summary: Summary,
-    /// What the axes of `pose3d.trc` are, in words.
+    /// Meaning of the axes of `pose3d.trc`, in words.
     pub trc_axes: String,
     /// The views, as they are numbered in messages.
     pub views: Vec<ViewSummary>,
@@ -41,7 +41,7 @@ pub struct ViewSummary {
     pub source_from_frame: [[f64; 3]; 2],
 }
 
-/// What was seen and what was missed, over the whole run.
+/// Counts of what was seen and what was missed, over the whole run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Summary {
     /// How well every camera fits the others, by name; since the process was started last.
@@ -83,7 +83,7 @@ pub struct Summary {
     pub searches: BTreeMap<String, BTreeMap<String, u64>>,
     /// How far the results can be trusted; since the process was started last.
     pub trust: Trust,
-    /// Of how many results every view is missing, by name, for every reason.
+    /// Number of results from which every view is missing, by name, for every reason.
     pub views_missing: BTreeMap<String, BTreeMap<Missing, u64>>,
     /// How many results every view has a part in, by name.
     pub views_present: BTreeMap<String, u64>,
@@ -162,14 +162,14 @@ pub struct CameraFit {
     /// earlier. Unknown while too little has moved.
     #[serde(default, deserialize_with = "nullable")]
     pub offset_ms: Option<f64>,
-    /// Whether it was found, at any time of the run, to be out of step with the others.
+    /// True if it was found, at any time of the run, to be out of step with the others.
     #[serde(default)]
     pub out_of_step: bool,
     /// How far apart cameras see the same parts if it is one of them, pixels of its footage; unknown of
     /// fewer than three cameras, and while too little was seen.
     #[serde(deserialize_with = "nullable")]
     pub residual_px: Option<f64>,
-    /// Whether it was found, at any time of the run, not to stand where the calibration says.
+    /// True if it was found, at any time of the run, not to stand where the calibration says.
     pub suspected: bool,
     /// [`CameraFit::residual_px`] of the others without it.
     #[serde(deserialize_with = "nullable")]
@@ -185,7 +185,7 @@ pub struct Exchanged {
     pub degrees: f64,
     /// The same with the two exchanged.
     pub exchanged_degrees: f64,
-    /// Whether it is these two: of cameras in a ring others may fit almost as well.
+    /// True if it is certainly these two: of cameras in a ring others may fit almost as well.
     pub sure: bool,
 }
 
@@ -197,17 +197,17 @@ pub struct Contradicted {
     /// The two cameras whose exchange fits best, if any fits better.
     #[serde(deserialize_with = "nullable")]
     pub likely: Option<[String; 2]>,
-    /// What is usual at most, degrees.
+    /// Largest usual value, degrees.
     pub usual_degrees: f64,
 }
 
-/// What every version of the file has.
+/// Key that every version of the file has.
 #[derive(Deserialize)]
 struct OfVersion {
     schema_version: u64,
 }
 
-/// What every version of the file has.
+/// Key that every version of the file has.
 #[derive(Deserialize)]
 struct OfSession {
     session: u64,

@@ -20,7 +20,7 @@ pub struct TimesLine {
     pub views: BTreeMap<String, ViewTimes>,
 }
 
-/// What came of one view of a frame.
+/// Times of one view of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ViewTimes {
     /// The frame of its camera; none if none came.

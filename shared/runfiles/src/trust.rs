@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::nullable::nullable;
 
-/// What the results say about their own quality. Shares are from 0 to 1.
+/// Statements of the results about their own quality. Shares are from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trust {
     /// Median over the skeletons: root mean square deviation of the bones' lengths from those of people, standard deviations.
@@ -64,8 +64,8 @@ impl Kind {
         Self::Sides,
     ];
 
-    /// What is tolerated. Chosen so that single persons who are seen whole by calibrated cameras stay below: balancing and
-    /// synthetic people reach two thirds of each at most.
+    /// Returns the limit of what is tolerated. Chosen so that single persons who are seen whole by calibrated cameras stay below:
+    /// balancing and synthetic people reach two thirds of each at most.
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,
@@ -76,7 +76,7 @@ impl Kind {
         }
     }
 
-    /// What cannot be, however few the results are.
+    /// Returns the least value that is impossible, however few the results are.
     fn impossible(self) -> f64 {
         match self {
             Self::Reprojection => 0.25,
@@ -150,7 +150,7 @@ impl Trust {
 }
 
 impl Doubt {
-    /// Whether it is the same reason, whatever the numbers.
+    /// Returns true if it is the same reason, whatever the numbers.
     pub fn is_like(&self, other: &Self) -> bool {
         self.kind == other.kind
     }
@@ -221,13 +221,16 @@ mod tests {
     fn good_results_raise_no_doubt_and_each_limit_raises_one() {
         assert_eq!(good().doubts(), []);
         let cases: [(Spoil, &str); 7] = [
-            (|it| it.reprojection = Some(0.2), "joints are 20 %"),
-            (|it| it.bone_scatter_m = Some(0.0163), "by 2.6 cm together"),
-            (|it| it.jumps = 0.087, "jumps in 8.7 %"),
-            (|it| it.implausible = 0.4, "40 % of what was found"),
-            (|it| it.joints_implausible = 0.3, "30 % of the joints"),
-            (|it| it.body_deviation = Some(3.0), "bones are 3.0"),
-            (|it| it.sides_unsure = 0.5, "unsure in 50 %"),
+            (|trust| trust.reprojection = Some(0.2), "joints are 20 %"),
+            (
+                |trust| trust.bone_scatter_m = Some(0.0163),
+                "by 2.6 cm together",
+            ),
+            (|trust| trust.jumps = 0.087, "jumps in 8.7 %"),
+            (|trust| trust.implausible = 0.4, "40 % of what was found"),
+            (|trust| trust.joints_implausible = 0.3, "30 % of the joints"),
+            (|trust| trust.body_deviation = Some(3.0), "bones are 3.0"),
+            (|trust| trust.sides_unsure = 0.5, "unsure in 50 %"),
         ];
         for (spoil, said) in cases {
             let mut trust = good();

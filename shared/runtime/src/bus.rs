@@ -113,7 +113,7 @@ impl Bus {
         &self.process
     }
 
-    /// What another thread needs to create its own ports.
+    /// Returns the parts that another thread needs to create its own ports.
     pub(crate) fn parts(&self) -> BusParts {
         BusParts {
             node: Arc::clone(&self.node),
@@ -123,7 +123,7 @@ impl Bus {
         }
     }
 
-    /// What ends every wait.
+    /// Returns the stop request that ends every wait.
     pub fn stop(&self) -> &Stop {
         &self.stop
     }

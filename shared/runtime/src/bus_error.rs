@@ -37,9 +37,9 @@ pub enum BusError {
     Full {
         /// Name of the process.
         process: String,
-        /// What is needed.
+        /// Memory that is needed.
         needed_bytes: u64,
-        /// What is free.
+        /// Memory that is free.
         free_bytes: u64,
     },
     /// The process cannot be registered.

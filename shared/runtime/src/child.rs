@@ -29,7 +29,7 @@ pub struct Child {
     output: Option<PipeReader>,
     /// Output since the last end of a line.
     partial: Vec<u8>,
-    /// Whether the output has ended.
+    /// True if the output has ended.
     ended: bool,
 }
 
@@ -136,8 +136,8 @@ impl Child {
         Ok(status)
     }
 
-    /// Whether a signal has stopped it (SIGSTOP, SIGTSTP), as opposed to it waiting for a processor; `false`
-    /// where the system does not report it (`/proc` is Linux's).
+    /// Returns true if a signal has stopped it (SIGSTOP, SIGTSTP), as opposed to it waiting for a processor; `false` where the
+    /// system does not report it (`/proc` is Linux's).
     pub fn is_stopped(&self) -> bool {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.pid()));
         stat.is_ok_and(|stat| state_in(&stat) == Some('T'))
@@ -251,7 +251,7 @@ mod tests {
 
     use super::{Child, freeze, kill, state_in, thaw, wait_for_any};
 
-    /// What takes longer counts as never.
+    /// Time after which something counts as never happening.
     const WATCHDOG: Duration = Duration::from_mins(1);
 
     fn shell(script: &str) -> Child {

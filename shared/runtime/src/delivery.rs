@@ -1,6 +1,6 @@
-//! What a topic does about a slow receiver, its number of ports and their buffers.
+//! Behaviour of a topic for a slow receiver, its number of ports and their buffers.
 
-/// What happens when a receiver is slower than its sender.
+/// Behaviour when a receiver is slower than its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Delivery {
     /// The sender never waits: a full buffer drops its oldest message, so the latest frame wins.

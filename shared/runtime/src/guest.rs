@@ -71,7 +71,7 @@ pub enum GuestError {
     Version {
         /// Its name.
         name: String,
-        /// What is sent, without the version.
+        /// Topic without the version.
         topic: String,
         /// The version of the deployment.
         theirs: String,
@@ -108,7 +108,7 @@ pub enum GuestError {
     Transport {
         /// Its name.
         name: String,
-        /// What failed, and why.
+        /// Action that failed, and the reason.
         what: String,
     },
 }
@@ -201,7 +201,7 @@ impl Guest {
         &self.namespace
     }
 
-    /// Whether the deployment is ending: everything that came of this guest has to be dropped.
+    /// Returns true if the deployment is ending: everything that came of this guest has to be dropped.
     pub fn is_over(&self) -> bool {
         running_supervisor(&self.namespace) != Some(self.supervisor)
     }
@@ -265,7 +265,7 @@ impl Guest {
     fn absent(&self, topic: &str) -> GuestError {
         let name = self.namespace.name();
         let (ours, all) = (parts_of(topic), self.topics());
-        let theirs = all.iter().filter_map(|it| parts_of(it));
+        let theirs = all.iter().filter_map(|other| parts_of(other));
         let other = ours.and_then(|ours| {
             // One of the same version was made since this one was not there.
             let mut others = theirs
@@ -361,7 +361,7 @@ impl<E: Message, H: Header> Seen<E, H> {
 /// [`LockError`].
 pub fn running_deployments() -> Result<Vec<String>, LockError> {
     let all = deployments(&Namespace::usual_base())?.into_iter();
-    let running = all.filter(|it| it.supervisor.is_some());
+    let running = all.filter(|deployment| deployment.supervisor.is_some());
     Ok(running.map(|running| running.namespace.name().to_owned()).collect())
 }
 

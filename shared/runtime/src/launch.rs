@@ -38,7 +38,7 @@ impl Fault for LaunchError {
     }
 }
 
-/// What a process needs to know about its deployment.
+/// Facts about a deployment that its process needs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
     /// The location of its shared memory.
@@ -49,7 +49,7 @@ pub struct Launch {
     pub session: u64,
     /// How often the process has been restarted; goes into the stamp of every message.
     pub epoch: u32,
-    /// What happens when a receiver is slower than its sender.
+    /// Behaviour when a receiver is slower than its sender.
     pub delivery: Delivery,
     /// The process id of the supervisor; the process ends when that one ends.
     pub supervisor: Option<u32>,

@@ -12,7 +12,7 @@ pub struct Mapped {
     pub inode: u64,
     /// Offset in the file, bytes.
     pub offset: u64,
-    /// Whether this process may write to it.
+    /// True if this process may write to it.
     pub is_writable: bool,
 }
 
@@ -48,7 +48,7 @@ fn find(maps: &str, begin: usize, end: usize) -> Option<Mapped> {
 pub(crate) struct Mapping<'a> {
     pub(crate) address: usize,
     pub(crate) len: usize,
-    /// Whether it is shared with the file.
+    /// True if it is shared with the file.
     pub(crate) shared: bool,
     pub(crate) writable: bool,
     pub(crate) offset: u64,

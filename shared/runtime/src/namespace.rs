@@ -155,8 +155,8 @@ impl Namespace {
         self.root.join("config").join("iceoryx2.toml")
     }
 
-    /// What the deployment says about itself while it runs ([`crate::DeploymentLock::describe`]); of one that is starting
-    /// [`wait_for_description`](crate::wait_for_description).
+    /// Returns the description of the deployment by itself while it runs ([`crate::DeploymentLock::describe`]); for one that is
+    /// starting use [`wait_for_description`](crate::wait_for_description).
     ///
     /// # Errors
     ///

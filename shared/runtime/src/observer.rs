@@ -168,7 +168,7 @@ impl Observer {
         Ok(observed.collect())
     }
 
-    /// Whether the deployment is ending, so that this observer has to be dropped.
+    /// Returns true if the deployment is ending, so that this observer has to be dropped.
     pub fn is_over(&self) -> bool {
         running_supervisor(self.bus.namespace()) != Some(self.supervisor)
     }

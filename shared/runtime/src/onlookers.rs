@@ -27,7 +27,7 @@ impl Onlookers {
         });
     }
 
-    /// Whether a subscriber is one of them.
+    /// Returns true if a subscriber is one of them.
     pub(crate) fn contain(&self, subscriber: u128) -> bool {
         let ids = self.ids.lock().unwrap_or_else(PoisonError::into_inner);
         ids.contains(&subscriber)

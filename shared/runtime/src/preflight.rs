@@ -1,4 +1,4 @@
-//! Whether there is room for the topics of a deployment; the topics of every process.
+//! Check that there is room for the topics of a deployment; the topics of every process.
 
 use std::io;
 

@@ -46,7 +46,7 @@ pub enum PrivacyError {
     /// It is a symbolic link, which is never followed.
     #[error("{path:?} is a symbolic link of {owner} to {target:?}, and not a directory")]
     Link {
-        /// What is there.
+        /// Path of the link.
         path: PathBuf,
         /// Whose it is, with the number.
         owner: String,
@@ -56,7 +56,7 @@ pub enum PrivacyError {
     /// It is not a directory.
     #[error("{path:?} is not a directory")]
     NoDirectory {
-        /// What is there.
+        /// Path that is not a directory.
         path: PathBuf,
     },
     /// Others may replace its entries.
@@ -91,7 +91,7 @@ pub enum PrivacyError {
 }
 
 impl PrivacyError {
-    /// What the user may try.
+    /// Returns a remedy that the user may try, if one is known.
     pub(crate) fn hint(&self) -> Option<String> {
         match self {
             Self::Foreign { path, owner, .. } => Some(format!(
@@ -233,7 +233,7 @@ fn open_or_make(base: &OwnedFd, name: &str) -> Result<OwnedFd, Errno> {
     beneath::directory_in(base, name.as_bytes())
 }
 
-/// Whether a directory has the marker file of a deployment.
+/// Returns true if a directory has the marker file of a deployment.
 pub(crate) fn is_marked(directory: impl AsFd, namespace: &Namespace) -> bool {
     let expected = mark_of(namespace);
     let most = expected.len() as u64 + 1;

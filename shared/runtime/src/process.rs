@@ -12,7 +12,7 @@ use failure::{DEFECT, ExitKind, Failure, Stop, init_logging, log_panics, panic_t
 
 use crate::{Bus, Delivery, Health, Launch, Patience, Progress};
 
-/// What a service works with: the bus for its ports, its stop request and its counters.
+/// Tools of a service: the bus for its ports, its stop request and its counters.
 #[derive(Debug)]
 pub struct Service {
     bus: Bus,
@@ -56,7 +56,7 @@ impl Service {
         &self.launch.process
     }
 
-    /// What happens when a receiver is slower than its sender.
+    /// Returns the behaviour when a receiver is slower than its sender.
     pub fn delivery(&self) -> Delivery {
         self.launch.delivery
     }

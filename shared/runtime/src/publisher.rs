@@ -103,7 +103,7 @@ impl Fault for SendError {
 }
 
 impl SendError {
-    /// Whether the only reason is a stop request.
+    /// Returns true if the only reason is a stop request.
     pub fn is_stopped(&self) -> bool {
         matches!(self, Self::Stopped { .. })
     }
@@ -453,7 +453,7 @@ impl Port {
 const LEAST_PAUSE: Duration = Duration::from_micros(50);
 const MOST_PAUSE: Duration = Duration::from_millis(1);
 
-/// What to do while a receiver has no room: wait, until the patience is over or stop is requested. An onlooker misses the
+/// Returns the action while a receiver has no room: wait, until the patience is over or stop is requested. An onlooker misses the
 /// message.
 fn patience(
     bus: &Bus,

@@ -18,7 +18,7 @@ use crate::{BusError, LockError, Namespace, beneath, private};
 pub struct Remains {
     /// Its location.
     pub namespace: Namespace,
-    /// Whether its directory has the marker file. Other directories are never removed.
+    /// True if its directory has the marker file. Other directories are never removed.
     pub is_marked: bool,
     /// The process id of its supervisor; none if it does not run.
     pub supervisor: Option<u32>,
@@ -161,7 +161,7 @@ mod tests {
         fs::write(dead.join("capture-0.place"), vec![1; 5000]).unwrap();
         fs::write(base.path().join("a file"), "").unwrap();
         let found = deployments(base.path()).unwrap();
-        let names: Vec<&str> = found.iter().map(|it| it.namespace.name()).collect();
+        let names: Vec<&str> = found.iter().map(|deployment| deployment.namespace.name()).collect();
         assert_eq!(names, ["dead", "lives"]);
         assert_eq!(found[0].supervisor, None);
         assert_eq!(found[0].n_files, 3);
@@ -190,7 +190,9 @@ mod tests {
         let mark = other.root().join("parallax-deployment");
         fs::copy(mark, photos.join("parallax-deployment")).unwrap();
         let found = deployments(base.path()).unwrap();
-        let names = found.iter().map(|it| (it.namespace.name(), it.is_marked));
+        let names = found
+            .iter()
+            .map(|deployment| (deployment.namespace.name(), deployment.is_marked));
         let names: Vec<_> = names.collect();
         assert_eq!(names, [("other", true), ("photos", false)]);
         let error = found[1].remove().unwrap_err().to_string();

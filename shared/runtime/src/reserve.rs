@@ -25,7 +25,7 @@ const TMPFS_MAGIC: u64 = 0x0102_1994;
 static REFUSED: AtomicU64 = AtomicU64::new(0);
 /// How often one was refused.
 static N_REFUSED: AtomicU64 = AtomicU64::new(0);
-/// Whether it exceeded the limit on the size of a file.
+/// True if a segment exceeded the limit on the size of a file.
 static IS_LIMITED: AtomicBool = AtomicBool::new(false);
 
 /// Why a segment could not be given its size.

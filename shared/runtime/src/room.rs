@@ -11,7 +11,7 @@ use crate::reserve::{Refused, n_refused, refused};
 /// Queues and management of one process, bytes: ten times the measured size.
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
-/// What to try where there is no room.
+/// Remedy where there is no room.
 pub(crate) const ROOM: &str =
     "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)";
 
@@ -33,7 +33,7 @@ pub(crate) fn no_room() -> Option<String> {
     })
 }
 
-/// What was free when something of the transport failed last, bytes; more than there is if nothing has failed.
+/// Free memory when something of the transport failed last, bytes; more than there is if nothing has failed.
 static FREE_AT_FAILURE: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Notes how much room there is at a failure of the transport, which need not tell its reason. To be called at once: what failed
@@ -54,8 +54,8 @@ pub(crate) fn short_of_room() -> Option<String> {
         .or_else(|| short("are", free_shared_memory().ok()?))
 }
 
-/// What a port does where it cannot connect to another one, which iceoryx2 tries once: without room it fails, since sender and receiver
-/// would wait for one another for ever. Any other reason is that the other one has just ended.
+/// Returns the action of a port that cannot connect to another one, which iceoryx2 tries once: without room it fails, since
+/// sender and receiver would wait for one another for ever. Any other reason is that the other one has just ended.
 pub(crate) fn connections()
 -> impl Fn(DegradationCause, &DegradationInfo) -> DegradationAction + Send + 'static {
     let known = AtomicU64::new(n_refused());

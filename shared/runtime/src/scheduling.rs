@@ -17,7 +17,7 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 pub use denied::{Denied, Refusal};
 pub use text::SchedulingError;
 
-/// What a process requests from the system's scheduler. The default requests nothing.
+/// Requests of a process to the system's scheduler. The default requests nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Scheduling {
     /// Cores that it may run on, numbered from 0 as Linux does; if empty those that it was started on.
@@ -67,8 +67,8 @@ impl Scheduling {
         [self.apply_to_thread(), memory.into_iter().collect()].concat()
     }
 
-    /// What [`apply`](Self::apply) would return in a process that this one starts. It is tried on a
-    /// short-lived thread, so that this process does not change.
+    /// Returns the result that [`apply`](Self::apply) would have in a process that this one starts. It is tried on a short-lived
+    /// thread, so that this process does not change.
     pub fn rehearse(&self) -> Vec<Denied> {
         let wanted = self.clone();
         let thread = thread::Builder::new().name("rehearsal".to_owned());
@@ -175,7 +175,7 @@ fn memory_limit() -> Option<u64> {
     (!has_capability(&status, CAP_IPC_LOCK)).then_some(limit)
 }
 
-/// Whether a process has a capability according to `/proc/PID/status`.
+/// Returns true if a process has a capability according to `/proc/PID/status`.
 fn has_capability(status: &str, capability: u32) -> bool {
     let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
     let mask = effective.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok());

@@ -212,16 +212,16 @@ pub(crate) struct Extras {
     pub(crate) loaned: usize,
     /// Chunks of a publisher.
     pub(crate) chunks: usize,
-    /// Of these, those that are mapped ahead of use.
+    /// Chunks among them that are mapped ahead of use.
     pub(crate) mapped: usize,
-    /// Whether senders wake receivers.
+    /// True if senders wake receivers.
     pub(crate) wakes: bool,
-    /// What happens when a receiver is slower than its sender.
+    /// Behaviour when a receiver is slower than its sender.
     pub(crate) delivery: Delivery,
 }
 
 impl Extras {
-    /// What [`extras`] reads; the delivery is a setting of the service itself.
+    /// Returns the attributes that [`extras`] reads; the delivery is a setting of the service itself.
     pub(crate) fn attributes(&self) -> Option<AttributeSpecifier> {
         let mut attributes = AttributeSpecifier::new();
         for (key, value) in [

@@ -96,7 +96,7 @@ impl TopicPlan {
         &self.topic
     }
 
-    /// What happens when a receiver is slower than its sender.
+    /// Returns the behaviour when a receiver is slower than its sender.
     pub fn delivery(&self) -> Delivery {
         self.delivery
     }
@@ -111,7 +111,7 @@ impl TopicPlan {
         self.max_len
     }
 
-    /// Whether senders notify receivers.
+    /// Returns true if senders notify receivers.
     pub fn wakes(&self) -> bool {
         self.wakes
     }
@@ -127,12 +127,12 @@ impl TopicPlan {
         needed + self.onlooked_chunks()
     }
 
-    /// Of these, those that onlookers may keep from their publisher.
+    /// Returns the number of chunks that onlookers may keep from their publisher.
     fn onlooked_chunks(&self) -> usize {
         self.limits.onlookers * (self.limits.buffer + 1)
     }
 
-    /// Of these, those that are mapped ahead of use.
+    /// Returns the number of chunks that are mapped ahead of use.
     pub(crate) fn mapped_chunks(&self) -> usize {
         let chunks = self.chunks() - self.onlooked_chunks();
         self.usual_chunks.map_or(chunks, |usual_chunk| usual_chunk.min(chunks))

@@ -52,9 +52,9 @@ pub struct Waiter {
     listeners: Vec<Listener<ipc::Service>>,
     stop: Stop,
     progress: Progress,
-    /// Whether it spins instead of sleeping while there are subscribers.
+    /// True if it spins instead of sleeping while there are subscribers.
     spins: bool,
-    /// Whether there are subscribers.
+    /// True if there are subscribers.
     has_ports: bool,
     n_turns: Cell<u32>,
 }

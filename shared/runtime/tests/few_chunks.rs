@@ -87,7 +87,7 @@ fn a_sender_waits_until_a_chunk_is_released() {
         while let Some(sample) = subscriber.receive().unwrap() {
             let value = sample.payload()[0];
             assert!(
-                sample.payload().iter().all(|it| *it == value),
+                sample.payload().iter().all(|byte| *byte == value),
                 "overwritten"
             );
             got.push(value);

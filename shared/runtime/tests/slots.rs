@@ -94,7 +94,7 @@ fn killed_sender(deployment: &Deployment) -> PathBuf {
         &[namespace.base(), Path::new(namespace.name())],
     );
     let mut new = folders(&nodes);
-    new.retain(|it| !before.contains(it));
+    new.retain(|folder| !before.contains(folder));
     kill(&mut sender);
     assert_eq!(new.len(), 1, "{new:?}");
     new.remove(0)

@@ -11,7 +11,7 @@ use messages::FrameHeader;
 use runtime::{Bus, Delivery, Limits, TopicPlan, Woken};
 
 const TOPIC: &str = "pixels";
-/// What takes longer counts as never.
+/// Time after which something counts as never happening.
 const WATCHDOG: Duration = Duration::from_mins(1);
 
 fn deployment(delivery: Delivery) -> Deployment {

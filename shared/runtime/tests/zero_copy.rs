@@ -46,7 +46,7 @@ fn every_receiver_reads_pixels_in_place() {
         assert_eq!(loan.send().unwrap(), 2);
         for port in &ports {
             let sample = port.receive().unwrap().unwrap();
-            assert!(sample.payload().iter().all(|it| *it == round));
+            assert!(sample.payload().iter().all(|value| *value == round));
             let read = mapped_at(sample.payload()).unwrap().unwrap();
             assert_eq!(file(&read), file(&written));
             assert!(!read.is_writable, "a reader cannot change it");
@@ -88,7 +88,7 @@ fn messages_are_copied_once_when_sent_and_once_when_received() {
         publisher.send(&PairPose::default()).unwrap();
         assert!(subscriber.receive().unwrap().is_some());
         let bytes = n * size_of::<PairPose>() as u64;
-        assert_eq!([&from, &to].map(|it| it.copies().bytes()), [bytes; 2]);
+        assert_eq!([&from, &to].map(|end| end.copies().bytes()), [bytes; 2]);
     }
     assert!(subscriber.receive().unwrap().is_none());
 }

@@ -85,11 +85,11 @@ impl View<'_> {
     /// and below; NaN outside the valid range of the lens.
     fn directions(&self, width: usize, height: usize) -> Vec<Point2<f32>> {
         let nothing = Point2::new(f32::NAN, f32::NAN);
-        let at = |it: usize| {
-            let pixel = Point2::new((it % (width + 1)) as f64, (it / (width + 1)) as f64);
+        let at = |i: usize| {
+            let pixel = Point2::new((i % (width + 1)) as f64, (i / (width + 1)) as f64);
             self.camera
                 .undistort(&pixel)
-                .map_or(nothing, |it| Point2::new(it.x as f32, it.y as f32))
+                .map_or(nothing, |point| Point2::new(point.x as f32, point.y as f32))
         };
         (0..(width + 1) * (height + 1)).map(at).collect()
     }

@@ -122,7 +122,7 @@ impl Fabric {
         (self.colour + (self.second - self.colour) * second) * worn
     }
 
-    /// What folds add to the normal, in the frame of the body at rest.
+    /// Returns the addition of folds to the normal, in the frame of the body at rest.
     pub(crate) fn folds(&self, place: &Vector3<f32>) -> Vector3<f32> {
         // Folds run across limbs more than along them.
         let at = Vector3::new(place.x * 13.0, place.y * 13.0, place.z * 22.0);

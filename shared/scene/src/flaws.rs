@@ -63,7 +63,7 @@ impl Flaws {
             &mut self.calibration_degrees,
             &mut self.calibration_mm,
         ];
-        Self::NAMES.iter().zip(all).find(|it| *it.0 == name).map(|it| it.1)
+        Self::NAMES.iter().zip(all).find(|flaw| *flaw.0 == name).map(|flaw| flaw.1)
     }
 
     /// Checks the ranges.
@@ -82,7 +82,7 @@ impl Flaws {
             (0.0, 2000.0),
         ];
         for (what, (low, high)) in Self::NAMES.into_iter().zip(limits) {
-            let got = self.by_name_mut(what).map_or(0.0, |it| *it);
+            let got = self.by_name_mut(what).map_or(0.0, |value| *value);
             if !(low..=high).contains(&got) {
                 return Err(FlawError {
                     what,
@@ -95,7 +95,7 @@ impl Flaws {
         Ok(())
     }
 
-    /// Whether a camera's frame is dropped. The first never is.
+    /// Returns true if a camera's frame is dropped. The first never is.
     pub(crate) fn drops(&self, random: Random, camera: usize, frame: u64) -> bool {
         frame > 0 && random.fork("drop").nth(camera as u64).nth(frame).chance(self.drop)
     }
@@ -262,7 +262,7 @@ mod tests {
         };
         let n = (0..2000).filter(|i| flaws.drops(Random::new(3), 1, *i)).count();
         assert!((330..470).contains(&n), "{n}");
-        assert!(!(0..50).any(|it| flaws.drops(Random::new(it), 1, 0)));
+        assert!(!(0..50).any(|seed| flaws.drops(Random::new(seed), 1, 0)));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::room::Block;
 use crate::subject::Subject;
 use stance::Stance;
 
-/// What the person does.
+/// Action of the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Action {
     /// Around the middle of the room.
@@ -70,7 +70,7 @@ impl Action {
 
     /// The action of that name, if there is one.
     pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|it| it.name() == name)
+        Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 

@@ -139,7 +139,7 @@ impl Painter {
         }
     }
 
-    /// Whether a sample sees the subject.
+    /// Returns true if a sample sees the subject.
     pub(crate) fn sees_subject(&self, sample: usize) -> bool {
         let end = self.bodies.get(1).map_or(usize::MAX, |body| body.first_triangle);
         let triangle = self.samples.triangle[sample];
@@ -163,7 +163,7 @@ impl Painter {
         let width = self.samples.width / SUB;
         for y in y1 / SUB..y2.div_ceil(SUB) {
             for x in x1 / SUB..x2.div_ceil(SUB) {
-                let n = self.of_pixel(x, y).filter(|it| self.sees_subject(*it)).count();
+                let n = self.of_pixel(x, y).filter(|triangle| self.sees_subject(*triangle)).count();
                 mask[y * width + x] = (n * 255 / (SUB * SUB)) as u8;
             }
         }
@@ -221,7 +221,7 @@ impl Painter {
         let key = direct * (1.0 - dark);
         let to_eye = self.eye - at.coords;
         let half = to_eye.try_normalize(1e-6).unwrap_or(Vector3::z()) + of.light.to_key;
-        let mirrored = half.try_normalize(1e-6).map_or(0.0, |it| it.dot(&normal).max(0.0));
+        let mirrored = half.try_normalize(1e-6).map_or(0.0, |half| half.dot(&normal).max(0.0));
         let shine = finish.gloss * mirrored.powi(24) * 4.0 * (1.0 - dark);
         // Places near the floor are darker.
         let low = 1.0 - 0.35 * (-(at.z.max(0.0)) / 0.25).exp();

@@ -1,4 +1,4 @@
-//! What the person of a scene does: a generated action, or a recording.
+//! Performance of the person of a scene: a generated action, or a recording.
 
 use nalgebra::Isometry3;
 

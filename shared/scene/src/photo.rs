@@ -52,7 +52,10 @@ pub fn photos_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         let ending = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        if ["png", "jpg", "jpeg", "bmp"].iter().any(|it| ending.eq_ignore_ascii_case(it)) {
+        if ["png", "jpg", "jpeg", "bmp"]
+            .iter()
+            .any(|known| ending.eq_ignore_ascii_case(known))
+        {
             found.push(path);
         }
     }

@@ -136,11 +136,11 @@ fn leg(bones: &Bones) -> f64 {
 fn recorded_leg(recording: &Recording) -> f64 {
     let length = |posture: &Posture, side: usize| {
         let [hip, knee, ankle] =
-            [HIPS, KNEES, ANKLES].map(|it| Vector3::from(posture.joints[it[side]]));
+            [HIPS, KNEES, ANKLES].map(|pair| Vector3::from(posture.joints[pair[side]]));
         (knee - hip).norm() + (ankle - knee).norm()
     };
     let all = recording.postures.iter();
-    let all: Vec<f64> = all.flat_map(|it| [0, 1].map(|side| length(it, side))).collect();
+    let all: Vec<f64> = all.flat_map(|posture| [0, 1].map(|side| length(posture, side))).collect();
     Sorted::new(all)
         .upper_median()
         .map_or(1e-3, |upper_median| upper_median.max(1e-3))
@@ -164,13 +164,13 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     turns[NECK] = turns[HEAD];
     for side in [LEFT, RIGHT] {
         turns[COLLAR[side]] = turns[CHEST];
-        let arm = [SHOULDERS, ELBOWS, WRISTS].map(|it| joint(it[side]));
+        let arm = [SHOULDERS, ELBOWS, WRISTS].map(|pair| joint(pair[side]));
         // Elbows fold forward, knees backward.
         let [upper, fore] = hinged(&turns[CHEST], arm, -1.0);
         turns[UPPER_ARM[side]] = upper;
         turns[FOREARM[side]] = fore;
         turns[HAND[side]] = fore;
-        let leg = [HIPS, KNEES, ANKLES].map(|it| joint(it[side]));
+        let leg = [HIPS, KNEES, ANKLES].map(|pair| joint(pair[side]));
         let [thigh, shin] = hinged(&turns[PELVIS], leg, 1.0);
         turns[THIGH[side]] = thigh;
         turns[SHIN[side]] = shin;

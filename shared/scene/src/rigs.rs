@@ -80,12 +80,12 @@ impl RigChoice {
         };
         let mut fields = rest.split(':');
         let n = fields.next().and_then(|field| field.parse().ok());
-        let n = n.filter(|it| (1..=MAX_RING_CAMERAS).contains(it)).ok_or_else(wrong)?;
+        let n = n.filter(|n| (1..=MAX_RING_CAMERAS).contains(n)).ok_or_else(wrong)?;
         let mut metres = |default: f64, least: f64| match fields.next() {
             None => Ok(default),
             Some(text) => {
                 let value: Option<f64> = text.parse().ok();
-                value.filter(|it| (least..=50.0).contains(it)).ok_or_else(wrong)
+                value.filter(|value| (least..=50.0).contains(value)).ok_or_else(wrong)
             }
         };
         let ring = Self::Ring {
@@ -219,7 +219,7 @@ trait OrX {
 }
 
 impl OrX for Vector3<f64> {
-    /// Of length 1; x for a vector of no length.
+    /// Returns a vector of length 1; x for a vector of no length.
     fn normalize_or_x(self) -> Self {
         self.try_normalize(1e-9).unwrap_or(Self::x())
     }
@@ -296,7 +296,7 @@ mod tests {
                 let [width, height] = camera.intrinsics.size.map(f64::from);
                 let share = [pixel.x / width, pixel.y / height];
                 assert!(
-                    share.iter().all(|it| (0.25..0.75).contains(it)),
+                    share.iter().all(|share| (0.25..0.75).contains(share)),
                     "{choice}: {share:?}"
                 );
             }

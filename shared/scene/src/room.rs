@@ -63,7 +63,7 @@ pub(crate) struct Room {
     high: Vector3<f32>,
     floor: Material,
     wall: Material,
-    /// Of the walls of -x, +x, -y, +y.
+    /// Panels of the walls of -x, +x, -y, +y.
     panels: [Vec<Panel>; 4],
     blocks: Vec<Block>,
     pub(crate) light: Light,
@@ -92,7 +92,7 @@ impl Room {
         furnish::room(random, cameras, furniture)
     }
 
-    /// What a ray from inside the room sees.
+    /// Returns the first hit of a ray from inside the room.
     pub(crate) fn cast(&self, from: &Point3<f32>, direction: &Vector3<f32>) -> Hit {
         let mut hit = self.walls(from, direction);
         for block in &self.blocks {
@@ -113,7 +113,7 @@ impl Room {
         hit
     }
 
-    /// Whether furniture stands between a point and the key lamp.
+    /// Returns true if furniture stands between a point and the key lamp.
     pub(crate) fn is_shaded(&self, at: &Vector3<f32>, towards: &Vector3<f32>) -> bool {
         let from = Point3::from(at + towards * 2e-3);
         self.blocks.iter().any(|block| block.enter(&from, towards).is_some())

@@ -39,7 +39,7 @@ pub enum SceneError {
     /// No such camera.
     #[error("there is no camera {name:?}, only {}", known.join(", "))]
     NoCamera {
-        /// What was asked for.
+        /// Name that was asked for.
         name: String,
         /// Names of the rig.
         known: Vec<String>,
@@ -80,7 +80,7 @@ impl Scene {
             name: settings.action.name().to_owned(),
             course: Course::Acted(Box::new(motion)),
         };
-        Self::of(settings, &subject, performance)
+        Self::build(settings, &subject, performance)
     }
 
     /// Makes a scene of a recording: the subject does what was recorded, in the middle of the room, scaled to the
@@ -104,10 +104,10 @@ impl Scene {
             height,
             name: recording.name.clone(),
         };
-        Self::of(settings, &subject, performance)
+        Self::build(settings, &subject, performance)
     }
 
-    fn of(
+    fn build(
         settings: &Settings,
         subject: &Subject,
         performance: Performance,
@@ -140,12 +140,12 @@ impl Scene {
         })
     }
 
-    /// What it was made of.
+    /// Returns the settings that the scene was made of.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// What the person does: the name of the action, or of the recording.
+    /// Returns the name of the person's action, or of the recording.
     pub fn action(&self) -> &str {
         &self.performance.name
     }
@@ -368,8 +368,8 @@ impl View {
             figure: &scene.figure,
             frames: &frames,
         };
-        let others = others.iter().map(|(it, frames)| Person {
-            figure: &it.figure,
+        let others = others.iter().map(|(other, frames)| Person {
+            figure: &other.figure,
             frames,
         });
         let people: Vec<Person<'_>> = core::iter::once(subject).chain(others).collect();
@@ -417,7 +417,7 @@ impl View {
         }
     }
 
-    /// Whether nothing occludes a joint but the body around it.
+    /// Returns true if nothing occludes a joint but the body around it.
     fn is_visible(&self, joint: usize, at: &Point3<f64>, pixel: Option<[f64; 2]>) -> bool {
         let Some([x, y]) = pixel else { return false };
         let samples = &self.painter.samples;

@@ -13,7 +13,7 @@ pub struct Settings {
     pub rig: RigChoice,
     /// Number of the subject: shape, clothes, style of movement.
     pub subject: u64,
-    /// What the subject does.
+    /// Action of the subject.
     pub action: Action,
     /// How many other people stand around, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
     pub others: u64,
@@ -94,7 +94,7 @@ pub enum AddressError {
         key: String,
         /// The value.
         value: String,
-        /// What it should be.
+        /// Description of the values that are accepted.
         expected: String,
     },
     /// An invalid flaw.
@@ -147,7 +147,7 @@ impl Address {
         "calibration-mm",
     ];
 
-    /// Whether a text begins like an address, valid or not.
+    /// Returns true if a text begins like an address, valid or not.
     pub fn is_address(text: &str) -> bool {
         text.starts_with(SCHEME)
     }
@@ -287,7 +287,7 @@ impl std::fmt::Display for Address {
             write!(out, "&skew-ms={}", all.join(","))?;
         }
         for name in Flaws::NAMES {
-            if let Some(value) = flaws.by_name_mut(name).filter(|it| **it != 0.0) {
+            if let Some(value) = flaws.by_name_mut(name).filter(|value| **value != 0.0) {
                 write!(out, "&{name}={value}")?;
             }
         }

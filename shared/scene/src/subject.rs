@@ -35,7 +35,7 @@ pub(crate) struct Hair {
     pub(crate) beard: bool,
 }
 
-/// What covers the trunk.
+/// Clothing of the trunk.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Top {
     pub(crate) fabric: Fabric,
@@ -47,7 +47,7 @@ pub(crate) struct Top {
     pub(crate) slack: f32,
 }
 
-/// What covers the legs.
+/// Clothing of the legs.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bottom {
     pub(crate) fabric: Fabric,
@@ -209,12 +209,12 @@ mod tests {
             let n = people.iter().filter(|person| property(person)).count();
             (4..196).contains(&n)
         };
-        assert!(has(&|it| it.curves > 0.5));
-        assert!(has(&|it| it.bottom.is_skirt));
-        assert!(has(&|it| it.top.sleeve > 0.5));
-        assert!(has(&|it| it.bottom.leg > 0.7));
-        assert!(has(&|it| it.hair.length > 0.0));
-        assert!(has(&|it| it.hair.beard));
+        assert!(has(&|person| person.curves > 0.5));
+        assert!(has(&|person| person.bottom.is_skirt));
+        assert!(has(&|person| person.top.sleeve > 0.5));
+        assert!(has(&|person| person.bottom.leg > 0.7));
+        assert!(has(&|person| person.hair.length > 0.0));
+        assert!(has(&|person| person.hair.beard));
         for it in &people {
             assert!((1.4..2.1).contains(&it.proportions.height));
         }

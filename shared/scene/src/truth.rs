@@ -66,7 +66,7 @@ pub struct View {
     pub from_behind: bool,
     /// The joints on the picture, pixels, as they were when it was taken; `None` behind the camera.
     pub pixels: [Option<[f64; 2]>; N_JOINTS],
-    /// Whether the joint can be seen.
+    /// For every joint true if it can be seen.
     pub visible: [bool; N_JOINTS],
     /// Bounding box of the visible part of the person, `[x1, y1, x2, y2]` pixels.
     #[serde(rename = "box")]

@@ -1,4 +1,4 @@
-//! What a stage needs from its process: the session, the clock and the counters.
+//! Context of a stage in its process: the session, the clock and the counters.
 
 use failure::now_nanos;
 use messages::{Cause, Refusal, Stamp, Status};

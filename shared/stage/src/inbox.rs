@@ -117,7 +117,7 @@ impl<'a, T> Inbox<'a, T> {
         self.joins.joiner.n_pending()
     }
 
-    /// Whether no frame will follow.
+    /// Returns true if no frame will follow.
     pub(crate) fn is_over(&self, now: u64) -> bool {
         self.joins.joiner.is_over(now)
     }

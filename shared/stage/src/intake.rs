@@ -63,7 +63,7 @@ impl Intake {
         self.past
     }
 
-    /// Whether a frame is to be processed: not if it was sent again for another receiver, and not if the cadence skips it.
+    /// Returns true if a frame is to be processed: neither sent again for another receiver, nor skipped by the cadence.
     pub(crate) fn takes(&self, header: &FrameHeader) -> bool {
         let frame = header.stamp.frame;
         self.last_frame != Some(frame)

@@ -21,7 +21,7 @@ pub struct Joined<T> {
     pub items: Vec<Option<T>>,
 }
 
-/// What happened to a message.
+/// Outcome of pushing a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Push {
     /// It was accepted and waits for the other inputs.
@@ -68,7 +68,7 @@ impl Input {
             .is_some_and(|at| began_at < at && now.saturating_sub(at) >= TAKEN_UP_NANOS)
     }
 
-    /// Whether it has been silent for too long.
+    /// Returns true if the input has been silent for too long.
     ///
     /// * `patience`: without a living sender, and with one.
     fn silent_since(&self, began_at: u64, now: u64, patience: [u64; 2]) -> bool {
@@ -216,7 +216,7 @@ impl<T> Joiner<T> {
         (latest, n_skipped)
     }
 
-    /// Whether frames do not wait for an input because it has been silent for too long.
+    /// Returns true if frames do not wait for an input because it has been silent for too long.
     pub fn is_down(&self, input: usize) -> bool {
         self.inputs.get(input).is_some_and(|input| input.down)
     }
@@ -226,7 +226,7 @@ impl<T> Joiner<T> {
         self.pending.len()
     }
 
-    /// Whether no frame will follow: every frame was returned, and all inputs have ended, or at least one has and the
+    /// Returns true if no frame will follow: every frame was returned, and all inputs have ended, or at least one has and the
     /// others have been silent for too long.
     pub fn is_over(&self, now: u64) -> bool {
         let patience = [self.patience_nanos, self.alive_patience_nanos];

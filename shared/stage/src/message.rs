@@ -14,7 +14,7 @@ pub trait Stamped: Copy {
     fn stamp(&self) -> &Stamp;
     /// When its sender received its input and sent it.
     fn timing(&self) -> &Timing;
-    /// Whether it carries a result, or is the end of the stream.
+    /// Returns the status: the message carries a result, or is the end of the stream, or the reason why it has none.
     fn status(&self) -> Status;
     /// The same message with another stamp and timing.
     #[must_use]

@@ -81,7 +81,7 @@ impl<M: Message + Stamped> Port<Subscriber<M>> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn open(
         service: &Service,
         waiter: &mut Waiter,

@@ -83,7 +83,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn view_input<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -102,7 +102,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn optional_input<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -125,7 +125,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn pair_inputs(
         &mut self,
         n_workers: usize,
@@ -150,7 +150,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn people_input(
         &mut self,
         decode: impl FnMut(&People) -> Result<T, WireError> + 'a,
@@ -190,7 +190,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn hold_evidence(
         &mut self,
         view: usize,
@@ -210,7 +210,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn hold_frames(
         &mut self,
         view: usize,
@@ -236,7 +236,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn output<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -249,7 +249,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn view_output<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -273,7 +273,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports.
+    /// Errors of the transport.
     pub fn bulk_output<E: Element, H: BulkHeader>(
         &mut self,
         topic: &str,
@@ -302,7 +302,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports, and the errors of `step`.
+    /// Errors of the transport, and those of `step`.
     pub fn run(
         mut self,
         mut step: impl FnMut(&mut Frame<'_, T>) -> Result<(), Failure>,
@@ -402,7 +402,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// What the transport reports, and the errors of `send_end`.
+    /// Errors of the transport, and those of `send_end`.
     pub fn end_with(
         &self,
         n_connected: impl Fn() -> usize,

@@ -36,7 +36,7 @@ impl Stage<'_, ()> {
     ///
     /// # Errors
     ///
-    /// What the transport reports, and the errors of `step`.
+    /// Errors of the transport, and those of `step`.
     pub fn run_stream(
         mut self,
         view: usize,

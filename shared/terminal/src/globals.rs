@@ -16,7 +16,7 @@ pub struct Globals {
 }
 
 impl Globals {
-    /// What is printed and logged, for other crates.
+    /// Returns the verbosity of output and log, for other crates.
     pub fn verbosity(self) -> Verbosity {
         Verbosity {
             quiet: self.quiet,

@@ -70,7 +70,7 @@ pub fn bar_style(template: &str) -> Option<ProgressStyle> {
     )
 }
 
-/// Whether standard error is a terminal, so that a progress bar can be drawn.
+/// Returns true if standard error is a terminal, so that a progress bar can be drawn.
 pub fn is_terminal() -> bool {
     io::stderr().is_terminal()
 }

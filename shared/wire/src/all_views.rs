@@ -26,9 +26,10 @@ pub fn all_views_to_messages(
 ) -> Result<Vec<PairPose>, WireError> {
     let message = |view: usize| {
         let place = |all_views_result: &AllViewsResult| {
-            all_views_result.views.iter().position(|it| *it == view)
+            all_views_result.views.iter().position(|other| *other == view)
         };
-        let found = answer.and_then(|it| Some((it, place(it).filter(|place| *place > 0)?)));
+        let found =
+            answer.and_then(|answer| Some((answer, place(answer).filter(|place| *place > 0)?)));
         let Some((answer, place)) = found else {
             return pair_to_message([view - 1, view], None, views_present);
         };
@@ -204,7 +205,7 @@ mod tests {
     fn read(messages: &[PairPose]) -> Vec<PairResult> {
         let plans = plans_of(N_VIEWS);
         let read = messages.iter().map(|message| pair_from_message(message, &plans));
-        read.filter_map(|it| it.unwrap()).collect()
+        read.filter_map(|pair| pair.unwrap()).collect()
     }
 
     proptest! {

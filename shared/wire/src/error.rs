@@ -46,7 +46,7 @@ pub enum WireError {
         entry: usize,
         /// Its value.
         got: f64,
-        /// What is expected.
+        /// Description of the values that are accepted.
         expected: &'static str,
     },
     /// The message is from another run.

@@ -184,7 +184,7 @@ mod tests {
         let [width, height] = layout.image_size;
         let ranges = (range(layout.levels.len()), range(width), range(height));
         ranges.prop_map(move |(levels, x, y)| {
-            let [x, y] = [x, y].map(|it| it.map(|value| value as u32));
+            let [x, y] = [x, y].map(|ends| ends.map(|value| value as u32));
             let levels = levels.map(|level| level as u16);
             Scope::new(&layout, levels[0]..levels[1], Region { x, y }).unwrap()
         })
@@ -237,7 +237,7 @@ mod tests {
                 if any_scope {
                     message.x = [ranges[0], ranges[1]];
                     message.y = [ranges[2], ranges[3]];
-                    message.scope_levels = [ranges[4], ranges[5]].map(|it| it as u16 / 4);
+                    message.scope_levels = [ranges[4], ranges[5]].map(|level| level as u16 / 4);
                 }
                 if let Ok(evidence) = evidence_from_message(&message, &values, &layout) {
                     let evidence = evidence.responses();

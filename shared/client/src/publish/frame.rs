@@ -20,7 +20,7 @@ pub struct Frame<'a> {
     pub n_people: u32,
     /// "ok", or why there is no skeleton.
     pub status: &'a str,
-    /// Whether left and right are decided.
+    /// Decision on left and right, in words.
     pub sides: &'a str,
     /// Number of people that several views agree on; 0 if it was not counted.
     pub n_seen: u32,

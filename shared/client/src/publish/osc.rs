@@ -116,7 +116,7 @@ mod tests {
             let size = u32::from_be_bytes(rest[..4].try_into().unwrap()) as usize;
             assert_eq!(size % 4, 0);
             let message = &rest[4..4 + size];
-            let end = message.iter().position(|it| *it == 0).unwrap();
+            let end = message.iter().position(|byte| *byte == 0).unwrap();
             let address = String::from_utf8(message[..end].to_vec()).unwrap();
             let types = &message[(end + 1).next_multiple_of(4)..];
             let end = types.iter().position(|kind| *kind == 0).unwrap();

@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// How often names are told that are left out of the lines.
 const NAMES: Duration = Duration::from_secs(1);
 
-/// What was sent.
+/// Counts of what was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Frames that were published.

@@ -2,7 +2,7 @@
 
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-/// What a datagram holds.
+/// Content of a datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// One line of JSON.
@@ -28,9 +28,9 @@ pub enum TargetError {
         "{text:?} is no target: {why}; expected udp://127.0.0.1:9000, udp://127.0.0.1:9000?format=osc or osc://127.0.0.1:9000"
     )]
     Malformed {
-        /// What was written.
+        /// Text as it was written.
         text: String,
-        /// What is wrong.
+        /// Reason why it is malformed.
         why: &'static str,
     },
     /// It is another machine.

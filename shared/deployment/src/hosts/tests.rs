@@ -1,4 +1,4 @@
-//! What a deployment of several hosts may say.
+//! Tests of what a deployment of several hosts may say.
 
 use std::path::Path;
 

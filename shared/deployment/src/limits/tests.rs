@@ -218,7 +218,7 @@ fn every_key_with_a_number_says_what_it_may_be() {
     for (key, refused, taken) in ROWS {
         for (value, words) in *refused {
             let said = read(&format!("{key}={value}"))
-                .map_or_else(|it| it.to_string(), |_| "taken".to_owned());
+                .map_or_else(|error| error.to_string(), |_| "taken".to_owned());
             if !said.contains(words) {
                 wrong.push(format!("{key} = {value}, expected {words:?}: {said}"));
             }

@@ -167,7 +167,7 @@ fn text_that_is_not_toml_is_refused_with_its_line() {
     assert!(got.starts_with("deployment.toml:15: "), "{got}");
 }
 
-/// Whether a text and an option are taken; what is refused is said with its place.
+/// Returns true if a text and an option are taken; checks that a refusal names its place.
 fn is_taken(text: &str, set: &str) -> bool {
     let file = Path::new("deployment.toml");
     match Loaded::parse(text, file, &[set.to_owned()], &AnyMachine) {
@@ -178,7 +178,7 @@ fn is_taken(text: &str, set: &str) -> bool {
         Err(error) => {
             let said = error.to_string();
             let begin = ["deployment.toml", "--set"];
-            assert!(begin.iter().any(|it| said.starts_with(it)), "{said}");
+            assert!(begin.iter().any(|start| said.starts_with(start)), "{said}");
             assert!(!said.contains('\n'), "{said}");
             false
         }

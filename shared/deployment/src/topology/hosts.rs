@@ -70,12 +70,12 @@ impl Topology {
             processes.any(|process| process.outputs.contains(text))
         };
         let mut all: Vec<String> = of_views.chain(fused).chain([topic::skeletons()]).collect();
-        all.retain(|it| !is_published(it));
+        all.retain(|topic| !is_published(topic));
         all
     }
 }
 
-/// Whether a service runs where the camera is.
+/// Returns true if a service runs where the camera is.
 fn is_at_camera(service: &str, carry: Carry) -> bool {
     let with_poses = [Stage::Pose, Stage::Quality].map(Stage::name);
     service == Stage::Capture.name() || (carry == Carry::Poses && with_poses.contains(&service))
@@ -138,7 +138,7 @@ mod tests {
                 let part = whole.clone().on_host(&it, host);
                 all.extend(names(&part).into_iter().map(str::to_owned));
             }
-            all.retain(|it| it != BRIDGE);
+            all.retain(|name| name != BRIDGE);
             all.sort();
             let mut expected: Vec<&str> = names(&whole);
             expected.sort_unstable();
@@ -229,7 +229,8 @@ mod tests {
             hosts: Vec::new(),
             ..with.clone()
         };
-        let [with, without] = [with, without].map(|it| Topology::new(&it, None, None));
+        let [with, without] =
+            [with, without].map(|deployment| Topology::new(&deployment, None, None));
         assert_eq!(with, without);
     }
 }

@@ -25,7 +25,7 @@ const ONLOOKERS: usize = 4;
 /// The same of images: fewer, as each costs memory for two.
 const ONLOOKERS_OF_IMAGES: usize = 3;
 
-/// What is sent on a topic between processes.
+/// Content of a topic between processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
     /// Pixels of a view, with their header.
@@ -51,7 +51,7 @@ pub enum Content {
 pub struct Room {
     /// Its name.
     pub topic: String,
-    /// What is sent on it.
+    /// Content of the topic.
     pub content: Content,
     /// Processes that may receive it at the same time, at least those of the deployment.
     pub receivers: usize,

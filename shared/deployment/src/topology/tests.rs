@@ -1,4 +1,4 @@
-//! What must hold of the processes of any deployment.
+//! Properties that hold for the processes of any deployment.
 
 use core::fmt::Write as _;
 use std::path::Path;
@@ -117,7 +117,7 @@ const SIZE: ViewSize = ViewSize {
     picture_bytes: 0,
 };
 
-/// What a test of numbers looks at: name, receivers, queue, borrowed, longest, usual.
+/// Row of the tests of numbers: name, receivers, queue, borrowed, longest, usual.
 type Numbers<'a> = (&'a str, usize, usize, usize, usize, Option<usize>);
 
 fn numbers(rooms: &[Room]) -> Vec<Numbers<'_>> {
@@ -184,7 +184,7 @@ fn every_pair_has_one_worker() {
         let topology = Topology::new(&deployment, None, None);
         let mut dealt: Vec<usize> = (0..topology.n_workers())
             .flat_map(|worker| topology.pairs_of(worker))
-            .map(|it| it.0)
+            .map(|pair| pair.0)
             .collect();
         dealt.sort_unstable();
         assert_eq!(dealt, (0..10).collect::<Vec<_>>(), "{most} workers");
@@ -246,7 +246,7 @@ proptest! {
         let all = topology.processes();
 
         // A topic has one sender, and a receiver nothing twice.
-        let mut outputs: Vec<&String> = all.iter().flat_map(|it| &it.outputs).collect();
+        let mut outputs: Vec<&String> = all.iter().flat_map(|process| &process.outputs).collect();
         let n_outputs = outputs.len();
         outputs.sort();
         outputs.dedup();
@@ -261,7 +261,7 @@ proptest! {
             }
         }
         for topic in &outputs {
-            let lists = all.iter().filter(|it| it.inputs.contains(topic)).count();
+            let lists = all.iter().filter(|process| process.inputs.contains(topic)).count();
             prop_assert_eq!(topology.receivers_of(topic), lists);
         }
 
@@ -269,14 +269,14 @@ proptest! {
         let rooms = topology.rooms(Mode::Realtime, &vec![SIZE; n_views], 1);
         for topic in &outputs {
             let mut its = rooms.iter().filter(|room| room.topic == **topic);
-            let room = its.next().map_or(0, |it| it.receivers);
+            let room = its.next().map_or(0, |room| room.receivers);
             prop_assert!(room >= topology.receivers_of(topic), "{topic}: {room}");
             prop_assert!(its.next().is_none(), "{topic}: twice");
         }
 
         // Senders start after their receivers.
         for (nth, sender) in all.iter().enumerate() {
-            let before = |topic: &String| all[nth..].iter().all(|it| !it.inputs.contains(topic));
+            let before = |topic: &String| all[nth..].iter().all(|process| !process.inputs.contains(topic));
             prop_assert!(sender.outputs.iter().all(before), "{}", sender.name);
         }
 
@@ -284,7 +284,7 @@ proptest! {
         let n_workers = of_service(&topology, "fuse").len();
         prop_assert_eq!(n_workers, topology.n_workers());
         for service in ["triangulate", "results", "record"] {
-            for it in of_service(&topology, service).into_iter().filter(|it| !it.is_replayed) {
+            for it in of_service(&topology, service).into_iter().filter(|process| !process.is_replayed) {
                 for worker in 0..8 {
                     let takes = it.inputs.contains(&topic::pair_pose(worker));
                     prop_assert_eq!(takes, worker < n_workers, "{} of {}", it.name, worker);
@@ -293,7 +293,7 @@ proptest! {
         }
 
         // A worker reads the evidence of the views of its pairs, and of no others.
-        for worker in of_service(&topology, "fuse").into_iter().filter(|it| !it.is_replayed) {
+        for worker in of_service(&topology, "fuse").into_iter().filter(|process| !process.is_replayed) {
             let pairs = topology.pairs_of(worker.index.unwrap());
             prop_assert!(!pairs.is_empty());
             for view in 0..n_views {

@@ -70,7 +70,7 @@ fn places(joints: &[Joint], frame: &[f64]) -> Vec<Point3<f64>> {
         }
         all.push((turn * own, place));
     }
-    all.into_iter().map(|it| it.1).collect()
+    all.into_iter().map(|node| node.1).collect()
 }
 
 fn written(trial: &Trial) -> (String, Notes) {

@@ -38,7 +38,7 @@ impl Store {
     /// Adds an attribute of vertices, with its range.
     pub(super) fn vertices<const N: usize>(&mut self, values: &[[f32; N]], kind: &str) -> usize {
         let flat = values.as_flattened();
-        let bytes: Vec<u8> = flat.iter().flat_map(|it| it.to_le_bytes()).collect();
+        let bytes: Vec<u8> = flat.iter().flat_map(|value| value.to_le_bytes()).collect();
         let index = self.add(&bytes, Some(VERTICES), REAL, (values.len(), kind));
         let of = |choose: fn(f32, f32) -> f32| -> Vec<f32> {
             (0..N)
@@ -53,7 +53,7 @@ impl Store {
     /// Adds numbers of joints, four for each vertex.
     pub(super) fn joints(&mut self, values: &[[u16; 4]]) -> usize {
         let flat = values.as_flattened();
-        let bytes: Vec<u8> = flat.iter().flat_map(|it| it.to_le_bytes()).collect();
+        let bytes: Vec<u8> = flat.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.add(&bytes, Some(VERTICES), WORD, (values.len(), "VEC4"))
     }
 

@@ -14,7 +14,7 @@ struct Read {
 }
 
 impl Read {
-    fn of(trial: &Trial) -> Self {
+    fn new(trial: &Trial) -> Self {
         let mut file = Vec::new();
         write(trial, &mut file).unwrap();
         let word = |at: usize| u32::from_le_bytes(*file[at..].first_chunk().unwrap()) as usize;
@@ -43,7 +43,7 @@ impl Read {
         bytes.iter().map(|byte| f64::from(f32::from_le_bytes(*byte))).collect()
     }
 
-    /// What a node has in a frame: its animated value, else its own.
+    /// Returns the value of a node in a frame: its animated value, else its own.
     fn value(&self, node: usize, path: &str, frame: usize, default: &[f64]) -> Vec<f64> {
         let animation = &self.json["animations"][0];
         let channels = animation["channels"].as_array().unwrap();
@@ -56,8 +56,8 @@ impl Read {
             return all[frame * default.len()..(frame + 1) * default.len()].to_vec();
         }
         let own = self.json["nodes"][node][path].as_array();
-        own.map_or(default.to_vec(), |it| {
-            it.iter().map(|it| it.as_f64().unwrap()).collect()
+        own.map_or(default.to_vec(), |values| {
+            values.iter().map(|value| value.as_f64().unwrap()).collect()
         })
     }
 
@@ -100,7 +100,7 @@ fn place(matrix: &Matrix4<f64>) -> Point3<f64> {
 #[test]
 fn the_nodes_stand_where_the_joints_were_seen() {
     let trial = walker(30);
-    let read = Read::of(&trial);
+    let read = Read::new(&trial);
     let landmarks = Landmarks::of(&trial);
     for frame in [0, 7, 29] {
         let globals = read.globals(frame);
@@ -120,7 +120,7 @@ fn the_skin_reaches_from_joint_to_joint_and_is_not_there_in_a_gap() {
     let mut trial = walker(3);
     trial.slots[1].points[0] = Err(Gap("implausible".into()));
     trial.slots[2].points.clear();
-    let read = Read::of(&trial);
+    let read = Read::new(&trial);
     let skin = &read.json["skins"][0];
     let joints = skin["joints"].as_array().unwrap();
     let bind = read.reals(&skin["inverseBindMatrices"]);
@@ -162,7 +162,7 @@ fn keypoints_are_marks_of_their_own() {
         slot.points.push(head);
     }
     trial.slots[1].points[14] = Err(Gap("".into()));
-    let read = Read::of(&trial);
+    let read = Read::new(&trial);
     let nose = read.node("nose");
     let due = trial.y_up_from_world() * trial.point(2, 14).unwrap().in_world;
     assert!((place(&read.globals(2)[nose]) - due).norm() < 1e-5);
@@ -176,7 +176,7 @@ fn bones_whose_ends_coincide_are_left_out_and_all_numbers_are_finite() {
     for slot in &mut trial.slots {
         slot.points[0] = slot.points[1].clone();
     }
-    let read = Read::of(&trial);
+    let read = Read::new(&trial);
     let nodes = read.json["nodes"].as_array().unwrap();
     let has = |name: &str| nodes.iter().any(|node| node["name"] == name);
     assert!(!has("right_ankle_bone") && has("left_ankle_bone"));

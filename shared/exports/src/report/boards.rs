@@ -14,15 +14,15 @@ use crate::report::parts::{about_table, begin, number, verdict, worst};
 pub struct Page<'a> {
     /// Names of the cameras.
     pub names: &'a [String],
-    /// What came out.
+    /// Outcome of the calibration.
     pub outcome: &'a Outcome,
-    /// Whether the poses were wanted too.
+    /// True if the poses were wanted too.
     pub has_rig: bool,
     /// The corners of the board, metres: its outline in the order around it.
     pub outline: [Point2<f64>; 4],
-    /// What was looked at: key and value.
+    /// Description of the input: key and value.
     pub about: &'a [(String, String)],
-    /// What speaks against it, beside the doubts of the outcome.
+    /// Reasons for doubt beside those of the outcome.
     pub more_doubts: &'a [String],
     /// The worst pictures, as JPEG with a caption.
     pub worst: &'a [(String, Vec<u8>)],
@@ -67,7 +67,7 @@ pub fn html(page: &Page<'_>) -> String {
 fn focal(camera: &CameraOutcome) -> (String, String) {
     let known = camera.numbers.iter().find(|number| number.name == "focal length");
     let intrinsics = &camera.camera.intrinsics;
-    let sd = known.map_or("given".to_owned(), |it| number(it.sd, 2));
+    let sd = known.map_or("given".to_owned(), |known| number(known.sd, 2));
     (format!("{:.1}, {:.1}", intrinsics.fx, intrinsics.fy), sd)
 }
 

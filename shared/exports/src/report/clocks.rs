@@ -18,11 +18,11 @@ const BOTTOM: f64 = 34.0;
 pub struct Page<'a> {
     /// Names of the cameras.
     pub names: &'a [&'a str],
-    /// What came out.
+    /// Outcome of the synchronisation.
     pub outcome: &'a Outcome,
-    /// Whether sounds were compared, and not joints.
+    /// True if sounds were compared, and not joints.
     pub is_heard: bool,
-    /// What was looked at: key and value.
+    /// Description of the input: key and value.
     pub about: &'a [(String, String)],
 }
 

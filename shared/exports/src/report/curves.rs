@@ -9,7 +9,7 @@ const MARGIN: f64 = 48.0;
 /// A line of a diagram: one value for every pass; those that are not finite are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line<'a> {
-    /// What it is called.
+    /// Name of the line.
     pub name: &'a str,
     /// The values.
     pub values: Vec<f64>,
@@ -18,7 +18,7 @@ pub struct Line<'a> {
 /// A diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel<'a> {
-    /// What its lines show.
+    /// Quantity that its lines show.
     pub what: &'a str,
     /// The lines: at most as many as there are colours, 3.
     pub lines: Vec<Line<'a>>,
@@ -88,7 +88,7 @@ fn panel(Panel { what, lines }: &Panel<'_>, best: Option<usize>, top: f64) -> St
     }
     for (nth, (Line { name, values }, colour)) in lines.iter().zip(COLOURS).enumerate() {
         let mut path = String::new();
-        for (at, value) in values.iter().enumerate().filter(|it| it.1.is_finite()) {
+        for (at, value) in values.iter().enumerate().filter(|sample| sample.1.is_finite()) {
             let to = if path.is_empty() { 'M' } else { 'L' };
             // Writing to a text cannot fail.
             write!(path, "{to}{:.1} {:.1}", x(at), y(*value)).unwrap_or_default();

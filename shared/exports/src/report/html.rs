@@ -1,4 +1,4 @@
-//! What all pages have in common: the style sheet, markup as a type, data in a script.
+//! Basis of all pages: the style sheet, markup as a type, data in a script.
 //!
 //! Markup is [`Html`], and only this file makes one from characters. The pages write with [`put!`] and [`html!`]: a
 //! literal of the program as it is, and in its braces values, each of which its type [writes](Value): markup as it is,
@@ -20,7 +20,7 @@ pub const STAGE: &str = include_str!("stage.js");
 pub struct Html(String);
 
 impl Html {
-    /// What the program has as a constant: a style sheet, a script.
+    /// Wraps markup that the program has as a constant: a style sheet, a script.
     pub fn constant(markup: &'static str) -> Self {
         Self(markup.to_owned())
     }
@@ -36,7 +36,7 @@ impl Html {
         let _infallible = fmt::Write::write_fmt(&mut self.0, markup);
     }
 
-    /// Whether nothing has been written.
+    /// Returns true if nothing has been written.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -77,7 +77,7 @@ macro_rules! html {
 
 pub(crate) use {html, put};
 
-/// What may stand in the braces of [`put!`].
+/// Value that may stand in the braces of [`put!`].
 pub trait Value {
     /// Writes it as markup.
     ///

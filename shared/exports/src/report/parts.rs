@@ -1,4 +1,4 @@
-//! What several pages have: their beginning, the verdict, what was looked at, numbers.
+//! Parts that several pages share: their beginning, the verdict, the description of the input, numbers.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -18,7 +18,7 @@ pub fn begin(title: &str) -> Html {
     out
 }
 
-/// Whether what the page is about can be used.
+/// Writes the verdict: usable, or not, with the doubts.
 ///
 /// * `good`, `bad`: what is said without and with doubts.
 pub fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[String]) {
@@ -33,7 +33,7 @@ pub fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[String]) {
     put!(out, "</ul>\n");
 }
 
-/// What was looked at, or run: key and value.
+/// Writes the description of the input or of the run: key and value.
 pub fn about_table(out: &mut Html, about: &[(String, String)]) {
     put!(out, "<div class=\"scroll\"><table>\n");
     for (key, value) in about {

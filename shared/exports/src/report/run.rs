@@ -14,20 +14,20 @@ use crate::report::html::{Html, STYLE, html, put};
 pub use space::{Eye, Moment, Point, Space};
 pub use timeline::Mark;
 
-/// What the page says.
+/// Content of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Page {
     /// Its title.
     pub title: String,
     /// Sentences under the title.
     pub lead: String,
-    /// What stands first; if not given, whether all limits held.
+    /// First line of the page; if not given, a statement whether all limits held.
     pub verdict: Option<Verdict>,
-    /// What was asked of the run.
+    /// Limits that were set for the run.
     pub limits: Vec<Limit>,
     /// The skeleton in space.
     pub space: Space,
-    /// What happened when.
+    /// Events and their times.
     pub marks: Vec<Mark>,
     /// Numbers.
     pub tables: Vec<Table>,
@@ -37,25 +37,25 @@ pub struct Page {
     pub strips: Vec<Strip>,
 }
 
-/// What is said of a run in one line.
+/// Judgement of a run in one line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verdict {
     /// The line.
     pub text: String,
-    /// Whether it is good.
+    /// True if it is good.
     pub is_good: bool,
 }
 
 /// Something that was asked of the run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Limit {
-    /// What is measured.
+    /// Quantity that is measured.
     pub what: String,
-    /// What was asked.
+    /// Limit that was set.
     pub asked: String,
-    /// What was measured.
+    /// Measured value.
     pub got: String,
-    /// Whether that will do.
+    /// True if the limit held.
     pub held: bool,
 }
 
@@ -75,7 +75,7 @@ pub struct Table {
 /// Pictures side by side, one for every view.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Strip {
-    /// What they have in common.
+    /// Caption that they share.
     pub caption: String,
     /// The pictures.
     pub pictures: Vec<Picture>,

@@ -12,11 +12,11 @@ use crate::report::run::{Eye, Moment, SCRIPT, Space};
 /// Cells of a picture along each axis, and the size of its drawing.
 const CELLS: usize = 8;
 const WIDTH: f64 = 160.0;
-/// What is said of a rig with doubts.
+/// Words for a rig with doubts.
 const UNUSABLE: &str = "not to be used";
-/// What is said of a rig with cautions.
+/// Words for a rig with cautions.
 const ROUGH: &str = "usable, but not known well";
-/// What is drawn into pictures.
+/// Legend of the drawings in pictures.
 const DRAWN: &str =
     "Ring: the joint as it was seen; line: to where the rig has it, from what all cameras see.";
 /// The most skeletons that are drawn.
@@ -217,7 +217,9 @@ fn in_space(
     let seconds = (span_s[1] - span_s[0]) / (skeletons.len().max(2) - 1) as f64;
     let each = skeletons.iter().enumerate().step_by(step);
     let moments = each.map(|(nth, it)| {
-        let of = |joint: usize| it.get(joint).copied().flatten().map(|it| [it.x, it.y, it.z]);
+        let of = |joint: usize| {
+            it.get(joint).copied().flatten().map(|point| [point.x, point.y, point.z])
+        };
         Moment {
             frame: nth as u64,
             seconds: seconds * nth as f64,

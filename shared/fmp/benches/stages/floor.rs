@@ -29,7 +29,7 @@ impl Floors {
     pub(crate) fn new(workload: &Workload, ranges: &Ranges, isa: Isa, quick: bool) -> Self {
         let n = if quick { 300 } else { 3000 };
         let [multiply_add, max_plus] =
-            [Peak::MultiplyAdd, Peak::MaxPlus].map(|it| per_ms(quick, || it.run(isa, n)));
+            [Peak::MultiplyAdd, Peak::MaxPlus].map(|peak| per_ms(quick, || peak.run(isa, n)));
         Self {
             peaks: Peaks {
                 isa: isa.name(),

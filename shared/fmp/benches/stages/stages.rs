@@ -87,7 +87,7 @@ impl Stage {
     }
 }
 
-/// What one thread needs for images and features.
+/// Memory that one thread needs for images and features.
 #[derive(Default)]
 struct Arena {
     images: [Planes; 2],
@@ -174,7 +174,7 @@ impl<'a> Bench<'a> {
         if wants(&[Stage::Tracked]) {
             all.push((Stage::Tracked, self.tracked(clock, &mut values)));
         }
-        all.retain(|it| options.wants_stage(it.0));
+        all.retain(|entry| options.wants_stage(entry.0));
         all
     }
 

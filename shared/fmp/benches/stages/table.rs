@@ -87,7 +87,7 @@ impl Row {
 impl fmt::Display for Row {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let shown = |value: Option<f64>, digits: usize| {
-            value.map_or_else(|| "-".to_owned(), |it| format!("{it:.digits$}"))
+            value.map_or_else(|| "-".to_owned(), |number| format!("{number:.digits$}"))
         };
         write!(
             f,

@@ -128,7 +128,7 @@ fn made_up_pixels([width, height]: [usize; 2]) -> Vec<u8> {
     (0..3 * width * height).map(&mut pixel).collect()
 }
 
-/// What another view would add: one map for all parts, and a type that is preferred.
+/// Contribution of another view: one map for all parts, and a type that is preferred.
 pub(crate) struct OtherView {
     /// One per level.
     maps: Vec<Vec<f32>>,

@@ -364,7 +364,10 @@ fn largest_agrees(model: &Elements<'_, '_>, filters: &[Filter]) -> Result<(), Ma
     };
     let [rows, cols]: [f64; 2] = at.row()?;
     let largest = |side: fn(&Filter) -> usize| filters.iter().map(side).max().unwrap_or(0);
-    for (got, expected) in [(rows, largest(|it| it.rows)), (cols, largest(|it| it.cols))] {
+    for (got, expected) in [
+        (rows, largest(|filter| filter.rows)),
+        (cols, largest(|filter| filter.cols)),
+    ] {
         if got != expected as f64 {
             return Err(at.wrong(got, format!("{expected}, the largest filter's side")));
         }

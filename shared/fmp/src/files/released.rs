@@ -1,4 +1,4 @@
-//! What the released models' formats have in common: everything is named by 1-based indices.
+//! Common basis of the released models' formats: everything is named by 1-based indices.
 
 use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
 

@@ -2,7 +2,7 @@
 
 use crate::{Model, Spring, Springs};
 
-/// What a model is made of, without its weights.
+/// Structure of a model, without its weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSummary {
     /// Where the model comes from.
@@ -19,7 +19,7 @@ pub struct ModelSummary {
     pub bias_range: Option<[f64; 2]>,
     /// Number of springs.
     pub n_springs: usize,
-    /// Whether springs belong to pairs of types rather than to the child's type.
+    /// True if springs belong to pairs of types rather than to the child's type.
     pub springs_per_pair: bool,
     /// Ranges of the springs; `None` if there is none.
     pub springs: Option<SpringRanges>,
@@ -33,7 +33,7 @@ pub struct ModelSummary {
     pub interval: usize,
     /// Side of a feature cell, pixels.
     pub cell_px: usize,
-    /// Whether the model knows which parts are each other's mirror image.
+    /// True if the model knows which parts are each other's mirror image.
     pub has_mirror: bool,
 }
 

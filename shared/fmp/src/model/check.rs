@@ -82,7 +82,7 @@ fn check_edge(part_idx: usize, edge: &Edge, n_types: [usize; 2]) -> Result<(), M
         for &bias in row.iter().filter(|&&it| it != f64::NEG_INFINITY) {
             number("bias", whose, bias)?;
         }
-        if row.iter().all(|&it| it == f64::NEG_INFINITY) {
+        if row.iter().all(|&entry| entry == f64::NEG_INFINITY) {
             return Err(ModelError::DeadEnd {
                 part: part_idx + 1,
                 parent_type: parent_type + 1,
@@ -285,7 +285,10 @@ mod tests {
 
     #[test]
     fn refuses_a_model_without_parts() {
-        assert_eq!(outcome(|it| it.parts.clear()), "the model has no parts");
+        assert_eq!(
+            outcome(|model| model.parts.clear()),
+            "the model has no parts"
+        );
     }
 
     #[test]
@@ -293,37 +296,43 @@ mod tests {
         let cases: [(&str, Change); 10] = [
             (
                 "number of parts of the model is 65, expected 1 to 64",
-                |it| {
-                    it.parts = vec![it.parts[0].clone(); 65];
+                |model| {
+                    model.parts = vec![model.parts[0].clone(); 65];
                 },
             ),
             (
                 "number of filters of the model is 0, expected 1 to 2048",
-                |it| it.filters.clear(),
+                |model| model.filters.clear(),
             ),
-            ("number of types of part 2 is 0, expected 1 to 32", |it| {
-                it.parts[1].filter_of_type.clear();
+            (
+                "number of types of part 2 is 0, expected 1 to 32",
+                |model| {
+                    model.parts[1].filter_of_type.clear();
+                },
+            ),
+            (
+                "number of types of part 2 is 33, expected 1 to 32",
+                |model| {
+                    model.parts[1].filter_of_type = vec![0; 33];
+                },
+            ),
+            ("interval of the model is 0, expected 1 to 64", |model| {
+                model.interval = 0;
             }),
-            ("number of types of part 2 is 33, expected 1 to 32", |it| {
-                it.parts[1].filter_of_type = vec![0; 33];
+            ("interval of the model is 65, expected 1 to 64", |model| {
+                model.interval = 65;
             }),
-            ("interval of the model is 0, expected 1 to 64", |it| {
-                it.interval = 0;
+            ("cell size of the model is 1, expected 2 to 64", |model| {
+                model.cell_px = 1;
             }),
-            ("interval of the model is 65, expected 1 to 64", |it| {
-                it.interval = 65;
+            ("cell size of the model is 65, expected 2 to 64", |model| {
+                model.cell_px = 65;
             }),
-            ("cell size of the model is 1, expected 2 to 64", |it| {
-                it.cell_px = 1;
+            ("height of filter 3 is 17, expected 1 to 16", |model| {
+                model.filters[2].rows = 17;
             }),
-            ("cell size of the model is 65, expected 2 to 64", |it| {
-                it.cell_px = 65;
-            }),
-            ("height of filter 3 is 17, expected 1 to 16", |it| {
-                it.filters[2].rows = 17;
-            }),
-            ("width of filter 3 is 0, expected 1 to 16", |it| {
-                it.filters[2].cols = 0;
+            ("width of filter 3 is 0, expected 1 to 16", |model| {
+                model.filters[2].cols = 0;
             }),
         ];
         for (expected, change) in cases {
@@ -334,11 +343,11 @@ mod tests {
     #[test]
     fn only_part_1_is_the_root() {
         assert_eq!(
-            outcome(|it| it.parts[0].edge = it.parts[1].edge.clone()),
+            outcome(|model| model.parts[0].edge = model.parts[1].edge.clone()),
             "part 1 has a parent: part 1 and only part 1 is the root"
         );
         assert_eq!(
-            outcome(|it| it.parts[2].edge = None),
+            outcome(|model| model.parts[2].edge = None),
             "part 3 has no parent: part 1 and only part 1 is the root"
         );
     }
@@ -346,23 +355,23 @@ mod tests {
     #[test]
     fn a_cycle_is_rejected() {
         let refused = "part 2 names part 3 as its parent: the tree has a cycle or is out of order";
-        assert_eq!(outcome(|it| edge(it, 1).parent = 2), refused);
+        assert_eq!(outcome(|model| edge(model, 1).parent = 2), refused);
         let refused = "part 3 names part 3 as its parent: the tree has a cycle or is out of order";
-        assert_eq!(outcome(|it| edge(it, 2).parent = 2), refused);
+        assert_eq!(outcome(|model| edge(model, 2).parent = 2), refused);
     }
 
     #[test]
     fn rejects_indices_out_of_range() {
         assert_eq!(
-            outcome(|it| it.parts[1].filter_of_type[1] = 6),
+            outcome(|model| model.parts[1].filter_of_type[1] = 6),
             "part 2 names filter 7, but there are 6"
         );
         assert_eq!(
-            outcome(|it| edge(it, 1).parent = 3),
+            outcome(|model| edge(model, 1).parent = 3),
             "part 2 names part 4, but there are 3"
         );
         assert_eq!(
-            outcome(|it| it.mirror = Some(vec![0, 1, usize::MAX])),
+            outcome(|model| model.mirror = Some(vec![0, 1, usize::MAX])),
             format!(
                 "part 3 names as its mirror part {}, but there are 3",
                 usize::MAX
@@ -373,26 +382,29 @@ mod tests {
     #[test]
     fn refuses_arrays_of_another_size() {
         let cases: [(&str, Change); 6] = [
-            ("bias of part 2 has 1 entries, expected 2", |it| {
-                edge(it, 1).bias.pop();
+            ("bias of part 2 has 1 entries, expected 2", |model| {
+                edge(model, 1).bias.pop();
             }),
             (
                 "bias of part 2, parent type 2, has 1 entries, expected 2",
-                |it| {
-                    edge(it, 1).bias[1].pop();
+                |model| {
+                    edge(model, 1).bias[1].pop();
                 },
             ),
-            ("springs of part 2 has 0 entries, expected 2", |it| {
-                edge(it, 1).springs = Springs::PerChildType(vec![]);
+            ("springs of part 2 has 0 entries, expected 2", |model| {
+                edge(model, 1).springs = Springs::PerChildType(vec![]);
             }),
-            ("springs of part 2 has 1 entries, expected 2", |it| {
-                edge(it, 1).springs = Springs::PerTypePair(vec![vec![None; 2]]);
+            ("springs of part 2 has 1 entries, expected 2", |model| {
+                edge(model, 1).springs = Springs::PerTypePair(vec![vec![None; 2]]);
             }),
-            ("weights of filter 1 has 127 entries, expected 128", |it| {
-                it.filters[0].weights.pop();
-            }),
-            ("mirror of the model has 2 entries, expected 3", |it| {
-                it.mirror = Some(vec![0, 1]);
+            (
+                "weights of filter 1 has 127 entries, expected 128",
+                |model| {
+                    model.filters[0].weights.pop();
+                },
+            ),
+            ("mirror of the model has 2 entries, expected 3", |model| {
+                model.mirror = Some(vec![0, 1]);
             }),
         ];
         for (expected, change) in cases {
@@ -416,7 +428,7 @@ mod tests {
             ];
             for (what, change) in changes {
                 let expected = format!("{what} is {bad}, expected -1e9 to 1e9");
-                assert_eq!(outcome(|it| change(it, bad)), expected);
+                assert_eq!(outcome(|model| change(model, bad)), expected);
             }
         }
     }
@@ -426,13 +438,13 @@ mod tests {
         for bad in [0.0, -0.01, f64::NAN, f64::INFINITY, 1e-300] {
             for axis in [0, 2] {
                 assert_eq!(
-                    outcome(|it| spring(it).w[axis] = bad),
+                    outcome(|model| spring(model).w[axis] = bad),
                     format!("stiffness of a spring of part 2 is {bad}, expected 1e-9 to 1e9")
                 );
             }
         }
         assert_eq!(
-            outcome(|it| spring(it).anchor[1] = -1001),
+            outcome(|model| spring(model).anchor[1] = -1001),
             "anchor of a spring of part 2 is -1001, expected -1000 to 1000 cells"
         );
     }
@@ -440,9 +452,12 @@ mod tests {
     #[test]
     fn every_type_of_the_parent_goes_with_some_type_of_the_child() {
         let never = f64::NEG_INFINITY;
-        assert_eq!(outcome(|it| edge(it, 1).bias[1] = vec![never, 0.5]), "fine");
         assert_eq!(
-            outcome(|it| edge(it, 1).bias[1] = vec![never, never]),
+            outcome(|model| edge(model, 1).bias[1] = vec![never, 0.5]),
+            "fine"
+        );
+        assert_eq!(
+            outcome(|model| edge(model, 1).bias[1] = vec![never, never]),
             "no type of part 2 goes with type 2 of its parent"
         );
     }
@@ -459,18 +474,18 @@ mod tests {
     #[test]
     fn the_mirror_exchanges_parts_in_pairs_and_keeps_the_tree() {
         assert_eq!(
-            outcome(|it| it.mirror = Some(vec![1, 2, 0])),
+            outcome(|model| model.mirror = Some(vec![1, 2, 0])),
             "part 1 mirrors part 2, but not the other way round or not on the same tree"
         );
         assert_eq!(
-            outcome(|it| it.mirror = Some(vec![2, 1, 0])),
+            outcome(|model| model.mirror = Some(vec![2, 1, 0])),
             "part 1 mirrors part 3, but not the other way round or not on the same tree"
         );
-        assert_eq!(outcome(|it| it.mirror = Some(vec![0, 1, 2])), "fine");
+        assert_eq!(outcome(|model| model.mirror = Some(vec![0, 1, 2])), "fine");
         // Three arms in a ring: the tree stays, but nothing is exchanged in pairs.
-        let ring = outcome(|it| {
-            it.parts.push(it.parts[2].clone());
-            it.mirror = Some(vec![0, 2, 3, 1]);
+        let ring = outcome(|model| {
+            model.parts.push(model.parts[2].clone());
+            model.mirror = Some(vec![0, 2, 3, 1]);
         });
         let expected = "part 2 mirrors part 3, but not the other way round or not on the same tree";
         assert_eq!(ring, expected);

@@ -70,7 +70,7 @@ impl Solver {
                     (at..peaks.len()).filter(|&i| peaks[i].level == level).take(*batch).collect();
                 *batch *= 2;
                 let found = self.sweep_levels(evidence, &[level], None, |sweep| {
-                    let trees = next.iter().map(|&it| (it, sweep.backtrack(peaks[it])));
+                    let trees = next.iter().map(|&i| (i, sweep.backtrack(peaks[i])));
                     trees.collect::<Vec<_>>()
                 });
                 for (it, pose) in found.into_iter().flatten() {
@@ -95,13 +95,13 @@ fn peaks(roots: &[Root]) -> Vec<Root> {
         return Vec::new();
     };
     let (rows, cols) = (last.y + 1, last.x + 1);
-    let is_peak = |it: &&Root| {
-        let mut around = (it.y.saturating_sub(1)..rows.min(it.y + 2))
-            .flat_map(|y| (it.x.saturating_sub(1)..cols.min(it.x + 2)).map(move |x| (y, x)));
-        it.score > f32::NEG_INFINITY
+    let is_peak = |root: &&Root| {
+        let mut around = (root.y.saturating_sub(1)..rows.min(root.y + 2))
+            .flat_map(|y| (root.x.saturating_sub(1)..cols.min(root.x + 2)).map(move |x| (y, x)));
+        root.score > f32::NEG_INFINITY
             && around.all(|(y, x)| {
                 let other = roots[y * cols + x].score;
-                other < it.score || (other == it.score && (y, x) >= (it.y, it.x))
+                other < root.score || (other == root.score && (y, x) >= (root.y, root.x))
             })
     };
     roots.iter().filter(is_peak).copied().collect()

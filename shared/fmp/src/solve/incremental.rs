@@ -152,7 +152,7 @@ impl IncrementalSolver<'_> {
         }
         self.lowest = lowest;
         self.order.sort_unstable_by(|a, b| {
-            let later = |it: u16| Some(it) != first;
+            let later = |level: u16| Some(level) != first;
             let by_bound = b.0.most.total_cmp(&a.0.most).then(a.1.cmp(&b.1));
             later(a.1).cmp(&later(b.1)).then(by_bound)
         });

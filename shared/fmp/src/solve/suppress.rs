@@ -57,7 +57,7 @@ impl Solver {
 impl Root {
     /// Highest score first, then lowest level, then row-major order.
     pub fn best_first(&self, other: &Self) -> std::cmp::Ordering {
-        let place = |it: &Self| (it.level, it.y, it.x);
+        let place = |root: &Self| (root.level, root.y, root.x);
         other.score.total_cmp(&self.score).then_with(|| place(self).cmp(&place(other)))
     }
 }

@@ -21,9 +21,9 @@ pub(super) struct Workspace {
     slack: f64,
     /// The keys of every part's terms.
     keys: Vec<Option<u64>>,
-    /// Whether a part's planes can be kept: all terms of its subtree are unchanged.
+    /// True for a part whose planes can be kept: all terms of its subtree are unchanged.
     stays: Vec<bool>,
-    /// Whether the part's own score has been written.
+    /// True for a part whose own score has been written.
     begun: Vec<bool>,
     /// Sum over the parts of the largest own score of each.
     own: f64,
@@ -175,7 +175,7 @@ impl<'a> Sweep<'a> {
                 && !workspace.stays[edge.parent]
             {
                 workspace.begin(problem, edge.parent);
-                let [of_parent, of_child] = [edge.parent, part].map(|it| solver.planes(it));
+                let [of_parent, of_child] = [edge.parent, part].map(|part| solver.planes(part));
                 let planes = workspace.planes.scores_mut();
                 let (before, child) = planes.split_at_mut(grid.len(of_child.start));
                 let (ranges, child_ranges) = workspace.ranges.split_at_mut(of_child.start);
@@ -228,7 +228,7 @@ impl<'a> Sweep<'a> {
     /// The best root of the level: first cell in row-major order, then first type.
     pub(super) fn best_root(&self) -> Option<Root> {
         let better = |a: Root, b: Root| if b.score > a.score { b } else { a };
-        self.roots().reduce(better).filter(|it| it.score > f32::NEG_INFINITY)
+        self.roots().reduce(better).filter(|root| root.score > f32::NEG_INFINITY)
     }
 
     /// The best type of the root at every cell of the window, in row-major order.
@@ -283,7 +283,7 @@ impl<'a> Sweep<'a> {
     /// The part's planes and the margin after them.
     fn planes(&self, part: usize) -> &[f32] {
         let planes = self.solver.planes(part);
-        let [first, end] = [planes.start, planes.end].map(|it| self.grid.len(it));
+        let [first, end] = [planes.start, planes.end].map(|plane| self.grid.len(plane));
         &self.workspace.planes.scores()[first..end + self.grid.margin()]
     }
 }
@@ -382,7 +382,7 @@ pub(super) fn score(problem: &Problem<'_>, pose: &Pose, scores: &mut Vec<f32>) -
         if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
             let [of_parent, of_child] = [edge.parent, part].map(|i| pose.parts[i]);
             let cell = |placement: Placement| [usize::from(placement.y), usize::from(placement.x)];
-            let types = [of_parent, of_child].map(|it| usize::from(it.mixture));
+            let types = [of_parent, of_child].map(|placement| usize::from(placement.mixture));
             let value = rule.value(scores[part], types, cell(of_parent), cell(of_child));
             scores[edge.parent] += value;
         }

@@ -29,7 +29,8 @@ fn main() {
     let mut some = Vec::new();
     let counted = allocations(|| some = std::hint::black_box(vec![1_u8; 100]));
     assert_eq!((counted, some.len()), (1, 100), "the counter counts");
-    let elsewhere = || std::thread::scope(|it| drop(it.spawn(|| vec![1_u8; 100]).join().unwrap()));
+    let elsewhere =
+        || std::thread::scope(|scope| drop(scope.spawn(|| vec![1_u8; 100]).join().unwrap()));
     assert!(allocations(elsewhere) > 0, "and on all threads");
     solve::takes_memory_for_the_answer_only();
     solve::takes_memory_for_the_answer_only_again();

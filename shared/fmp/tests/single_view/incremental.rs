@@ -69,7 +69,7 @@ proptest! {
         let mut other = Evidence::new(&mut noise, &model, &SIZES);
         other.levels.truncate(n_levels);
         let solver = Solver::new(Arc::clone(&model));
-        let solve = || [&evidence, &other].map(|it| check(&solver, it, given, &times));
+        let solve = || [&evidence, &other].map(|evidence| check(&solver, evidence, given, &times));
         match threads {
             0 => solve(),
             _ => rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(solve),
@@ -195,7 +195,7 @@ fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews
     let mut incremental = solver.incremental(&view);
     let mut last: Option<Pose> = None;
     for (terms, guess) in times {
-        let elsewhere = last.clone().map(|it| Pose { level: 4, ..it });
+        let elsewhere = last.clone().map(|pose| Pose { level: 4, ..pose });
         let guess = match guess {
             Guess::None => None,
             Guess::Last => last.as_ref(),

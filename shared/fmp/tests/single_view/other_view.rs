@@ -35,7 +35,7 @@ pub(crate) struct OtherViews {
     pub(crate) gain: f32,
     /// Multiplies all terms.
     pub(crate) scale: f32,
-    /// Whether the gain is told.
+    /// True if the gain is given.
     pub(crate) known: bool,
 }
 

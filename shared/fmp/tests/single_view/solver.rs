@@ -135,13 +135,13 @@ proptest! {
         let found = solver.candidates(&evidence, &settings);
         prop_assert_eq!(&found[0], &best);
         prop_assert!(found.len() <= max);
-        prop_assert!(found.iter().all(|it| it.score >= threshold));
+        prop_assert!(found.iter().all(|pose| pose.score >= threshold));
         prop_assert!(found.is_sorted_by(|a, b| a.score >= b.score));
         for (at, picked) in found.iter().enumerate() {
             prop_assert_eq!(solver.score(&evidence, picked, None), picked.score);
             for later in &found[at + 1..] {
                 for part in 0..model.n_parts() {
-                    let [a, b] = [picked, later].map(|it| it.part_box(&model, evidence.layout(), part));
+                    let [a, b] = [picked, later].map(|pose| pose.part_box(&model, evidence.layout(), part));
                     let side = |axis: usize| (a[axis + 2].min(b[axis + 2]) - a[axis].max(b[axis]) + 1.0).max(0.0);
                     let area = (a[2] - a[0] + 1.0) * (a[3] - a[1] + 1.0);
                     prop_assert!(side(0) * side(1) / area <= overlap);
@@ -168,7 +168,7 @@ proptest! {
         prop_assert_eq!(&all[0], &solver.best(&evidence, None).unwrap());
         prop_assert!(all.is_sorted_by(|a, b| a.score >= b.score));
         let far = |a: &Pose, b: &Pose| {
-            let centres = [a, b].map(|it| it.centres(&model, evidence.layout()));
+            let centres = [a, b].map(|pose| pose.centres(&model, evidence.layout()));
             let distance = centres[0].iter().zip(&centres[1]);
             let distance: f64 = distance.map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1])).sum();
             let side = |pose: &Pose| evidence.layout().levels[usize::from(pose.level)].scale;
@@ -177,7 +177,7 @@ proptest! {
         let mut want: Vec<Pose> = Vec::new();
         for pose in all {
             prop_assert_eq!(solver.score(&evidence, &pose, None), pose.score);
-            if want.len() < 4 && want.iter().all(|it| far(it, &pose)) {
+            if want.len() < 4 && want.iter().all(|other| far(other, &pose)) {
                 want.push(pose);
             }
         }
@@ -199,8 +199,8 @@ proptest! {
         };
         let score = |(y, x): (usize, usize)| roots[y * cols + x];
         let mut found = solver.distinct(&evidence, usize::MAX, 0.0);
-        found.sort_by_key(|it| (it.parts[0].y, it.parts[0].x));
-        let found = found.iter().map(|it| (usize::from(it.parts[0].y), usize::from(it.parts[0].x)));
+        found.sort_by_key(|pose| (pose.parts[0].y, pose.parts[0].x));
+        let found = found.iter().map(|pose| (usize::from(pose.parts[0].y), usize::from(pose.parts[0].x)));
         let peaks = (0..rows * cols).map(|i| (i / cols, i % cols)).filter(|&at| {
             neighbours(at.0, at.1).all(|neighbour| score(neighbour) < score(at) || (score(neighbour) == score(at) && neighbour > at))
         });

@@ -34,7 +34,7 @@ impl Scene {
         }
     }
 
-    /// Whether a frame is searched in full, given the score that is found then.
+    /// Returns true if a frame is searched in full, given the score that is found then.
     fn is_full(&mut self, at: impl Into<FrameTime>, score: Option<f32>) -> bool {
         let (at, whole) = (at.into(), Scope::whole(&self.layout));
         let mut scope = self.tracker.scope(&self.layout, at);
@@ -88,7 +88,8 @@ fn the_first_frame_and_then_every_so_many_are_searched_in_full() {
 fn a_frame_without_a_pose_is_searched_in_full_and_so_is_the_next() {
     let mut scene = Scene::new(Some(TRACK));
     let found = [Some(1.0), Some(1.0), None, Some(1.0), Some(1.0)];
-    let full: Vec<bool> = (0..).zip(found).map(|(it, score)| scene.is_full(it, score)).collect();
+    let full: Vec<bool> =
+        (0..).zip(found).map(|(frame, score)| scene.is_full(frame, score)).collect();
     assert_eq!(full, [true, false, true, true, false]);
 }
 
@@ -147,8 +148,10 @@ fn a_fallen_score_makes_the_same_frame_be_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
     // Little by little counts as well; what the full search finds is the new measure.
     let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];
-    let full: Vec<bool> =
-        (0..).zip(scores).map(|(it, score)| scene.is_full(it, Some(score))).collect();
+    let full: Vec<bool> = (0..)
+        .zip(scores)
+        .map(|(frame, score)| scene.is_full(frame, Some(score)))
+        .collect();
     assert_eq!(full, [true, false, false, true, false, false]);
 }
 

@@ -30,7 +30,10 @@ pub fn compose(tiles: &[Tile<'_>], n_columns: usize) -> Canvas {
         let sides = tiles.iter().map(|tile| side(tile.picture.size()));
         sides.max().unwrap_or(0)
     };
-    let cell = Size::new(largest(|it| it.width), largest(|it| it.height) + CAPTION);
+    let cell = Size::new(
+        largest(|size| size.width),
+        largest(|size| size.height) + CAPTION,
+    );
     let n_columns = n_columns.min(tiles.len());
     let n_rows = tiles.len().div_ceil(n_columns);
     let size = Size::new(

@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 1 << 29;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Reading {
     pub(super) rotation: Rotation,
-    /// Of images with 16 bits that use fewer.
+    /// Depth of images with 16 bits that use fewer.
     pub(super) depth: Option<Depth>,
 }
 
@@ -145,7 +145,7 @@ impl<'a> Encoded<'a> {
     }
 
     fn is_jpeg(&self) -> bool {
-        image::guess_format(&self.bytes).is_ok_and(|it| it == ImageFormat::Jpeg)
+        image::guess_format(&self.bytes).is_ok_and(|format| format == ImageFormat::Jpeg)
     }
 
     fn error(&self, source: ImageError) -> FootageError {
@@ -182,7 +182,7 @@ fn size_of(decoder: &impl ImageDecoder) -> Size {
     Size::new(width as usize, height as usize)
 }
 
-/// Whether the data of a JPEG file reaches its end-of-image marker (ITU-T T.81, B.1.1).
+/// Returns true if the data of a JPEG file reaches its end-of-image marker (ITU-T T.81, B.1.1).
 ///
 /// Decoders fill missing data with grey without an error. The segments in front of the data are
 /// skipped, because a thumbnail in them has an end marker of its own.
@@ -203,7 +203,7 @@ pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     false
 }
 
-/// Whether JPEG pictures of one size stand one behind the other, as cameras write Motion JPEG without a container.
+/// Returns true if JPEG pictures of one size stand one behind the other, as cameras write Motion JPEG without a container.
 ///
 /// Photographs may have pictures behind them as well (smaller ones, depth, what makes them brighter): these are smaller, or are
 /// named in a segment of the first (`MPF`, CIPA DC-007).
@@ -215,13 +215,13 @@ pub(super) fn is_jpeg_stream(bytes: &[u8]) -> bool {
     let data = bytes.get(first.data..).unwrap_or_default();
     let next = data.windows(3).position(|window| window == [0xff, 0xd8, 0xff]);
     let second = next.and_then(|at| JpegHead::read(&data[at..]));
-    !first.has_others && second.is_some_and(|it| it.sides == first.sides)
+    !first.has_others && second.is_some_and(|head| head.sides == first.sides)
 }
 
-/// What the segments of a JPEG picture say before its data.
+/// Content of the segments of a JPEG picture before its data.
 struct JpegHead {
     sides: [u8; 4],
-    /// Whether a segment names more pictures.
+    /// True if a segment names more pictures.
     has_others: bool,
     /// Where the data begins.
     data: usize,
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn bits_that_are_not_used_are_told_by_the_largest_value() {
-        let bits = |brightest| Depth::of(brightest).map(|it| it.bits);
+        let bits = |brightest| Depth::of(brightest).map(|depth| depth.bits);
         assert_eq!(
             [200, 1023, 4000, 16_000].map(bits),
             [8, 10, 12, 14].map(Some)

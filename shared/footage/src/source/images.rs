@@ -180,8 +180,8 @@ pub fn read_upright(path: &Path) -> Result<(Size, Vec<u8>, Turn), FootageError> 
     Ok((still.size, still.rgb, still.tag))
 }
 
-/// Whether the content of a file is that of one image (an empty file of an image's name counts as one): JPEG pictures one behind
-/// the other are a video.
+/// Returns true if the content of a file is that of one image (an empty file of an image's name counts as one): JPEG pictures one
+/// behind the other are a video.
 ///
 /// # Errors
 ///

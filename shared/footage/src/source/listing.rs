@@ -10,7 +10,7 @@ use super::live;
 use super::password::without_passwords;
 use crate::FootageError;
 
-/// What a path stands for.
+/// Files that a path stands for.
 #[derive(Debug, PartialEq)]
 pub(super) enum Listing {
     /// One file, which may be an image or a video.
@@ -259,7 +259,8 @@ mod tests {
 
     #[test]
     fn only_a_percent_sign_digits_and_d_are_a_numbered_pattern() {
-        let parse = |it| Numbered::parse(Path::new(it)).map(|value| (value.prefix, value.suffix));
+        let parse =
+            |name| Numbered::parse(Path::new(name)).map(|value| (value.prefix, value.suffix));
         assert_eq!(parse("x/im%05d.png"), Some(("im", ".png")));
         assert_eq!(parse("im%d.png"), Some(("im", ".png")));
         assert_eq!(parse("100%.png"), None);

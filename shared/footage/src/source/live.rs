@@ -54,18 +54,18 @@ impl fmt::Display for LiveAddress {
     }
 }
 
-/// Whether a text is the address of a camera or a stream: `rtsp://...`, `udp://...`, `http://...`, `v4l2:...`,
+/// Returns true if a text is the address of a camera or a stream: `rtsp://...`, `udp://...`, `http://...`, `v4l2:...`,
 /// `/dev/video0`.
 pub fn is_live(text: &str) -> bool {
     LiveAddress::parse(text).is_some()
 }
 
-/// Whether a text is an address of any kind, also of one that cannot be read: no path of a file.
+/// Returns true if a text is an address of any kind, also one that cannot be read: not the path of a file.
 pub fn is_address(text: &str) -> bool {
     what(text).is_some()
 }
 
-/// What a source is that is no footage: the kind that the scheme of an address stands for; `None` for a file.
+/// Returns the kind of source that the scheme of an address stands for, if it is not footage; `None` for a file.
 pub(super) fn what(text: &str) -> Option<&'static str> {
     match LiveAddress::parse(text) {
         Some(LiveAddress::Device(_)) => return Some("a live camera"),
@@ -93,7 +93,7 @@ pub(super) fn kind(file_type: FileType) -> &'static str {
     }
 }
 
-/// What to do instead, for the message.
+/// Returns the remedy for the message.
 pub(super) fn instead(path: &str) -> String {
     if let Some(file) = path.strip_prefix("file://") {
         return format!("name the file without file://: {file}");

@@ -13,7 +13,7 @@ const MAX_TIMES: usize = 1 << 14;
 /// How long to wait for the time of a frame that has been read.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What a decoder complained about.
+/// Complaints of a decoder.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Complaints {
     /// Messages.
@@ -40,7 +40,7 @@ pub(crate) struct Log {
     complaints: Arc<Mutex<Complaints>>,
 }
 
-/// What is said of a frame.
+/// Log entry of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameTime {
     /// Its presentation time, seconds.
@@ -64,7 +64,7 @@ impl Log {
         })
     }
 
-    /// What the decoder has complained about so far.
+    /// Returns the complaints of the decoder so far.
     pub(crate) fn complaints(&self) -> Complaints {
         let complaints = self.complaints.lock();
         complaints.unwrap_or_else(PoisonError::into_inner).clone()
@@ -146,7 +146,7 @@ impl Lines {
         let complaints = self.complaints.lock();
         let mut complaints = complaints.unwrap_or_else(PoisonError::into_inner);
         complaints.messages += 1;
-        complaints.undecoded += u64::from(UNDECODED.iter().any(|it| message.contains(it)));
+        complaints.undecoded += u64::from(UNDECODED.iter().any(|words| message.contains(words)));
         message.clone_into(&mut complaints.last);
     }
 }
@@ -199,7 +199,7 @@ mod tests {
     fn read(text: &str) -> (Vec<u8>, Vec<f64>) {
         let (sender, times) = sync_channel(MAX_TIMES);
         let kept = Lines::new(sender).read(text.as_bytes());
-        (kept, times.try_iter().map(|it| it.time_s).collect())
+        (kept, times.try_iter().map(|time| time.time_s).collect())
     }
 
     #[test]

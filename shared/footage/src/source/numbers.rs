@@ -18,7 +18,7 @@ pub(super) struct Numbered {
 ///
 /// Pictures in front of the first frame, and between two frames, are left out.
 pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Vec<Numbered> {
-    let told = numbers.and_then(|it| Some((it, numbers_of(&paths)?)));
+    let told = numbers.and_then(|numbers| Some((numbers, numbers_of(&paths)?)));
     let Some((PictureNumbers { first, step }, numbers)) = told else {
         let all = paths.into_iter().zip(0..);
         return all.map(|(path, frame)| Numbered { path, frame }).collect();
@@ -48,21 +48,21 @@ fn numbers_of(paths: &[PathBuf]) -> Option<Vec<u64>> {
     let all: Vec<Vec<&str>> = texts.iter().map(|text| runs(text)).collect();
     let first = all.first()?;
     let is_number = |text: &str| text.starts_with(|letter: char| letter.is_ascii_digit());
-    let is_alike = |it: &Vec<&str>| {
-        let mut pairs = it.iter().zip(first);
-        it.len() == first.len() && pairs.all(|(a, b)| a == b || (is_number(a) && is_number(b)))
+    let is_alike = |row: &Vec<&str>| {
+        let mut pairs = row.iter().zip(first);
+        row.len() == first.len() && pairs.all(|(a, b)| a == b || (is_number(a) && is_number(b)))
     };
     if !all.iter().all(is_alike) {
         return None;
     }
     let column = |nth: usize| -> Option<Vec<u64>> {
-        let numbers = all.iter().map(|it| it[nth].parse().ok());
+        let numbers = all.iter().map(|row| row[nth].parse().ok());
         let numbers: Vec<u64> = numbers.collect::<Option<_>>()?;
         numbers.is_sorted_by(|a, b| a < b).then_some(numbers)
     };
     // Of several that rise (a number and a time), the one with the least gaps; the last of equal ones.
     let rising = (0..first.len()).rev().filter_map(column);
-    rising.min_by_key(|it| it[it.len() - 1] - it[0])
+    rising.min_by_key(|numbers| numbers[numbers.len() - 1] - numbers[0])
 }
 
 /// The numbers of the pictures of a folder, a pattern or a glob, rising; none for other footage, and where they are not numbered.
@@ -94,7 +94,7 @@ impl Counting {
         let firsts: Vec<u64> =
             cameras.iter().filter_map(|camera| camera.first().copied()).collect();
         let lasts = cameras.iter().filter_map(|camera| camera.last().copied());
-        let lengths = cameras.iter().filter_map(|it| Some(it.last()? - it.first()?));
+        let lengths = cameras.iter().filter_map(|camera| Some(camera.last()? - camera.first()?));
         let from = firsts.iter().copied().max().unwrap_or(0);
         let both = (lasts.min().unwrap_or(0) + 1).saturating_sub(from);
         let is_common = 2 * both > lengths.min().unwrap_or(0);

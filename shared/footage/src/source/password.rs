@@ -1,6 +1,6 @@
 //! Names and passwords in the addresses of cameras, which belong in no message and in no file.
 
-/// What stands in the place of a password.
+/// Text that replaces a password.
 const HIDDEN: &str = "***";
 /// Keys of an address whose values are secret.
 const SECRET_KEYS: [&str; 14] = [
@@ -51,7 +51,7 @@ fn is_end(it: char) -> bool {
 fn push_address(out: &mut String, address: &str) {
     let end = address.find(['/', '?', '#']).unwrap_or(address.len());
     let (host, path) = address.split_at(end);
-    out.push_str(host.rsplit_once('@').map_or(host, |it| it.1));
+    out.push_str(host.rsplit_once('@').map_or(host, |parts| parts.1));
     let Some((path, query)) = path.split_once('?') else {
         out.push_str(path);
         return;
@@ -75,10 +75,10 @@ const SHORTEST: usize = 3;
 pub(crate) fn without_password_of(address: &str, message: &str) -> String {
     let shown = without_passwords(address);
     let mut message = without_passwords(&message.replace(address, &shown));
-    let host = address.split_once("://").map_or("", |it| it.1);
+    let host = address.split_once("://").map_or("", |parts| parts.1);
     let host = &host[..host.find(['/', '?', '#']).unwrap_or(host.len())];
-    let before = host.rsplit_once('@').map_or("", |it| it.0);
-    let password = before.split_once(':').map_or("", |it| it.1);
+    let before = host.rsplit_once('@').map_or("", |parts| parts.0);
+    let password = before.split_once(':').map_or("", |parts| parts.1);
     for secret in [before, password] {
         if secret.len() >= SHORTEST {
             message = message.replace(secret, HIDDEN);

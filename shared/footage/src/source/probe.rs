@@ -7,14 +7,14 @@ use serde_json::Value;
 use super::answers::run_ffprobe;
 use crate::{FootageError, Size, SourceSpec, Turn};
 
-/// What is known of a video before it is decoded.
+/// Facts about a video that are known before it is decoded.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Probe {
     /// Number of the stream in the file.
     pub(super) stream: u64,
     /// Size as stored.
     pub(super) stored: Size,
-    /// What the display matrix asks.
+    /// Turn that the display matrix asks for.
     pub(super) tag: Turn,
     /// Frames per second, where the file tells.
     pub(super) rate_hz: Option<f64>,
@@ -28,11 +28,11 @@ pub(super) struct Probe {
     pub(super) times_s: Option<Vec<f64>>,
     /// Time of the first frame as the decoder has it, seconds; none where only the first one that is decoded tells.
     pub(super) origin_s: Option<f64>,
-    /// Whether pictures are made of others.
+    /// True if pictures are coded from other pictures.
     pub(super) is_inter: bool,
-    /// Whether every picture is two, of different moments, line by line.
+    /// True if every picture holds two of different moments, line by line.
     pub(super) is_interlaced: bool,
-    /// Whether the option that keeps every frame is called `-fps_mode` (since 5.1) or `-vsync`.
+    /// True if the option that keeps every frame is called `-fps_mode` (since 5.1), false if it is `-vsync`.
     pub(super) has_fps_mode: bool,
 }
 
@@ -128,7 +128,7 @@ fn film(output: &Value) -> &Value {
     best.unwrap_or(&Value::Null)
 }
 
-/// What the display matrix of a stream asks.
+/// Returns the turn that the display matrix of a stream asks for.
 fn tag(stream: &Value) -> Turn {
     let data = stream["side_data_list"].as_array().map_or(&[][..], Vec::as_slice);
     let text = data.iter().find_map(|value| value["displaymatrix"].as_str());
@@ -157,7 +157,7 @@ fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
 }
 
 impl Probe {
-    /// Whether fewer frames are shown than are stored, by the duration of what is shown: MP4 and its relatives have edit lists.
+    /// Returns true if fewer frames are shown than are stored, by the duration shown: MP4 and its relatives have edit lists.
     fn is_trimmed(&self, stream: &Value, format: &Value) -> bool {
         let names = format["format_name"].as_str().unwrap_or_default();
         let has_edits = names.split(',').any(|part| part == "mov" || part == "mp4");
@@ -217,7 +217,7 @@ impl Probe {
         nearest.map(|nearest| nearest as u64)
     }
 
-    /// Whether all frames are equally spaced, to a quarter of a frame, because some containers round times to
+    /// Returns true if all frames are equally spaced, to a quarter of a frame, because some containers round times to
     /// milliseconds.
     fn is_regular(&self, times_s: &[f64]) -> bool {
         self.clock_hz.is_some_and(|rate_hz| {
@@ -244,7 +244,7 @@ pub(super) fn key_frames(
     let mut shown: Vec<(f64, String)> = packets
         .iter()
         .map(|packet| (number(&packet["pts_time"]).unwrap_or(0.0), flags(packet)))
-        .filter(|it| !it.1.contains('D'))
+        .filter(|packet| !packet.1.contains('D'))
         .collect();
     shown.sort_by(|a, b| a.0.total_cmp(&b.0));
     let numbered = (0..).zip(shown);
@@ -265,7 +265,7 @@ pub(crate) fn fraction(value: &Value) -> Option<f64> {
     (rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
-/// Whether `ffmpeg` is of version 5.1 or later, which has `-fps_mode` and writes the times of sender reports.
+/// Returns true if `ffmpeg` is of version 5.1 or later, which has `-fps_mode` and writes the times of sender reports.
 ///
 /// * `version`: `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are assumed to be recent.
 pub(crate) fn is_5_1(version: &str) -> bool {

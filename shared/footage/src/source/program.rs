@@ -5,11 +5,11 @@ use std::path::Path;
 
 use crate::FootageError;
 
-/// What ffmpeg must know to read a file: pictures one behind the other are no picture, whatever the file is called.
+/// Returns the options that ffmpeg needs to read a file: JPEG pictures one behind the other are a video, whatever its name.
 pub(crate) fn input_options(path: &Path) -> &'static [&'static str] {
     use std::io::Read as _;
     let mut head = [0; 3];
-    let read = std::fs::File::open(path).and_then(|mut it| it.read_exact(&mut head));
+    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut head));
     if read.is_ok() && head == [0xff, 0xd8, 0xff] {
         return &["-f", "mjpeg"];
     }

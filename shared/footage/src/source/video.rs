@@ -137,7 +137,7 @@ impl Video {
         self.probe.listed_s().is_some()
     }
 
-    /// What the decoder has complained about so far.
+    /// Returns the complaints of the decoder so far.
     pub(super) fn complaints(&self) -> Complaints {
         self.log.complaints()
     }
@@ -164,7 +164,7 @@ impl Video {
         Ok(filled == rgb.len())
     }
 
-    /// Whether a frame is not made of one that could not be decoded: after such a one, from the next that stands alone on.
+    /// Returns true if a frame depends on no frame that failed to decode: after one, from the next key frame on.
     ///
     /// * `next`: the frame that follows the one before it.
     fn is_whole(&mut self, index: u64, next: u64) -> Result<bool, FootageError> {
@@ -260,7 +260,7 @@ fn shrinking(probe: &Probe, spec: &SourceSpec) -> Option<String> {
     (by > 1).then_some(filter)
 }
 
-/// Whether the decoder is asked for the times of frames.
+/// Returns true if the decoder is asked for the times of frames.
 fn has_times(probe: &Probe) -> bool {
     probe.regular_hz().is_some() || probe.listed_s().is_some()
 }

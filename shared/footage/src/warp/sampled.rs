@@ -62,7 +62,7 @@ impl Sampled {
         let offsets = sample_offsets(source_from_output, n_samples);
         let n_phases = 1 << phase_bits;
         let last_fraction = 1.0 - 1.0 / f64::from(n_phases);
-        let footprint = Footprint::of(&offsets, last_fraction);
+        let footprint = Footprint::new(&offsets, last_fraction);
         let phases = (0..n_phases).flat_map(|y| (0..n_phases).map(move |x| [x, y]));
         let kernels = phases
             .flat_map(|phase| {
@@ -243,7 +243,7 @@ fn sample_offsets(map: &Affine, n_samples: [usize; 2]) -> Vec<[f64; 2]> {
 
 impl Footprint {
     /// All pixels that samples at `offsets` touch, from phases up to `last_fraction` of a pixel.
-    fn of(offsets: &[[f64; 2]], last_fraction: f64) -> Self {
+    fn new(offsets: &[[f64; 2]], last_fraction: f64) -> Self {
         let range = |axis: usize| {
             let values = || offsets.iter().map(move |offset| offset[axis]);
             let first = values().map(|value| value.floor() as i64).min().unwrap_or(0);

@@ -29,7 +29,7 @@ pub(crate) fn write_images(folder: &Path, n: usize) {
     }
 }
 
-/// Whether there is an ffmpeg; prints that the test is skipped if not.
+/// Returns true if there is an ffmpeg; prints that the test is skipped if not.
 #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 pub(crate) fn has_ffmpeg() -> bool {
     let is_there = Command::new("ffmpeg").arg("-version").output().is_ok();

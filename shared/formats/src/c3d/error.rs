@@ -6,7 +6,7 @@ pub enum C3dError {
     /// The file ends before required or declared data.
     #[error("the file has {got} bytes, {what} would end at byte {needed}")]
     Short {
-        /// What is cut off.
+        /// Item that is cut off.
         what: &'static str,
         /// Where it would end.
         needed: u64,
@@ -30,7 +30,7 @@ pub enum C3dError {
     Parameter {
         /// Where it begins.
         at: usize,
-        /// What is wrong with it.
+        /// Reason why the parameter is wrong.
         what: &'static str,
     },
     /// The scale is zero or not a number.

@@ -86,7 +86,7 @@ impl Header {
     fn point(&self, bytes: Bytes<'_>, point: &[u8]) -> Option<[f64; 3]> {
         let (place, residual) = if self.scale < 0.0 {
             let [x, y, z, w] = *point.as_chunks().0.first_chunk()?;
-            let place = [x, y, z].map(|it| f64::from(bytes.f32_of(it)));
+            let place = [x, y, z].map(|coordinate| f64::from(bytes.f32_of(coordinate)));
             (place, bytes.f32_of(w))
         } else {
             let [x, y, z, w] = *point.as_chunks().0.first_chunk()?;

@@ -68,11 +68,11 @@ impl<'a> Bytes<'a> {
     }
 
     pub(crate) fn u16(&self, at: usize, what: &'static str) -> Result<u16, C3dError> {
-        self.array(at, what).map(|it| self.u16_of(it))
+        self.array(at, what).map(|bytes| self.u16_of(bytes))
     }
 
     pub(crate) fn f32(&self, at: usize, what: &'static str) -> Result<f32, C3dError> {
-        self.array(at, what).map(|it| self.f32_of(it))
+        self.array(at, what).map(|bytes| self.f32_of(bytes))
     }
 
     pub(crate) fn u16_of(&self, bytes: [u8; 2]) -> u16 {

@@ -6,7 +6,7 @@ use crate::c3d::numbers::{BLOCK, Bytes};
 /// One value, its bytes still in the file.
 #[derive(Debug, Clone)]
 struct Parameter<'a> {
-    /// Of its group.
+    /// Number of its group.
     id: u8,
     name: String,
     /// -1: characters; 1, 2 and 4: bytes of a number.
@@ -108,9 +108,9 @@ impl<'a> Parameters<'a> {
     }
 
     fn get(&self, group: &str, name: &str) -> Option<&Parameter<'a>> {
-        let id = self.groups.iter().find(|it| it.1 == group)?.0;
+        let id = self.groups.iter().find(|entry| entry.1 == group)?.0;
         let mut all = self.entries.iter();
-        all.find(|it| it.id == id && it.name == name)
+        all.find(|parameter| parameter.id == id && parameter.name == name)
     }
 
     /// A text, without surrounding blanks.
@@ -121,7 +121,7 @@ impl<'a> Parameters<'a> {
 
     /// A list of texts, the first `most` of them; empty if there is no such parameter.
     pub(crate) fn texts(&self, group: &str, name: &str, most: usize) -> Vec<String> {
-        let Some(parameter) = self.get(group, name).filter(|it| it.kind == -1) else {
+        let Some(parameter) = self.get(group, name).filter(|parameter| parameter.kind == -1) else {
             return Vec::new();
         };
         match parameter.sizes {
@@ -146,11 +146,11 @@ impl<'a> Parameters<'a> {
 
     /// A whole number of 32 bits, as two words, the lower first; none for a parameter of any other form.
     pub(crate) fn double_word(&self, group: &str, name: &str) -> Option<f64> {
-        let parameter = self.get(group, name).filter(|it| it.kind == 2)?;
+        let parameter = self.get(group, name).filter(|parameter| parameter.kind == 2)?;
         let &[a, b, c, d] = parameter.data else {
             return None;
         };
-        let [low, high] = [[a, b], [c, d]].map(|it| f64::from(self.bytes.u16_of(it)));
+        let [low, high] = [[a, b], [c, d]].map(|pair| f64::from(self.bytes.u16_of(pair)));
         Some(high * 65536.0 + low)
     }
 }

@@ -147,7 +147,7 @@ proptest! {
         points in prop::collection::vec(prop::option::of(prop::array::uniform3(-3000..3000_i32)), 12),
         n_analog in 0..5_u16,
     ) {
-        let point = |it: &Option<[i32; 3]>| it.map(|it| it.map(|value| f64::from(value) * 0.25));
+        let point = |raw: &Option<[i32; 3]>| raw.map(|coordinates| coordinates.map(|value| f64::from(value) * 0.25));
         let frames = points.chunks(3).map(|chunk| chunk.iter().map(point).collect()).collect();
         let trial = Trial { frames, n_analog, ..trial() };
         for processor in PROCESSORS {

@@ -13,7 +13,7 @@ const MAX_BLOCKS: usize = 255;
 /// Steps of a residual: one byte holds it.
 const MAX_RESIDUAL: f64 = 255.0;
 
-/// What a file says before its points; see [`write()`].
+/// Header of a file, before its points; see [`write()`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading<'a> {
     /// Frames per second.
@@ -24,7 +24,7 @@ pub struct Heading<'a> {
     pub up: &'a str,
     /// Names of the points; characters beyond Latin-1 become question marks, and what is longer than 127 is cut.
     pub labels: &'a [String],
-    /// What each point is; as the names. May be empty.
+    /// Description of each point, in the order of the names. May be empty.
     pub descriptions: &'a [String],
     /// Frames that follow.
     pub n_frames: u32,

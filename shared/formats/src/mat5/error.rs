@@ -17,7 +17,7 @@ pub enum ContainerError {
     /// The file ends too early.
     #[error("the file ends within {what}: {got} bytes left, {expected} needed")]
     Ended {
-        /// What was being read.
+        /// Item that was being read.
         what: &'static str,
         /// Bytes left.
         got: usize,
@@ -27,7 +27,7 @@ pub enum ContainerError {
     /// A tag has an unexpected type.
     #[error("{what} has type {got}, expected {expected}")]
     Type {
-        /// What was being read.
+        /// Item that was being read.
         what: &'static str,
         /// The type's number.
         got: u32,
@@ -45,7 +45,7 @@ pub enum ContainerError {
     /// The file exceeds a limit that models and annotations do not reach.
     #[error("the file holds more than {limit} {what}")]
     TooMuch {
-        /// What is counted.
+        /// Item that is counted.
         what: &'static str,
         /// The number accepted.
         limit: usize,

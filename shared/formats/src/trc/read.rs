@@ -21,7 +21,7 @@ pub enum TrcError {
     Header {
         /// 1-based line.
         line: usize,
-        /// What should be there.
+        /// Text that is expected.
         expected: &'static str,
     },
     /// A row has another number of columns than the header announces.

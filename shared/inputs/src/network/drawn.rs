@@ -1,4 +1,4 @@
-//! What a network sees, as a picture.
+//! Output of a network, drawn as a picture.
 
 use footage::{Canvas, Limb, Side, Size, Tile, compose, draw_limbs};
 use keypoints::Keypoint;
@@ -65,7 +65,7 @@ pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> 
     let peaks = maps.peaks();
     let points: Vec<[f64; 2]> = peaks
         .iter()
-        .map(|peak| peak.map_or([f64::NAN; 2], |it| in_tile(it.at)))
+        .map(|peak| peak.map_or([f64::NAN; 2], |peak| in_tile(peak.at)))
         .collect();
     draw_limbs(&mut joints, &points, &limbs());
     let mut tiles = vec![(joints, network.card().name.clone())];

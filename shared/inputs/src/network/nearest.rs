@@ -26,8 +26,8 @@ pub fn nearest_detectors(description: &Description) -> Vec<&'static str> {
 
 fn best(rated: &[(&'static str, usize)]) -> Vec<&'static str> {
     let best = rated.iter().map(|rated| rated.1).max();
-    let best = rated.iter().filter(|it| Some(it.1) == best);
-    best.map(|it| it.0).collect()
+    let best = rated.iter().filter(|rated| Some(rated.1) == best);
+    best.map(|rated| rated.0).collect()
 }
 
 /// How well the card of a detector agrees; `None` unless the output does.
@@ -109,7 +109,7 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
         } => {
             let bins = |side: usize| (side as f64 * bins_per_pixel).round() as usize;
             let across = given(&[1, n, bins(width)]);
-            let output = across.and_then(|it| Some(it.min(given(&[1, n, bins(height)])?)));
+            let output = across.and_then(|across| Some(across.min(given(&[1, n, bins(height)])?)));
             (output.map(|output| 8 + output), named(x) + named(y))
         }
         Codec::Keypoints { list, fields, .. } => {
@@ -168,6 +168,6 @@ fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<us
 fn agreeing(port: &Port, sides: &[usize]) -> Option<usize> {
     let fits = port.sides.len() == sides.len()
         && port.sides.iter().zip(sides).all(|(side, n)| side.may_be(*n));
-    let fixed = |it: &&Side| matches!(it, Side::Fixed(_));
+    let fixed = |side: &&Side| matches!(side, Side::Fixed(_));
     fits.then(|| port.sides.iter().filter(fixed).count())
 }

@@ -91,7 +91,7 @@ fn a_network_without_a_card_or_cut_short_is_refused() {
 fn the_nearest_card_has_the_networks_sides() {
     let near = |inputs: &[usize], outputs: &[(&str, &[usize])]| {
         let mut net = Network::default();
-        let sides = |it: &[usize]| it.iter().map(|it| Side::Fixed(*it)).collect::<Vec<_>>();
+        let sides = |sizes: &[usize]| sizes.iter().map(|n| Side::Fixed(*n)).collect::<Vec<_>>();
         net.inputs.push(("x".to_owned(), sides(inputs)));
         for (name, shape) in outputs {
             net.outputs.push(((*name).to_owned(), sides(shape)));

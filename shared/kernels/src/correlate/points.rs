@@ -51,7 +51,7 @@ impl Points {
         all.positive[..n_pairs].copy_from_slice(points);
         all.whole = product(points.iter().copied());
         for k in 0..n_pairs {
-            let others = points.iter().enumerate().filter(|(it, _)| *it != k);
+            let others = points.iter().enumerate().filter(|(i, _)| *i != k);
             all.without[k] = product(others.map(|(_, point)| *point));
             for (i, powers) in all.powers.iter_mut().enumerate() {
                 powers[k] = power(f64::from(points[k]), i) as f32;

@@ -32,16 +32,16 @@ impl Problem {
             .iter()
             .flat_map(|(size, n)| std::iter::repeat_n(*size, *n))
             .enumerate()
-            .map(|(it, size)| {
+            .map(|(nth, size)| {
                 (
                     size,
-                    noise(seed ^ it as u64, size[0] * size[1] * N_CHANNELS),
+                    noise(seed ^ nth as u64, size[0] * size[1] * N_CHANNELS),
                 )
             })
             .collect();
-        let maps = sizes.iter().enumerate().map(|(it, size)| {
+        let maps = sizes.iter().enumerate().map(|(nth, size)| {
             let area = (size[0] + largest[0] - 1) * (size[1] + largest[1] - 1);
-            let cells = noise(!seed ^ it as u64, area * N_CHANNELS);
+            let cells = noise(!seed ^ nth as u64, area * N_CHANNELS);
             (*size, cells.into_iter().map(|cell| cell as f32).collect())
         });
         Self {
@@ -97,7 +97,12 @@ impl Problem {
     fn reference(&self) -> Vec<Vec<f32>> {
         let of = |level: Level<'_>| {
             let all = self.templates().into_iter();
-            let all = all.map(|it| (Self::method([it.rows, it.cols], level.size), it));
+            let all = all.map(|template| {
+                (
+                    Self::method([template.rows, template.cols], level.size),
+                    template,
+                )
+            });
             all.map(|(way, it)| reference::correlate(way, it, level)).collect::<Vec<_>>()
         };
         self.levels().flat_map(of).collect()
@@ -136,7 +141,7 @@ fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64
             let sums: Vec<f64> = (0..N_CHANNELS)
                 .map(|k| filter.weights[k..].iter().step_by(N_CHANNELS).map(|w| w.abs()).sum())
                 .collect();
-            let got = got.next().map_or(&[][..], |it| it);
+            let got = got.next().map_or(&[][..], |values| values);
             assert_eq!(got.len(), want.len());
             for (at, (got, want)) in got.iter().zip(want).enumerate() {
                 let place = [at / level.size[1], at % level.size[1]];
@@ -270,7 +275,7 @@ fn the_method_depends_on_sizes_only() {
 fn blocks_cover_everything_once_and_evenly() {
     for total in 0..70 {
         let all: Vec<_> = blocks(total, 14).collect();
-        assert!(all.iter().all(|it| (1..=14).contains(&it.len())));
+        assert!(all.iter().all(|block| (1..=14).contains(&block.len())));
         assert_eq!(
             all.into_iter().flatten().collect::<Vec<_>>(),
             (0..total).collect::<Vec<_>>()

@@ -185,8 +185,8 @@ pub(super) fn flush<S: Simd>(simd: S, pending: &mut Pending, answer: &mut Answer
 /// How many of the first tiles lie side by side; at most [`GATHERED`].
 fn neighbours(tiles: &[Tile], step: usize) -> usize {
     let first = tiles[0];
-    let beside = |(it, tile): &(usize, &Tile)| {
-        [tile.level, tile.y, tile.x] == [first.level, first.y, first.x + it * step]
+    let beside = |(nth, tile): &(usize, &Tile)| {
+        [tile.level, tile.y, tile.x] == [first.level, first.y, first.x + nth * step]
     };
     let all = tiles.iter().enumerate().take(GATHERED);
     all.take_while(beside).count()

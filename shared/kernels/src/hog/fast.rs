@@ -31,9 +31,9 @@ impl HogWorkspace {
     }
 
     fn prepare(&mut self, stride: usize) {
-        let fit = |it: &mut Vec<f32>, n: usize| {
-            it.clear();
-            it.resize(n, 0.0);
+        let fit = |buffer: &mut Vec<f32>, n: usize| {
+            buffer.clear();
+            buffer.resize(n, 0.0);
         };
         for it in &mut self.histograms {
             fit(it, N_ORIENTATIONS * stride);

@@ -53,7 +53,7 @@ fn histograms(image: &Planes, cell_px: usize, [rows, cols]: [usize; 2]) -> Vec<H
     (0..rows * cols).map(cell).collect()
 }
 
-/// What the pixels between four cell centres give to each of the four cells, `[below?][right?]`.
+/// Returns the votes of the pixels between four cell centres for each of the four cells, `[below?][right?]`.
 fn votes_of_block(
     image: &Planes,
     cell_px: usize,

@@ -81,7 +81,7 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
         let (line, rest) = line.split_at_mut(whole);
         for (run, out) in line.chunks_exact_mut(S::LANES).enumerate() {
             let at = y * grid.cols + run * S::LANES;
-            let scores = sum.of(|from| simd.load(&from[at..]));
+            let scores = sum.total(|from| simd.load(&from[at..]));
             simd.store(scores, out);
             seen = RunningRange::include(simd, seen, scores, S::LANES);
         }
@@ -90,7 +90,7 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
             let mut scores = simd.splat(f32::NEG_INFINITY);
             if run == 0 && n > 0 {
                 let at = y * grid.cols + whole;
-                scores = simd.first(n, sum.of(|from| load(simd, from, at, n)), scores);
+                scores = simd.first(n, sum.total(|from| load(simd, from, at, n)), scores);
                 seen = RunningRange::include(simd, seen, scores, n);
             }
             simd.store(scores, out);
@@ -110,7 +110,7 @@ struct Sum<'a, S: Simd> {
 
 impl<S: Simd> Sum<'_, S> {
     #[inline(always)]
-    fn of(&self, load: impl Fn(&[f32]) -> S::V) -> S::V {
+    fn total(&self, load: impl Fn(&[f32]) -> S::V) -> S::V {
         let mut scores = load(self.own.map);
         if let Some(term) = self.own.term {
             scores = self.simd.plus(scores, self.one, load(term));

@@ -114,8 +114,8 @@ fn cases(
                             child[..rows * cols].fill(f32::NEG_INFINITY);
                         }
                     }
-                    let choices = biases.into_iter().map(|it| {
-                        it.into_iter()
+                    let choices = biases.into_iter().map(|row| {
+                        row.into_iter()
                             .enumerate()
                             .filter_map(|(s, bias)| Some((s, bias?)))
                             .collect()
@@ -197,7 +197,7 @@ proptest! {
             for (y, x) in (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| (y, x))) {
                 let at = grid.at(l, y, x);
                 let found = case.rule.trace(case.scores(&ranges), l, [y, x]);
-                let value = found.map_or(f32::NEG_INFINITY, |it| it.score);
+                let value = found.map_or(f32::NEG_INFINITY, |found| found.score);
                 prop_assert_eq!(case.parent[at] + value, after[at]);
                 let Some(found) = found else { continue };
                 let score = case.child[grid.at(found.child_type, found.y, found.x)];
@@ -260,7 +260,7 @@ fn an_impossible_child_makes_its_parent_impossible() {
     };
     let mut workspace = MessageWorkspace::default();
     let (parent, ranges) = case.add_message(Isa::best(), &mut workspace);
-    assert!(parent.iter().all(|&it| it == f32::NEG_INFINITY));
+    assert!(parent.iter().all(|&score| score == f32::NEG_INFINITY));
     assert!(ranges[0].spread().is_nan());
     let ranges = case.ranges();
     assert_eq!(case.rule.trace(case.scores(&ranges), 0, [1, 1]), None);

@@ -49,7 +49,7 @@ impl MessageRule {
                 continue;
             };
             let score = score + bias;
-            if best.map_or(score > f32::NEG_INFINITY, |it| score > it.score) {
+            if best.map_or(score > f32::NEG_INFINITY, |best| score > best.score) {
                 best = Some(TracedChild {
                     score,
                     child_type: *child_type,

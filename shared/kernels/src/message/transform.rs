@@ -10,7 +10,7 @@ use crate::spring::{Axis, Spring};
 pub(super) struct Transform {
     /// The child's plane.
     pub(super) plane: usize,
-    /// Whether all of the plane is minus infinity.
+    /// True if the whole plane is minus infinity.
     pub(super) impossible: bool,
     /// The vertical pass, by blocks of [`BLOCK`] rows.
     pub(super) down: Pass,
@@ -23,7 +23,7 @@ pub(super) struct Transform {
 pub(super) struct Pass {
     /// Offsets that every block of parents tries.
     blocks: Vec<Range<isize>>,
-    /// What the spring adds, from the first offset of any block on.
+    /// Scores that the spring adds, from the first offset of any block on.
     scores: Vec<f32>,
     first: isize,
 }

@@ -86,7 +86,7 @@ impl Body for Resize<'_> {
         // The columns that any sample of the part is made of.
         let left = along.first.first().map_or(0, |value| 3 * value);
         let right = along.first.last().map_or(0, |value| 3 * (value + along.n));
-        along.first.iter_mut().for_each(|it| *it -= left / 3);
+        along.first.iter_mut().for_each(|index| *index -= left / 3);
         let stride = 3 * image.width();
         line.clear();
         // The fourth sample of the last pixel is read and not used.

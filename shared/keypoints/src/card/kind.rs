@@ -1,4 +1,4 @@
-//! What a card says that it is, before its keys are read.
+//! Kind that a card declares, before its keys are read.
 
 use serde::Deserialize;
 
@@ -11,7 +11,7 @@ pub(crate) const DETECTOR_FORMAT: &str = "parallax-detector";
 /// The version of either that is read.
 pub(crate) const VERSION: u32 = 1;
 
-/// What a card is of.
+/// Kind of network that a card describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CardKind {
     /// A network that finds keypoints: [`Card`](crate::Card).
@@ -21,7 +21,7 @@ pub enum CardKind {
 }
 
 impl CardKind {
-    /// What a text says that it is; `None` if it says neither.
+    /// Returns the kind that a text declares; `None` if it declares none.
     pub fn of(text: &str) -> Option<Self> {
         let head: Head = toml::from_str(text).ok()?;
         match head.format.as_str() {
@@ -32,7 +32,7 @@ impl CardKind {
     }
 }
 
-/// What any card begins with.
+/// Beginning of any card.
 #[derive(Debug, Deserialize)]
 struct Head {
     format: String,

@@ -55,7 +55,7 @@ fn every_codec_is_read() {
     ));
 }
 
-/// What is replaced, by what, and what is said.
+/// Replaced text, replacement, and expected message.
 const CASES: [[&str; 3]; 18] = [
     [
         "codec = \"heat-map\"",

@@ -15,7 +15,7 @@ pub enum Refine {
     Parabola,
 }
 
-/// What a score is.
+/// Meaning of a score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Score {

@@ -13,7 +13,7 @@ use crate::files::seen::{
     FileError, MAX_FRAMES, MAX_PEOPLE, SeenKeypoints, at_most, person, told_by,
 };
 
-/// What is expected of a data set, and of results, for errors.
+/// Layout of a data set, and of results, for errors.
 const DATA_SET: &str =
     "`{\"images\": [{\"id\"}], \"annotations\": [{\"image_id\", \"keypoints\": [x, y, v, ...]}]}`";
 const RESULTS: &str = "`[{\"image_id\", \"keypoints\": [x, y, confidence, ...]}]`";
@@ -204,9 +204,9 @@ fn collected(
         };
         let is_data_set = !list.is_empty();
         let is_found = if is_data_set {
-            |it: [f64; 3]| it[2] > 0.0
+            |keypoint: [f64; 3]| keypoint[2] > 0.0
         } else {
-            |it: [f64; 3]| it != [0.0; 3]
+            |keypoint: [f64; 3]| keypoint != [0.0; 3]
         };
         let people = frames.entry(frame).or_default();
         people.push(person(&it.keypoints, names, entry, is_found)?);
@@ -226,12 +226,13 @@ fn collected(
 
 /// The category of people: the only one that has keypoints, or the one called `person`.
 fn category(all: &[Category]) -> Result<Option<&Category>, FileError> {
-    let with: Vec<&Category> = all.iter().filter(|it| !it.keypoints.is_empty()).collect();
+    let with: Vec<&Category> =
+        all.iter().filter(|category| !category.keypoints.is_empty()).collect();
     match &with[..] {
         [] => Ok(None),
         [only] => Ok(Some(only)),
         several => {
-            let person = several.iter().find(|it| it.name == "person");
+            let person = several.iter().find(|category| category.name == "person");
             let person = person.ok_or_else(|| FileError::Entry {
                 entry: "categories".to_owned(),
                 got: format!("{} with keypoints", several.len()),

@@ -9,7 +9,7 @@ use crate::files::names::NameSet;
 use crate::files::people::{Film, Frame, people_of};
 use crate::files::seen::{FileError, MAX_FRAMES, MAX_PEOPLE, at_most};
 
-/// What is expected, for errors.
+/// Expected layout, for errors.
 const LAYOUT: &str = "mmpose's `[{\"keypoints\": [[x, y], ...], \"keypoint_scores\": [...]}]`, or `[{\"frame_id\", \"instances\": [...]}]`";
 
 /// A person.
@@ -37,13 +37,13 @@ enum Frames {
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum File {
-    /// Of mmpose's demonstrations.
+    /// Output of mmpose's demonstrations.
     Described {
         #[serde(default)]
         meta_info: Meta,
         instance_info: Frames,
     },
-    /// Of its inferencer.
+    /// Output of mmpose's inferencer.
     Plain(Frames),
 }
 
@@ -53,7 +53,7 @@ struct Meta {
     keypoint_id2name: BTreeMap<String, String>,
 }
 
-/// Whether a text has one of the keys that no other layout has.
+/// Returns true if a text has one of the keys that no other layout has.
 pub(super) fn is_mmpose(text: &[u8]) -> bool {
     let has = |key: &[u8]| text.windows(key.len()).any(|part| part == key);
     let head = &text[..text.len().min(1 << 16)];

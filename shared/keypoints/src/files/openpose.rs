@@ -9,7 +9,7 @@ pub use crate::files::people::Frame;
 use crate::files::people::people_of;
 use crate::files::seen::{FileError, MAX_PEOPLE, at_most};
 
-/// What is expected, for errors.
+/// Expected layout, for errors.
 const LAYOUT: &str = "`{\"people\": [{\"pose_keypoints_2d\": [x, y, confidence, ...]}]}`";
 
 /// `bodies` and `joints` are `AlphaPose`'s.

@@ -8,7 +8,7 @@ use crate::files::seen::{FileError, SeenKeypoints, person, told_by};
 /// The people of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// What their keypoints are called; `None` where nobody has keypoints and no names were given.
+    /// Names of their keypoints; `None` where nobody has keypoints and no names were given.
     pub names: Option<NameSet>,
     /// In the order of the file. Without names their lists are empty.
     pub people: Vec<SeenKeypoints>,
@@ -17,7 +17,7 @@ pub struct Frame {
 /// The people of all frames of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
-    /// What their keypoints are called.
+    /// Names of their keypoints.
     pub names: NameSet,
     /// Number of frames: images of a data set; one more than the highest number of results.
     pub n_frames: u64,
@@ -41,7 +41,12 @@ pub(super) fn people_of(
         (None, None) => None,
     };
     let read = |(nth, values): (usize, &&[Option<f64>])| match &names {
-        Some(names) => person(values, names, || entry(nth), |it| it != [0.0; 3]),
+        Some(names) => person(
+            values,
+            names,
+            || entry(nth),
+            |keypoint| keypoint != [0.0; 3],
+        ),
         None => Ok(SeenKeypoints::default()),
     };
     let people: Result<_, _> = lists.iter().enumerate().map(read).collect();

@@ -61,9 +61,9 @@ pub enum FileError {
         entry: String,
         /// Which of its numbers, from 0.
         index: usize,
-        /// What it is.
+        /// Value in the file.
         value: f64,
-        /// What is accepted.
+        /// Description of the values that are accepted.
         expected: String,
     },
     /// The number of keypoints tells no set.
@@ -86,7 +86,7 @@ pub enum FileError {
     OtherKeys {
         /// The person.
         entry: String,
-        /// What it has.
+        /// Keys of the file.
         keys: Vec<String>,
     },
     /// The names of the keypoints cannot be used.
@@ -100,7 +100,7 @@ pub enum FileError {
     /// There are too many of something.
     #[error("{got} {what}, at most {most} are read")]
     TooMany {
-        /// Of what.
+        /// Kind of item.
         what: String,
         /// How many.
         got: u64,
@@ -112,9 +112,9 @@ pub enum FileError {
     Entry {
         /// The entry.
         entry: String,
-        /// What it is.
+        /// Entry in the file.
         got: String,
-        /// What is accepted.
+        /// Description of the values that are accepted.
         expected: String,
     },
 }

@@ -31,7 +31,7 @@ pub enum KeypointFileError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong in it.
+        /// Error in the file.
         source: FileError,
     },
     /// A folder has no files of keypoints.

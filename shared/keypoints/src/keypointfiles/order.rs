@@ -1,4 +1,4 @@
-//! Whether 25 keypoints of which nobody said what they are called lie as those of `body-25` do.
+//! Check whether 25 keypoints without names lie as those of `body-25` do.
 //!
 //! OpenPose has two sets of 25, and files do not say which: `body-25`, and `body-25b` of its experimental model. The first has a
 //! pelvis in the middle of the hips. What is there in the second, an elbow, a wrist and a hip, lies apart.
@@ -21,7 +21,7 @@ pub(crate) fn pelvis_off(people: &mut dyn Iterator<Item = &SeenKeypoints>) -> Op
 
 fn off(person: &SeenKeypoints) -> Option<f64> {
     let at = |name: &str| {
-        let nth = BODY_25.iter().position(|it| *it == name)?;
+        let nth = BODY_25.iter().position(|known| *known == name)?;
         Some(person.keypoints.get(nth)?.as_ref()?.at)
     };
     let [pelvis, right, left] = [at("pelvis")?, at("right hip")?, at("left hip")?];

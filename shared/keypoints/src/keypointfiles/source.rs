@@ -74,7 +74,7 @@ impl KeypointSource {
         })
     }
 
-    /// What the keypoints are called.
+    /// Returns the names of the keypoints.
     pub fn names(&self) -> &NameSet {
         &self.names
     }
@@ -106,7 +106,7 @@ impl KeypointSource {
                 people.extend_from_slice(seen);
             }
             Frames::Files(files) => {
-                let Ok(at) = files.binary_search_by_key(&frame, |it| it.0) else {
+                let Ok(at) = files.binary_search_by_key(&frame, |file| file.0) else {
                     return Ok(None);
                 };
                 let path = &files[at].1;

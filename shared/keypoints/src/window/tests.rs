@@ -35,7 +35,7 @@ proptest! {
         rgb in proptest::collection::vec(any::<u8>(), 3 * 7 * 5),
     ) {
         let at = if whole { [x.floor(), y.floor()] } else { [x, y] };
-        let both = [sample, sample_anywhere].map(|it| it(&rgb, [7, 5], at, 12.5));
+        let both = [sample, sample_anywhere].map(|sampler| sampler(&rgb, [7, 5], at, 12.5));
         prop_assert_eq!(both[0], both[1]);
     }
 }

@@ -11,30 +11,31 @@ use crate::role::{Role, Side};
 /// An angle of a body. The axes of pelvis and thorax are x forwards, y upwards, z to the right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Angle {
-    /// Of the trunk (middle of the hips to the neck) from the vertical, forwards, in the direction that the hips face.
+    /// Angle of the trunk (middle of the hips to the neck) from the vertical, forwards, in the direction that the hips face.
     TrunkForwards,
     /// The same to the person's right.
     TrunkSideways,
-    /// Of the line of the shoulders about the trunk, from that of the hips, positive with the right shoulder forwards (to the left).
+    /// Turn of the line of the shoulders about the trunk from that of the hips, positive to the left (right shoulder forwards).
     TrunkRotation,
-    /// Of the trunk from the plane perpendicular to the line of the hips: bent towards the right.
+    /// Angle of the trunk from the plane perpendicular to the line of the hips: bent towards the right.
     TrunkBend,
-    /// Of the thigh about the line of the hips, forwards.
+    /// Turn of the thigh about the line of the hips, forwards.
     HipFlexion(Side),
-    /// Of the thigh from the plane of flexion, outwards.
+    /// Angle of the thigh from the plane of flexion, outwards.
     HipAbduction(Side),
-    /// Of the axis about which the knee bends about the thigh, inwards.
+    /// Turn about the thigh of the axis about which the knee bends, inwards.
     HipRotation(Side),
     /// Between thigh and lower leg, 0 straight.
     KneeFlexion(Side),
-    /// Of the foot (heel to toe) up from the perpendicular of the lower leg.
+    /// Angle of the foot (heel to toe) up from the perpendicular of the lower leg.
     AnkleDorsiflexion(Side),
     /// Between the upper arm and the trunk's downwards direction.
     ShoulderElevation(Side),
     /// Plane of elevation: 0 sideways (abduction), 90 forwards (flexion).
     ShoulderPlane(Side),
-    /// Of the axis about which the elbow bends about the upper arm, inwards, from where the first two rotations put it: 0 for an arm that
-    /// is held out sideways with the forearm forwards. For hanging arms the plane of elevation is not defined, nor is this.
+    /// Turn about the upper arm of the axis about which the elbow bends, inwards, from where the first two rotations put it: 0
+    /// for an arm that is held out sideways with the forearm forwards. For hanging arms the plane of elevation is not defined,
+    /// nor is this.
     ShoulderRotation(Side),
     /// Between upper arm and forearm, 0 straight.
     ElbowFlexion(Side),
@@ -65,7 +66,7 @@ impl Angle {
         trunk.into_iter().chain(SIDES.into_iter().flat_map(of_side)).collect()
     }
 
-    /// Whether it is one with the vertical.
+    /// Returns true if the angle is one with the vertical.
     pub fn needs_up(self) -> bool {
         matches!(self, Self::TrunkForwards | Self::TrunkSideways)
     }
@@ -158,7 +159,7 @@ fn outwards(side: Side) -> f64 {
     }
 }
 
-/// Whether two components are long enough to have a direction.
+/// Returns true if two components are long enough to have a direction.
 fn is_told(a: f64, b: f64) -> bool {
     a.hypot(b) > LEAST_TILT
 }

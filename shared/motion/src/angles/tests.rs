@@ -45,14 +45,14 @@ fn estimates(pose: &[(Role, Vector3<f64>)], sd_m: f64) -> Vec<(Role, Estimate)> 
     pose.iter().map(|pose| (pose.0, estimate(pose.1))).collect()
 }
 
-fn of(pose: &[(Role, Vector3<f64>)], angle: Angle) -> Result<Value, Unknown> {
+fn value_of(pose: &[(Role, Vector3<f64>)], angle: Angle) -> Result<Value, Unknown> {
     let all = angles(&estimates(pose, 0.002), Some(Vector3::z_axis()));
-    all.into_iter().find(|it| it.0 == angle).unwrap().1
+    all.into_iter().find(|entry| entry.0 == angle).unwrap().1
 }
 
 #[track_caller]
 fn is(pose: &[(Role, Vector3<f64>)], angle: Angle, degrees: f64) {
-    let got = of(pose, angle).unwrap().degrees;
+    let got = value_of(pose, angle).unwrap().degrees;
     assert!(
         (got - degrees).abs() < 1e-6,
         "{angle}: {got}, expected {degrees}"
@@ -62,9 +62,9 @@ fn is(pose: &[(Role, Vector3<f64>)], angle: Angle, degrees: f64) {
 #[test]
 fn standing_upright_is_zero_and_what_a_straight_limb_does_not_tell_is_nothing() {
     let pose = standing();
-    let defined = |it: &(Angle, Result<Value, Unknown>)| it.1.is_ok();
+    let defined = |entry: &(Angle, Result<Value, Unknown>)| entry.1.is_ok();
     let all = angles(&estimates(&pose, 0.002), Some(Vector3::z_axis()));
-    for (angle, value) in all.iter().filter(|it| defined(it)) {
+    for (angle, value) in all.iter().filter(|entry| defined(entry)) {
         assert!(value.unwrap().degrees.abs() < 1e-6, "{angle}");
     }
     for side in Side::BOTH {
@@ -73,7 +73,7 @@ fn standing_upright_is_zero_and_what_a_straight_limb_does_not_tell_is_nothing() 
             Angle::ShoulderPlane(side),
             Angle::ShoulderRotation(side),
         ] {
-            assert_eq!(of(&pose, angle), Err(Unknown::Undefined), "{angle}");
+            assert_eq!(value_of(&pose, angle), Err(Unknown::Undefined), "{angle}");
         }
     }
 }
@@ -175,7 +175,7 @@ fn without_feet_or_a_vertical_their_angles_are_missing() {
     let no_feet: Vec<_> =
         pose.iter().filter(|pose| !matches!(pose.0, Role::Heel(_))).copied().collect();
     assert_eq!(
-        of(&no_feet, Angle::AnkleDorsiflexion(Left)),
+        value_of(&no_feet, Angle::AnkleDorsiflexion(Left)),
         Err(Unknown::Missing)
     );
     let all = angles(&estimates(&pose, 0.01), None);
@@ -186,14 +186,14 @@ fn without_feet_or_a_vertical_their_angles_are_missing() {
 fn an_angle_that_nothing_is_known_of_is_none() {
     let pose = standing();
     let all = angles(&estimates(&pose, 0.8), None);
-    let knee = all.iter().find(|it| it.0 == Angle::KneeFlexion(Left)).unwrap();
+    let knee = all.iter().find(|entry| entry.0 == Angle::KneeFlexion(Left)).unwrap();
     assert_eq!(knee.1, Err(Unknown::Uncertain));
     let mut unknown = estimates(&pose, 0.01);
     for it in &mut unknown {
         it.1.covariance = Some(Matrix3::from_element(f64::NAN));
     }
     let all = angles(&unknown, None);
-    let knee = all.iter().find(|it| it.0 == Angle::KneeFlexion(Left)).unwrap();
+    let knee = all.iter().find(|entry| entry.0 == Angle::KneeFlexion(Left)).unwrap();
     assert_eq!(knee.1.unwrap().sd_degrees, None);
 }
 
@@ -223,8 +223,8 @@ fn what_the_covariances_make_of_an_angle_is_what_sampling_makes_of_it() {
     let n = 1500;
     let mut sums = vec![0.0; all.len()];
     for _ in 0..n {
-        let noise = |it: &(Role, Vector3<f64>), normal: &mut dyn FnMut() -> f64| {
-            (it.0, it.1 + Vector3::from_fn(|_, _| sd_m * normal()))
+        let noise = |joint: &(Role, Vector3<f64>), normal: &mut dyn FnMut() -> f64| {
+            (joint.0, joint.1 + Vector3::from_fn(|_, _| sd_m * normal()))
         };
         let moved: Vec<_> = pose.iter().map(|pose| noise(pose, &mut normal)).collect();
         for (at, it) in angles(&estimates(&moved, 1e-4), Some(Vector3::z_axis())).iter().enumerate()
@@ -268,9 +268,9 @@ proptest! {
 
     #[test]
     fn nothing_makes_an_angle_that_is_no_number(places in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 18)) {
-        let pose: Vec<_> = bent().iter().zip(&places).map(|(it, place)| {
+        let pose: Vec<_> = bent().iter().zip(&places).map(|(joint, place)| {
             // Every second joint in one place.
-            (it.0, if place[0] > 0.0 { Vector3::zeros() } else { Vector3::from(*place) })
+            (joint.0, if place[0] > 0.0 { Vector3::zeros() } else { Vector3::from(*place) })
         }).collect();
         for (_, value) in angles(&estimates(&pose, 0.05), Some(Vector3::z_axis())) {
             if let Ok(value) = value {

@@ -1,4 +1,4 @@
-//! What a run left, as people over time.
+//! Files of a run, as people over time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader};
@@ -21,7 +21,7 @@ pub struct Run {
     pub frames: Vec<u64>,
     /// The people, by ascending identity; all over the same instants.
     pub people: Vec<Person>,
-    /// What is missing at the end of the file, in words.
+    /// Part that is missing at the end of the file, in words.
     pub cut: Option<String>,
 }
 
@@ -222,7 +222,7 @@ fn add<'a>(
     }
 }
 
-/// What the deployment of a run says of itself, if it can be read.
+/// Returns the deployment's description of itself in the folder of a run, if it can be read.
 fn deployment_of(folder: &Path) -> Option<Value> {
     let text = files::read_text(&folder.join("deployment.json"), files::SETTINGS).ok()?;
     let value: Value = serde_json::from_str(&text).ok()?;

@@ -9,7 +9,7 @@ pub struct Settings {
     pub cutoff_hz: f64,
     /// The longest time between two measurements of a joint that is filled, seconds.
     pub fill_s: f64,
-    /// Whether [`Method::Rts`] keeps the lengths of the limbs' bones constant over the run.
+    /// True if [`Method::Rts`] keeps the lengths of the limbs' bones constant over the run.
     pub constant_bones: bool,
 }
 

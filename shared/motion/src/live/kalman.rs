@@ -187,7 +187,7 @@ fn shares(models: &[Model; N_MODELS]) -> [f64; N_MODELS] {
     odds.map(|odd| odd / sum)
 }
 
-/// What all filters say together; `None` if that is no number.
+/// Returns the estimate of all filters together; `None` if that is not a number.
 fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
     let shares = shares(models);
     let mut position = Vector3::zeros();
@@ -211,7 +211,7 @@ fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
 fn delay_s(gain: Vector3<f64>, dt: f64) -> f64 {
     let transition = Matrix3::new(1.0, dt, 0.5 * dt * dt, 0.0, 1.0, dt, 0.0, 0.0, 1.0);
     let seen = Matrix3::identity() - gain * RowVector3::new(1.0, 0.0, 0.0);
-    let feedback = (seen * transition).map(|it| Complex::new(it, 0.0));
+    let feedback = (seen * transition).map(|entry| Complex::new(entry, 0.0));
     let turn = 2.0 * PI * DELAY_HZ * dt;
     let back = Complex::new(turn.cos(), -turn.sin());
     let system = Matrix3::<Complex<f64>>::identity() - feedback * back;

@@ -48,7 +48,9 @@ fn recorded(rate_hz: f64, sd_m: f64, told_sd_m: f64, seconds: f64) -> Recorded {
 fn error_m(recorded: &Recorded, track: &[crate::Smoothed]) -> f64 {
     let errors = track.iter().zip(&recorded.times);
     let errors: Vec<f64> = errors
-        .filter_map(|(it, time)| Some((it.ok()?.position - swing(*time)).norm_squared()))
+        .filter_map(|(smoothed, time)| {
+            Some((smoothed.ok()?.position - swing(*time)).norm_squared())
+        })
         .collect();
     (errors.iter().sum::<f64>() / errors.len() as f64).sqrt()
 }

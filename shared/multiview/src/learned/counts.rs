@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 
 /// Co-occurrences of part types of pairs of views.
 ///
-/// Of every part `i` of the first view a row-major matrix, `[type in first view][type in second view]`, where the part
-/// of the second view is the one that shows the same limb.
+/// Row-major matrix of every part `i` of the first view, `[type in first view][type in second view]`, where the part of the
+/// second view is the one that shows the same limb.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
-    /// Of views that see the person from the same side.
+    /// Counts of views that see the person from the same side.
     pub same: Vec<Vec<u32>>,
-    /// Of views on opposite sides of the person: left and right are exchanged.
+    /// Counts of views on opposite sides of the person: left and right are exchanged.
     pub exchanged: Vec<Vec<u32>>,
 }
 
@@ -84,10 +84,10 @@ impl Counts {
     /// Number of co-occurrences, all parts.
     pub fn total(&self) -> u64 {
         let both = self.same.iter().chain(&self.exchanged).flatten();
-        both.map(|it| u64::from(*it)).sum()
+        both.map(|count| u64::from(*count)).sum()
     }
 
-    /// Whether there is a matrix of the right size for every part.
+    /// Returns true if there is a matrix of the right size for every part.
     pub(crate) fn fits(&self, shape: &Shape) -> bool {
         [false, true].into_iter().all(|exchanged| {
             let cells = self.of(exchanged).iter().map(Vec::len);
@@ -145,7 +145,8 @@ impl Counts {
         weight: f64,
         appearance: Appearance,
     ) -> TypeTables {
-        let [same, exchanged] = [false, true].map(|it| self.joint(shape, marginals, weight, it));
+        let [same, exchanged] =
+            [false, true].map(|exchanged| self.joint(shape, marginals, weight, exchanged));
         let valued = |joint: &[DMatrix<f64>]| {
             Arc::new(Compatibility::of(match appearance {
                 Appearance::Joint => joint.to_vec(),
@@ -154,7 +155,7 @@ impl Counts {
         };
         let joint = Compatibility::of(same.clone());
         TypeTables {
-            conditional: [&joint, &joint.transposed()].map(|it| Arc::new(it.conditional())),
+            conditional: [&joint, &joint.transposed()].map(|table| Arc::new(table.conditional())),
             joint: valued(&same),
             exchanged: Some(valued(&exchanged)),
         }

@@ -61,7 +61,7 @@ pub struct Learned {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelOf {
-    /// Of the model file.
+    /// Fingerprint of the model file.
     pub fingerprint: String,
     /// Its parts and types.
     pub shape: Shape,
@@ -83,9 +83,9 @@ pub struct LearnedFrom {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Weights {
-    /// Of the geometric term; score per squared cell.
+    /// Weight of the geometric term; score per squared cell.
     pub alpha: f64,
-    /// Of the appearance term.
+    /// Weight of the appearance term.
     pub beta: f64,
     /// Distance at which the geometric term is capped, cells.
     pub max_distance_cells: Option<f64>,

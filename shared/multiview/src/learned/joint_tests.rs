@@ -1,4 +1,4 @@
-//! What is learned of people who are made up, and files with errors.
+//! Tests of learning from made-up people, and of files with errors.
 
 use proptest::prelude::*;
 use skeleton::{HUMANEVA20, JointSet, MIRROR, N_PARTS, PARSE14, UMPM15};
@@ -6,7 +6,7 @@ use skeleton::{HUMANEVA20, JointSet, MIRROR, N_PARTS, PARSE14, UMPM15};
 use crate::learned::local::own;
 use crate::learned::{JointFile, JointsLearned, LearnedSet, Local, Marked, best_local, try_all};
 
-/// What is one and the same for all these tests: reach and ridge.
+/// Settings of all these tests: reach and ridge.
 const SETTINGS: Local = Local {
     reach: 2,
     ridge: 1e-4,
@@ -140,7 +140,7 @@ fn a_small_data_set_counts_as_much_as_a_large_one() {
 fn settings_are_chosen_by_people_who_were_left_out() {
     let tried = try_all(&[people(1, 60, 0.5)]);
     let (best, errors) = best_local(&tried).unwrap();
-    assert!(tried.iter().all(|it| it.1[0] >= errors[0]));
+    assert!(tried.iter().all(|trial| trial.1[0] >= errors[0]));
     assert!(
         best.ridge < 1e-2,
         "an offset without noise needs little ridge"
@@ -187,29 +187,33 @@ fn every_joint_set_is_made_of_the_same_joints() {
 fn a_wrong_file_is_refused_with_the_field() {
     type Change = fn(&mut JointFile);
     let cases: [(&str, Change); 13] = [
-        ("parallax-else", |it| it.format = "parallax-else".to_owned()),
-        ("version 2", |it| it.version = 2),
-        ("`model`", |it| it.model = "0123".to_owned()),
-        ("`model`", |it| it.model = "0123456789abcdeG".to_owned()),
-        ("`joints`", |it| drop(it.joints.pop())),
-        ("`joints[3].name`", |it| {
-            it.joints[3].name = "hip".to_owned();
+        ("parallax-else", |file| {
+            file.format = "parallax-else".to_owned()
         }),
-        ("`joints[0].weights`", |it| {
-            it.joints[0].weights.truncate(25);
+        ("version 2", |file| file.version = 2),
+        ("`model`", |file| file.model = "0123".to_owned()),
+        ("`model`", |file| file.model = "0123456789abcdeG".to_owned()),
+        ("`joints`", |file| drop(file.joints.pop())),
+        ("`joints[3].name`", |file| {
+            file.joints[3].name = "hip".to_owned();
         }),
-        ("`joints[5].weights`", |it| it.joints[5].weights[2] += 0.01),
-        ("`joints[5].weights`", |it| {
-            it.joints[5].weights[2] += 20.0;
-            it.joints[5].weights[3] -= 20.0;
+        ("`joints[0].weights`", |file| {
+            file.joints[0].weights.truncate(25);
         }),
-        ("`learned.ridge`", |it| it.learned.ridge = -1.0),
-        ("`learned.reach`", |it| it.learned.reach = 27),
-        ("`learned.sets[0].found`", |it| {
-            it.learned.sets[0].found = 62;
+        ("`joints[5].weights`", |file| {
+            file.joints[5].weights[2] += 0.01
         }),
-        ("`learned.sets[0].error_after`", |it| {
-            it.learned.sets[0].error_after = -0.5;
+        ("`joints[5].weights`", |file| {
+            file.joints[5].weights[2] += 20.0;
+            file.joints[5].weights[3] -= 20.0;
+        }),
+        ("`learned.ridge`", |file| file.learned.ridge = -1.0),
+        ("`learned.reach`", |file| file.learned.reach = 27),
+        ("`learned.sets[0].found`", |file| {
+            file.learned.sets[0].found = 62;
+        }),
+        ("`learned.sets[0].error_after`", |file| {
+            file.learned.sets[0].error_after = -0.5;
         }),
     ];
     for (words, change) in cases {

@@ -117,7 +117,7 @@ impl JointFit {
     pub fn error_of(&self, other: &Self, ridge: f64) -> Option<f64> {
         let n: f64 = self.joints.iter().map(|joint| joint.n).sum();
         let error = |joint: &Normal| {
-            let theirs = other.joints.iter().find(|it| it.parts == joint.parts);
+            let theirs = other.joints.iter().find(|candidate| candidate.parts == joint.parts);
             let weights = theirs.and_then(|theirs| theirs.solve(ridge));
             joint.error(&weights.unwrap_or_else(|| DVector::zeros(N_PARTS)))
         };
@@ -171,7 +171,7 @@ fn mirror_of(parts: &[usize]) -> Option<&'static [usize]> {
     let mut mirrored: Vec<usize> = parts.iter().map(|&part| MIRROR[part]).collect();
     mirrored.sort_unstable();
     let all = JointSet::ALL.into_iter().flat_map(|joint_set| joint_set.joints);
-    all.map(|it| it.parts).find(|parts| *parts == mirrored)
+    all.map(|joint| joint.parts).find(|parts| *parts == mirrored)
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub struct ViewObservation {
     pub centres: Vec<[f64; 2]>,
     /// Error of every part, tenths of the person's size.
     pub errors: Vec<f32>,
-    /// Whether left and right are exchanged according to the ground truth: the person is seen from behind.
+    /// True if left and right are exchanged according to the ground truth: the person is seen from behind.
     pub exchanged: bool,
     /// Size of the person, pixels.
     pub size: f64,
@@ -53,7 +53,7 @@ pub struct ViewObservation {
 /// Two views of one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct Pair<'a> {
-    /// What was observed in each.
+    /// Observations of the two views.
     pub views: [&'a ViewObservation; 2],
     /// The angle from the first to the second as seen from the person (`crate::angle_between`), radians.
     pub angle: Option<f64>,
@@ -79,7 +79,7 @@ pub struct Learner {
     shape: Shape,
     ring: Vec<Counts>,
     named: Vec<NamedPair>,
-    /// Of every part.
+    /// Errors of every part.
     errors: Vec<Vec<f32>>,
     joints: JointFit,
     from: LearnedFrom,
@@ -111,7 +111,7 @@ impl Learner {
         if view.centres.len() != N_PARTS || mean > self.settings.max_mean_error {
             return;
         }
-        let part = |it: usize| view.centres[self.shape.partner(it, view.exchanged)];
+        let part = |part: usize| view.centres[self.shape.partner(part, view.exchanged)];
         let centres: Vec<[f64; 2]> = (0..N_PARTS).map(part).collect();
         for (joint, at) in set.joints.iter().zip(&view.joints) {
             if let Some(at) = at {
@@ -152,7 +152,7 @@ impl Learner {
     }
 
     fn add_named(&mut self, cameras: [&str; 2], part: usize, types: [usize; 2], exchanged: bool) {
-        let at = self.named.iter().position(|it| it.cameras == cameras);
+        let at = self.named.iter().position(|named| named.cameras == cameras);
         let at = at.unwrap_or_else(|| {
             self.named.push(NamedPair {
                 cameras: cameras.map(str::to_owned),
@@ -166,8 +166,9 @@ impl Learner {
     /// A type counts if its part and the parent, to which it is relative, are right.
     fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
-        let right =
-            |it: usize| view.errors.get(it).is_some_and(|error| *error <= self.settings.max_error);
+        let right = |part: usize| {
+            view.errors.get(part).is_some_and(|error| *error <= self.settings.max_error)
+        };
         right(part) && right(parent)
     }
 
@@ -192,7 +193,7 @@ impl Learner {
                 let joint = own.joint(&self.shape, &marginals, self.settings.smoothing, exchanged);
                 for (part, cells) in theirs.of(exchanged).iter().enumerate() {
                     let (rows, cols) = (joint[part].column_sum(), joint[part].row_sum());
-                    for (cell, count) in cells.iter().enumerate().filter(|it| *it.1 > 0) {
+                    for (cell, count) in cells.iter().enumerate().filter(|cell| *cell.1 > 0) {
                         let at = (cell / cols.len(), cell % cols.len());
                         let lift = joint[part][at] / (rows[at.0] * cols[at.1]);
                         sum += f64::from(*count) * lift.ln();
@@ -218,7 +219,7 @@ impl Learner {
         rig: Option<&str>,
         ridge: Option<f64>,
     ) -> Result<Learned, LearnError> {
-        if self.ring.iter().all(|it| it.total() == 0) {
+        if self.ring.iter().all(|counts| counts.total() == 0) {
             return Err(LearnError::Nothing {
                 views: self.from.views,
             });

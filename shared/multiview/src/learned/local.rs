@@ -34,7 +34,7 @@ pub struct Local {
 }
 
 impl Local {
-    /// What is tried, the plainest first.
+    /// Returns the settings that are tried, the plainest first.
     pub fn tried() -> Vec<Self> {
         let with = |reach| [1e-2, 1e-3, 1e-4].map(|ridge| Self { reach, ridge });
         [1, 2, 4].into_iter().flat_map(with).collect()
@@ -113,11 +113,13 @@ impl Local {
 ///
 /// * `rows`: as of [`Local::learn`]; the parts themselves without them.
 pub fn mean_error(rows: Option<&[Vec<f64>]>, people: &[&Marked]) -> Option<f64> {
-    let of_person = |it: &&Marked| {
-        let size = size(&it.joints);
+    let of_person = |person: &&Marked| {
+        let size = size(&person.joints);
         let joint = |joint: usize| {
-            let at = rows.map_or(it.centres[own(joint)], |rows| read(&rows[joint], it));
-            let [x, y] = [0, 1].map(|axis| at[axis] - it.joints[joint][axis]);
+            let at = rows.map_or(person.centres[own(joint)], |rows| {
+                read(&rows[joint], person)
+            });
+            let [x, y] = [0, 1].map(|axis| at[axis] - person.joints[joint][axis]);
             100.0 * (x.hypot(y) / size).min(LIMIT)
         };
         (0..N_JOINTS).map(joint).sum::<f64>() / N_JOINTS as f64
@@ -136,7 +138,7 @@ pub fn try_all(sets: &[Vec<Marked>]) -> Vec<Tried> {
 
 /// The settings of the least error, every data set counting the same; of equal ones the first.
 pub fn best(tried: &[Tried]) -> Option<&Tried> {
-    let mean = |it: &&Tried| it.1.iter().sum::<f64>();
+    let mean = |tried: &&Tried| tried.1.iter().sum::<f64>();
     tried.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)))
 }
 

@@ -1,4 +1,4 @@
-//! What of a person model the tables depend on.
+//! Properties of a person model on which the tables depend.
 
 use fmp::Model;
 

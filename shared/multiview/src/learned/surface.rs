@@ -153,8 +153,8 @@ mod tests {
         let tried = grid.appearance(&without_appearance(0.004, Some(4.0)));
         assert_eq!(tried.len(), 3 * 8);
         let alphas = [0.002, 0.004, 0.008];
-        assert!(tried.iter().all(|it| alphas.contains(&it.alpha)));
-        assert!(tried.iter().all(|it| it.max_distance_cells == Some(4.0)));
+        assert!(tried.iter().all(|settings| alphas.contains(&settings.alpha)));
+        assert!(tried.iter().all(|settings| settings.max_distance_cells == Some(4.0)));
         let at_the_edge = grid.appearance(&without_appearance(0.0005, None));
         assert_eq!(at_the_edge.len(), 2 * 8);
     }

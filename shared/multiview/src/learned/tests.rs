@@ -74,8 +74,8 @@ fn types_seen_together_are_likely_at_their_angle_in_both_directions() {
 #[test]
 fn the_order_of_two_views_does_not_matter() {
     let views = [
-        observation(|it| (it % 3) as u8, 0.1, false),
-        observation(|it| (it % 2) as u8, 0.1, true),
+        observation(|part| (part % 3) as u8, 0.1, false),
+        observation(|part| (part % 2) as u8, 0.1, true),
     ];
     let [mut one, mut other] = [learner(), learner()];
     add_views(&mut one, [&views[0], &views[1]], 70.0, 30);
@@ -162,7 +162,7 @@ fn unseen_pairs_of_types_have_no_lift_without_data() {
 #[test]
 fn the_lift_is_positive_for_similar_people_only() {
     let [mut own, mut alike, mut other] = [learner(), learner(), learner()];
-    let person = |it: u8| observation(move |_| it, 0.1, false);
+    let person = |part_type: u8| observation(move |_| part_type, 0.1, false);
     for [a, b] in [[0, 2], [1, 1], [2, 0]] {
         add_views(&mut own, [&person(a), &person(b)], 50.0, 40);
         add_views(&mut alike, [&person(a), &person(b)], 50.0, 10);
@@ -195,7 +195,7 @@ proptest! {
 fn example() -> Learned {
     let mut learner = learner();
     let views = [
-        observation(|it| (it % 3) as u8, 0.1, false),
+        observation(|part| (part % 3) as u8, 0.1, false),
         observation(|_| 1, 0.2, true),
     ];
     add_views(&mut learner, [&views[0], &views[1]], 100.0, 3);

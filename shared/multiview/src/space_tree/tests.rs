@@ -62,7 +62,7 @@ const SIGMA: f64 = 9.0;
 const EPS: f64 = 0.02;
 
 impl Bumps {
-    fn of(camera: &Camera) -> Self {
+    fn new(camera: &Camera) -> Self {
         Self::of_joints(camera, &STANDING)
     }
 
@@ -71,7 +71,7 @@ impl Bumps {
             let at = camera.project(&Point3::from(joint)).unwrap();
             Some([at.x, at.y])
         });
-        let maxima = at.map(|at| at.map_or_else(Vec::new, |it| vec![(it, 1.02_f32.ln())]));
+        let maxima = at.map(|at| at.map_or_else(Vec::new, |point| vec![(point, 1.02_f32.ln())]));
         Self {
             at,
             maxima: maxima.to_vec(),
@@ -123,7 +123,7 @@ fn solved_by<E: JointEvidence>(
 fn worst(found: &SpacePose) -> f64 {
     let errors = found.joints.iter().zip(STANDING);
     errors
-        .filter_map(|(it, truth)| Some(((*it)? - Point3::from(truth)).norm()))
+        .filter_map(|(joint, truth)| Some(((*joint)? - Point3::from(truth)).norm()))
         .fold(0.0, f64::max)
 }
 
@@ -133,7 +133,7 @@ const RING: [f64; 4] = [10.0, 95.0, 190.0, 260.0];
 fn a_person_whom_all_views_show_is_found() {
     for n in 2..=4 {
         let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
-        let bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
+        let bumps: Vec<Bumps> = cameras.iter().map(Bumps::new).collect();
         let error = worst(&solved(&cameras, &bumps));
         assert!(error < 0.03, "{n} views: {error}");
     }
@@ -142,7 +142,7 @@ fn a_person_whom_all_views_show_is_found() {
 #[test]
 fn a_joint_that_views_put_elsewhere_is_outvoted_by_bones_and_the_other_views() {
     let cameras = RING.map(camera);
-    let mut bumps = cameras.each_ref().map(Bumps::of);
+    let mut bumps = cameras.each_ref().map(Bumps::new);
     for (view, joint) in [(0, 6), (1, 6), (2, 0), (3, 10)] {
         let wrong = bumps[view].at[joint].map(|at| [at[0] + 70.0, at[1] - 40.0]);
         bumps[view].at[joint] = wrong;
@@ -155,7 +155,7 @@ fn a_joint_that_views_put_elsewhere_is_outvoted_by_bones_and_the_other_views() {
 #[test]
 fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() {
     let cameras = RING.map(camera);
-    let mut bumps = cameras.each_ref().map(Bumps::of);
+    let mut bumps = cameras.each_ref().map(Bumps::new);
     for view in [1, 3] {
         bumps[view].at[6] = None;
         bumps[view].maxima[6].clear();
@@ -183,7 +183,7 @@ fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() 
 fn a_view_that_names_the_sides_the_wrong_way_is_exchanged() {
     for n in 3..=4 {
         let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
-        let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
+        let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::new).collect();
         for [right, left] in LIMBS.into_iter().flatten() {
             bumps[1].at.swap(right, left);
             bumps[1].maxima.swap(right, left);
@@ -201,7 +201,7 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
     };
     for (n, exchanged) in [(2, 0b10), (3, 0b011), (4, 0b1010), (4, 0b0110), (4, 0b1111)] {
         let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
-        let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
+        let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::new).collect();
         for view in (0..n).filter(|i| exchanged >> i & 1 == 1) {
             for [right, left] in LIMBS.into_iter().flatten() {
                 bumps[view].at.swap(right, left);
@@ -240,7 +240,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
     }
     let cameras = [45.0, 135.0, 225.0, 315.0].map(camera);
     let bumps = cameras.each_ref().map(|camera| {
-        let mut seen = Bumps::of_joints(camera, &flat);
+        let mut seen = Bumps::new_joints(camera, &flat);
         // The side on the left of the picture is called the right one.
         for [right, left] in LIMBS.into_iter().flatten() {
             if seen.at[right].unwrap()[0] > seen.at[left].unwrap()[0] {
@@ -272,7 +272,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
 #[test]
 fn a_camera_that_was_turned_is_left_out_where_three_others_agree() {
     let cameras = RING.map(camera);
-    let bumps = cameras.each_ref().map(Bumps::of);
+    let bumps = cameras.each_ref().map(Bumps::new);
     for turned in 0..4 {
         let mut calibrated = cameras.clone();
         let turn = UnitQuaternion::from_euler_angles(0.0, 3.0_f64.to_radians(), 0.0);
@@ -337,8 +337,8 @@ fn whoever_is_the_same_person_in_most_views_is_chosen() {
 struct EitherLeg(Bumps);
 
 impl EitherLeg {
-    fn of(camera: &Camera) -> Self {
-        let mut bumps = Bumps::of(camera);
+    fn new(camera: &Camera) -> Self {
+        let mut bumps = Bumps::new(camera);
         for [right, left] in [[1, 4], [0, 5]] {
             let places = [left, right].map(|i| bumps.at[i].unwrap());
             let heats: [f32; 2] = [1.0, 0.8];
@@ -353,7 +353,7 @@ impl EitherLeg {
 
 impl JointEvidence for EitherLeg {
     fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
-        let heat = |it: usize| self.0.at(it, point).exp() - EPS as f32;
+        let heat = |joint: usize| self.0.at(joint, point).exp() - EPS as f32;
         match joint {
             0 | 5 => (heat(5).max(0.8 * heat(0)) + EPS as f32).ln(),
             1 | 4 => (heat(4).max(0.8 * heat(1)) + EPS as f32).ln(),
@@ -373,7 +373,7 @@ impl JointEvidence for EitherLeg {
 #[test]
 fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
     let cameras = RING.map(camera);
-    let evidence = cameras.each_ref().map(EitherLeg::of);
+    let evidence = cameras.each_ref().map(EitherLeg::new);
     let apart = solved(&cameras, &evidence);
     assert!(worst(&apart) < 0.03, "{}", worst(&apart));
     let without = SpaceSettings {
@@ -388,7 +388,7 @@ fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
 fn legs_that_are_together_stay_together() {
     // What both maps show is in one place only: there is no other leg to find.
     let cameras = RING.map(camera);
-    let mut bumps = cameras.each_ref().map(Bumps::of);
+    let mut bumps = cameras.each_ref().map(Bumps::new);
     for view in &mut bumps {
         for [right, left] in [[1, 4], [0, 5]] {
             view.at[right] = view.at[left];

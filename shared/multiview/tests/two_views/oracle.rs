@@ -122,8 +122,7 @@ pub(crate) fn released(
     sum
 }
 
-/// Whether a part of the support is on: it is good enough, or both are bad but it is clearly
-/// better.
+/// Returns true if a part of the support is on: it is good enough, or both are bad but it is clearly better.
 ///
 /// * `parts`: of the support and of the target.
 fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usize; 2]) -> bool {

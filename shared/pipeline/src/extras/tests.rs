@@ -32,7 +32,7 @@ const JOINTS: [[f64; 3]; 14] = [
 ];
 const EXTRAS: [[f64; 3]; 3] = [[0.1, 0.0, 1.62], [0.1, 0.13, 0.02], [0.3, -0.13, 0.02]];
 
-/// What all views found, and the step.
+/// Sightings of all views, and the step.
 struct Scene {
     step: ExtrasStep,
     skeleton: Skeleton,
@@ -102,9 +102,9 @@ impl Scene {
 }
 
 fn skeleton() -> Skeleton {
-    let joint = |it: &[f64; 3]| {
+    let joint = |point: &[f64; 3]| {
         Ok(Triangulated {
-            in_world: Point3::from(*it),
+            in_world: Point3::from(*point),
             covariance: Matrix3::identity() * 1e-4,
             reprojection_px: 0.0,
             views_used: 0b1111,
@@ -136,7 +136,7 @@ fn check(found: &[Result<Triangulated, NoJoint>]) {
 fn what_all_views_see_lies_where_it_is() {
     let found = Scene::new().run();
     check(&found);
-    assert!(found.iter().flatten().all(|it| it.views_used == 0b1111));
+    assert!(found.iter().flatten().all(|joint| joint.views_used == 0b1111));
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn a_view_that_exchanges_the_legs_takes_part() {
     person.extras.swap(1, 2);
     let found = scene.run();
     check(&found);
-    assert!(found.iter().flatten().all(|it| it.views_used == 0b1111));
+    assert!(found.iter().flatten().all(|joint| joint.views_used == 0b1111));
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn the_candidate_that_is_the_person_counts() {
     scene.seen[3].pop();
     let found = scene.run();
     check(&found);
-    assert!(found.iter().flatten().all(|it| it.views_used == 0b0111));
+    assert!(found.iter().flatten().all(|joint| joint.views_used == 0b0111));
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn a_candidate_without_its_keypoints_is_no_other_one() {
     scene.seen[0][1].extras.clear();
     let found = scene.run();
     check(&found);
-    assert!(found.iter().flatten().all(|it| it.views_used == 0b1110));
+    assert!(found.iter().flatten().all(|joint| joint.views_used == 0b1110));
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub(crate) fn camera(view: usize) -> Camera {
     }
 }
 
-/// What a view sees of a person who stands at a place.
+/// Returns a view's sighting of a person who stands at a place.
 fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> FoundBody {
     let line = [1.75, 1.5, 0.95, 0.5, 0.08].map(|z| Point3::new(x, y, z));
     let points_px = line.map(|line| <[f64; 2]>::from(camera.project(&line).unwrap()));
@@ -73,13 +73,14 @@ fn three_people_are_found_where_they_stand_the_clearest_first() {
     let cameras = cameras(4);
     let people = [([-1.0, 0.4], 0.6), ([0.9, 0.8], 1.0), ([0.2, -1.1], 0.8)];
     let found = found(&cameras, &people).people;
-    let places: Vec<[f64; 2]> = found.iter().map(|it| [it.place.x, it.place.y]).collect();
+    let places: Vec<[f64; 2]> =
+        found.iter().map(|person| [person.place.x, person.place.y]).collect();
     assert_eq!(places.len(), 3, "{places:?}");
     for (got, index) in places.iter().zip([1, 2, 0]) {
         let [x, y] = people[index].0;
         assert!((got[0] - x).hypot(got[1] - y) < 1e-6, "{places:?}");
     }
-    assert!(found.iter().all(|it| it.n_views() == 4));
+    assert!(found.iter().all(|person| person.n_views() == 4));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What the steps of `fuse` and `triangulate` allocate for a frame, once their buffers are there.
+//! Allocations of the steps of `fuse` and `triangulate` for a frame, once their buffers are there.
 //!
 //! The goal is nothing; it is not reached. Nothing as large as a response map is allocated: a frame of four times the
 //! cells takes no more than a small one. What is left are the answers themselves (the poses of every solution, the
@@ -25,19 +25,19 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 /// Views of the rig; pairs are the six of them.
 const N_VIEWS: usize = 4;
 
-/// Of `fuse`, for each single-view solution.
+/// Limit of `fuse`, for each single-view solution.
 const MOST_OF_SOLUTION: Count = Count {
     allocations: 13,
     bytes: 5_500,
 };
 
-/// Of `triangulate`.
+/// Limit of `triangulate`.
 const MOST_OF_SKELETON: Count = Count {
     allocations: 580,
     bytes: 250_000,
 };
 
-/// What a call allocates and reallocates, and how many bytes that are.
+/// Number of allocations and reallocations of a call, and of their bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Count {
     allocations: usize,
@@ -64,7 +64,7 @@ fn count<T>(call: impl FnOnce() -> T) -> (T, Count) {
     (answer, count)
 }
 
-/// What a frame of pairs takes in `fuse` for each of its single-view solutions, and in `triangulate`.
+/// Counts a frame of pairs: in `fuse` for each of its single-view solutions, and in `triangulate`.
 fn of_frame(rows: usize, combine: Combine) -> [Count; 2] {
     let scene = Scene::new(rows, N_VIEWS);
     let settings = multiview::Settings::default();

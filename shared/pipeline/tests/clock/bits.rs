@@ -39,7 +39,7 @@ fn digits(skeletons: &[Skeleton]) -> Vec<String> {
 fn with_equal_capture_times_the_result_is_the_same_to_the_bit() {
     let scene = Scene::new(48, 3);
     let before = skeletons(&scene, false, [0.0; 3]);
-    assert!(before.iter().all(|it| it.joints.iter().any(Result::is_ok)));
+    assert!(before.iter().all(|skeleton| skeleton.joints.iter().any(Result::is_ok)));
     assert_eq!(digits(&before), digits(&skeletons(&scene, true, [0.0; 3])));
     let untold = skeletons(&scene, false, [0.0, 0.01, -0.01]);
     assert_eq!(digits(&before), digits(&untold), "no rate, no velocities");

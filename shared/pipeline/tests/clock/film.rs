@@ -55,7 +55,7 @@ impl Film {
         core::array::from_fn(|_| Vector2::new(one(), one()))
     }
 
-    /// What a camera sees at a time.
+    /// Returns the joints that a camera sees at a time.
     pub(crate) fn see(
         &self,
         camera: &Camera,
@@ -111,7 +111,7 @@ impl Random {
         ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
-    /// Of mean 0 and standard deviation 1.
+    /// Draws from a normal distribution of mean 0 and standard deviation 1.
     fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.unit().ln()).sqrt();
         radius * (core::f64::consts::TAU * self.unit()).cos()

@@ -77,7 +77,7 @@ fn nothing_is_found_where_all_are_in_step() {
                 &cameras,
             );
             for view in 0..4 {
-                let off = watch.step(view).map_or(0.0, |it| it.offset_ms);
+                let off = watch.step(view).map_or(0.0, |step| step.offset_ms);
                 worst = worst.max(off.abs());
                 assert!(!watch.is_reported(view), "{seed}: {off}");
             }
@@ -94,7 +94,7 @@ fn nothing_is_said_of_a_person_who_does_not_move() {
     for frame in 0..600 {
         let views = cameras.iter().map(|camera| {
             let noise = film.noise();
-            Some(film.see(camera, 1.0, &noise).map(|it| [it.x, it.y]).to_vec())
+            Some(film.see(camera, 1.0, &noise).map(|point| [point.x, point.y]).to_vec())
         });
         watch.note(
             f64::from(frame) / RATE_HZ,

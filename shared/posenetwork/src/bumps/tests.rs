@@ -121,7 +121,7 @@ fn a_gaussian_at_the_edge_or_beyond_it_stays_within_the_window() {
         bump(2, [-500.0, 9000.0], 0.9, [2.0, 2.0], 0.0),
     ];
     let (sent, found, received) = there_and_back(&given);
-    assert!(found.iter().all(|it| it.joint == 1), "{found:?}");
+    assert!(found.iter().all(|bump| bump.joint == 1), "{found:?}");
     assert!(off(&sent, &received) < 0.03, "{found:?}");
 }
 

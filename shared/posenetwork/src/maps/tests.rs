@@ -60,7 +60,7 @@ fn a_joint_is_highest_where_its_keypoint_lies_and_as_high_as_its_score() {
 #[test]
 fn a_keypoint_that_is_no_joint_is_told_with_its_deviation() {
     let mut keypoints = person();
-    let heel = BODY_25.iter().position(|it| *it == "left heel").unwrap();
+    let heel = BODY_25.iter().position(|name| *name == "left heel").unwrap();
     let mut maps = maps(&keypoints);
     let (found, sigma_px) = maps.keypoint(heel).unwrap();
     assert_eq!(Some(found), keypoints[heel]);

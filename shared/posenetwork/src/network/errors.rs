@@ -55,7 +55,7 @@ pub enum LookError {
     Output {
         /// Its name.
         name: String,
-        /// What is wrong.
+        /// Error of the output.
         error: OutputError,
     },
     /// An output does not consist of numbers in single precision.

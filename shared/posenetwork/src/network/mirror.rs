@@ -1,4 +1,4 @@
-//! What a network sees in the mirror image of a window, beside what it sees in the window.
+//! Look at the mirror image of a window, beside the look at the window.
 
 use keypoints::{Card, Codec, Layout, mirrored};
 

@@ -39,7 +39,7 @@ pub(super) fn fitted(net: &Network, card: &str) -> Result<PoseNetwork, FitError>
     PoseNetwork::new(session, Card::parse(card).unwrap())
 }
 
-/// What is said of a network that does not fit.
+/// Returns the message for a network that does not fit.
 fn refused(net: &Network, card: &str) -> String {
     fitted(net, card).unwrap_err().to_string()
 }

@@ -38,8 +38,8 @@ impl Turn {
     /// * `towards`: pixels of the picture, across and down.
     pub(crate) fn towards(self, [x, y]: [f64; 2], most: f64) -> Self {
         let angle = x.atan2(-y);
-        let off = |it: &Self| {
-            let off = (angle - it.angle()).abs();
+        let off = |turn: &Self| {
+            let off = (angle - turn.angle()).abs();
             off.min(core::f64::consts::TAU - off)
         };
         if off(&self) <= most || !angle.is_finite() {
@@ -49,7 +49,7 @@ impl Turn {
         all.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(self)
     }
 
-    /// Whether columns become rows.
+    /// Returns true if columns become rows.
     pub(super) fn is_sideways(self) -> bool {
         matches!(self, Self::Right | Self::Left)
     }
@@ -132,8 +132,8 @@ impl Turn {
         }
         let front = card.also.front.as_deref();
         let mut named = network.outputs.iter().zip(outputs).rev();
-        let found = named.find(|it| Some(it.0.as_str()) == front);
-        if let Some(right) = found.and_then(|it| it.1.values.first_mut()) {
+        let found = named.find(|output| Some(output.0.as_str()) == front);
+        if let Some(right) = found.and_then(|output| output.1.values.first_mut()) {
             // Towards the side of the input is up or down in the picture, of which nothing is told.
             *right = if self == Self::Down { -*right } else { 0.0 };
         }

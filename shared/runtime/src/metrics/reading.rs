@@ -94,9 +94,9 @@ pub struct Reading {
     pub n_people: Option<u32>,
     /// Its view, if it works for one.
     pub view: Option<ViewName>,
-    /// Whether it has received the end of stream and sent it on.
+    /// True if it has received the end of stream and sent it on.
     pub is_finished: bool,
-    /// What became of the pictures of its live camera, if it has one.
+    /// Counts of the pictures of its live camera, if it has one.
     pub camera: Option<CameraCounts>,
     /// Durations by stage and view.
     pub times: Vec<Timed>,
@@ -146,7 +146,7 @@ impl Reading {
         let mut times: Vec<Timed> = Vec::with_capacity(rows.len());
         for (second, row) in rows.iter().enumerate() {
             let timed = timed(second, row)?;
-            let same = |it: &Timed| it.span == timed.span && it.view == timed.view;
+            let same = |other: &Timed| other.span == timed.span && other.view == timed.view;
             if let Some(first) = times.iter().position(same) {
                 return Err(ReadingError::Twice { first, second });
             }
@@ -177,10 +177,10 @@ impl Reading {
             memory_bytes: message.memory_bytes,
             peak_memory_bytes: message.peak_memory_bytes,
             queue: queue_of(message)?,
-            n_people: Some(message.n_people).filter(|it| *it != NO_PEOPLE),
+            n_people: Some(message.n_people).filter(|n| *n != NO_PEOPLE),
             view: view.map(|index| ViewName { index, name }),
             is_finished: message.finished == 1,
-            camera: Some(message.camera).filter(|it| it.n_connections > 0),
+            camera: Some(message.camera).filter(|camera| camera.n_connections > 0),
             times,
         })
     }
@@ -285,7 +285,7 @@ fn queue_of(message: &Metrics) -> Result<Option<[u32; 2]>, ReadingError> {
 fn name_of(bytes: &[u8; MAX_NAME]) -> Result<String, ReadingError> {
     let len = bytes.iter().position(|byte| *byte == 0).unwrap_or(MAX_NAME);
     let (name, rest) = bytes.split_at(len);
-    let name = core::str::from_utf8(name).ok().filter(|_| rest.iter().all(|it| *it == 0));
+    let name = core::str::from_utf8(name).ok().filter(|_| rest.iter().all(|byte| *byte == 0));
     name.map(str::to_owned).ok_or(ReadingError::Name)
 }
 
@@ -481,7 +481,7 @@ mod tests {
 
     #[test]
     fn refuses_counts_that_contradict_each_other() {
-        let is_contradiction = |it| matches!(it, ReadingError::Contradiction { .. });
+        let is_contradiction = |error| matches!(error, ReadingError::Contradiction { .. });
         assert!(is_contradiction(refused(|message| message.queue = 3)));
         assert!(is_contradiction(refused(|message| (
             message.queue,

@@ -12,9 +12,9 @@ pub enum Denied {
         "cannot run on cores {}: {} may be used", text::list(.asked), text::list(.allowed)
     )]
     Cores {
-        /// What was asked for.
+        /// Cores that were asked for.
         asked: Vec<usize>,
-        /// What may be used.
+        /// Cores that may be used.
         allowed: Vec<usize>,
         /// Why, if the system call failed.
         #[source]
@@ -23,7 +23,7 @@ pub enum Denied {
     /// The real-time priority may not be used.
     #[error("cannot run at real-time priority {} ({})", .asked.priority, .asked.policy.system_name())]
     RealTime {
-        /// What was asked for.
+        /// Priority that was asked for.
         asked: RealTime,
         /// Why.
         #[source]
@@ -64,7 +64,7 @@ impl From<io::ErrorKind> for Refusal {
 }
 
 impl Denied {
-    /// What to try.
+    /// Returns a remedy to try.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Cores { .. } => {

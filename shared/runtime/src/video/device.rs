@@ -10,7 +10,7 @@ use rustix::fs::{FileType, Mode, OFlags, major, open, stat};
 use super::raw::{self, Raw, Request};
 use super::{FourCc, VideoError};
 
-/// What a device says that it is.
+/// Description of a device by itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoAbout {
     /// Name of the camera.
@@ -21,7 +21,7 @@ pub struct VideoAbout {
     pub bus: String,
 }
 
-/// What is wanted of a device; what is not given stays as the device has it.
+/// Wishes for a device; a setting that is not given stays as the device has it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VideoWish {
     /// Formats, the best first; the first that the device has is taken.
@@ -121,7 +121,7 @@ impl VideoDevice {
         Ok(capability)
     }
 
-    /// What it says that it is.
+    /// Returns the device's description of itself.
     ///
     /// # Errors
     ///
@@ -203,7 +203,7 @@ pub fn video_devices() -> io::Result<Vec<PathBuf>> {
         found.extend(number.map(|number| (number, Path::new("/dev").join(name))));
     }
     found.sort();
-    Ok(found.into_iter().map(|it| it.1).collect())
+    Ok(found.into_iter().map(|device| device.1).collect())
 }
 
 #[cfg(test)]

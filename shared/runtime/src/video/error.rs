@@ -21,7 +21,7 @@ pub enum VideoError {
     NoCamera {
         /// Which.
         path: PathBuf,
-        /// What is missing.
+        /// Condition that is missing.
         why: String,
     },
     /// A request failed.
@@ -29,7 +29,7 @@ pub enum VideoError {
     Request {
         /// Which.
         path: PathBuf,
-        /// What was asked for.
+        /// Request to the kernel.
         what: &'static str,
         /// Why.
         source: io::Error,
@@ -43,7 +43,7 @@ pub enum VideoError {
         what: &'static str,
         /// As asked for.
         wanted: String,
-        /// What it has.
+        /// Choices that the device has.
         offered: String,
     },
     /// A control that it does not have.
@@ -53,7 +53,7 @@ pub enum VideoError {
         path: PathBuf,
         /// As asked for.
         name: String,
-        /// What it has.
+        /// Controls that the device has.
         offered: String,
     },
     /// A value that a control does not take.
@@ -65,7 +65,7 @@ pub enum VideoError {
         name: String,
         /// As asked for.
         value: i64,
-        /// What it takes.
+        /// Values that the control takes.
         expected: String,
     },
     /// It does not deliver any more.
@@ -73,7 +73,7 @@ pub enum VideoError {
     Gone {
         /// Which.
         path: PathBuf,
-        /// What the kernel said.
+        /// Error of the kernel.
         source: io::Error,
     },
 }

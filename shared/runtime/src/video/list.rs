@@ -1,4 +1,4 @@
-//! What a device offers: formats, sizes, rates, controls.
+//! Capabilities of a device: formats, sizes, rates, controls.
 
 use super::device::{rate_hz, text};
 use super::raw::{self, QueryControl};
@@ -49,16 +49,16 @@ impl VideoSize {
 impl VideoFormat {
     /// The size itself where it is offered, else the largest that is.
     pub(super) fn nearest(&self, size: [u32; 2]) -> Option<[u32; 2]> {
-        if self.sizes.iter().any(|it| it.has(size)) {
+        if self.sizes.iter().any(|range| range.has(size)) {
             return Some(size);
         }
         let all = self.sizes.iter().map(|size| size.most);
-        all.max_by_key(|it| u64::from(it[0]) * u64::from(it[1]))
+        all.max_by_key(|size| u64::from(size[0]) * u64::from(size[1]))
     }
 
     pub(super) fn rates_at(&self, size: [u32; 2]) -> Vec<f64> {
-        let own = self.sizes.iter().find(|it| it.has(size));
-        own.map_or_else(Vec::new, |it| it.rates_hz.clone())
+        let own = self.sizes.iter().find(|range| range.has(size));
+        own.map_or_else(Vec::new, |range| range.rates_hz.clone())
     }
 }
 
@@ -77,12 +77,12 @@ pub struct VideoControl {
     pub value: Option<i32>,
     /// The choices of a menu: number and name.
     pub choices: Vec<(u32, String)>,
-    /// Whether it cannot be set, now or ever.
+    /// True if it cannot be set, now or ever.
     pub is_fixed: bool,
 }
 
 impl VideoControl {
-    /// What it takes, for people.
+    /// Returns the values that it takes, for people.
     pub fn takes(&self) -> String {
         if self.choices.is_empty() {
             let [least, most, step] = self.range;
@@ -92,13 +92,13 @@ impl VideoControl {
                 format!("{least} to {most}")
             };
         }
-        let all = self.choices.iter().map(|(it, name)| format!("{it} ({name})"));
+        let all = self.choices.iter().map(|(value, name)| format!("{value} ({name})"));
         all.collect::<Vec<_>>().join(", ")
     }
 
     fn accepts(&self, value: i64) -> bool {
         let [least, most, _] = self.range.map(i64::from);
-        let is_choice = |it: &(u32, String)| i64::from(it.0) == value;
+        let is_choice = |choice: &(u32, String)| i64::from(choice.0) == value;
         (least..=most).contains(&value)
             && (self.choices.is_empty() || self.choices.iter().any(is_choice))
     }
@@ -295,7 +295,7 @@ impl VideoDevice {
 /// The driver's name of a control as a key: `Exposure Time, Absolute` is `exposure_time_absolute`.
 fn as_key(name: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric();
-    let words = name.split(|it| !is_plain(it)).filter(|part| !part.is_empty());
+    let words = name.split(|letter| !is_plain(letter)).filter(|part| !part.is_empty());
     words.collect::<Vec<_>>().join("_").to_ascii_lowercase()
 }
 

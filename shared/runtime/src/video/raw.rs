@@ -274,7 +274,7 @@ raw!(FrameInterval: ENUM_FRAMEINTERVALS);
 ///
 /// # Errors
 ///
-/// What the kernel says.
+/// Errors of the kernel.
 ///
 /// # Panics
 ///

@@ -16,14 +16,14 @@ impl VideoDevice {
         let has = |four_cc: &FourCc| offered.iter().any(|offer| offer.format == *four_cc);
         let format = match &wish.formats[..] {
             [] => now.format,
-            wanted => *wanted.iter().find(|it| has(it)).ok_or_else(|| {
+            wanted => *wanted.iter().find(|format| has(format)).ok_or_else(|| {
                 let names: Vec<String> = wanted.iter().map(ToString::to_string).collect();
                 self.not_offered("format", names.join(" or "), names_of(&offered))
             })?,
         };
         let size = wish.size.unwrap_or_else(|| {
-            let own = offered.iter().find(|it| it.format == format);
-            own.and_then(|it| it.nearest(now.size)).unwrap_or(now.size)
+            let own = offered.iter().find(|offer| offer.format == format);
+            own.and_then(|offer| offer.nearest(now.size)).unwrap_or(now.size)
         });
         self.set_format(format, size, &offered)?;
         if let Some(rate) = wish.rate_hz {
@@ -78,8 +78,8 @@ impl VideoDevice {
         if asked.is_ok() && set.is_some_and(fits) {
             return Ok(());
         }
-        let own = offered.iter().find(|it| it.format == format);
-        let rates = own.map_or_else(Vec::new, |it| it.rates_at(size));
+        let own = offered.iter().find(|offer| offer.format == format);
+        let rates = own.map_or_else(Vec::new, |offer| offer.rates_at(size));
         let rates: Vec<String> = rates.iter().map(|rate| format!("{rate:.2}")).collect();
         let offered = if rates.is_empty() {
             set.map_or_else(|| "no choice".to_owned(), |set| format!("{set:.2}"))

@@ -25,9 +25,9 @@ pub struct VideoPicture<'a> {
     pub at_nanos: Option<u64>,
     /// Its number by the driver, which counts those that are lost too.
     pub sequence: u32,
-    /// Whether the driver marked it as damaged.
+    /// True if the driver marked it as damaged.
     pub is_damaged: bool,
-    /// Whether all buffers were full before it was read: what is lost next was lost for want of a buffer.
+    /// True if all buffers were full before it was read: the next loss was for want of a buffer.
     pub was_full: bool,
 }
 
@@ -149,7 +149,7 @@ impl VideoStream {
         }))
     }
 
-    /// Whether there is a picture within `patience`.
+    /// Returns true if there is a picture within `patience`.
     fn is_ready(&self, patience: Duration) -> Result<bool, VideoError> {
         let mut fds = [PollFd::from_borrowed_fd(self.device.fd(), PollFlags::IN)];
         let timeout = Timespec {
@@ -168,7 +168,7 @@ impl VideoStream {
         Ok(is_ready)
     }
 
-    /// Whether every buffer holds a picture, so that the driver has to lose the next one.
+    /// Returns true if every buffer holds a picture, so that the driver has to lose the next one.
     fn is_full(&self) -> bool {
         const DONE: u32 = 4;
         let is_done = |index: usize| {

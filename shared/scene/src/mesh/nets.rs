@@ -31,9 +31,9 @@ pub(super) fn surface(grid: &Grid) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
                 for axis in 0..3 {
                     let mut next = here;
                     next[axis] += 1;
-                    let inside = [here, next].map(|it| grid.values[grid.index(it)] < 0.0);
+                    let inside = [here, next].map(|cell| grid.values[grid.index(cell)] < 0.0);
                     if inside[0] != inside[1] {
-                        let around = around(here, axis).map(|it| at_cell[grid.index(it)]);
+                        let around = around(here, axis).map(|cell| at_cell[grid.index(cell)]);
                         let [a, b, c, d] = around;
                         let turned = if inside[0] {
                             [a, b, c, d]
@@ -75,7 +75,7 @@ fn cut(grid: &Grid, cell: [usize; 3]) -> Option<Point3<f32>> {
             let to = from | 1 << axis;
             if to != from && (values[from] < 0.0) != (values[to] < 0.0) {
                 let share = values[from] / (values[from] - values[to]);
-                let [a, b] = [from, to].map(|it| grid.point(corner(it)));
+                let [a, b] = [from, to].map(|i| grid.point(corner(i)));
                 sum += a.coords + (b - a) * share;
                 n += 1.0;
             }

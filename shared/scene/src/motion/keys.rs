@@ -155,10 +155,10 @@ fn sitting(it: Stance) -> Stance {
 }
 
 fn chair(it: Stance, phase: i64, random: &mut Random) -> Stance {
-    let rest = |it: Stance, random: &mut Random| match random.unit() {
-        share if share < 0.5 => it.arms([24.0, 8.0, -8.0], 62.0),
-        share if share < 0.75 => it.arms([42.0, 8.0, -42.0], 98.0),
-        _ => it.arm(0, [26.0, 14.0, 8.0], 84.0).arm(1, [24.0, 8.0, -8.0], 60.0),
+    let rest = |stance: Stance, random: &mut Random| match random.unit() {
+        share if share < 0.5 => stance.arms([24.0, 8.0, -8.0], 62.0),
+        share if share < 0.75 => stance.arms([42.0, 8.0, -42.0], 98.0),
+        _ => stance.arm(0, [26.0, 14.0, 8.0], 84.0).arm(1, [24.0, 8.0, -8.0], 60.0),
     };
     match phase {
         0 => it,
@@ -232,14 +232,14 @@ fn lean(it: Stance, nth: i64, actor: &Actor) -> Stance {
 }
 
 fn table(it: Stance, random: &mut Random) -> Stance {
-    let mut arm = |it: Stance, side: usize| {
+    let mut arm = |stance: Stance, side: usize| {
         let shoulder = [
             random.range(18.0, 64.0),
             random.range(4.0, 26.0),
             random.range(-25.0, 5.0),
         ];
         let elbow = random.range(26.0, 88.0);
-        it.arm(side, shoulder, elbow)
+        stance.arm(side, shoulder, elbow)
     };
     let it = arm(it, 0);
     let it = arm(it, 1);

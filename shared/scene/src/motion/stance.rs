@@ -17,7 +17,7 @@ pub(super) struct Stance {
     pub(super) spin: f64,
     /// Where the middle of the feet (or of the hips) is, metres.
     pub(super) place: [f64; 2],
-    /// Whether `place` is that of the feet.
+    /// True if `place` is that of the feet.
     pub(super) planted: bool,
     /// Height of the lowest point above the floor, metres.
     pub(super) lift: f64,

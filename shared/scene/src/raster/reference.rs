@@ -27,7 +27,7 @@ pub(super) fn nearest_triangle(
             .iter()
             .all(|(from, to)| (to - from).cross(&(p - from)).dot(&normal) >= 0.0);
         let depth = (camera.camera_from_world * p).z;
-        if inside && along > 0.0 && best.is_none_or(|it| depth < it.1) {
+        if inside && along > 0.0 && best.is_none_or(|best| depth < best.1) {
             best = Some((index as u32, depth));
         }
     }

@@ -191,7 +191,7 @@ fn chair([x, y]: [f32; 2], yaw: f32, material: Material) -> Vec<Block> {
     ]
 }
 
-/// Whether a block is off the stage, and neither at nor in front of a camera.
+/// Returns true if a block is off the stage, and neither at nor in front of a camera.
 fn is_free(block: &Block, cameras: &[Point3<f32>]) -> bool {
     let [x, y, _] = block.centre;
     let reach = block.half[0].hypot(block.half[1]);
@@ -211,7 +211,7 @@ fn is_free(block: &Block, cameras: &[Point3<f32>]) -> bool {
     })
 }
 
-/// Whether two blocks are so near that they may touch.
+/// Returns true if two blocks are so near that they may touch.
 fn touch(a: &Block, b: &Block) -> bool {
     let reach = |block: &Block| block.half[0].hypot(block.half[1]);
     (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]) < reach(a) + reach(b)

@@ -29,7 +29,7 @@ proptest! {
                 prop_assert!((room.low[axis] - 1e-3..=room.high[axis] + 1e-3).contains(&hit.at[axis]));
             }
             prop_assert!((hit.normal.norm() - 1.0).abs() < 1e-4 && hit.normal.dot(&way) < 1e-4);
-            prop_assert!(hit.colour.iter().all(|it| (0.0..2.0).contains(it)));
+            prop_assert!(hit.colour.iter().all(|channel| (0.0..2.0).contains(channel)));
         }
     }
 

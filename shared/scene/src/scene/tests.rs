@@ -50,7 +50,7 @@ fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
         let (mask, size) = (view.mask(), view.size());
         let [x1, y1, x2, y2] = seen.outline.unwrap();
         let mut inside = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
-        for (index, _) in mask.iter().enumerate().filter(|it| *it.1 > 0) {
+        for (index, _) in mask.iter().enumerate().filter(|pixel| *pixel.1 > 0) {
             let [x, y] = [(index % size.width) as f64, (index / size.width) as f64];
             inside = [
                 inside[0].min(x),
@@ -60,7 +60,7 @@ fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
             ];
         }
         assert_eq!(inside, [x1, y1, x2, y2]);
-        let visible = seen.pixels.iter().zip(seen.visible).filter(|it| it.1);
+        let visible = seen.pixels.iter().zip(seen.visible).filter(|point| point.1);
         let mut n_visible = 0;
         for (pixel, _) in visible {
             let [x, y] = pixel.unwrap();
@@ -139,7 +139,8 @@ fn a_person_covers_pixels_and_casts_a_shadow() {
     let mask = view.mask();
     let (mut covered, mut darker) = (0, 0);
     for (index, share) in mask.iter().enumerate() {
-        let grey = |it: &[u8]| it[3 * index..][..3].iter().map(|it| i32::from(*it)).sum::<i32>();
+        let grey =
+            |image: &[u8]| image[3 * index..][..3].iter().map(|byte| i32::from(*byte)).sum::<i32>();
         let difference = grey(&rgb) - grey(&view.backdrop.bytes);
         match share {
             0 => darker += i32::from(difference < -20),

@@ -11,7 +11,7 @@ use crate::subject::Subject;
 
 struct SolidBuilder<'a> {
     subject: &'a Subject,
-    /// Of the height.
+    /// Height, relative to a man of 1.75 m.
     scale: f32,
     pieces: Vec<(usize, Solid)>,
 }

@@ -80,7 +80,7 @@ impl Solid {
         }
     }
 
-    /// Whether a point is certainly farther than `limit`, by a bounding ball.
+    /// Returns true if a point is certainly farther than `limit`, by a bounding ball.
     pub(super) fn is_far(&self, at: &Point3<f32>, limit: f32) -> bool {
         let (centre, radius) = match self {
             Self::Cone {

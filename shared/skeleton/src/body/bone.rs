@@ -28,7 +28,7 @@ pub(crate) const HEAD: usize = 13;
 pub struct Bone {
     /// Name.
     pub name: &'static str,
-    /// What it is.
+    /// Kind of the bone.
     pub kind: Kind,
     /// It begins in the middle of these two joints; the same joint twice for all but the trunk.
     pub from: [usize; 2],

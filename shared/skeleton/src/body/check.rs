@@ -1,4 +1,4 @@
-//! Whether a skeleton can be a person, and which of its joints cannot.
+//! Check that a skeleton can be a person, and search for the joints that cannot belong to one.
 
 use crate::body::bone::{self, BONES, SIDES, clean, joints_of};
 use crate::body::lengths::{Learned, Lengths};
@@ -75,7 +75,7 @@ pub fn check(joints: &Joints, covariances: &Covariances, lengths: Option<&Length
     }
 }
 
-/// What is expected of a bone.
+/// Expected length of a bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Expected {
     pub(crate) metres: f64,
@@ -175,7 +175,7 @@ impl<'a> Judgement<'a> {
             for joint in joints_of(conflict.joints) {
                 spoilt[joint] += 1;
             }
-            if worst.is_none_or(|it| conflict.z > it.z) {
+            if worst.is_none_or(|worst| conflict.z > worst.z) {
                 worst = Some(conflict);
             }
         });
@@ -194,8 +194,8 @@ impl<'a> Judgement<'a> {
 
     /// Sum of the deviations of a joint's bones.
     fn strain(&self, joint: usize) -> f64 {
-        let of_joint = BONES.iter().zip(&self.z).filter(|it| it.0.mask() >> joint & 1 == 1);
-        of_joint.filter_map(|it| *it.1).map(f64::abs).sum()
+        let of_joint = BONES.iter().zip(&self.z).filter(|bone| bone.0.mask() >> joint & 1 == 1);
+        of_joint.filter_map(|bone| *bone.1).map(f64::abs).sum()
     }
 
     /// Calls `found` for everything that is impossible.

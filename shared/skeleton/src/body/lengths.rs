@@ -65,9 +65,9 @@ impl Lengths {
         }
         let lengths = bone::lengths(&verdict.keep(joints));
         for kind in Kind::ALL {
-            let of_kind = BONES.iter().zip(&lengths).filter(|it| it.0.kind == kind);
+            let of_kind = BONES.iter().zip(&lengths).filter(|bone| bone.0.kind == kind);
             let (sum, n) = of_kind
-                .filter_map(|it| *it.1)
+                .filter_map(|bone| *bone.1)
                 .fold((0.0, 0.0), |(sum, n), length| (sum + length, n + 1.0));
             if n > 0.0 {
                 self.push(kind, sum / n);

@@ -12,7 +12,7 @@ pub const MEASUREMENT_SD: f64 = 0.05;
 /// between the mean women (1.629 m) and men (1.756 m) of ANSUR II, our choice of where growth has ended.
 pub const CHILD_AND_ADULT: [f64; 2] = [0.95, 1.65];
 
-/// What a bone is; left and right are of one kind.
+/// Kind of a bone; left and right are of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Shoulder to elbow.

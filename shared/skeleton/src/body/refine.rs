@@ -64,7 +64,7 @@ pub fn refine(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengt
         };
         let steps = [1.0, 0.5, 0.25, 0.125].map(|share| best.towards(&target, share));
         let Some((next, next_cost)) =
-            steps.iter().map(|next| (next, problem.cost(next))).find(|it| it.1 < cost)
+            steps.iter().map(|next| (next, problem.cost(next))).find(|step| step.1 < cost)
         else {
             break;
         };
@@ -85,7 +85,7 @@ struct About {
     linear: [Option<Linear>; N_ROWS],
     /// Covariance times derivatives: how the joints follow a row.
     follow: [[Vector3<f64>; N_JOINTS]; N_ROWS],
-    /// Of `J C Jᵀ + variances`.
+    /// Factorisation of `J C Jᵀ + variances`.
     normal: Normal,
 }
 
@@ -103,7 +103,8 @@ struct Problem {
 impl Problem {
     fn new(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengths>) -> Self {
         let [low, high] = STATURES;
-        let stature = stature(joints).map_or(ANY_STATURE, |it| it.metres.clamp(low, high));
+        let stature =
+            stature(joints).map_or(ANY_STATURE, |stature| stature.metres.clamp(low, high));
         let measured = State {
             joints: joints.map(|joint| joint.map_or(Vector3::zeros(), |joint| joint.coords)),
             stature,
@@ -132,7 +133,7 @@ impl Problem {
         }
     }
 
-    /// What is minimised.
+    /// Returns the cost that is minimised.
     fn cost(&self, state: &State) -> f64 {
         let off = (state.stature - self.measured.stature).powi(2) / STATURE_VARIANCE;
         let joints = state.joints.iter().zip(&self.measured.joints);
@@ -255,9 +256,9 @@ fn usable(given: Option<Matrix3<f64>>) -> [Matrix3<f64>; 2] {
     };
     let least = Matrix3::from_diagonal_element(LEAST_VARIANCE);
     let given = given
-        .filter(|it| it.iter().all(|entry| entry.abs() < 1e6))
-        .map(|it| 0.5 * (it + it.transpose()) + least);
-    let both = given.and_then(|it| Some([it, inverse(&it)?]));
+        .filter(|covariance| covariance.iter().all(|entry| entry.abs() < 1e6))
+        .map(|covariance| 0.5 * (covariance + covariance.transpose()) + least);
+    let both = given.and_then(|covariance| Some([covariance, inverse(&covariance)?]));
     both.unwrap_or_else(|| {
         let variance = UNKNOWN_SD * UNKNOWN_SD;
         [variance, 1.0 / variance].map(Matrix3::from_diagonal_element)

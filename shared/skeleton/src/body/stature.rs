@@ -54,7 +54,7 @@ pub(crate) fn median_of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<f64>
     Votes::new(lengths).map(|votes| votes.median())
 }
 
-/// What the bones say, ascending, each with its weight: the inverse of its relative deviation.
+/// Statures that the bones vote for, ascending, each with its weight: the inverse of its relative deviation.
 struct Votes {
     votes: [[f64; 2]; N_BONES],
     n: usize,

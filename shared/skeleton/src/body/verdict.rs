@@ -1,4 +1,4 @@
-//! What can be said of a skeleton, and why it is nobody.
+//! Judgement of a skeleton, and the reason why it is nobody.
 
 use core::fmt;
 
@@ -52,7 +52,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// What can be said of a skeleton.
+/// Judgement of a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
     /// The standing height, from the joints that are kept; from all if it is nobody. `None` with too few bones.

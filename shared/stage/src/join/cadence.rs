@@ -35,7 +35,7 @@ impl Default for Cadence {
 }
 
 impl Cadence {
-    /// Whether a frame is to be processed.
+    /// Returns true if a frame is to be processed.
     ///
     /// * `nth`: its position among the frames that the deployment uses; the same in all stages.
     pub fn takes(&self, nth: u64) -> bool {

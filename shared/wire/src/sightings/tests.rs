@@ -16,8 +16,8 @@ fn person() -> impl Strategy<Value = Sighting> {
         .prop_map(|(joints, score, front, extras)| {
             let is_seen = |joint: usize| joints[joint].3 && joints[joint].2 > 0.0;
             let at = |joint: usize| [joints[joint].0, joints[joint].1];
-            let extra = |it: Option<(u16, u16, u16)>| {
-                it.map(|(x, y, sigma)| ([x, y].map(f64::from), f64::from(sigma)))
+            let extra = |point: Option<(u16, u16, u16)>| {
+                point.map(|(x, y, sigma)| ([x, y].map(f64::from), f64::from(sigma)))
             };
             Sighting {
                 joints: core::array::from_fn(|joint| is_seen(joint).then(|| at(joint))),

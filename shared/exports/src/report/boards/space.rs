@@ -36,7 +36,7 @@ struct Frame {
 }
 
 impl Frame {
-    fn of(points: &[Vector2<f64>]) -> Self {
+    fn around(points: &[Vector2<f64>]) -> Self {
         let finite = points.iter().filter(|point| point.iter().all(|c| c.is_finite()));
         let low = finite.clone().fold(Vector2::repeat(f64::MAX), |low, it| low.inf(it));
         let high = finite.fold(Vector2::repeat(f64::MIN), |high, it| high.sup(it));
@@ -76,7 +76,7 @@ fn view(out: &mut Html, page: &Page<'_>, map: &Matrix2x3<f64>) {
         .collect();
     let ends = cameras.iter().flat_map(|camera| [camera.0, camera.1]);
     let all: Vec<Vector2<f64>> = ends.chain(boards.iter().flatten().copied()).collect();
-    let frame = Frame::of(&all);
+    let frame = Frame::around(&all);
     put!(
         out,
         "<svg class=\"chart\" viewBox=\"0 0 {SIDE} {SIDE}\" width=\"{SIDE}\" height=\"{SIDE}\" role=\"img\">",

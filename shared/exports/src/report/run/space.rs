@@ -58,7 +58,7 @@ impl Space {
             json!({
                 "frame": moment.frame,
                 "seconds": (100.0 * moment.seconds).round() / 100.0,
-                "found": moment.found.iter().map(|it| it.as_ref().map(mm)).collect::<Vec<_>>(),
+                "found": moment.found.iter().map(|joint| joint.as_ref().map(mm)).collect::<Vec<_>>(),
                 "truth": moment.truth.iter().map(mm).collect::<Vec<_>>(),
                 "views": moment.views,
             })

@@ -1,4 +1,4 @@
-//! What the page says where, and that it asks for nothing.
+//! Tests of the content of the page, and that it asks for nothing.
 
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -118,7 +118,7 @@ fn a_view_that_was_not_there_is_seen_in_the_timeline_and_among_the_pictures() {
 fn the_script_finds_every_element_that_it_asks_for() {
     let html = html(&page());
     let asked = SCRIPT.split("element(\"").skip(1);
-    let names = asked.map(|it| it.split('"').next().unwrap());
+    let names = asked.map(|rest| rest.split('"').next().unwrap());
     for name in names {
         assert!(html.contains(&format!("id=\"{name}\"")), "{name}");
     }

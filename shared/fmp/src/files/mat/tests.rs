@@ -91,8 +91,8 @@ fn a_parent_with_one_type_may_exclude_a_type_of_its_child() {
 #[test]
 fn an_array_whose_sizes_and_values_disagree_is_refused() {
     let expected = "not a readable MATLAB level 5 file: an array of [1, 2] holds 3 values";
-    let said = outcome(&three_parts(), "maxsize", |it| {
-        *it = Mat::Numbers(vec![1, 2], vec![2.0; 3]);
+    let said = outcome(&three_parts(), "maxsize", |mat| {
+        *mat = Mat::Numbers(vec![1, 2], vec![2.0; 3]);
     });
     assert_eq!(said, expected);
 }
@@ -104,43 +104,43 @@ fn errors_name_the_field() {
         (
             "sbin",
             "`model.sbin` holds 4.5, expected a whole number from 0",
-            |it| *it = number(4.5),
+            |mat| *mat = number(4.5),
         ),
-        ("thresh", "`model.thresh` is 1x2, expected 1x1", |it| {
-            *it = row(vec![1.0, 2.0]);
+        ("thresh", "`model.thresh` is 1x2, expected 1x1", |mat| {
+            *mat = row(vec![1.0, 2.0]);
         }),
         (
             "interval",
             "`model.interval` is not an array of real numbers",
-            |it| *it = Mat::Cell(vec![]),
+            |mat| *mat = Mat::Cell(vec![]),
         ),
         (
             "pa",
             "`model.pa` holds 2, expected 1 for part 3, as the components say",
-            |it| *it = row(vec![0.0, 1.0, 2.0]),
+            |mat| *mat = row(vec![0.0, 1.0, 2.0]),
         ),
         (
             "maxsize",
             "`model.maxsize` holds 3, expected 2, the largest filter's side",
-            |it| *it = row(vec![2.0, 3.0]),
+            |mat| *mat = row(vec![2.0, 3.0]),
         ),
-        ("bias", "`model.bias(2).w` is 1x2, expected 1x1", |it| {
-            *value(it, 2) = row(vec![0.0; 2]);
+        ("bias", "`model.bias(2).w` is 1x2, expected 1x1", |mat| {
+            *value(mat, 2) = row(vec![0.0; 2]);
         }),
         (
             "filters",
             "`model.filters(3).w` is 2x2x31, expected 2x2x32",
-            |it| *value(it, 4) = Mat::Numbers(vec![2, 2, 31], vec![0.5; 124]),
+            |mat| *value(mat, 4) = Mat::Numbers(vec![2, 2, 31], vec![0.5; 124]),
         ),
         (
             "filters",
             "`model.filters(1).w` is 17x1x32, expected 16x1x32",
-            |it| *value(it, 0) = Mat::Numbers(vec![17, 1, 32], vec![0.5; 544]),
+            |mat| *value(mat, 0) = Mat::Numbers(vec![17, 1, 32], vec![0.5; 544]),
         ),
         (
             "defs",
             "`model.defs(1).anchor` holds 1, expected 0 octaves between a part and its parent",
-            |it| *value(it, 2) = row(vec![1.0, 1.0, 1.0]),
+            |mat| *value(mat, 2) = row(vec![1.0, 1.0, 1.0]),
         ),
     ];
     for (field, expected, change) in cases {
@@ -153,29 +153,29 @@ fn errors_name_the_part() {
     let cases: [(&str, Change); 7] = [
         (
             "`model.components{1}(2).parent` holds 9, expected 0 to 3",
-            |it| *of_part(it, 2, 3) = number(9.0),
+            |mat| *of_part(mat, 2, 3) = number(9.0),
         ),
         (
             "`model.components{1}(2).biasid` is 1x2, expected 2x2",
-            |it| *of_part(it, 2, 0) = row(vec![1.0; 2]),
+            |mat| *of_part(mat, 2, 0) = row(vec![1.0; 2]),
         ),
         (
             "`model.components{1}(3).defid` is 1x3, expected 2x2",
-            |it| *of_part(it, 3, 2) = row(vec![1.0; 3]),
+            |mat| *of_part(mat, 3, 2) = row(vec![1.0; 3]),
         ),
         (
             "the components name an entry that does not exist: part 3 names spring 5, but there are 4",
-            |it| *of_part(it, 3, 2) = row(vec![1.0, 5.0]),
+            |mat| *of_part(mat, 3, 2) = row(vec![1.0, 5.0]),
         ),
         (
             "the components name an entry that does not exist: part 1 names bias 0, but there are 9",
-            |it| *of_part(it, 1, 0) = number(0.0),
+            |mat| *of_part(mat, 1, 0) = number(0.0),
         ),
-        ("`model.components` is 1x2, expected 1x1", |it| {
-            *it = Mat::Cell(vec![number(1.0); 2]);
+        ("`model.components` is 1x2, expected 1x1", |mat| {
+            *mat = Mat::Cell(vec![number(1.0); 2]);
         }),
-        ("`model.components` is not a cell array", |it| {
-            *it = number(1.0);
+        ("`model.components` is not a cell array", |mat| {
+            *mat = number(1.0);
         }),
     ];
     for (expected, change) in cases {

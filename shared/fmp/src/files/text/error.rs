@@ -29,7 +29,7 @@ pub enum TextError {
         field: &'static str,
         /// Where.
         place: TextPosition,
-        /// What stands there.
+        /// Text in the file.
         got: String,
     },
     /// The text ends too early.
@@ -49,7 +49,7 @@ pub enum TextError {
         place: TextPosition,
         /// Which numbers would do.
         kind: &'static str,
-        /// What stands there.
+        /// Text in the file.
         got: String,
     },
     /// Two places of the file contradict each other.
@@ -97,7 +97,7 @@ pub enum TextError {
     Trailing {
         /// Where.
         place: TextPosition,
-        /// What stands there.
+        /// Text in the file.
         got: String,
     },
     /// An index is out of range.

@@ -1,4 +1,4 @@
-//! What was written is read by the reader of this crate.
+//! Tests that the reader of this crate reads a written file.
 
 use proptest::prelude::*;
 

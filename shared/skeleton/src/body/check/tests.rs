@@ -243,13 +243,14 @@ fn coordinate() -> impl Strategy<Value = f64> {
 fn joints() -> impl Strategy<Value = Joints> {
     let joint = prop::option::weighted(0.9, prop::array::uniform3(coordinate()));
     prop::collection::vec(joint, N_JOINTS)
-        .prop_map(|it| core::array::from_fn(|i| it[i].map(Point3::from)))
+        .prop_map(|joints| core::array::from_fn(|i| joints[i].map(Point3::from)))
 }
 
 fn covariances() -> impl Strategy<Value = Covariances> {
     let covariance = prop::option::of(prop::array::uniform9(coordinate()));
-    prop::collection::vec(covariance, N_JOINTS)
-        .prop_map(|it| core::array::from_fn(|i| it[i].map(|it| Matrix3::from_row_slice(&it))))
+    prop::collection::vec(covariance, N_JOINTS).prop_map(|covariances| {
+        core::array::from_fn(|i| covariances[i].map(|entries| Matrix3::from_row_slice(&entries)))
+    })
 }
 
 proptest! {

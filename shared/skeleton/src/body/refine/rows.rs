@@ -1,4 +1,4 @@
-//! What is expected of bones, as residuals of joints and stature, with their derivatives.
+//! Expectations of bones, as residuals of joints and stature, with their derivatives.
 
 use nalgebra::{Point3, Vector3};
 
@@ -15,7 +15,7 @@ const LEAST_SPREAD: f64 = 0.015;
 /// Standard deviation of the difference between the sides, metres: our own choice.
 const SIDES_SD: f64 = 0.015;
 
-/// What is looked for.
+/// Unknowns of the solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct State {
     /// Metres in the world; 0 where a joint is missing.
@@ -49,7 +49,7 @@ impl State {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Row {
     of: Of,
-    /// Of what is expected, square metres.
+    /// Variance of the expectation, square metres.
     pub(super) variance: f64,
 }
 

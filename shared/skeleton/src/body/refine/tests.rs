@@ -3,7 +3,7 @@
 use super::*;
 use crate::body::testing::{self, NO_COVARIANCES, POSTURES};
 
-/// Of the noise: 5 cm along x, 1 cm across.
+/// Returns covariances of the noise: 5 cm along x, 1 cm across.
 fn depth_noise() -> Covariances {
     [Some(Matrix3::from_diagonal(&Vector3::new(25e-4, 1e-4, 1e-4))); N_JOINTS]
 }
@@ -27,10 +27,10 @@ fn errors(body: impl Fn(&Joints) -> Joints, tall: f64, lengths: Option<&Lengths>
 /// Legs longer and arms shorter than the mean, by two standard deviations among people.
 fn unusual(joints: &Joints) -> Joints {
     let mut it = *joints;
-    let stretch = |it: &mut Joints, from: usize, to: &[usize], by: f64| {
+    let stretch = |stretched: &mut Joints, from: usize, to: &[usize], by: f64| {
         let add = (joints[to[0]].unwrap() - joints[from].unwrap()) * by;
         for &joint in to {
-            it[joint] = it[joint].map(|point| point + add);
+            stretched[joint] = stretched[joint].map(|point| point + add);
         }
     };
     for [hip, knee, ankle, shoulder, elbow, wrist] in [[2, 1, 0, 8, 7, 6], [3, 4, 5, 9, 10, 11]] {
@@ -45,7 +45,7 @@ fn unusual(joints: &Joints) -> Joints {
 #[test]
 fn noise_along_the_depth_becomes_less() {
     for tall in [1.62, 1.76] {
-        let [before, after] = errors(|it| *it, tall, None);
+        let [before, after] = errors(|joints| *joints, tall, None);
         assert!(after < 0.88 * before, "{tall}: {before} {after}");
     }
 }
@@ -69,7 +69,7 @@ fn unusual_bodies_are_not_made_worse() {
 #[test]
 fn a_child_with_the_proportions_of_an_adult_is_not_made_worse() {
     let [before, after] = errors(
-        |it| it.map(|joint| joint.map(|joint| joint * 0.5)),
+        |joints| joints.map(|joint| joint.map(|joint| joint * 0.5)),
         2.0,
         None,
     );

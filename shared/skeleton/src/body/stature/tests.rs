@@ -5,7 +5,7 @@ use nalgebra::{Point3, Rotation3, Vector3};
 use super::*;
 use crate::body::testing::{self, POSTURES};
 
-fn of(joints: &Joints) -> f64 {
+fn stature_of(joints: &Joints) -> f64 {
     stature(joints).unwrap().metres
 }
 
@@ -26,14 +26,18 @@ fn one_limb_that_is_wrong_changes_little() {
     for joint in [6, 7] {
         joints[joint] = joints[joint].map(|joint| joint + Vector3::new(0.8, 0.0, 0.0));
     }
-    assert!((of(&joints) - 1.7).abs() < 0.05, "{}", of(&joints));
+    assert!(
+        (stature_of(&joints) - 1.7).abs() < 0.05,
+        "{}",
+        stature_of(&joints)
+    );
 }
 
 #[test]
 fn an_adult_scaled_is_as_much_taller() {
     let joints = testing::bent(1.7);
     let scaled = joints.map(|joint| joint.map(|joint| joint * 1.2));
-    assert!((of(&scaled) - 1.2 * of(&joints)).abs() < 1e-9);
+    assert!((stature_of(&scaled) - 1.2 * stature_of(&joints)).abs() < 1e-9);
 }
 
 #[test]
@@ -46,8 +50,8 @@ fn turning_moving_and_mirroring_change_nothing() {
     );
     let turn = Rotation3::from_euler_angles(0.3, 1.0, -2.0);
     let moved = joints.map(|joint| joint.map(|joint| turn * joint + Vector3::new(5.0, -3.0, 1.0)));
-    assert!((of(&moved) - of(&joints)).abs() < 1e-9);
-    assert_eq!(of(&testing::mirrored(&joints)), of(&joints));
+    assert!((stature_of(&moved) - stature_of(&joints)).abs() < 1e-9);
+    assert_eq!(stature_of(&testing::mirrored(&joints)), stature_of(&joints));
 }
 
 #[test]
