@@ -1,5 +1,6 @@
 //! The book (README.md, docs/ and the other Markdown files): commands parse, marked ones run, links and names exist.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 mod blocks;
 mod command;
@@ -201,6 +202,34 @@ fn every_page_is_in_the_summary() {
                 "docs/SUMMARY.md does not name {page}"
             );
         }
+    }
+}
+
+/// `mdbook build`, where it is installed: it says nothing worse than what it does, and every page is there.
+#[test]
+fn the_book_renders() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new("mdbook");
+    command
+        .arg("build")
+        .arg(root().join("docs"))
+        .arg("--dest-dir")
+        .arg(folder.path());
+    let Ok(built) = command.output() else {
+        eprintln!("skipped: mdbook is not installed");
+        return;
+    };
+    let said = String::from_utf8_lossy(&built.stderr);
+    let is_clean = !said.contains("WARN") && !said.contains("ERROR");
+    assert!(built.status.success() && is_clean, "{said}");
+    let docs = root().join("docs");
+    for page in files_below(&docs, "md").iter().filter(|page| !page.ends_with("SUMMARY.md")) {
+        let rendered = folder.path().join(page.strip_prefix(&docs).unwrap());
+        assert!(
+            rendered.with_extension("html").exists(),
+            "{}",
+            page.display()
+        );
     }
 }
 

@@ -7,8 +7,8 @@ use std::time::Instant;
 use failure::{ExitKind, Fault, Stop};
 use messages::{Health, Metrics, topic};
 use runtime::{
-    Bus, BusError, Child, Cleaner, Launch, LockError, Losses, PortError, PreflightError, preflight,
-    wait_for_any,
+    Bus, BusError, Child, Cleaner, Launch, LockError, Losses, PortError, PreflightError,
+    SUPERVISOR, preflight, wait_for_any,
 };
 
 use crate::stall::Stall;
@@ -123,7 +123,7 @@ pub fn run(
     // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.
     let lock = plan.namespace.acquire()?;
     preflight(&plan.topics)?;
-    let bus = Bus::open(&plan.namespace, "supervisor", stop)?;
+    let bus = Bus::open(&plan.namespace, SUPERVISOR, stop)?;
     let _topics = bus.create_topics(&plan.topics)?;
     // Says to others that all topics are there.
     lock.describe(&plan.description)?;

@@ -49,7 +49,7 @@ pub use delivery::{Delivery, Limits};
 pub use guest::{Guest, GuestError, GuestPort, MOST_GUESTS, Seen, running_deployments};
 pub use health::{HEARTBEAT, Health, HealthError};
 pub use launch::{Launch, LaunchError};
-pub use lock::{DeploymentLock, LockError};
+pub use lock::{DeploymentLock, LockError, SUPERVISOR};
 pub use losses::{Losses, Patience};
 pub use mapped::{Mapped, mapped_at};
 pub use memory::{MemoryError, free_shared_memory, free_space, peak_memory};

@@ -20,6 +20,8 @@ use crate::private::{self, LOCK_FILE, Root};
 use crate::{BusError, Namespace, beneath};
 use failure::{ExitKind, Fault};
 
+/// The process of a deployment that holds its lock: the name with which it opens its [`Bus`](crate::Bus).
+pub const SUPERVISOR: &str = "supervisor";
 /// Tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
 /// The description until all of it is written.

@@ -9,7 +9,6 @@ use iceoryx2::service::ServiceListError;
 use messages::{Metrics, topic};
 
 use crate::lock::{ENDING_FILE, living};
-use crate::private::LOCK_FILE;
 use crate::remains::{all_locks, supervisor};
 use crate::{Bus, BusError, Namespace, PortError, ReceiveError, Subscriber};
 use failure::{ExitKind, Fault, Stop};
@@ -210,11 +209,10 @@ pub(crate) fn unless_over<E>(
 
 /// The supervisor of a deployment, unless it is ending.
 pub(crate) fn running_supervisor(namespace: &Namespace) -> Option<u32> {
-    let root = namespace.root();
-    if root.join(ENDING_FILE).exists() {
+    if namespace.root().join(ENDING_FILE).exists() {
         return None;
     }
-    supervisor(&root.join(LOCK_FILE), &all_locks())
+    supervisor(namespace, &all_locks())
 }
 
 /// The names of all processes of a deployment, read off its metrics topics.

@@ -8,7 +8,7 @@ use std::path::Path;
 use rustix::fs::{major, minor};
 use rustix::io::Errno;
 
-use crate::lock::{alive, entries};
+use crate::lock::{SUPERVISOR, alive, entries, living};
 use crate::memory::SHARED_MEMORY;
 use crate::private::LOCK_FILE;
 use crate::{BusError, LockError, Namespace, beneath, private};
@@ -85,7 +85,7 @@ fn inspect(namespace: Namespace, is_marked: bool, locks: &str) -> Result<Remains
         }
     }
     Ok(Remains {
-        supervisor: supervisor(&namespace.root().join(LOCK_FILE), locks),
+        supervisor: supervisor(&namespace, locks),
         processes: if is_marked {
             alive(&config)
         } else {
@@ -105,11 +105,19 @@ pub(crate) fn all_locks() -> String {
     (0..3).map(reading).collect()
 }
 
-/// The process that holds a lock file, from the kernel's list of locks: trying to lock it could disturb a
-/// deployment that is starting.
-pub(crate) fn supervisor(file: &Path, locks: &str) -> Option<u32> {
-    let metadata = fs::metadata(file).ok()?;
-    locks.lines().find_map(|line| holder(line, &metadata))
+/// The process that runs a deployment: the holder of its lock file, from the kernel's list of locks, as trying to lock it could disturb a
+/// deployment that is starting. The list leaves out holders in other pid namespaces (containers): there it is the living process with the
+/// supervisor's name, with the process id that it has in its own.
+pub(crate) fn supervisor(namespace: &Namespace, locks: &str) -> Option<u32> {
+    let metadata = fs::metadata(namespace.root().join(LOCK_FILE)).ok()?;
+    let holder = locks.lines().find_map(|line| holder(line, &metadata));
+    holder.or_else(|| elsewhere(namespace))
+}
+
+fn elsewhere(namespace: &Namespace) -> Option<u32> {
+    let config = namespace.config().ok()?;
+    let mut living = living(&config).into_iter().flatten();
+    living.find_map(|(name, pid)| (name == SUPERVISOR).then_some(pid))
 }
 
 /// `1: FLOCK  ADVISORY  WRITE 1234 00:1a:42 0 EOF`.

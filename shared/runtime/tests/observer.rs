@@ -1,8 +1,11 @@
 //! An observer sees all processes of a deployment and does not disturb them.
+#![expect(clippy::print_stderr, reason = "a test reports what it skips")]
 
 use crate::common;
 
 use core::time::Duration;
+use std::env;
+use std::process::Command;
 use std::sync::mpsc;
 use std::thread::{Builder, sleep};
 use std::time::Instant;
@@ -50,6 +53,36 @@ fn lists_all_processes_with_their_pids_and_last_metrics() {
         3,
         "its last metrics are kept"
     );
+}
+
+#[test]
+fn a_deployment_is_seen_from_another_pid_namespace() {
+    const BASE: &str = "PARALLAX_TEST_BASE";
+    if let Some(base) = env::var_os(BASE) {
+        assert_eq!(std::process::id(), 1, "this is the other namespace");
+        let found = runtime::deployments(base.as_ref()).unwrap();
+        let mut observer = Observer::open(&found[0].namespace).unwrap();
+        assert_eq!(found[0].supervisor, Some(observer.supervisor()));
+        assert_eq!(observer.observe().unwrap().len(), 2);
+        assert!(!observer.is_over());
+        return;
+    }
+    let within = || {
+        let mut command = Command::new("unshare");
+        command.args(["--map-root-user", "--pid", "--fork", "--mount-proc"]);
+        command
+    };
+    if !within().arg("true").status().is_ok_and(|status| status.success()) {
+        eprintln!("skipped: no pid namespace may be made here");
+        return;
+    }
+    let deployment = two();
+    let own = "observer::a_deployment_is_seen_from_another_pid_namespace";
+    let mut again = within();
+    again.arg(env::current_exe().unwrap()).args(["--exact", own]);
+    let ended = again.env(BASE, deployment.namespace().base()).output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stdout);
+    assert!(said.contains("1 passed"), "{said}");
 }
 
 #[test]
