@@ -240,7 +240,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
     }
     let cameras = [45.0, 135.0, 225.0, 315.0].map(camera);
     let bumps = cameras.each_ref().map(|camera| {
-        let mut seen = Bumps::new_joints(camera, &flat);
+        let mut seen = Bumps::of_joints(camera, &flat);
         // The side on the left of the picture is called the right one.
         for [right, left] in LIMBS.into_iter().flatten() {
             if seen.at[right].unwrap()[0] > seen.at[left].unwrap()[0] {
