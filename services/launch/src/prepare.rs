@@ -203,7 +203,7 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
         }
         failure.with_hint(
             "calibrate at the size of the footage; if the footage lacks rows or columns of the \
-             calibrated image, say where it begins: source_offset_px = [x, y] in its [[camera]]",
+             calibrated image, say where it begins: source_offset_px = [x, y] in its [[camera]], [0, 0] if they are missing on the right or below",
         )
     })
 }
