@@ -332,8 +332,7 @@ impl Report {
                 it.frames_with_pose, self.n_frames
             )?;
             self.write_slow(text, it);
-            writeln!(text, "  people        {}", it.people.text())?;
-            text.push_str(&everybody::table(&it.people));
+            text.push_str(&everybody::text(&it.people));
             text.push_str(&trust::text(it, &self.doubts()));
             self.write_views(text, it)?;
             self.write_misplaced(text, it)?;

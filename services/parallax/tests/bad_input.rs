@@ -69,7 +69,7 @@ fn deployment_files() {
         Row {
             what: "frames of fewer than 40 pixels",
             broken: |fixture| {
-                fixture.edit("deployment.toml", "upright", "size = [96, 39]\nupright")
+                fixture.edit("deployment.toml", "upright", "size = [96, 39]\nupright");
             },
             arguments: DRY,
             code: 4,
@@ -142,7 +142,7 @@ fn calibrations() {
         Row {
             what: "for another image size",
             broken: |fixture| {
-                fixture.edit("rig.toml", "size_px = [96, 128]", "size_px = [128, 96]")
+                fixture.edit("rig.toml", "size_px = [96, 128]", "size_px = [128, 96]");
             },
             arguments: DRY,
             code: 5,

@@ -7,8 +7,13 @@ use runfiles::{People, PersonSummary};
 /// Most people of the table: those with the most frames.
 const MOST_ROWS: usize = 8;
 
+/// How many people there are, and the table.
+pub(super) fn text(people: &People) -> String {
+    format!("  people        {}\n{}", people.text(), table(people))
+}
+
 /// A row for each person, by id; nothing for one person alone.
-pub(super) fn table(people: &People) -> String {
+fn table(people: &People) -> String {
     if people.each.len() < 2 {
         return String::new();
     }

@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn without_an_injected_fault_the_limits_are_missed() {
         let got = missed_once(ProcessFault::Kill, "pose-1", |cost, _| {
-            *cost = Cost::default()
+            *cost = Cost::default();
         });
         assert_eq!(got.len(), 3, "{got:?}");
     }

@@ -188,7 +188,7 @@ fn a_wrong_file_is_refused_with_the_field() {
     type Change = fn(&mut JointFile);
     let cases: [(&str, Change); 13] = [
         ("parallax-else", |file| {
-            file.format = "parallax-else".to_owned()
+            file.format = "parallax-else".to_owned();
         }),
         ("version 2", |file| file.version = 2),
         ("`model`", |file| file.model = "0123".to_owned()),
@@ -201,7 +201,7 @@ fn a_wrong_file_is_refused_with_the_field() {
             file.joints[0].weights.truncate(25);
         }),
         ("`joints[5].weights`", |file| {
-            file.joints[5].weights[2] += 0.01
+            file.joints[5].weights[2] += 0.01;
         }),
         ("`joints[5].weights`", |file| {
             file.joints[5].weights[2] += 20.0;
