@@ -50,7 +50,7 @@ pub struct Absent {
 pub struct FusedRecord {
     /// Index of the pair; 0 for all views at once in space.
     pub index: usize,
-    /// Status of the result: good, or the reason why there is none.
+    /// Status of the result: good, or why it is missing.
     pub status: Status,
     /// When it was received and sent.
     pub timing: Timing,

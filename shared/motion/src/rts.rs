@@ -30,7 +30,7 @@ pub(crate) struct Known {
 pub(crate) struct Stretch {
     /// At every instant; none if there is no measurement.
     pub(crate) known: Vec<Known>,
-    /// Weight of the measurement at every instant, 0..1; 0 where it is rejected or there is none.
+    /// Weight of the measurement at every instant, 0..1; 0 where it is rejected or missing.
     pub(crate) weights: Vec<f64>,
 }
 

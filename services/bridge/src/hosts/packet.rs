@@ -49,7 +49,7 @@ pub struct Head {
     pub content: Content,
     /// The view.
     pub view: u32,
-    /// Status of the result: good, or the reason why there is none.
+    /// Status of the result: good, or why it is missing.
     pub status: Status,
     /// The start of the sending bridge, a number of its own: sequences begin anew with it.
     pub origin: u64,

@@ -15,7 +15,7 @@ use super::{Footage, advice, source};
 /// Frames of a live camera that runs until it is stopped: the most of any footage.
 pub(crate) const ENDLESS: u64 = 1_000_000_000_000;
 
-/// Returns true if the source of a camera is live: a file of such a name is none.
+/// Returns true if the source of a camera is live: a file of such a name is not.
 pub fn is_live(source: &str) -> bool {
     footage::is_live(source) && !Path::new(source).is_file()
 }

@@ -163,7 +163,7 @@ mod tests {
         Rig::new((0..4).map(camera).collect(), None, "test").unwrap()
     }
 
-    /// Returns the poses of somebody who walks about, as the cameras see them; one that sees the back names sides as it sees them.
+    /// Returns the poses of a person who walks about, as the cameras see them; one that sees the back names sides as it sees them.
     ///
     /// * `shown`: for every camera the one whose pictures it has.
     fn seen(rig: &Rig, shown: [usize; 4]) -> String {
