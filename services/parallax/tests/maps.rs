@@ -431,7 +431,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
         other.unwrap_or_else(|| name.to_owned())
     };
     with_keypoints(&case, "halpe-26", |view| {
-        HALPE_26.map(|halpe_26| named(view, halpe_26)).to_vec()
+        HALPE_26.map(|name| named(view, name)).to_vec()
     });
     let ended = run(&case, &[]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

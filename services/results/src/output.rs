@@ -170,7 +170,7 @@ impl Output {
     fn rows(&mut self, frame: &Skeletons) {
         let row = trc::row(&self.scene, self.tally.n_lines(), frame);
         let rows = self.pose3d_csv.append(&pose3d::csv_rows(&self.scene, frame));
-        let row = self.trc_rows.as_mut().map_or(Ok(()), |trc_row| trc_row.append(&row));
+        let row = self.trc_rows.as_mut().map_or(Ok(()), |rows| rows.append(&row));
         self.note(rows);
         self.note(row);
     }

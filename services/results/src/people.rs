@@ -110,8 +110,11 @@ impl Counted {
             px.map(|joint| is_placed(joint).then_some(joint.reprojection_px)),
         );
         one.trusted.count(person, limbs, (time_s, &[]));
-        let Some(now_s) = time_s else { return };
-        one.seen_s = now_s;
+        one.seen_s = time_s.unwrap_or(one.seen_s);
+    }
+
+    /// Keeps no more than the summary of those who cannot come back, after the people of a frame were added.
+    pub(crate) fn forget(&mut self, now_s: f64) {
         let gone = self.each.extract_if(.., |_, one| now_s - one.seen_s > GONE_S);
         self.gone.extend(gone.map(|(id, one)| (id, one.summary(id))));
     }
@@ -203,6 +206,7 @@ mod tests {
             person.id = id;
             counted.person(frame, &person, &[], Some(time_s));
         }
+        counted.forget(90.0);
         assert_eq!(counted.each.keys().copied().collect::<Vec<_>>(), [9]);
         let each = counted.people().each;
         let told = |one: &PersonSummary| (one.id, one.frames, one.first_frame, one.last_frame);

@@ -111,6 +111,9 @@ impl Tally {
         for person in people {
             self.people.person(record.frame(), person, scene.joints.limbs, seen.0);
         }
+        if let Some(now_s) = seen.0 {
+            self.people.forget(now_s);
+        }
         self.people.add(frame);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |frame| frame.n_dropped);

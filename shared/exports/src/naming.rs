@@ -104,13 +104,7 @@ mod tests {
             "LHeel",
             "RHeel",
         ];
-        let own = HALPE_26.map(|halpe_26| {
-            if halpe_26 == "head top" {
-                "head"
-            } else {
-                halpe_26
-            }
-        });
+        let own = HALPE_26.map(|name| if name == "head top" { "head" } else { name });
         assert_eq!(own.map(|name| Naming::OpenSim.apply(name)), due);
     }
 

@@ -100,7 +100,7 @@ mod tests {
     ];
 
     fn maps(joints: [[f64; 2]; 14]) -> JointMaps {
-        let names: Vec<String> = LSP_14.iter().map(|lsp_14| (*lsp_14).to_owned()).collect();
+        let names: Vec<String> = LSP_14.iter().map(|name| (*name).to_owned()).collect();
         let keypoint = |at: [f64; 2]| Keypoint {
             at: [at[0] + 200.0, at[1] + 200.0],
             score: 0.9,

@@ -148,7 +148,7 @@ pub struct PersonSummary {
     /// Root mean square reprojection error over all joints, pixels of the frame.
     #[serde(deserialize_with = "nullable")]
     pub reprojection_px: Option<f64>,
-    /// How far the results of this person can be trusted; since the process was started last.
+    /// Trust in the results of this person, since the process was started last.
     pub trust: Trust,
 }
 

@@ -116,8 +116,8 @@ pub(super) fn selection(text: &str) -> Result<Selection, String> {
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let terminal = Terminal::with_bar(globals.quiet, false, BAR);
-    let is_network = arguments.model.extension();
-    if is_network.is_some_and(|is_network| is_network.eq_ignore_ascii_case("onnx")) {
+    let extension = arguments.model.extension();
+    if extension.is_some_and(|extension| extension.eq_ignore_ascii_case("onnx")) {
         if finding::is_file::<finding::Picture>(&arguments.dataset) {
             return detector::run(arguments, &stop, &terminal);
         }

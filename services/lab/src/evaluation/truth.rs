@@ -11,7 +11,7 @@ pub fn parse14(set: &JointSet, joints: &[Option<Point>]) -> Vec<Option<Point>> {
         let at = set.joints.iter().position(|joint| joint.parts == parts)?;
         joints[at]
     };
-    PARSE14.joints.iter().map(|parse_joint| joint(parse_joint.parts)).collect()
+    PARSE14.joints.iter().map(|joint_of_set| joint(joint_of_set.parts)).collect()
 }
 
 /// The parts of the right side that lie between two joints (as parts), and the share of the second.

@@ -160,9 +160,7 @@ impl ResourceMonitor {
 
 /// Ages of one class differ by less than a factor of two: the logarithm of the age in seconds.
 fn age_class(nanos: u64) -> u32 {
-    (nanos / 1_000_000_000)
-        .checked_ilog2()
-        .map_or(0, |checked_ilog2| checked_ilog2 + 1)
+    (nanos / 1_000_000_000).checked_ilog2().map_or(0, |exponent| exponent + 1)
 }
 
 /// The memory of all processes in two parts of a run, bytes: of every process the mean over the classes of age that it had in
