@@ -184,6 +184,20 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
         assert!(frame >= first || before == after, "{before}\n{after}");
     }
     assert_eq!(after.lines().count(), N_FRAMES, "{after}");
+
+    // Nothing can be read of the last frames of one view, and of any frame of the other: the run ends where it ended.
+    for (view, from) in [(0, 4), (1, 0)] {
+        let poses = &recording.tracks[&format!("view-pose/v8/{view}")].entries;
+        for entry in poses.iter().filter(|pose| pose.frame >= Some(from)) {
+            let at = (entry.offset + entry.len / 2) as usize;
+            file[at..at + 6].iter_mut().for_each(|byte| *byte ^= 0x2a);
+        }
+    }
+    case.write("run.mcap", &file);
+    let ended = replayed(&case, &["--from", "triangulate", "--out", "least"]);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let least = text(&case.path("least"), "pose3d.jsonl");
+    assert_eq!(least.lines().count(), N_FRAMES, "{least}");
 }
 
 #[test]

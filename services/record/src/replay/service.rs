@@ -4,8 +4,8 @@ use core::time::Duration;
 use std::fs::File;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use messages::{Cause, Status, Timing};
-use recording::{Buffer, Entry, Envelope, ReadError, Recording, Track, in_order};
+use messages::{Cause, Stamp, Status, Timing};
+use recording::{Buffer, Entry, Envelope, Kind, ReadError, Recording, Track, in_order};
 use runtime::{Place, SendError, Service, Woken};
 use stage::Stage;
 use stage::any::Sender;
@@ -86,7 +86,7 @@ fn tracks<'a>(job: &Job, recording: &'a Recording) -> Result<Vec<&'a Track>, Fai
     tracks.collect()
 }
 
-/// The end of stream for a recording in which it is missing or damaged: one frame step after the last frame that can be read.
+/// The end of stream for a recording in which it is missing or damaged: one frame step after the last frame.
 fn end_after(
     order: &[(usize, Entry)],
     tracks: &[&Track],
@@ -94,17 +94,12 @@ fn end_after(
     job: &Job,
     session: u64,
 ) -> Envelope {
-    let mut buffer = Buffer::default();
-    let mut last_of = |output: usize| {
-        let entries = order.iter().rev().filter(|(other, _)| *other == output);
-        entries.into_iter().find_map(|(_, entry)| {
-            let kind = tracks[output].kind;
-            let message = recording::read(file, kind, entry, &mut buffer).ok()?;
-            let stamp = Envelope::of(kind, message.head)?.stamp;
-            (stamp.session == session).then_some(stamp)
-        })
-    };
-    let last = (0..tracks.len()).filter_map(&mut last_of);
+    let last = (0..tracks.len()).filter_map(|output| {
+        let kind = tracks[output].kind;
+        let entries = order.iter().filter(|(other, _)| *other == output);
+        let entries: Vec<_> = entries.map(|(_, entry)| *entry).collect();
+        last_of(file, kind, &entries, [session, job.frame_step])
+    });
     let mut stamp = last.max_by_key(|stamp| stamp.frame).unwrap_or_default();
     stamp.frame = stamp.frame.saturating_add(job.frame_step);
     Envelope {
@@ -112,6 +107,41 @@ fn end_after(
         timing: Timing::default(),
         status: Status::END,
     }
+}
+
+/// The last frame of a track; none if the track holds no message of the session.
+///
+/// It is that of the last message that can be read, or of a damaged one after it: most numbers in a damaged chunk are right, and
+/// without them the last frames of a run would be missing. A number counts only if so many frames can be in the damaged messages.
+///
+/// * `recorded`: the session, and the distance of two frames.
+fn last_of(file: &mut File, kind: Kind, entries: &[Entry], recorded: [u64; 2]) -> Option<Stamp> {
+    let [session, frame_step] = recorded;
+    let mut buffer = Buffer::default();
+    let readable = entries.iter().enumerate().rev().find_map(|(nth, entry)| {
+        let message = recording::read(file, kind, entry, &mut buffer).ok()?;
+        let stamp = Envelope::of(kind, message.head)?.stamp;
+        (stamp.session == session).then_some((nth, stamp))
+    });
+    let damaged = &entries[readable.map_or(0, |(nth, _)| nth + 1)..];
+    let mut head = Vec::new();
+    let claims = damaged.iter().filter_map(|entry| {
+        let head = recording::read_head(file, kind, entry, &mut head).ok()?;
+        let Envelope {
+            mut stamp, status, ..
+        } = Envelope::of(kind, head)?;
+        if status == Status::END {
+            stamp.frame = stamp.frame.saturating_sub(frame_step);
+        }
+        (stamp.session == session).then_some(stamp)
+    });
+    let claims: Vec<Stamp> = claims.collect();
+    let first = claims.iter().min_by_key(|stamp| stamp.frame);
+    let known = readable.map(|(_, stamp)| stamp).or(first.copied())?;
+    let room = frame_step.saturating_mul(damaged.len() as u64);
+    let most = known.frame.saturating_add(room);
+    let believed = claims.into_iter().filter(|stamp| stamp.frame <= most);
+    believed.chain([known]).max_by_key(|stamp| stamp.frame)
 }
 
 /// Index of the view, or of the worker, at the end of the name of a topic; 0 for a topic of all views.
