@@ -16,7 +16,7 @@ pub struct Config {
     pub file: PathBuf,
     /// The detector of people, which finds boxes for the network: an ONNX file with its card beside it or in its metadata, or `"shipped"`.
     pub detector: PathBuf,
-    /// Search for people in every n-th frame; by default twice a second, and eight times while several people are seen.
+    /// Search for people in every n-th frame; by default twice a second, and eight times while several people are near each other or one of them came or went.
     pub find_every: Option<u64>,
     /// Least mean heat of the joints of a visible person, 0 to 1.
     pub least_heat: f64,

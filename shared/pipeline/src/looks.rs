@@ -4,12 +4,14 @@ use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap};
 
 use crate::network_memory::{NetworkMemory, Seen, is_known, shift};
-use crate::tracks::{Track, moved, wider};
+use crate::tracks::{Pace, Track, moved, wider};
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
 /// Boxes of a detector that overlap by more are of one person.
 const SAME_BOX: f64 = 0.85;
+/// A person in a box that overlaps with one of somebody larger by more may be hidden soon.
+const BEHIND: f64 = 0.2;
 /// Least number of joints of a person behind others that these do not cover.
 const LEAST_BEHIND: usize = 7;
 /// Somebody new who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
@@ -40,16 +42,70 @@ fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     outline_of(sure).is_some_and(|other| overlap(other, outline) < SAME)
 }
 
+/// The boxes of a detector that are not of people who are held.
+pub(crate) fn of_others(outlines: Vec<[f64; 4]>, held: &[Seen]) -> Vec<[f64; 4]> {
+    let of_held: Vec<usize> =
+        held.iter().filter_map(|held| best_box(&outlines, held.outline)).collect();
+    let others = outlines.into_iter().enumerate();
+    others
+        .filter(|other| !of_held.contains(&other.0))
+        .map(|other| other.1)
+        .collect()
+}
+
+/// The box of a detector that is of the person in a box; `None` if none is.
+fn best_box(outlines: &[[f64; 4]], outline: [f64; 4]) -> Option<usize> {
+    let overlaps = outlines.iter().map(|other| overlap(*other, outline));
+    let best = overlaps.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    best.filter(|best| best.1 > SAME).map(|best| best.0)
+}
+
+/// How a person of the frame before moves, by another look.
+///
+/// * `n_frames`: from the last look to this one.
+fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>) -> Option<Pace> {
+    let moved = shift(&before?.maps, &seen.maps)?;
+    Some(Pace::next(track.pace, moved, n_frames?))
+}
+
 impl Looks<'_> {
-    /// Looks at a person of the frame before: around the box of then if that is long ago, in a wider box if the last pose was doubtful, else
-    /// in the same. All but the first need no look while they stand still. Where boxes were looked for, the person is looked at in the
-    /// same box only.
+    /// Takes the people of the frame before who stand still as they were. The first is looked at in every frame, and so is who stands behind somebody
+    /// larger.
+    ///
+    /// * `before`: the people of the frame before; of those who are held, other memory afterwards.
+    pub(crate) fn hold_still(
+        &self,
+        tracks: &mut [Track],
+        before: &mut [Seen],
+        memory: &mut NetworkMemory,
+    ) {
+        let Some(hold) = memory.hold.filter(|_| memory.is_followed()) else {
+            return;
+        };
+        for nth in 1..tracks.len() {
+            let (larger, others) = tracks.split_at_mut(nth);
+            let track = &mut others[0];
+            let is_behind = |larger: &Track| overlap(larger.outline, track.outline) > BEHIND;
+            let n_frames = track.n_held + hold.gap;
+            // One frame further, the person would have moved too far by the next.
+            if n_frames < hold.most
+                && track.is_still(n_frames + 1)
+                && !larger.iter().any(is_behind)
+                && let Some(before) = before.get_mut(track.index)
+            {
+                track.is_seen = self.hold(track, n_frames, before, memory);
+            }
+        }
+    }
+
+    /// Looks at a person of the frame before who is not seen yet: around the box of then if that is long ago, in a wider box if the last pose
+    /// was doubtful, else in the same. Where boxes were looked for, the person is looked at in the same box only.
     ///
     /// * `before`: the people of the frame before.
     pub(crate) fn see_once_more(
         &self,
-        (nth, track): (usize, &Track),
-        before: &mut [Seen],
+        track: &Track,
+        before: &[Seen],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
         if memory.has_searched {
@@ -60,17 +116,6 @@ impl Looks<'_> {
         }
         if track.is_doubtful {
             return self.see_wider(track, memory);
-        }
-        if nth > 0
-            && let Some(hold) = memory.hold
-            && let Some(before) = before.get_mut(track.index)
-        {
-            let n_frames = track.n_held + hold.gap;
-            // One frame further, the person would have moved too far by the next.
-            if n_frames < hold.most && track.is_still(n_frames + 1) {
-                self.hold(track, n_frames, before, memory);
-                return Ok(());
-            }
         }
         self.see_again(track, before.get(track.index), memory)
     }
@@ -168,18 +213,31 @@ impl Looks<'_> {
         Ok(Some(best))
     }
 
-    /// Takes a person of the frame before who has hardly moved as the last look saw them, where nobody is known yet.
+    /// Takes a person of the frame before who has hardly moved as the last look saw them; returns whether nobody is known there yet.
     ///
     /// * `n_held`: frames since that look.
     /// * `before`: the sight of the person in the frame before; other memory afterwards.
-    fn hold(&self, track: &Track, n_held: u64, before: &mut Seen, memory: &mut NetworkMemory) {
+    fn hold(
+        &self,
+        track: &Track,
+        n_held: u64,
+        before: &mut Seen,
+        memory: &mut NetworkMemory,
+    ) -> bool {
         if !self.is_unknown(track.outline, memory) {
-            return;
+            return false;
         }
         let (_, seen) = memory.next();
         core::mem::swap(seen, before);
         seen.next = Some(Track { n_held, ..*track });
-        memory.n_seen += usize::from(!is_known(&memory.seen, memory.n_seen));
+        let is_new = !is_known(&memory.seen, memory.n_seen);
+        if is_new {
+            memory.n_seen += 1;
+        } else {
+            let (_, seen) = memory.next();
+            core::mem::swap(seen, before);
+        }
+        is_new
     }
 
     /// Looks at a person of the frame before, where nobody is known yet, in a wider box as well and around what is seen there, and keeps
@@ -253,9 +311,7 @@ impl Looks<'_> {
         seen.turn = track.turn;
         seen.front = front;
         seen.usual_score = Some(track.usual_score);
-        let moved = before.and_then(|before| shift(&before.maps, &seen.maps));
-        let per_frame = moved.zip(n_frames);
-        seen.speed = per_frame.map(|(moved, n_frames)| moved / n_frames.max(1) as f64);
+        seen.pace = pace(track, before, seen, n_frames);
         let has_moved = !is_soon && has_moved(&seen.maps, track.outline);
         if has_moved || seen.maps.turn(track.turn) != track.turn {
             let first = (track.outline, track.turn, seen.front);
@@ -287,7 +343,7 @@ impl Looks<'_> {
         seen.turn = look.turn;
         seen.front = look.front;
         seen.usual_score = usual_score;
-        seen.speed = None;
+        seen.pace = None;
         self.keep(memory);
     }
 
@@ -303,5 +359,19 @@ impl Looks<'_> {
         }
         let is_new = !is_known(&memory.seen, memory.n_seen);
         memory.n_seen += usize::from(is_new);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_of_a_detector_is_of_the_person_whose_box_it_covers_most() {
+        let person = [100.0, 50.0, 180.0, 250.0];
+        let shifted = |by: f64| [person[0] + by, person[1], person[2] + by, person[3]];
+        assert_eq!(best_box(&[shifted(20.0), shifted(5.0)], person), Some(1));
+        assert_eq!(best_box(&[shifted(60.0), shifted(-90.0)], person), None);
+        assert_eq!(best_box(&[], person), None);
     }
 }

@@ -1,11 +1,11 @@
 //! Memory of the step with a network from frame to frame.
 
 use multiview::FrontEvidence;
-use posenetwork::{Bar, JointMaps, LookMemory, Turn};
+use posenetwork::{Bar, JointMaps, LookMemory, Turn, overlap};
 use skeleton::MIRRORED;
 use statistics::Sorted;
 
-use crate::tracks::Track;
+use crate::tracks::{Pace, Track, wider};
 
 /// Joints that are nearer to each other, as a share of the height of the network's window, are the same; and sights that have this share
 /// of the joints in common, with sides as they are or exchanged, are of one person.
@@ -35,6 +35,8 @@ pub struct NetworkMemory {
     pub(crate) before: Vec<Seen>,
     /// Frames until boxes are looked for; none before the first frame.
     pub(crate) until: Option<u64>,
+    /// Frames for which boxes are looked for often: people were near each other, or one of several was lost or found.
+    n_unsettled: u64,
     /// The number of the last frame, where it is told ([`Self::begin`]).
     last: Option<u64>,
     /// True if the last frame is so short a time ago that nobody has left their box.
@@ -64,7 +66,7 @@ pub(crate) struct Seen {
     /// Where the person is looked for next; `None` of one who was just looked at.
     pub(crate) next: Option<Track>,
     /// As in [`Track`].
-    pub(crate) speed: Option<f64>,
+    pub(crate) pace: Option<Pace>,
     pub(crate) maps: JointMaps,
     pub(crate) outline: [f64; 4],
     /// How the picture was turned for the network.
@@ -107,6 +109,34 @@ impl NetworkMemory {
         let size = |seen: &Seen| seen.heat * (seen.outline[3] - seen.outline[1]);
         self.seen[..self.n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
         self.n_seen = self.n_seen.min(n_most);
+    }
+
+    /// Notes whether people are near each other in this frame, or their number changed.
+    ///
+    /// * `n_before`: people of the frame before.
+    /// * `n_frames`: frames for which boxes are looked for often after that.
+    pub(crate) fn note_company(&mut self, n_before: usize, n_frames: u64) {
+        let people = self.people();
+        let are_near = |(nth, person): (usize, &Seen)| {
+            let around = wider(person.outline);
+            people[..nth].iter().any(|other| overlap(wider(other.outline), around) > 0.0)
+        };
+        let has_changed = self.n_seen != n_before && self.n_seen.max(n_before) > 1;
+        self.n_unsettled = if has_changed || people.iter().enumerate().any(are_near) {
+            n_frames
+        } else {
+            self.n_unsettled.saturating_sub(1)
+        };
+    }
+
+    /// Returns true if the last frame is so short a time ago that people are about in their boxes.
+    pub(crate) fn is_followed(&self) -> bool {
+        self.hold.is_some() && self.apart.is_none()
+    }
+
+    /// Returns true if boxes are to be looked for often.
+    pub(crate) fn is_unsettled(&self) -> bool {
+        self.n_unsettled > 0
     }
 
     /// Begins with a frame. If it is long after the last one, frames between were dropped or lost: people are then looked for around
@@ -193,10 +223,10 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// How far a whole person has moved from one sight to another: the median over the joints along each axis, which the errors of single
 /// joints hardly change; share of the height of the first one's window.
-pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<f64> {
+pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<[f64; 2]> {
     let [_, top, _, bottom] = first.extent();
     let along = |axis: usize| median(steps(first, second).map(|step| step[axis]));
-    Some(along(0)?.hypot(along(1)?) / (bottom - top))
+    Some([along(0)?, along(1)?].map(|along| along / (bottom - top)))
 }
 
 #[cfg(test)]
@@ -219,6 +249,36 @@ mod tests {
         assert_eq!(after(&[3, 4, 15], Some(2.0)), Some(0));
         assert_eq!(after(&[30], Some(2.0)), Some(7), "the first frame");
         assert_eq!(after(&[3, 90], None), Some(7), "no rate is known");
+    }
+
+    #[test]
+    fn boxes_are_looked_for_often_where_people_may_hide_each_other_and_after_one_was_lost() {
+        let seen = |lefts: &[f64]| NetworkMemory {
+            seen: lefts
+                .iter()
+                .map(|left| Seen {
+                    outline: [*left, 0.0, left + 40.0, 100.0],
+                    ..Seen::default()
+                })
+                .collect(),
+            n_seen: lefts.len(),
+            ..NetworkMemory::default()
+        };
+        let n_often = |lefts: &[f64], n_before: usize| {
+            let mut memory = seen(lefts);
+            let mut n_often = 0;
+            memory.note_company(n_before, 5);
+            while memory.is_unsettled() && n_often < 9 {
+                n_often += 1;
+                memory.note_company(lefts.len(), 5);
+            }
+            n_often
+        };
+        assert_eq!(n_often(&[0.0, 200.0], 2), 0, "apart");
+        assert_eq!(n_often(&[0.0, 80.0], 2), 9, "near");
+        assert_eq!(n_often(&[0.0, 200.0], 3), 5, "one was lost");
+        assert_eq!(n_often(&[0.0], 2), 5, "one of two was lost");
+        assert_eq!(n_often(&[0.0], 0), 0, "somebody alone");
     }
 
     #[test]

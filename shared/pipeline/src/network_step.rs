@@ -11,7 +11,7 @@ use posenetwork::{
     Detector, JointMaps, LookError, Looker, MOST_CELLS, MapSettings, PersonMaps, PoseNetwork, Turn,
 };
 
-use crate::looks::Looks;
+use crate::looks::{Looks, of_others};
 use crate::network_memory::{NetworkMemory, Seen};
 use crate::placed::N;
 use crate::sighting::Sighting;
@@ -34,7 +34,8 @@ pub struct NetworkSettings {
     pub n_people: usize,
     /// Boxes are looked for in every n-th frame, and in every one in which nobody is seen well.
     pub find_every: u64,
-    /// The same while several people are seen.
+    /// The same while people are near each other, and for [`Self::find_every`] frames after: one who is hidden for a moment is found
+    /// again soon; also after one of several was lost or found.
     pub find_every_of_several: u64,
     /// By how many frames the second of these comes sooner: views that look for boxes in turn do not keep one frame waiting.
     pub find_phase: u64,
@@ -106,7 +107,8 @@ impl NetworkStep {
 
     /// Looks at a frame; what is seen stays in the memory ([`Self::sightings`], [`Self::evidence`]).
     ///
-    /// Where boxes are looked for, they come before those of the frame before, so that no box shrinks or wanders off unnoticed. A person whose
+    /// Who stands still is held. Where boxes are looked for, they come before those of the frame before, so that no box shrinks or wanders off
+    /// unnoticed. A person whose
     /// pose was much worse than usual is looked at in a wider box as well, and the better sight kept. Up to twice as many people as
     /// are kept are looked at, and the largest kept.
     ///
@@ -119,7 +121,7 @@ impl NetworkStep {
             return Ok(());
         };
         let is_due = memory.is_due();
-        let tracks = core::mem::take(&mut memory.tracks);
+        let mut tracks = core::mem::take(&mut memory.tracks);
         let mut before = core::mem::take(&mut memory.before);
         core::mem::swap(&mut memory.seen, &mut before);
         let looks = Looks {
@@ -134,12 +136,13 @@ impl NetworkStep {
             most_lost: self.most_lost(),
         };
         memory.has_searched = is_due;
+        looks.hold_still(&mut tracks, &mut before, memory);
         if is_due {
             let found = find(detector, image, &mut memory.values)?;
-            looks.see_boxes(&found, memory)?;
+            looks.see_boxes(&of_others(found, memory.people()), memory)?;
         }
-        for (nth, track) in tracks.iter().enumerate() {
-            looks.see_once_more((nth, track), &mut before, memory)?;
+        for track in tracks.iter().filter(|track| !track.is_seen) {
+            looks.see_once_more(track, &before, memory)?;
         }
         if memory.n_seen == 0 && !is_due {
             memory.has_searched = true;
@@ -148,6 +151,7 @@ impl NetworkStep {
         }
         memory.before = before;
         memory.keep_largest(self.settings.n_people);
+        memory.note_company(tracks.len(), self.settings.find_every);
         self.plan_search(memory);
         // The memory of the list is kept.
         memory.tracks = tracks;
@@ -159,7 +163,7 @@ impl NetworkStep {
     fn plan_search(&self, memory: &mut NetworkMemory) {
         let settings = &self.settings;
         let first = settings.find_every - settings.find_phase % settings.find_every;
-        let every = if memory.n_seen > 1 {
+        let every = if memory.n_seen > 1 && memory.is_unsettled() {
             settings.find_every_of_several
         } else {
             settings.find_every
@@ -245,7 +249,7 @@ impl NetworkStep {
         let before = ((seen.outline, seen.turn), seen.usual_score);
         let around = seen.maps.around();
         seen.next = around.map(|around| Track {
-            speed: seen.speed,
+            pace: seen.pace,
             ..Track::next(before, (around, score), self.most_lost())
         });
     }

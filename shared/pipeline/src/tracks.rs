@@ -17,6 +17,10 @@ const MOST_MOVED: f64 = 1.0;
 /// A person who has moved by less is where the last look saw them, share of the height of the network's window: less than the
 /// network is off by.
 const STILL: f64 = 0.01;
+/// Who was seen so many times farther from the last place has moved, whatever the mean velocity.
+const MOST_STEP: f64 = 3.0;
+/// Weight of the earlier velocity after a frame: from look to look the network errs by more than a person who stands moves.
+const KEPT: f64 = 0.7;
 
 /// Where a person is looked for in the next frame.
 #[derive(Debug, Clone, Copy)]
@@ -33,9 +37,42 @@ pub(crate) struct Track {
     pub(crate) index: usize,
     /// Frames since the person was last looked at.
     pub(crate) n_held: u64,
-    /// How fast the person moved in the picture between the last two looks, share of the window's height for each frame; `None`
-    /// after one look.
-    pub(crate) speed: Option<f64>,
+    /// How the person moves in the picture; `None` after one look.
+    pub(crate) pace: Option<Pace>,
+    /// True if the person is seen in this frame already.
+    pub(crate) is_seen: bool,
+}
+
+/// How a person moves in the picture, shares of the height of the network's window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pace {
+    /// Mean velocity for each frame; the last looks count most.
+    velocity: [f64; 2],
+    /// How far the person moved between the last two looks.
+    step: f64,
+}
+
+impl Pace {
+    /// The pace after another look.
+    ///
+    /// * `moved`: since the look before; `n_frames`: from that one to this.
+    pub(crate) fn next(before: Option<Self>, moved: [f64; 2], n_frames: u64) -> Self {
+        let n_frames = n_frames.max(1) as f64;
+        let now = moved.map(|moved| moved / n_frames);
+        let (kept, last) =
+            before.map_or((0.0, now), |before| (KEPT.powf(n_frames), before.velocity));
+        let velocity = core::array::from_fn(|axis| kept * last[axis] + (1.0 - kept) * now[axis]);
+        Self {
+            velocity,
+            step: moved[0].hypot(moved[1]),
+        }
+    }
+
+    /// Returns true if somebody with this pace hardly moves in so many frames.
+    fn is_still(&self, n_frames: u64) -> bool {
+        let [x, y] = self.velocity;
+        self.step <= MOST_STEP * STILL && x.hypot(y) * n_frames as f64 <= STILL
+    }
 }
 
 impl Track {
@@ -71,7 +108,8 @@ impl Track {
             is_doubtful,
             index: 0,
             n_held: 0,
-            speed: None,
+            pace: None,
+            is_seen: false,
         }
     }
 
@@ -79,7 +117,7 @@ impl Track {
     ///
     /// * `n_frames`: from the last look to this frame.
     pub(crate) fn is_still(&self, n_frames: u64) -> bool {
-        !self.is_doubtful && self.speed.is_some_and(|speed| speed * n_frames as f64 <= STILL)
+        !self.is_doubtful && self.pace.is_some_and(|pace| pace.is_still(n_frames))
     }
 }
 
@@ -127,9 +165,9 @@ mod tests {
     #[test]
     fn who_stands_still_is_where_the_last_look_was_for_as_long_as_the_speed_allows() {
         let track = Track::next(((BOX, Turn::Up), Some(-18.0)), (BOX, -18.0), 6.0);
-        assert!(!track.is_still(1), "one look tells no speed");
+        assert!(!track.is_still(1), "one look tells no pace");
         let with = |speed: f64| Track {
-            speed: Some(speed),
+            pace: Some(Pace::next(None, [0.0, speed], 1)),
             ..track
         };
         let longest = |speed: f64| (1..=8).filter(|n| with(speed).is_still(*n)).count();
@@ -139,6 +177,25 @@ mod tests {
             ..with(0.0)
         };
         assert!(!doubtful.is_still(1));
+    }
+
+    #[test]
+    fn errors_of_the_network_are_no_movement_and_steps_are() {
+        let after = |moved: &[f64]| {
+            let looks = moved.iter().fold(None, |before, moved| {
+                Some(Pace::next(before, [*moved, 0.0], 1))
+            });
+            looks.unwrap()
+        };
+        let n_still = |moved: &[f64]| (1..=8).filter(|n| after(moved).is_still(*n)).count();
+        assert!(n_still(&[0.006, -0.006, 0.006, -0.006]) >= 4);
+        assert_eq!(n_still(&[0.006, -0.006, 0.04]), 0, "a step");
+        assert_eq!(n_still(&[0.009; 8]), 1, "a slow walk");
+        assert_eq!(
+            n_still(&[0.0, 0.0, 0.02]),
+            1,
+            "who begins to walk is looked at in the frame after the next at the latest"
+        );
     }
 
     #[test]
