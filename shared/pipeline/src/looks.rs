@@ -10,7 +10,7 @@ use crate::tracks::{Pace, Track, moved, wider};
 const SAME: f64 = 0.5;
 /// Boxes of a detector that overlap by more are of one person.
 const SAME_BOX: f64 = 0.85;
-/// A person in a box that overlaps with one of somebody larger by more may be hidden soon.
+/// A person whose box overlaps with that of a larger person by more may be hidden soon.
 const BEHIND: f64 = 0.2;
 /// Least number of joints of a person behind others that these do not cover.
 const LEAST_BEHIND: usize = 7;
@@ -69,8 +69,8 @@ fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>
 }
 
 impl Looks<'_> {
-    /// Takes the people of the frame before who stand still as they were. The first is looked at in every frame, and so is who stands behind somebody
-    /// larger.
+    /// Takes the people of the frame before who stand still as they were. The first is looked at in every frame, and so is a person behind a larger
+    /// one.
     ///
     /// * `before`: the people of the frame before; of those who are held, other memory afterwards.
     pub(crate) fn hold_still(

@@ -278,7 +278,7 @@ mod tests {
         assert_eq!(n_often(&[0.0, 80.0], 2), 9, "near");
         assert_eq!(n_often(&[0.0, 200.0], 3), 5, "one was lost");
         assert_eq!(n_often(&[0.0], 2), 5, "one of two was lost");
-        assert_eq!(n_often(&[0.0], 0), 0, "somebody alone");
+        assert_eq!(n_often(&[0.0], 0), 0, "a person alone");
     }
 
     #[test]

@@ -108,9 +108,8 @@ impl NetworkStep {
     /// Looks at a frame; what is seen stays in the memory ([`Self::sightings`], [`Self::evidence`]).
     ///
     /// Who stands still is held. Where boxes are looked for, they come before those of the frame before, so that no box shrinks or wanders off
-    /// unnoticed. A person whose
-    /// pose was much worse than usual is looked at in a wider box as well, and the better sight kept. Up to twice as many people as
-    /// are kept are looked at, and the largest kept.
+    /// unnoticed. A person whose pose was much worse than usual is looked at in a wider box as well, and the better sight kept. Up to twice as many
+    /// people as are kept are looked at, and the largest kept.
     ///
     /// # Errors
     ///

@@ -17,7 +17,7 @@ const MOST_MOVED: f64 = 1.0;
 /// A person who has moved by less is where the last look saw them, share of the height of the network's window: less than the
 /// network is off by.
 const STILL: f64 = 0.01;
-/// Who was seen so many times farther from the last place has moved, whatever the mean velocity.
+/// A person who was seen so many times [`STILL`] from the last place has moved, whatever the mean velocity.
 const MOST_STEP: f64 = 3.0;
 /// Weight of the earlier velocity after a frame: from look to look the network errs by more than a person who stands moves.
 const KEPT: f64 = 0.7;
@@ -48,7 +48,7 @@ pub(crate) struct Track {
 pub(crate) struct Pace {
     /// Mean velocity for each frame; the last looks count most.
     velocity: [f64; 2],
-    /// How far the person moved between the last two looks.
+    /// Distance of the last two sights.
     step: f64,
 }
 
@@ -68,7 +68,7 @@ impl Pace {
         }
     }
 
-    /// Returns true if somebody with this pace hardly moves in so many frames.
+    /// Returns true if a person with this pace hardly moves in so many frames.
     fn is_still(&self, n_frames: u64) -> bool {
         let [x, y] = self.velocity;
         self.step <= MOST_STEP * STILL && x.hypot(y) * n_frames as f64 <= STILL
@@ -194,7 +194,7 @@ mod tests {
         assert_eq!(
             n_still(&[0.0, 0.0, 0.02]),
             1,
-            "who begins to walk is looked at in the frame after the next at the latest"
+            "a person who begins to walk is not held over the next frame"
         );
     }
 
