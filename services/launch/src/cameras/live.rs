@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::thread;
 
-use capture::{Feed, FeedError, FeedInfo, LiveCamera, LiveError, Retimed};
+use capture::{Feed, LiveCamera, LiveError, Retimed};
 use deployment::capture::{Camera, CameraClock, Config, Transport};
 use deployment::{Deployment, Timeline};
-use failure::{ExitKind, Failure, Fault as _, OrFail as _};
+use failure::{ExitKind, Failure, Fault as _};
 use footage::LiveAddress;
 use scene::Address;
 
@@ -37,13 +37,7 @@ pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
     })
 }
 
-/// Answer of a camera.
-enum Asked {
-    Live(Result<(footage::Size, f64), LiveError>),
-    Files(Result<FeedInfo, FeedError>),
-}
-
-/// Reads the metadata of every camera's footage, of all at once: every one of them is a program, or a camera, that is waited for.
+/// Reads the metadata of every camera's footage; live cameras are asked all at once.
 ///
 /// * `is_here`: whether a camera is on this machine; of others what the calibration says.
 pub(crate) fn footage(
@@ -51,35 +45,30 @@ pub(crate) fn footage(
     is_here: &dyn Fn(usize) -> bool,
 ) -> Result<Vec<Footage>, Failure> {
     let capture = &deployment.capture;
-    let ask = |index: usize, camera: &Camera| {
-        let live = live_camera(camera).filter(|_| is_here(index));
-        let is_read = is_here(index) || Address::is_address(&camera.source);
-        let spec = source(camera, capture);
-        (live.is_some() || is_read).then_some(move || match live {
-            Some(live) => Asked::Live(live.look()),
-            None => Asked::Files(Feed::look(&spec)),
-        })
-    };
     let all: Vec<Result<Footage, Failure>> = thread::scope(|scope| {
-        let cameras = deployment.cameras.iter().enumerate();
-        let asked = cameras.map(|(index, camera)| {
-            let ask = ask(index, camera)?;
-            let thread = thread::Builder::new().name(camera.name.clone());
-            Some(thread.spawn_scoped(scope, ask))
-        });
-        let asked: Vec<_> = asked.collect();
-        let cameras = deployment.cameras.iter().zip(asked);
-        let read = cameras.map(|(camera, asked)| {
-            let Some(asked) = asked else {
-                return elsewhere(deployment, camera);
-            };
-            let asked = asked.or_fail(ExitKind::Run)?;
-            match asked.join() {
-                Ok(Asked::Files(info)) => of_files(camera, info),
-                Ok(Asked::Live(found)) => {
+        let asked: Vec<_> = deployment
+            .cameras
+            .iter()
+            .enumerate()
+            .map(|(index, camera)| {
+                let live = live_camera(camera).filter(|_| is_here(index))?;
+                let thread = thread::Builder::new().name(camera.name.clone());
+                thread.spawn_scoped(scope, move || live.look()).ok()
+            })
+            .collect();
+        let cameras = deployment.cameras.iter().enumerate().zip(asked);
+        let read = cameras.map(|((index, camera), asked)| {
+            match asked.map(thread::ScopedJoinHandle::join) {
+                None if is_here(index) || Address::is_address(&camera.source) => {
+                    of_files(camera, capture)
+                }
+                None => elsewhere(deployment, camera),
+                Some(Ok(found)) => {
                     found.map(|look| of_live(look, capture)).map_err(|error| refused(error, camera))
                 }
-                Err(_panic) => Err(Failure::new(ExitKind::Run, "a camera could not be asked")),
+                Some(Err(_panic)) => {
+                    Err(Failure::new(ExitKind::Run, "a camera could not be asked"))
+                }
             }
         });
         read.collect()
@@ -139,7 +128,8 @@ pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
     leads.max().unwrap_or(FOOTAGE)
 }
 
-fn of_files(camera: &Camera, info: Result<FeedInfo, FeedError>) -> Result<Footage, Failure> {
+fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
+    let info = Feed::look(&source(camera, capture));
     let info = info.map_err(|error| {
         let hint = advice::on_footage(&error, &camera.name);
         Failure::new(ExitKind::Input, error).with_hint(hint)
