@@ -5,10 +5,12 @@
 )]
 
 mod area;
+mod near;
 mod sampled;
 
 use area::Area;
 use kernels::{Body, Isa, dispatch};
+use near::Near;
 use sampled::Sampled;
 
 use crate::Size;
@@ -82,6 +84,7 @@ pub struct Warp {
 enum Plan {
     Copy,
     Area(Area),
+    Near(Near),
     Sampled(Sampled),
 }
 
@@ -118,12 +121,9 @@ impl Warp {
             Plan::Area(Area::new(source, output, [[a, tx], [d, ty]], fill))
         } else {
             let n_samples = scales.map(|scale| (scale - 1e-9).ceil().max(1.0) as usize);
-            Plan::Sampled(Sampled::new(
-                [source, output],
-                source_from_output,
-                n_samples,
-                fill,
-            ))
+            let sizes = [source, output];
+            let sampled = Sampled::new(sizes, source_from_output, n_samples, fill);
+            Near::new(&sampled).map_or(Plan::Sampled(sampled), Plan::Near)
         };
         Ok(Self {
             source,
@@ -183,6 +183,7 @@ impl Body for Run<'_> {
         match self.plan {
             Plan::Copy => self.out.copy_from_slice(self.source),
             Plan::Area(area) => area.apply(self.source, self.out),
+            Plan::Near(near) => near.apply(self.source, self.out),
             Plan::Sampled(sampled) => sampled.apply(self.source, self.out),
         }
     }
@@ -258,6 +259,23 @@ mod tests {
             for result in &results {
                 prop_assert_eq!(result, &results[0]);
             }
+        }
+
+        #[test]
+        fn samples_in_few_steps_have_the_bits_of_the_reference(
+            angle in -3.2..3.2_f64, scale in 0.3..1.0_f64, tx in -40.0..60.0, ty in -40.0..60.0,
+            size in (1..90_usize, 1..40_usize), replicate: bool,
+        ) {
+            let (sin, cos) = f64::sin_cos(angle);
+            let map = [[scale * cos, -scale * sin, tx], [scale * sin, scale * cos, ty]];
+            let fill = if replicate { Fill::Replicate } else { Fill::Black };
+            let output = Size::new(size.0, size.1);
+            let mut sampled = Sampled::new([SOURCE, output], &map, [1, 1], fill);
+            let near = Near::new(&sampled).unwrap();
+            let [mut expected, mut actual] = [vec![99; output.rgb_bytes()], vec![77; output.rgb_bytes()]];
+            sampled.apply(&noise(), &mut expected);
+            near.apply(&noise(), &mut actual);
+            prop_assert_eq!(actual, expected);
         }
     }
 }

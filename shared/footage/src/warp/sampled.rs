@@ -12,7 +12,7 @@ const BLOCK_PIXELS: usize = 8;
 const BLOCK: usize = 3 * BLOCK_PIXELS;
 
 /// Fractional bits of source positions.
-const POSITION_BITS: u32 = 32;
+pub(super) const POSITION_BITS: u32 = 32;
 
 /// Weights of a kernel add up to `1 << WEIGHT_BITS`, exactly, so that a constant image is unchanged.
 const WEIGHT_BITS: u32 = 14;
@@ -37,6 +37,27 @@ pub(super) struct Sampled {
     kernels: Vec<Block>,
     /// One output row.
     sums: Vec<Sums>,
+}
+
+/// Where the centre of an output pixel falls in the source.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    /// Behind which part of a source pixel, along rows and columns.
+    phase: [usize; 2],
+    /// First column and row of the footprint.
+    left: i64,
+    top: i64,
+}
+
+/// Where a row of the output lies in the source.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    /// Column and row of its first pixel, in fixed point, rounded when it is cut off.
+    pub(super) at: [i64; 2],
+    /// From one of its pixels to the next.
+    pub(super) step: [i64; 2],
+    /// Bytes of a row of the source.
+    pub(super) stride: usize,
 }
 
 /// The source pixels that a kernel covers, relative to the one that its centre lies in.
@@ -82,6 +103,47 @@ impl Sampled {
         }
     }
 
+    /// Output pixels of a row.
+    pub(super) fn width(&self) -> usize {
+        self.output.width
+    }
+
+    /// Where a row begins in the source, from one of its pixels on.
+    #[inline(always)]
+    pub(super) fn start(&self, [x, y]: [usize; 2]) -> Start {
+        let half = 1 << (POSITION_BITS - self.phase_bits - 1);
+        Start {
+            at: self.map.map(|[a, b, t]| a * x as i64 + b * y as i64 + t + half),
+            step: self.map.map(|[a, ..]| a),
+            stride: 3 * self.source.width,
+        }
+    }
+
+    /// Returns true if the source has all pixels of an output pixel's footprint, and a column more.
+    #[inline(always)]
+    pub(super) fn has_all(&self, at: [i64; 2]) -> bool {
+        let Footprint {
+            n_columns, n_rows, ..
+        } = self.footprint;
+        let place = self.place(at);
+        let fits = |first: i64, n: usize, all: usize| first >= 0 && first + n as i64 <= all as i64;
+        fits(place.left, n_columns + 1, self.source.width)
+            && fits(place.top, n_rows, self.source.height)
+    }
+
+    /// Returns true if every output pixel is one bilinear sample, with positions of so many fractional bits.
+    pub(super) fn is_bilinear(&self, part_bits: u32) -> bool {
+        let Footprint {
+            n_columns, n_rows, ..
+        } = self.footprint;
+        [n_columns, n_rows] == [2, 2] && self.phase_bits == part_bits
+    }
+
+    /// One output pixel at the border of the source, or outside.
+    pub(super) fn pixel_across(&self, source: &[u8], at: [i64; 2]) -> [u8; 3] {
+        rounded(by_channel(&self.add_across(source, &self.place(at))))
+    }
+
     /// In two passes over every row, because compilers vectorise them only apart: sums per byte of a
     /// block, then per channel.
     #[inline(always)]
@@ -101,27 +163,43 @@ impl Sampled {
 
     /// The products of one output pixel, added up per byte of a block.
     #[inline(always)]
-    fn add_up(&self, source: &[u8], [x, y]: [i64; 2], sums: &mut Sums) {
+    fn add_up(&self, source: &[u8], at: [i64; 2], sums: &mut Sums) {
+        let place = self.place(at);
+        match self.inside(&place) {
+            Some(at) => self.add_inside(&source[at..], self.kernel(&place), sums),
+            None => *sums = self.add_across(source, &place),
+        }
+    }
+
+    /// Where the centre of an output pixel falls.
+    #[inline(always)]
+    pub(super) fn place(&self, [x, y]: [i64; 2]) -> Place {
         let half = 1 << (POSITION_BITS - self.phase_bits - 1);
         let [u, v] = self
             .map
             .map(|[a, b, t]| (a * x + b * y + t + half) >> (POSITION_BITS - self.phase_bits));
         let mask = (1 << self.phase_bits) - 1;
-        let phase = (((v & mask) << self.phase_bits) | (u & mask)) as usize;
-        let n_kernel = self.footprint.n_rows * self.footprint.n_blocks;
-        let kernel = &self.kernels[phase * n_kernel..][..n_kernel];
-        let left = (u >> self.phase_bits) + self.footprint.left;
-        let top = (v >> self.phase_bits) + self.footprint.top;
-        match self.inside(left, top) {
-            Some(at) => self.add_inside(&source[at..], kernel, sums),
-            None => *sums = self.add_across(source, kernel, [left, top]),
+        Place {
+            phase: [u & mask, v & mask].map(|phase| phase as usize),
+            left: (u >> self.phase_bits) + self.footprint.left,
+            top: (v >> self.phase_bits) + self.footprint.top,
         }
+    }
+
+    #[inline(always)]
+    fn kernel(&self, place: &Place) -> &[Block] {
+        let phase = (place.phase[1] << self.phase_bits) | place.phase[0];
+        let n_kernel = self.footprint.n_rows * self.footprint.n_blocks;
+        &self.kernels[phase * n_kernel..][..n_kernel]
     }
 
     /// Index of the first byte of the footprint, if all blocks of it lie in the source.
     #[inline(always)]
-    fn inside(&self, left: i64, top: i64) -> Option<usize> {
-        let (left, top) = (usize::try_from(left).ok()?, usize::try_from(top).ok()?);
+    pub(super) fn inside(&self, place: &Place) -> Option<usize> {
+        let (left, top) = (
+            usize::try_from(place.left).ok()?,
+            usize::try_from(place.top).ok()?,
+        );
         let Footprint {
             n_columns,
             n_rows,
@@ -151,10 +229,16 @@ impl Sampled {
 
     /// The same sums, already per channel, where some pixels are outside of the source.
     #[cold]
-    fn add_across(&self, source: &[u8], kernel: &[Block], [left, top]: [i64; 2]) -> Sums {
+    fn add_across(&self, source: &[u8], place: &Place) -> Sums {
+        let kernel = self.kernel(place);
         let footprint = self.footprint;
-        let columns = Axis::new(left, footprint.n_columns, self.source.width, self.fill);
-        let rows = Axis::new(top, footprint.n_rows, self.source.height, self.fill);
+        let columns = Axis::new(
+            place.left,
+            footprint.n_columns,
+            self.source.width,
+            self.fill,
+        );
+        let rows = Axis::new(place.top, footprint.n_rows, self.source.height, self.fill);
         let mut sums = [0; BLOCK];
         for (row, y) in rows.positions() {
             for (column, x) in columns.positions() {

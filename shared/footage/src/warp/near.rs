@@ -1,0 +1,131 @@
+//! Bilinear samples in few steps, for maps that turn a picture and keep its scale.
+//!
+//! [`Sampled`] is the readable reference: the same bits, in three times as long. It also takes the pixels at the border.
+
+use std::ops::Range;
+
+use super::sampled::{POSITION_BITS, Sampled, Start};
+
+/// Bytes that are copied for a pixel: its three channels, and one of the next.
+const LANES: usize = 4;
+/// Positions that are taken together.
+const TILE: usize = 64;
+/// Bits of the parts of a source pixel in which positions are counted.
+const PART_BITS: u32 = 5;
+const PARTS: u16 = 1 << PART_BITS;
+/// Bits of the sum of all weights.
+const SUM_BITS: u32 = 2 * PART_BITS;
+
+/// Of the positions of a tile, a lane for each channel.
+type Lanes = [[u8; LANES]; TILE];
+
+/// A mean of the four source pixels around every position, weighted by how near they are.
+#[derive(Debug, Clone)]
+pub(super) struct Near {
+    sampled: Sampled,
+}
+
+/// Some positions of a row.
+struct Tile {
+    /// Source pixels above left, above right, below left and below right of the position.
+    around: [Lanes; 4],
+    /// How far the position lies to the right of the left ones, and below the upper ones, 1/32 pixel.
+    parts: [Lanes; 2],
+    mean: Lanes,
+}
+
+impl Near {
+    /// The samples of a map in few steps; `None` if a position takes more than four pixels, or is counted in other parts of a pixel.
+    pub(super) fn new(sampled: &Sampled) -> Option<Self> {
+        sampled.is_bilinear(PART_BITS).then(|| Self {
+            sampled: sampled.clone(),
+        })
+    }
+
+    #[inline(always)]
+    pub(super) fn apply(&self, source: &[u8], out: &mut [u8]) {
+        let mut tile = Tile {
+            around: [[[0; LANES]; TILE]; 4],
+            parts: [[[0; LANES]; TILE]; 2],
+            mean: [[0; LANES]; TILE],
+        };
+        let width = self.sampled.width();
+        let pixels = out.as_chunks_mut::<3>().0;
+        for (y, row) in pixels.chunks_exact_mut(width).enumerate() {
+            let within = self.within(y);
+            for x in (0..within.start).chain(within.end..width) {
+                row[x] = self.sampled.pixel_across(source, [x as i64, y as i64]);
+            }
+            let start = within.start;
+            for (nth, pixels) in row[within].chunks_mut(TILE).enumerate() {
+                let start = self.sampled.start([start + nth * TILE, y]);
+                tile.copy(source, start, pixels.len());
+                tile.add_up();
+                for (pixel, mean) in pixels.iter_mut().zip(&tile.mean) {
+                    *pixel = [mean[0], mean[1], mean[2]];
+                }
+            }
+        }
+    }
+
+    /// The part of an output row whose positions have all four pixels. A row is straight in the source, so that this is one part.
+    #[inline(always)]
+    fn within(&self, y: usize) -> Range<usize> {
+        let width = self.sampled.width();
+        let has_all = |x: &usize| self.sampled.has_all([*x as i64, y as i64]);
+        let first = (0..width).find(has_all).unwrap_or(width);
+        let end = (first..width).rfind(has_all).map_or(first, |last| last + 1);
+        first..end
+    }
+}
+
+impl Tile {
+    /// Copies the pixels around `n` positions of a row.
+    #[inline(always)]
+    fn copy(&mut self, source: &[u8], start: Start, n: usize) {
+        let Start {
+            at: [mut u, mut v],
+            step,
+            stride,
+        } = start;
+        let [a, b, c, d] = &mut self.around;
+        let [right, below] = &mut self.parts;
+        for x in 0..n.min(TILE) {
+            let [column, row] = [u, v].map(|at| (at >> POSITION_BITS) as usize);
+            let first = row * stride + 3 * column;
+            // `has_all` has made sure of a pixel more than a position takes.
+            let eight = |at: usize| {
+                let bytes = &source[at..at + 8];
+                u64::from_le_bytes(std::array::from_fn(|nth| bytes[nth]))
+            };
+            let [upper, lower] = [first, first + stride].map(eight);
+            a[x] = (upper as u32).to_le_bytes();
+            b[x] = ((upper >> 24) as u32).to_le_bytes();
+            c[x] = (lower as u32).to_le_bytes();
+            d[x] = ((lower >> 24) as u32).to_le_bytes();
+            let [part_u, part_v] =
+                [u, v].map(|at| (at >> (POSITION_BITS - PART_BITS)) as u8 % PARTS as u8);
+            right[x] = [part_u; LANES];
+            below[x] = [part_v; LANES];
+            u += step[0];
+            v += step[1];
+        }
+    }
+
+    /// Adds up the products: in a pass of their own, because compilers vectorise only this one.
+    #[inline(always)]
+    fn add_up(&mut self) {
+        let [a, b, c, d] = self.around.each_ref().map(|lanes| lanes.as_flattened());
+        let [right, below] = self.parts.each_ref().map(|lanes| lanes.as_flattened());
+        let mean = self.mean.as_flattened_mut();
+        for i in 0..LANES * TILE {
+            let [right, below] = [right[i], below[i]].map(u16::from);
+            let [a, b, c, d] = [a[i], b[i], c[i], d[i]].map(u16::from);
+            let upper = a * (PARTS - right) + b * right;
+            let lower = c * (PARTS - right) + d * right;
+            let sum =
+                u32::from(upper) * u32::from(PARTS - below) + u32::from(lower) * u32::from(below);
+            mean[i] = ((sum + (1 << (SUM_BITS - 1))) >> SUM_BITS) as u8;
+        }
+    }
+}
