@@ -206,7 +206,7 @@ fn ports_in_words(description: &Description) -> Result<(), Failure> {
     ] {
         for it in ports {
             let sides = match &it.sides[..] {
-                [] => "of sides that the file does not tell".to_owned(),
+                [] => "of a shape that the file does not give".to_owned(),
                 sides => written(sides),
             };
             output::line(format_args!("  {what:<6} `{}` {sides}", it.name))?;

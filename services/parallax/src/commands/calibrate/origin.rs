@@ -19,10 +19,10 @@ use terminal::{Globals, Terminal, output};
 /// Options of `parallax calibrate origin`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-With a board on the floor, its print up: the origin is its upper left corner, x along its rows, y against its columns, z up.
+With a board on the floor, its printed side up: the origin is its upper left corner, x runs along its rows, y against its columns, z up.
 With three points on the floor: the origin, one along x, and any other; each as pixels of at least two cameras.
-With --people the floor is below the feet of people who stand, in a finished run of this rig. The origin is in \
-the middle of their places, and x is as near to the old x as possible. If a person walked about, the plane of the standing feet \
+With --people the floor is below the feet of people who stand, in a finished run of this rig. The origin is in the \
+middle of the places where they stood, and x is as near to the old x as possible. If a person walked about, the plane of the standing feet \
 gives the vertical. Otherwise upright people do, less surely: the file is written, and the exit code is 7.
 
 Examples:
