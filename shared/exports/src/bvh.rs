@@ -164,12 +164,14 @@ fn notes(
     is_there: &[bool; N_NODES],
     held: &Held,
 ) -> Notes {
-    let mut notes =
-        vec!["how a bone is turned about itself is not seen: it turns with its parent".to_owned()];
+    let mut notes = vec![
+        "the joints do not show how a bone turns about its own axis: it turns with its parent"
+            .to_owned(),
+    ];
     if trial.first_frame > 0 {
         let (frame, time_s) = (trial.first_frame, trial.time_s(0).unwrap_or_default());
         notes.push(format!(
-            "the format begins at 0: its first line is frame {frame}, at {time_s:.3} s"
+            "the format counts from 0: its first line is frame {frame} of the run, at {time_s:.3} s"
         ));
     }
     if held.n_frames > 0 {

@@ -203,7 +203,7 @@ pub enum TrialError {
         frames: usize,
     },
     /// The joints are those of no set.
-    #[error("the joints are of no known set: {0}")]
+    #[error("the joints are not those of a known set: {0}")]
     Joints(String),
     /// Two frames are farther apart than can be.
     #[error(

@@ -260,7 +260,7 @@ impl<'a> Finding<'a> {
         };
         let bias = bias.ok_or("its bias is not a constant")?;
         let conv = Conv::new(size, &weights.values, &bias, input.stack == 0);
-        let conv = conv.map_err(|_error| "its weights do not fit its sides")?;
+        let conv = conv.map_err(|_error| "its weights do not fit its shape")?;
         self.front.border = self.front.border.max(most);
         let operation = Operation::Conv {
             conv,
