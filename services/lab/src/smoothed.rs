@@ -117,7 +117,7 @@ fn truth(
     }
     if n_known == 0 {
         let what = format!(
-            "{}: the truth is of none of the {} frames (from {}) and joints of the run",
+            "{}: the truth has none of the {} frames (from {}) or joints of the run",
             path.display(),
             frames.len(),
             frames.first().copied().unwrap_or_default()

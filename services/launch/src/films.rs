@@ -125,7 +125,7 @@ pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failur
     let of_entry = |camera: &deployment::capture::Camera| {
         if crate::cameras::is_live(&camera.source) {
             let message = format!(
-                "camera {:?} is live: nothing of it can be compared with others",
+                "camera {:?} is live: it has no footage to compare with that of others",
                 camera.name
             );
             let failure = Failure::new(ExitKind::Config, message);

@@ -136,8 +136,8 @@ impl Prepared {
         let has_other_model = paper.model.is_some() && !is_shipped(paper.model.as_ref());
         if has_other_model && is_shipped(errors.and_then(Errors::network)) {
             tracing::warn!(
-                "paper.errors is the one that ships, which was trained on what the model that ships finds; \
-                 of another model's poses it knows nothing"
+                "paper.errors is the network that ships, which was trained on poses of the model that ships; it knows \
+                 nothing about those of another model"
             );
         }
         inputs::quality_network(errors, self.model.n_parts())?;

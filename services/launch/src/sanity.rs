@@ -134,7 +134,7 @@ fn hint(finding: &Finding) -> String {
     match finding {
         Finding::Distance { metres, .. } => format!(
             "say in the deployment what the numbers of the file are: `unit = \"mm\"` makes this {:.3} m, `unit = \"cm\"` {:.3} m, \
-             `unit = \"m\"` means that it is so",
+             `unit = \"m\"` says that it is right",
             metres / 1000.0,
             metres / 100.0
         ),
@@ -186,7 +186,7 @@ fn without_rate(resolved: &Resolved) -> Option<String> {
     let names: Vec<&str> = unknown.map(|unknown| unknown.0.name.as_str()).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "nothing says how many frames per second {} has: taken are those of the other cameras; `capture.frame_rate_hz` says it",
+            "nothing says how many frames per second {} has: the rate of the other cameras is used; `capture.frame_rate_hz` sets it",
             names.join(", ")
         )
     })

@@ -242,7 +242,10 @@ pub fn remove_pictures(path: &Path) -> Result<(), FolderError> {
     if !path.join(MARK).is_file()
         && let Some(other) = other_than_pictures(path, 2).map_err(failed)?
     {
-        let text = format!("{} is no picture of a run; move it away", other.display());
+        let text = format!(
+            "{} is not a picture of a run; move it away",
+            other.display()
+        );
         return Err(failed(io::Error::other(text)));
     }
     fs::remove_dir_all(path).map_err(failed)
@@ -309,7 +312,7 @@ mod tests {
         let errors = folder.finish();
         let text = format!("{} {}", errors[0], errors[0].source);
         assert!(
-            text.contains("holiday.png is no picture of a run"),
+            text.contains("holiday.png is not a picture of a run"),
             "{text}"
         );
         assert!(own.exists() && pictures.join("left/000001.png").exists());

@@ -201,12 +201,12 @@ fn notes(
     let missing: Vec<&str> = missing.filter_map(|node| node.1.landmark).collect();
     if !missing.is_empty() {
         notes.push(format!(
-            "never seen with what they hang on, and left out: {}",
+            "never seen together with the joint before them, and left out: {}",
             missing.join(", ")
         ));
     }
     if !trial.extras.is_empty() {
-        notes.push("keypoints beside the joints are left out: they hang on nothing".to_owned());
+        notes.push("extra keypoints are left out: they belong to no bone".to_owned());
     }
     let known = lengths.iter().zip(NODES).filter_map(|bone| Some((bone.1.name, (*bone.0)?)));
     let known = known.map(|(name, length)| format!("{name} {:.1}", CM * length));

@@ -249,7 +249,7 @@ impl<'a> Finding<'a> {
             return Err("its padding or kernel is too large");
         }
         if channels != inputs || reach[0] < down || reach[1] < across {
-            return Err("its sides do not fit its input");
+            return Err("its shape does not fit its input");
         }
         let size = ConvSize {
             inputs,
@@ -308,7 +308,7 @@ impl<'a> Finding<'a> {
         let [sides, [channels, rows, cols]] = of.map(|value| self.front.sides[value.stack]);
         let fits = of[0].repeat == 1 && sides == [channels, rows * repeat, cols * repeat];
         if of[0].stack == 0 || of[1].stack == 0 || !fits {
-            return Err("it does not add stacks of the same sides");
+            return Err("it does not add stacks of the same shape");
         }
         self.give(Operation::Sum { of, repeat }, sides)
     }

@@ -172,12 +172,12 @@ impl fmt::Display for Doubt {
             ),
             Kind::Jumps => write!(
                 f,
-                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the one who is followed changes; `pose.follow` and \
-                 the space that is looked at say whom to follow"
+                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the one who is followed changes; `person.follow` \
+                 and the space that the cameras see say whom to follow"
             ),
             Kind::Implausible => write!(
                 f,
-                "{value:.0} % of what was found is no body that people have (more than {limit:.0} %): is one person seen whole, in the right size?"
+                "{value:.0} % of what was found is not a body that people have (more than {limit:.0} %): is one person seen whole, in the right size?"
             ),
             Kind::Joints => write!(
                 f,

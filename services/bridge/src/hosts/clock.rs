@@ -90,8 +90,8 @@ impl Estimate {
         (share > max_share).then(|| {
             format!(
                 "its clock is known to {:.3} ms only, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %): \
-                 the network's round trips take {:.3} ms at best; a quieter network helps, and where cameras stamp their \
-                 pictures themselves `chrony` or `linuxptp` on all hosts",
+                 the network's round trips take {:.3} ms at best; a quieter network helps; if cameras stamp their \
+                 pictures themselves, run `chrony` or `linuxptp` on all hosts",
                 self.bound_nanos as f64 * 1e-6,
                 100.0 * share,
                 100.0 * max_share,

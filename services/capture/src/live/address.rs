@@ -43,7 +43,7 @@ pub enum LiveError {
     },
     /// The stream does not tell its rate.
     #[error(
-        "{address} does not tell how many pictures it has in a second: give it as `frame_rate_hz` of the camera"
+        "{address} does not say how many pictures it has per second: set `frame_rate_hz` of the camera"
     )]
     NoRate {
         /// Without a password.

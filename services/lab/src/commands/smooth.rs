@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let run = finished::read(&arguments.folder, None)?;
     if let [first, _, ..] = &run.people[..] {
         output::message(format_args!(
-            "{} people are in the run, one in the truth: compared is person {}",
+            "the run has {} people, the truth has one: person {} is compared",
             run.people.len(),
             first.ids[0]
         ));

@@ -142,7 +142,10 @@ impl Data {
 /// All images of folders, by name.
 pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     if let Some(folder) = folders.iter().find(|folder| !folder.is_dir()) {
-        let message = format!("{}: no folder of images without people", folder.display());
+        let message = format!(
+            "{}: not a folder of images without people",
+            folder.display()
+        );
         return Err(Failure::new(ExitKind::Input, message));
     }
     images::listed(folders)

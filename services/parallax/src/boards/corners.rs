@@ -73,7 +73,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         let (frame, id) = (whole(0)?, whole(2)?);
         if id >= MOST_CORNERS {
             return Err(format!(
-                "row {}: corner {id} is no number of a corner",
+                "row {}: {id} is not the number of a corner",
                 nth + 2
             ));
         }

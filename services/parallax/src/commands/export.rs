@@ -207,7 +207,7 @@ fn found(trials: &[Trial]) -> String {
         let found = format!("{} of them have joints", only.n_with_points());
         return match &only.ids[..] {
             [_] => found,
-            ids => format!("{found}, of who was followed one after the other: people {ids:?}"),
+            ids => format!("{found}, of the people who were followed one after the other: {ids:?}"),
         };
     }
     let one = |trial: &Trial| format!("person {} in {}", trial.id(), trial.n_with_points());

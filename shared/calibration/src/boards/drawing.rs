@@ -70,7 +70,7 @@ pub enum PaperError {
     },
     /// Not the name of a page.
     #[error(
-        "{text:?} is no page: expected a4, a3, a2, a1, a0, letter, legal, tabloid, fit or WIDTHxHEIGHT in mm"
+        "{text:?} is not a page: expected a4, a3, a2, a1, a0, letter, legal, tabloid, fit or WIDTHxHEIGHT in mm"
     )]
     Unknown {
         /// The text.

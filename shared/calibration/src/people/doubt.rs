@@ -162,7 +162,7 @@ impl Doubt {
             ),
             Self::NoHalf { why } => format!("half of the recording gives no rig: {}", why.text(names)),
             Self::Bones { spread, limit } => format!(
-                "bones change their lengths by {:.0} %, more than {:.0} %: the joints in space are no person",
+                "bones change their lengths by {:.0} %, more than {:.0} %: the joints in space are not those of a person",
                 100.0 * spread,
                 100.0 * limit
             ),

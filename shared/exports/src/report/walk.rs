@@ -154,7 +154,7 @@ pub fn of_refinement(
             if it.is_told {
                 ""
             } else {
-                "held: the joints do not tell it"
+                "kept: the joints do not determine it"
             }
         );
     }
