@@ -106,7 +106,8 @@ impl Link {
     }
 }
 
-/// The settings of Zenoh. Nothing looks for others on the network, nobody is told of others, and only the host that fuses listens.
+/// The settings of Zenoh. Nothing searches the network for other hosts or announces them, and only the host that fuses
+/// listens.
 fn config(address: &Address) -> Value {
     let text = |path: &Path| Value::from(path.display().to_string());
     let protocol = if address.keys.is_some() { "tls" } else { "tcp" };

@@ -1,7 +1,7 @@
 //! The training of the network that finds people in whole pictures: its pictures, and what comes out.
 //!
-//! Three sources of pictures: photographs with marked people, in which a teacher, another detector, finds everybody else;
-//! photographs of nobody; and scenes that do not exist, with boxes around everybody.
+//! Three sources of pictures: photographs with marked people, in which a teacher (another detector) finds everybody else;
+//! photographs without people; and synthetic scenes, with boxes around everybody.
 
 mod judge;
 mod photographs;
@@ -31,7 +31,7 @@ pub struct Sources {
     pub photographs: Chosen,
     /// The teacher, once for every thread that asks it, or none.
     pub teachers: Vec<Detector>,
-    /// A folder of photographs of nobody.
+    /// A folder of photographs without people.
     pub empty: Option<PathBuf>,
     /// Scenes that do not exist.
     pub scenes: Scenes,

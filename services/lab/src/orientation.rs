@@ -55,7 +55,7 @@ pub struct Judged {
 pub struct Report {
     /// Photographs learned from.
     pub n_photographs: usize,
-    /// Those of them that show somebody from behind.
+    /// Those of them that show a person from behind.
     pub n_behind: usize,
     /// Pictures of scenes learned from.
     pub n_rendered: usize,

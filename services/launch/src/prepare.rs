@@ -303,7 +303,7 @@ pub(crate) fn frame_scale(framing: &Framing) -> f64 {
     1.0 / (a * d - b * c).abs().sqrt()
 }
 
-/// Heat that half of the joints of somebody whom a view sees well have, 0 to 1.
+/// Heat that half of the joints of a person whom a view sees well have, 0 to 1.
 pub(crate) fn least_heat(deployment: &Deployment) -> f64 {
     2.0 * deployment.network.least_heat
 }

@@ -174,7 +174,7 @@ impl Board {
         inner.recorder = on.then_some(page);
     }
 
-    /// Asks again for what could not be begun yet.
+    /// Asks again for the recording if it could not be begun yet.
     pub(crate) fn ask_again(&self) {
         let mut inner = self.lock();
         inner.record = inner.recorder.map(|_| true);

@@ -14,7 +14,7 @@ use crate::scene::Scene;
 use folder::Folder;
 use tape::Tape;
 
-/// Most pieces of the time line that the page is told about.
+/// Most pieces of the time line that the page gets.
 const MOST_PIECES: usize = 600;
 
 /// A finished run.

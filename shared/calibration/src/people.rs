@@ -6,7 +6,7 @@
 //! scale is that of a person's height, of one distance, or of the rig that was given. The vertical and the floor are those of
 //! the feet that stand. One person is enough; the one that the cameras see longest is used.
 //!
-//! The honest check is that two halves of the recording, each by itself from the beginning, give the same rig.
+//! The honest check is that two halves of the recording, each separately from the beginning, give the same rig.
 
 pub(crate) mod adjust;
 pub(crate) mod begin;

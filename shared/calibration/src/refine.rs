@@ -96,7 +96,7 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// [`PeopleError`]: what cannot be looked at. Where too little can be told there is an [`Outcome`] with doubts.
+/// [`PeopleError`]: what cannot be looked at. If too little can be determined, the result is an [`Outcome`] with doubts.
 pub fn refine(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
     let Recording { cameras, films } = *recording;
     if cameras.len() < 2 || cameras.len() != films.len() {
@@ -253,7 +253,7 @@ fn suspect(
     Ok(is_one.then_some(best.1))
 }
 
-/// The rig that fits best, what is given being believed; cameras that are not told are held.
+/// The rig that fits best together with the given rig; cameras that the joints do not determine are kept.
 fn fitted(
     study: &Study<'_>,
     choices: &[Choice],

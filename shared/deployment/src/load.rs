@@ -22,7 +22,7 @@ pub struct Loaded {
 impl Loaded {
     /// Reads the text of a deployment file; `set` are `key=value` pairs that replace what it says.
     ///
-    /// * `file`: where the text comes from. Relative paths are relative to it, whoever gives them.
+    /// * `file`: where the text comes from. Relative paths are relative to it, wherever they are given.
     ///
     /// # Errors
     ///

@@ -1,5 +1,5 @@
-//! A folder that is written to. Everything in it is opened beneath its descriptor, and no link in it is followed: whoever else may
-//! write there cannot lead a file astray.
+//! A folder that is written to. Everything in it is opened beneath its descriptor, and no link in it is followed: other
+//! users who may write there cannot redirect a file.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -77,7 +77,7 @@ impl Folder {
         &self.path
     }
 
-    /// Why what is written here may be changed by somebody else: `belongs to user mallory (4001)`, or
+    /// Why what is written here may be changed by another user: `belongs to user mallory (4001)`, or
     /// `may be written to by every user`.
     ///
     /// # Errors

@@ -14,8 +14,8 @@ use nalgebra::{Point2, Vector2};
 const N_NOTED: usize = 3;
 /// A point that is faster is another one: heights of the person per second. The foot of a jogger does 5.
 const MOST_SPEED: f64 = 9.0;
-/// A velocity that changes by more from one interval to the next is not believed, for one of the two tells of another point:
-/// heights per second.
+/// A velocity that changes by more from one interval to the next is not believed, because one of the two belongs to
+/// another point: heights per second.
 const MOST_CHANGE: f64 = 6.0;
 /// Pictures that are further apart say nothing of the velocity, seconds.
 const LONGEST_GAP_S: f64 = 0.15;

@@ -365,7 +365,7 @@ impl<'a> Finding<'a> {
     }
 }
 
-/// Says whether memory is enough for a stack of channels.
+/// Returns true if memory is enough for a stack of channels.
 fn fits([channels, rows, cols]: [usize; 3]) -> bool {
     let padded = [channels.div_ceil(16), rows, cols].map(|side| side.saturating_add(16));
     let n = padded.into_iter().fold(1_usize, usize::saturating_mul);

@@ -129,7 +129,7 @@ impl TimedBy {
     /// Their arrival, since the time that the camera tells is not believed.
     pub const DISBELIEVED: Self = Self(4);
 
-    /// The name for people.
+    /// Name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -231,7 +231,7 @@ impl Span {
         Self::END_TO_END,
     ];
 
-    /// The name for people.
+    /// Name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -270,7 +270,7 @@ impl Cause {
         Self::Malformed,
     ];
 
-    /// The name for people.
+    /// Name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -28,7 +28,7 @@ pub struct SolvedPerson {
 ///    against those of the first; then what the views say of the direction in which the person faces counts as well.
 /// 3. The arms or the legs of any view that fit better exchanged are exchanged.
 /// 4. Unless the first solution fits every view: of four views or more, those that contradict all others are left out: their camera
-///    was moved, or they look at somebody else.
+///    was moved, or they look at another person.
 /// 5. The bones of a person of the first solution's stature, and finer and finer grids, give the second one.
 ///
 /// * Returns `None` if no joint is seen by two views.
@@ -176,7 +176,7 @@ impl<'a> FirstSolver<'a> {
     }
 
     /// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is
-    /// none, or for fewer than four views, of which it cannot be told.
+    /// none, or for fewer than four views, which cannot show it.
     ///
     /// A view of which half is covered fits with the other half; one whose camera was turned fits with nothing.
     fn contradicts(&mut self, used: &[Used]) -> Option<usize> {

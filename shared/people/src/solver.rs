@@ -12,7 +12,7 @@ use crate::sight::{Prior, Sight, Sights, settle, sights};
 use crate::tree::{Choice, Expectations, choose};
 use crate::{N, Person, View};
 
-/// How likely a place in a picture is a person's joint that the detector gave to somebody else, or to nobody.
+/// How likely a place in a picture is a person's joint that the detector gave to another person, or to nobody.
 const TRUST_OTHERS: f64 = 0.3;
 const TRUST_LOOSE: f64 = 0.6;
 /// A joint is expected where it goes; how well that is known, metres, and how much less for every second, metres a second.
@@ -28,7 +28,7 @@ const MOVED: f64 = 0.25;
 const MOST_OF_MOVED: f64 = 0.5;
 /// Rays farther from the joint than this many standard deviations do not count.
 const OUTLYING: f64 = 3.0;
-/// The stature of somebody who does not show it, metres.
+/// The stature of a person who does not show it, metres.
 const ANY_STATURE_M: f64 = 1.7;
 
 /// The joints of a person.

@@ -37,7 +37,7 @@ pub(crate) struct Bodies {
     n_without: u32,
 }
 
-/// After so many frames without a body, the next one is somebody else's.
+/// After so many frames without a body, the next one is another person's.
 const FORGET_AFTER: u32 = 30;
 
 /// Changes of each of the 14 joints.

@@ -37,7 +37,7 @@ pub struct NetworkMemory {
     pub(crate) until: Option<u64>,
     /// Frames for which boxes are looked for often: people were near each other, or one of several was lost or found.
     n_unsettled: u64,
-    /// The number of the last frame, where it is told ([`Self::begin`]).
+    /// The number of the last frame, if it is known ([`Self::begin`]).
     last: Option<u64>,
     /// True if the last frame is so short a time ago that nobody has left their box.
     pub(crate) is_soon: bool,
@@ -71,7 +71,7 @@ pub(crate) struct Seen {
     pub(crate) outline: [f64; 4],
     /// How the picture was turned for the network.
     pub(crate) turn: Turn,
-    /// The score that the person's poses had in the frames before; `None` for somebody new.
+    /// The score that the person's poses had in the frames before; `None` for a new person.
     pub(crate) usual_score: Option<f32>,
     /// Mean heat of the joints at their peaks, 0 to 1.
     pub(crate) heat: f64,
@@ -162,7 +162,7 @@ impl NetworkMemory {
         self.last = Some(frame);
     }
 
-    /// Returns true if boxes are to be looked for in this frame, whoever is seen.
+    /// Returns true if boxes are to be looked for in this frame, no matter who is seen.
     pub(crate) fn is_due(&self) -> bool {
         self.until.is_none_or(|until| until == 0)
     }
@@ -176,7 +176,7 @@ impl NetworkMemory {
 impl Seen {
     /// Judges what is seen of a person who was looked at; returns whether the person is seen well, and in the frame.
     ///
-    /// * `size`: width and height of the frame; `least_heat`: mean heat of the joints of somebody who is seen well, 0 to 1.
+    /// * `size`: width and height of the frame; `least_heat`: mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) fn judge(&mut self, size: [usize; 2], least_heat: f64) -> bool {
         self.next = None;
         self.heat = self.maps.heat();

@@ -82,7 +82,7 @@ impl Track {
     /// put it beyond the edge of the next one. One that is much worse than the person's poses usually are moves no side at all.
     ///
     /// * `looked_at`: the box of this frame, and how the picture was turned; `usual_score`: of the person's poses before; `None` for
-    ///   somebody new.
+    ///   a new person.
     /// * `around`, `score`: the box around the pose that was seen, and its score.
     /// * `most_lost`: by how much a score may be lower than usual.
     pub(crate) fn next(

@@ -1,4 +1,4 @@
-//! Looking at people in boxes that may not fit: into several, and closer where somebody is seen.
+//! Looking at people in boxes that may not fit: into several, and closer where a person is seen.
 
 use kernels::Rgb8View;
 
@@ -90,7 +90,7 @@ impl Looker<'_> {
 
     /// Judges what was seen in a box whose maps are read.
     ///
-    /// * `turn`: how the picture was turned; `front`: what was told of the direction in which the trunk faces.
+    /// * `turn`: how the picture was turned; `front`: what the network says of the direction in which the trunk faces.
     pub fn judge(
         &self,
         (outline, turn, front): ([f64; 4], Turn, Option<[f32; 2]>),

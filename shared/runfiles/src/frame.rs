@@ -16,7 +16,7 @@ pub const MOST_PEOPLE: usize = 8;
 pub struct FrameLine {
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// The people, each with an identity of its own, the one who is followed first; none in a line without a result.
+    /// The people, each with an identity of its own, the followed person first; none in a line without a result.
     #[serde(deserialize_with = "people")]
     pub people: Vec<PersonLine>,
     /// Why there is no result; only in a line without one.
@@ -98,7 +98,7 @@ impl FrameLine {
         self.status == Self::OK
     }
 
-    /// The person who is followed; `None` if there is nobody.
+    /// The followed person; `None` if there is nobody.
     pub fn followed(&self) -> Option<&PersonLine> {
         self.people.first()
     }

@@ -37,9 +37,10 @@ pub struct SmoothReport {
 pub struct SmoothedPerson {
     /// Lengths of bones that were kept constant, by the names of both joints, metres.
     pub bones: BTreeMap<String, f64>,
-    /// Frames in which somebody else begins: nothing was smoothed across.
+    /// Frames in which another person begins: nothing was smoothed across.
     pub frames_of_breaks: Vec<u64>,
-    /// Identities within the run: more than one where never two people were there, and whoever was followed had one after the other.
+    /// Identities within the run: more than one if no frame had two people and the followed person had several, one
+    /// after the other.
     pub ids: Vec<u64>,
     /// Every joint and keypoint, by name.
     pub joints: BTreeMap<String, SmoothedJoint>,

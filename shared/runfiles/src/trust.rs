@@ -19,9 +19,9 @@ pub struct Trust {
     /// Mean distance of what the views found from the joints in space, metres, each at most 0.3.
     #[serde(deserialize_with = "nullable")]
     pub disagreement_m: Option<f64>,
-    /// Results in which somebody was found, whether as a body that people have or not.
+    /// Results in which a person was found, whether as a body that people have or not.
     pub frames: u64,
-    /// Share of these results whose body is none that people have.
+    /// Share of these results whose body is not one that people have.
     pub implausible: f64,
     /// Share of the joints of the skeletons that were left out, since no body has them there.
     pub joints_implausible: f64,

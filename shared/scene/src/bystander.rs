@@ -12,10 +12,10 @@ use crate::subject::Subject;
 use crate::truth::N_JOINTS;
 use crate::wear::Wear;
 
-/// Distance from the middle of the stage, metres: beyond the path of somebody who walks there.
+/// Distance from the middle of the stage, metres: beyond the path of a person who walks there.
 const AWAY_M: [f64; 2] = [1.7, 2.1];
 
-/// Centre of the way of somebody who passes, metres from the middle of the stage, around which the subject walks.
+/// Centre of the way of a person who passes, metres from the middle of the stage, around which the subject walks.
 const BESIDE_M: [f64; 2] = [0.4, 0.9];
 /// People who pass each other are not nearer, trunk to trunk, where such a way is found.
 const NEAREST_M: f64 = 0.6;

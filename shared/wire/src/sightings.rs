@@ -56,9 +56,9 @@ pub fn sightings_to_message(
     Ok(message)
 }
 
-/// Reads the people that a view sees; `None` unless the status is [`Status::OK`] and there is somebody.
+/// Reads the people that a view sees; `None` unless the status is [`Status::OK`] and there is a person.
 ///
-/// * `n_extras`: extra keypoints of a person. The last people may have none: there is room for some.
+/// * `n_extras`: extra keypoints of a person. The last people may lack them, because the room in a message is limited.
 ///
 /// # Errors
 ///

@@ -22,7 +22,7 @@ pub struct LiveCamera {
     pub controls: BTreeMap<String, i64>,
     /// How packets of an RTSP camera travel.
     pub transport: Option<Transport>,
-    /// True if the times that an RTSP camera tells of its pictures are used, where they can be right.
+    /// True if the times that an RTSP camera gives for its pictures are used, if they are plausible.
     pub has_own_clock: bool,
 }
 

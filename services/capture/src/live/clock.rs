@@ -72,8 +72,8 @@ pub(super) enum Verdict {
 
 /// Judges the clock of a camera that tells when its pictures were taken, by their delays.
 ///
-/// How far a clock is off cannot be told from how long a picture is under way, if it is off by little; by much, pictures would
-/// come from the future, or so late that nobody waits for them.
+/// A small error of a clock cannot be distinguished from the time that a picture is on its way. With a large error,
+/// pictures would come from the future, or so late that nobody waits for them.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
     least: Least,

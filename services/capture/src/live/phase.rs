@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 const N_PICTURES: usize = 15;
 const WINDOW_NANOS: u64 = 60_000_000_000;
 const MOST_MEASUREMENTS: usize = 240;
-/// For how long a camera must have been measured before its drift is told, nanoseconds.
+/// Least time for which a camera must have been measured before its drift is reported, nanoseconds.
 const LEAST_NANOS: u64 = 5_000_000_000;
 
 /// Follows the skew of a camera. Reads no clock.

@@ -16,7 +16,7 @@ pub enum Stress {
     Views(usize),
     /// One camera was turned by so many degrees about its vertical axis since it was calibrated.
     Turned(f64),
-    /// One view looks at somebody else: the same person, half a height beside.
+    /// One view looks at another person: the same person, half a height beside.
     Bystander,
     /// One view names left and right the wrong way.
     Exchanged,

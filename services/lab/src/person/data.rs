@@ -77,7 +77,7 @@ impl Data {
     ///
     /// # Errors
     ///
-    /// A data set or a selection cannot be read, somebody has a fault that was called fatal, or nobody
+    /// A data set or a selection cannot be read, a person has a fault that was called fatal, or nobody
     /// or no image without people is left.
     pub(super) fn read(
         arguments: &Chosen,

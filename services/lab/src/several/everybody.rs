@@ -157,7 +157,7 @@ fn joints(person: &PersonLine) -> Joints {
     })
 }
 
-/// Mean of the deviations that a run states, metres; infinite of nobody.
+/// Mean of the deviations that a run states, metres; infinite if there is no person.
 fn deviation(person: &PersonLine) -> f64 {
     let placed = person.joints.values().filter_map(|joint| joint.placed());
     let (mut sum, mut n) = (0.0, 0.0);

@@ -74,7 +74,7 @@ pub struct TruePerson {
     pub joints: [Point3<f64>; N_TRUE],
 }
 
-/// Says if a folder has this layout.
+/// Returns true if a folder has this layout.
 pub fn is_one(folder: &Path) -> bool {
     ["calibration.json", "gt.txt", "detection/0.txt"]
         .iter()

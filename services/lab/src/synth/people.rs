@@ -15,7 +15,7 @@ pub(super) struct People(Vec<(Person, String, bool)>);
 const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
 
 impl People {
-    /// Adds somebody.
+    /// Adds a person.
     pub(super) fn add(&mut self, person: Person, name: String, is_from_behind: bool) {
         self.0.push((person, name, is_from_behind));
     }

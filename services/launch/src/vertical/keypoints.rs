@@ -1,7 +1,7 @@
 //! The vertical by keypoints of files: people have their heads above their ankles.
 //!
-//! In a picture the head and the ankles of a person span a plane with the camera, and the vertical lies in it: whoever leans, leans one way
-//! in one picture and another way in the next. No person has to be known in two pictures.
+//! In a picture the head and the ankles of a person span a plane with the camera, and the vertical lies in it: a person
+//! who leans does so one way in one picture and another way in the next. No person has to be known in two pictures.
 
 use ::keypoints::Keypoint;
 use deployment::Deployment;

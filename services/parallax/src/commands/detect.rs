@@ -26,7 +26,7 @@ const SIZE: usize = 1280;
 /// Default of `--overlap`.
 const OVERLAP: f64 = 0.1;
 
-/// The default detection threshold of the shipped model where its parts are told, chosen by measurement; see [`Arguments`].
+/// The default detection threshold of the shipped model if its parts are printed, chosen by measurement; see [`Arguments`].
 const SHIPPED_THRESHOLD: f64 = -0.5;
 
 /// The least heat where the detector that ships finds boxes.

@@ -192,7 +192,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// Where files go that are not told.
+/// Folder of the files if `--out` is not given.
 fn beside(source: &Path) -> PathBuf {
     if source.is_dir() {
         return source.join("export");

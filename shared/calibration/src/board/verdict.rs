@@ -149,7 +149,7 @@ pub(super) fn is_spread(sight: &Sight) -> bool {
     finite && eigenvalues.min() > 0.01 * eigenvalues.max()
 }
 
-/// Standard deviation of a focal length, share of it; infinite where it is not told.
+/// Standard deviation of a focal length, share of it; infinite if it is not determined.
 fn focal_share(camera: &CameraOutcome) -> f64 {
     let focal = camera.numbers.iter().find(|number| number.name == "focal length");
     focal.map_or(f64::INFINITY, |focal| focal.sd / focal.value)

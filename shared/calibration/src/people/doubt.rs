@@ -50,7 +50,7 @@ pub enum Doubt {
         /// Which of it.
         what: String,
     },
-    /// A camera is known too badly.
+    /// The pose of a camera is too uncertain.
     Uncertain {
         /// Which.
         camera: usize,
@@ -85,7 +85,7 @@ pub enum Doubt {
 }
 
 impl Doubt {
-    /// That the joints of a camera do not fit, if so.
+    /// The doubt that the joints of a camera do not fit, if they do not.
     ///
     /// * `residual_px`: the median; `size_px`: of the person in the camera's pictures.
     pub(crate) fn of_fit(camera: usize, residual_px: f64, size_px: f64) -> Option<Self> {

@@ -13,7 +13,7 @@ const STANDING_M_S: f64 = 0.25;
 const FLOOR_M: [f64; 2] = [0.3, 0.06];
 /// The normal of the floor is within so much of the direction of bodies, radians.
 const FROM_BODIES: f64 = 0.5;
-/// Legs straighter than this are those of someone who stands, radians.
+/// Legs bent by less than this belong to a person who stands, radians.
 const STRAIGHT: f64 = 0.35;
 /// Height of the ankle above the floor as a share of the stature (Drillis & Contini 1966).
 pub(crate) const ANKLE: f64 = 0.039;

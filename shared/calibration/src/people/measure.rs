@@ -17,8 +17,8 @@ pub(crate) const CELLS: usize = 8;
 
 /// Expected errors from the residuals, by camera and joint.
 ///
-/// Each joint has one, as a share of the size of the person, which all cameras together tell: errors of every camera by itself would
-/// let one camera have its way in all.
+/// Each joint has one, as a share of the size of the person, which all cameras together tell: errors of every camera
+/// separately would let one camera have its way in all.
 ///
 /// * `sizes_px`: the size of the person in each camera.
 pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {

@@ -47,8 +47,8 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     chains.map(|(camera, it)| choice((camera, it.1))).collect()
 }
 
-/// How far joints of somebody in one camera are from where another one sees somebody, median, as a share of the size there; infinite
-/// where too few are seen by both.
+/// How far joints of a person in one camera are from where another one sees a person, median, as a share of the size
+/// there; infinite where too few are seen by both.
 ///
 /// * `pair`: each a camera and a chain.
 fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) -> f64 {

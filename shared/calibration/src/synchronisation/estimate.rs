@@ -45,8 +45,8 @@ pub struct CameraClock {
     pub offset_s: f64,
     /// Standard error of the offset in the middle of the footage, seconds; infinite where nothing is known.
     pub error_s: f64,
-    /// By how much a second of it is longer than one of the common clock: 1e-6 is one part per million. 0 where it is not
-    /// determined, or is not told from none.
+    /// By how much a second of it is longer than one of the common clock: 1e-6 is one part per million. 0 if it is not
+    /// determined, or cannot be distinguished from 0.
     pub drift: f64,
     /// Standard error of the drift; none where the footage is too short to determine it.
     pub drift_error: Option<f64>,

@@ -1,4 +1,5 @@
-//! A rig that people told, as one HTML page: the verdict, what is known of every camera, where in its picture people were, and the rig in space.
+//! A rig calibrated from people, as one HTML page: the verdict, what is known of every camera, where in its picture
+//! people were, and the rig in space.
 
 use calibration::people;
 use calibration::refine;

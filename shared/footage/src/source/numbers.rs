@@ -14,7 +14,7 @@ pub(super) struct Numbered {
     pub(super) frame: u64,
 }
 
-/// The frames of pictures: by their numbers where they are told, else one after the other.
+/// The frames of pictures: by their numbers if these are given, else one after the other.
 ///
 /// Pictures in front of the first frame, and between two frames, are left out.
 pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Vec<Numbered> {

@@ -29,7 +29,7 @@ pub(super) struct Video {
     n_given: u64,
     /// Index in the footage of the frame that was read last.
     last_index: u64,
-    /// The last frame whose time was told.
+    /// The last frame whose time was given.
     last_told: Option<u64>,
     /// Pictures that the decoder had left out at the last gap.
     n_undecoded: u64,

@@ -4,8 +4,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::{Problem, Step, Term};
 
-/// A diagonal entry counts as at least this share of the largest one of its block where it is damped, so that a parameter
-/// that nothing tells of stays where it is.
+/// A diagonal entry counts as at least this share of the largest one of its block where it is damped, so that a
+/// parameter that nothing determines stays where it is.
 const LEAST_DIAGONAL: f64 = 1e-12;
 
 /// The equations of one local block.

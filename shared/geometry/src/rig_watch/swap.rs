@@ -20,9 +20,9 @@ const MIN_DEGREES: f64 = 0.75;
 const MAX_DEGREES: f64 = 1.5;
 const FACTOR: f64 = 2.5;
 const LEAD: f64 = 1.5;
-/// With a larger angular residual the cameras do not see one person where the rig says.
+/// With a larger angular residual, the cameras do not see one person at the place that the rig gives.
 const CONTRADICTION_DEGREES: f64 = 2.5;
-/// With a larger one this is so however few the frames are: no detection of a person is as far off.
+/// With a residual larger than this, a few frames are enough to say so: no detection of a person is as far off.
 const IMPOSSIBLE_DEGREES: f64 = 5.0;
 
 /// Computes, frame by frame, the angular residual of the rays with the footage of two cameras exchanged.

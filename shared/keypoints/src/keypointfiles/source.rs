@@ -79,7 +79,7 @@ impl KeypointSource {
         &self.names
     }
 
-    /// Number of frames: one more than the highest number that the files tell of.
+    /// Number of frames: one more than the highest number in the files.
     pub fn n_frames(&self) -> u64 {
         self.n_frames
     }
@@ -87,7 +87,7 @@ impl KeypointSource {
     /// The people of a frame, from 0, in the order of its file.
     ///
     /// * `people`: replaced by them; empty where there are none.
-    /// * Returns how many there are; `None` where nothing tells of the frame: a gap, or beyond the end.
+    /// * Returns how many there are; `None` if the files do not have the frame: a gap, or beyond the end.
     ///
     /// # Errors
     ///

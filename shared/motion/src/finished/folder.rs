@@ -28,8 +28,8 @@ pub struct Run {
 /// A person of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Identities within the run, ascending: more than one where never two people were there, and whoever was followed had one after the
-    /// other.
+    /// Identities within the run, ascending: more than one if no frame had two people and the followed person had
+    /// several, one after the other.
     pub ids: Vec<u64>,
     /// Identity at every instant; where the person is not there, the one before.
     pub id_at: Vec<u64>,

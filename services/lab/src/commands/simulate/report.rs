@@ -12,7 +12,7 @@ use super::DEFAULT;
 ///
 /// # Errors
 ///
-/// The file is no report of a run, or no frame passed in it.
+/// The file is not the report of a run, or the run passed no frame.
 pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
     let refused = |what: &str| {
         let failure = Failure::new(ExitKind::Input, format!("{}: {what}", file.display()));
@@ -67,7 +67,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
 }
 
-/// The costs with what the link took.
+/// Adds the measured costs of the link to the costs.
 ///
 /// * `hosts`: what `hosts.json` says; `carries_poses`: whether poses cross, and no frames.
 fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {

@@ -49,7 +49,7 @@ impl Drift {
         line.filter(|line| line.slope.abs() >= SURE * line.error)
     }
 
-    /// By how much a second of the camera is longer than one of the reference; 0 where that is not told from none.
+    /// By how much a second of the camera is longer than one of the reference; 0 if it cannot be distinguished from 0.
     pub(super) fn sure(&self) -> f64 {
         self.line().map_or(0.0, |line| line.slope)
     }

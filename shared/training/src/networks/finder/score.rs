@@ -6,7 +6,7 @@ use super::picture::Around;
 
 /// A found box and a true one that is the same share this of their union, at least.
 const SAME: f32 = 0.5;
-/// A box that shares this with somebody who does not count is not false.
+/// A box that shares this with a person who does not count is not false.
 const UNASKED: f32 = 0.3;
 
 /// How good a network is.
@@ -18,9 +18,9 @@ pub struct Score {
     pub people: usize,
     /// Share of these that are.
     pub recall: f32,
-    /// Boxes of nobody, for each picture.
+    /// Boxes without a person, for each picture.
     pub false_boxes: f32,
-    /// Pictures of nobody.
+    /// Pictures without people.
     pub empty: usize,
     /// Share of these in which nobody is found.
     pub quiet: f32,

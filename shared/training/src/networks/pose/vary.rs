@@ -103,7 +103,7 @@ pub fn plain(person: &Person, shape: &Shape) -> Option<NetworkSample> {
 
 /// A person, varied at random.
 ///
-/// * `other`: somebody else, parts of whom may cover this one.
+/// * `other`: another person, parts of whom may cover this one.
 pub fn varied(
     person: &Person,
     other: &Person,
@@ -217,7 +217,7 @@ fn colour(rgb: &[u8], [x, y]: [f32; 2]) -> [f32; 3] {
     sum
 }
 
-/// Covers a rectangle with one colour, or with a part of somebody else.
+/// Covers a rectangle with one colour, or with a part of another person.
 fn cover(rgb: &mut [[f32; 3]], other: &Person, [width, height]: [usize; 2], rng: &mut Rng) {
     let sides = [
         rng.usize(width / 8..=width / 3),

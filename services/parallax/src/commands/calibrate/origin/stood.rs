@@ -17,8 +17,8 @@ const MOST_OFF: f64 = 0.15;
 /// The fewest joints in pictures that tell it.
 const LEAST_SEEN: usize = 50;
 
-/// Finds the floor, after a look whether the run is one of this rig. Of several people it takes the one who is followed: that may be one after
-/// the other, who stand on the same floor.
+/// Finds the floor, after checking that the run was made with this rig. Of several people it uses the followed person,
+/// who may change: all of them stand on the same floor.
 ///
 /// * `rate_hz`: frames a second, for a run that does not know.
 pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
