@@ -41,7 +41,7 @@ impl Link {
         Ok(Self(session.map_err(|error| failed(error.to_string()))?))
     }
 
-    /// Sends something; what there is no room for is dropped: what must not be lost is acknowledged.
+    /// Sends a message, or drops it if there is no room; messages that must not be lost are acknowledged.
     pub(crate) fn send(&self, key: &str, bytes: Vec<u8>, is_urgent: bool) {
         let priority = if is_urgent {
             Priority::RealTime

@@ -37,11 +37,11 @@ pub struct Sources {
     pub scenes: Scenes,
 }
 
-/// One of so many blocks of photographs in a row, and of so many subjects of scenes, is kept apart.
+/// One of this many blocks of photographs in a row, and of this many subjects of scenes, is kept apart.
 const KEPT: usize = 12;
 /// Photographs in a row that are kept apart together: neighbours often show the same event.
 const BLOCK: usize = 20;
-/// By how much hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+/// Amount by which hands, feet and hair reach beyond the joints: share of the longer side, on each side.
 const BEYOND: f64 = 0.05;
 
 /// The pictures to learn from, and those that are kept apart.

@@ -38,7 +38,7 @@ pub struct Row {
     pub acceleration_m_s2: Option<Mean>,
     /// Change of the error from instant to instant, mm.
     pub jitter_mm: Option<Mean>,
-    /// By how much it is late, ms.
+    /// Amount by which it is late, ms.
     pub lag_ms: Option<Mean>,
     /// Distance from the true position where nothing was measured and it has a position, mm.
     pub filled_mm: Option<Mean>,

@@ -98,7 +98,7 @@ impl Written {
     }
 }
 
-/// Name of the file that tells what was exported: `pose3d.export.json`.
+/// Name of the file that describes what was exported: `pose3d.export.json`.
 const MANIFEST: &str = ".export.json";
 
 /// Writes all formats of a run.
@@ -205,7 +205,7 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
     })
 }
 
-/// Refuses what the run does not tell.
+/// Refuses formats for which the run lacks data.
 fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     let lacks = |needs: fn(Format) -> bool| {
         let all = job.formats.iter().copied().filter(|format| needs(*format));

@@ -355,7 +355,7 @@ impl Reader<'_> {
 }
 
 impl Part {
-    /// The frames, of so many.
+    /// The range of frames, of `n_frames`.
     fn frames(self, n_frames: u64, rate_hz: f64) -> Range<u64> {
         let start = ((self.from_s * rate_hz).round() as u64).min(n_frames);
         let most = self.seconds.map(|second| (second * rate_hz).round() as u64);

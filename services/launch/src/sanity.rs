@@ -179,7 +179,7 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     ))
 }
 
-/// Names the cameras of which nothing says how many frames a second they have, beside others; none if there are none.
+/// Names the cameras whose frame rate nothing says, while it is known for others; none if there are none.
 fn without_rate(resolved: &Resolved) -> Option<String> {
     let views = resolved.deployment.cameras.iter().zip(&resolved.footage);
     let unknown = views.filter(|view| view.1.frame_rate_hz.is_none());

@@ -49,7 +49,8 @@ struct Hypothesis {
 
 /// Finds the vertical of a deployment. None if the rig or the deployment gives it, or if frames are not turned upright.
 ///
-/// The keypoints of files tell at once. A search of pictures takes a while; what it finds is kept beside the rig, and not searched again.
+/// With keypoint files the answer is immediate. A search of pictures takes a while; what it finds is kept beside the
+/// rig, and not searched again.
 ///
 /// # Errors
 ///

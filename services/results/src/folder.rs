@@ -251,7 +251,7 @@ pub fn remove_pictures(path: &Path) -> Result<(), FolderError> {
     fs::remove_dir_all(path).map_err(failed)
 }
 
-/// Something in a folder that is no numbered picture.
+/// Something in a folder that is not a numbered picture.
 ///
 /// * `deep`: folders that may lie in each other.
 fn other_than_pictures(folder: &Path, deep: usize) -> io::Result<Option<PathBuf>> {

@@ -209,7 +209,7 @@ impl Board {
         self.n_pages.load(Ordering::Relaxed) > 0
     }
 
-    /// Counts the pages that show the pictures of a view; none for a view that cannot be.
+    /// Counts the pages that show the pictures of a view; `None` for a view that does not exist.
     pub(crate) fn wanted(&self, view: usize) -> Option<&AtomicUsize> {
         self.wanted.get(view)
     }

@@ -40,7 +40,7 @@ impl Finished {
     ///
     /// # Errors
     ///
-    /// The file is no recording, or has no result.
+    /// The file is not a recording, or has no result.
     pub(crate) fn tape(path: &Path) -> Result<Self, Failure> {
         Tape::open(path).map(Self::Tape)
     }

@@ -45,7 +45,7 @@ pub enum State {
 /// Counts of what was not given to the caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Losses {
-    /// Messages of another run, or with counts or numbers that cannot be.
+    /// Messages of another run, or with impossible counts or numbers.
     pub refused: u64,
     /// Parts that came after their frame, and frames without a skeleton where one was asked for.
     pub late: u64,

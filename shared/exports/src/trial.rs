@@ -54,7 +54,7 @@ pub struct Gap(pub Box<str>);
 /// A place on the grid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Slot {
-    /// Identity of whom the points are of; `None` where nobody is.
+    /// Identity of the person whose points these are; `None` where nobody is.
     pub person: Option<u64>,
     /// `ok`, or why there is no skeleton; empty where the run left no line.
     pub status: Box<str>,

@@ -209,7 +209,7 @@ impl Folder {
         })
     }
 
-    /// The error for a name under which something lies that is not written to.
+    /// The error for a name that is taken by something that must not be written to.
     fn in_the_way(&self, name: &OsStr) -> io::Error {
         let text = match self.kind(name) {
             Ok(kind) => format!(

@@ -208,7 +208,7 @@ pub struct Report {
     pub bones: Vec<([usize; 2], f64)>,
     /// Largest difference of an instant from its place on the uniform grid, seconds; `None` where there is none.
     pub resampled_s: Option<f64>,
-    /// By how much a causal method lags, seconds; 0 for those that look ahead.
+    /// Amount by which a causal method lags, seconds; 0 for those that look ahead.
     pub delay_s: f64,
 }
 

@@ -1,5 +1,5 @@
-//! A person of whom nothing is known, solved in space: which views name left and right the other way round, which look elsewhere, and
-//! how tall the person is.
+//! A person about whom nothing is known, solved in space: which views name left and right the other way round, which
+//! look elsewhere, and how tall the person is.
 
 use geometry::Camera;
 use nalgebra::Point3;
@@ -20,7 +20,7 @@ pub struct SolvedPerson {
     pub views: Vec<Option<[bool; 2]>>,
 }
 
-/// Solves for a person of whom nothing is known.
+/// Solves for a person about whom nothing is known.
 ///
 /// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
 /// 2. Unless it fits every view: of three views or more, one whose exchange of left and right gives a better first solution is
@@ -256,8 +256,8 @@ fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
 const QUARTER: f64 = 0.25;
 const MOST: f64 = 0.75;
 
-/// By how much the joints that were found fit a view less than the best places that it knows for them: the smallest amount that
-/// holds for a share of them.
+/// Amount by which the joints that were found fit a view less than the best places that it knows for them: the smallest
+/// amount that holds for a share of them.
 fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
     let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
         let named = view.named(joint);

@@ -21,9 +21,9 @@ const EXPECTED_SD_M_PER_S: f64 = 1.5;
 /// Share of a new velocity in the kept one, and of the kept one in what is expected.
 const NEW_VELOCITY: f64 = 0.5;
 const DAMPING: f64 = 0.5;
-/// A joint that no view sees is given for so long where it is expected, seconds.
+/// How long a joint that no view sees is reported at the place where it is expected, seconds.
 const CARRIED_S: f64 = 1.0;
-/// A place costs this much for every half squared standard deviation from where the joint is expected, and at most so much.
+/// A place costs this much for every half squared standard deviation from where the joint is expected, and at most this much.
 const MOVED: f64 = 0.25;
 const MOST_OF_MOVED: f64 = 0.5;
 /// Rays farther from the joint than this many standard deviations do not count.
@@ -163,7 +163,7 @@ impl Solver {
     }
 }
 
-/// Weighs what a place is worth for a joint.
+/// Weighs a place as a candidate for a joint.
 fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
     let moved = prior.map_or(0.0, |prior| {
         let z = (place.place - prior.point).norm() / prior.sd;

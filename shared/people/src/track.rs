@@ -26,12 +26,12 @@ const SOON_S: f64 = 0.1;
 const FAST_M_PER_S: f64 = 4.0;
 /// A glimpse keeps this share of the velocity, and makes the time since the joints were seen shorter by it.
 const GLIMPSED: f64 = 0.5;
-/// And moves the person by no more, metres: one ray does not tell how far away a person is.
+/// And moves the person by no more, metres: one ray does not show how far away a person is.
 const GLIMPSED_M: f64 = 0.1;
 /// A track is a person if it was seen in this many of the last five frames.
 const FRAMES_OF_BIRTH: u32 = 3;
 const RECENT: u32 = 0b1_1111;
-/// And who was seen in so many of the last eight is no meeting of the rays of two people, who move.
+/// A track that was seen in this many of the last eight frames is not a chance meeting of the rays of two people, who move.
 const FRAMES_OF_TWO_VIEWS: u32 = 6;
 const LONG: u32 = 0b1111_1111;
 
@@ -211,7 +211,7 @@ impl Track {
     }
 }
 
-/// By how much the trunk moved; by how much everything did, where nothing of the trunk is known.
+/// Amount by which the trunk moved; by how much everything did, where nothing of the trunk is known.
 fn moved(from: &Joints, to: &Joints) -> Option<Vector3<f64>> {
     let of = |joints: &[usize]| {
         let both = joints.iter().filter_map(|joint| Some(to[*joint]? - from[*joint]?));

@@ -35,7 +35,7 @@ const REMEMBERED_S: f64 = 60.0;
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
-/// A new person is seen by so many views, or by all of fewer.
+/// A new person is seen by this many views, or by all views if there are fewer.
 const VIEWS_AT_ONCE: usize = 3;
 
 /// Finds out who is who, frame by frame.

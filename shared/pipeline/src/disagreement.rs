@@ -37,8 +37,8 @@ pub(crate) struct FoundByViews<'a> {
 ///
 /// A view found the candidate that lies nearest, with its sides as they are or exchanged; so did a view that was left out, if it sees
 /// a person there. A view that shows another person does not count, where two others agree. The residuals of every joint
-/// are set, and their root mean square; and to its covariance the disagreement is added of the two views that agree best
-/// on it (docs/method/three-d.md).
+/// are set, and their root mean square; and the disagreement of the two views that agree best on it is added to its
+/// covariance (docs/method/three-d.md).
 ///
 /// * `motion`: of the solution, as the views would show it.
 pub(crate) fn measure(

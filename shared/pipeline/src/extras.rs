@@ -19,7 +19,7 @@ use crate::view_result::ExtraKeypoint;
 /// A candidate that lies further from the fused pose than this is another person: the median distance of the joints,
 /// share of the longer side of the fused pose.
 const SAME: f64 = 0.1;
-/// A view that is further off than so many standard deviations is left out.
+/// A view that is further off than this many standard deviations is left out.
 const MOST_SIGMAS: f64 = 3.0;
 /// Least distance at which a view is left out, share of the longer side of the fused pose.
 const LEAST_REACH: f64 = 0.02;

@@ -25,7 +25,7 @@ pub enum Follow {
 /// every frame without the person.
 const REACH_M: f64 = 1.0;
 const REACH_PER_FRAME_M: f64 = 0.1;
-/// Another one is followed after as many frames without the person as there were with it, at most so many.
+/// Another one is followed after as many frames without the person as there were with it, at most this many.
 const MOST_PATIENCE: u32 = 30;
 
 /// Follows one person from frame to frame.

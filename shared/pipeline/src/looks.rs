@@ -30,7 +30,7 @@ pub(crate) struct Looks<'a> {
     pub(crate) n_most: usize,
     /// Least mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) least_heat: f64,
-    /// By how much the score of a pose may be lower than those of its person usually are.
+    /// Amount by which the score of a pose may be lower than usual for its person.
     pub(crate) most_lost: f32,
 }
 

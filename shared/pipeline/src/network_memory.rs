@@ -14,9 +14,10 @@ const TWIN: f64 = 0.3;
 /// Nobody leaves the box of the last frame within this share of the time for which people can be followed without a frame: a person
 /// who runs moves 0.2 m in 0.07 s.
 const SOON: f64 = 1.0 / 6.0;
-/// For so long a person who stands still need not be looked at, share of that time: who begins to walk moves 0.1 m in 0.13 s.
+/// How long a person who stands still need not be looked at, as a share of that time: a person who begins to walk moves
+/// 0.1 m in 0.13 s.
 const HELD: f64 = 1.0 / 3.0;
-/// After so many times that time (2 s) a person may be anywhere.
+/// After this many times that time (2 s) a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
 /// State of the step from frame to frame: memory that is used again, and the boxes of the people it sees.
@@ -39,7 +40,7 @@ pub struct NetworkMemory {
     n_unsettled: u64,
     /// The number of the last frame, if it is known ([`Self::begin`]).
     last: Option<u64>,
-    /// True if the last frame is so short a time ago that nobody has left their box.
+    /// True if the last frame is so recent that nobody has left their box.
     pub(crate) is_soon: bool,
     /// Frames from the last one to this one, and most frames for which a person who stands still is not looked at; `None` where the
     /// frames' rate is not known.
@@ -75,7 +76,7 @@ pub(crate) struct Seen {
     pub(crate) usual_score: Option<f32>,
     /// Mean heat of the joints at their peaks, 0 to 1.
     pub(crate) heat: f64,
-    /// In which direction the trunk faces, if the network tells.
+    /// Direction in which the trunk faces, if the network gives it.
     pub(crate) front: Option<FrontEvidence>,
 }
 
@@ -129,7 +130,7 @@ impl NetworkMemory {
         };
     }
 
-    /// Returns true if the last frame is so short a time ago that people are about in their boxes.
+    /// Returns true if the last frame is so recent that people are roughly in their boxes.
     pub(crate) fn is_followed(&self) -> bool {
         self.hold.is_some() && self.apart.is_none()
     }

@@ -207,7 +207,7 @@ impl NetworkStep {
         }
     }
 
-    /// By how much the score of a pose may be lower than those of its person usually are.
+    /// Amount by which the score of a pose may be lower than usual for its person.
     fn most_lost(&self) -> f32 {
         -MUCH_WORSE * self.settings.maps.floor()
     }

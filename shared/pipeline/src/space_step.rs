@@ -12,7 +12,7 @@ use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
-/// People of whom bone lengths and sides are remembered; of more the ones seen longest ago are forgotten.
+/// Number of people whose bone lengths and sides are remembered; beyond it, those seen longest ago are forgotten.
 const MOST_REMEMBERED: usize = 32;
 
 /// A person of a frame, solved.

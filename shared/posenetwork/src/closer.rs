@@ -6,9 +6,9 @@ use crate::maps::{JointMaps, MapSettings};
 use crate::network::{LookError, PoseNetwork, Turn, Workspace};
 use crate::outline::overlap;
 
-/// Boxes that cover each other by more show the same to a network: another look tells nothing new.
+/// Boxes that cover each other by more show the same to a network: another look shows nothing new.
 const FITS: f64 = 0.8;
-/// By how much the mean heat of the joints may be lower in a box that fits better, 0 to 1.
+/// Amount by which the mean heat of the joints may be lower in a box that fits better, 0 to 1.
 const FAINTER: f64 = 0.1;
 /// Most looks at one person beside the first.
 const MOST_MORE: usize = 2;

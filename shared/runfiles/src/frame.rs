@@ -43,7 +43,7 @@ pub struct PersonLine {
     /// How much the lengths of the bones differ from those of people, standard deviations; none where there is no body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_deviation: Option<f64>,
-    /// By how much the decision which views see the person from the same side was won; none where it was
+    /// Amount by which the decision which views see the person from the same side was won; none where it was
     /// not made.
     #[serde(deserialize_with = "nullable")]
     pub facing_margin: Option<f64>,
@@ -104,7 +104,7 @@ impl FrameLine {
     }
 }
 
-/// At most so many people as fit, no two of one identity.
+/// Reads at most as many people as fit, no two with one identity.
 fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Error> {
     let people = Vec::<PersonLine>::deserialize(from)?;
     if people.len() > MOST_PEOPLE {

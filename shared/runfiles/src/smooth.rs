@@ -12,7 +12,7 @@ use crate::read::{parse, to_text};
 pub struct SmoothReport {
     /// Cutoff of the low-pass filter, Hz, where there is one.
     pub cutoff_hz: Option<f64>,
-    /// By how much the positions are late, milliseconds; 0 for methods that look ahead.
+    /// Amount by which the positions are late, milliseconds; 0 for methods that look ahead.
     pub delay_ms: f64,
     /// Reasons to doubt the result, in words; an empty list is good.
     pub doubts: Vec<String>,
@@ -26,7 +26,7 @@ pub struct SmoothReport {
     pub people: Vec<SmoothedPerson>,
     /// Frames per second: the inverse of the median time between two.
     pub rate_hz: Option<f64>,
-    /// By how much the instants are off the uniform grid that they were interpolated to, at most, milliseconds.
+    /// Amount by which the instants are off the uniform grid that they were interpolated to, at most, milliseconds.
     pub resampled_ms: Option<f64>,
     /// [`crate::VERSION`].
     pub schema_version: u64,

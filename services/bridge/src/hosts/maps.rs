@@ -140,7 +140,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Checks that there are so many bytes more.
+    /// Checks that at least this many bytes are left.
     fn needs(&self, n: usize) -> Result<(), MapsError> {
         let end = self.at + n;
         if self.bytes.len() < end {

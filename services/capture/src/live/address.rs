@@ -41,7 +41,7 @@ pub enum LiveError {
         /// As asked for, or as the device is set.
         format: String,
     },
-    /// The stream does not tell its rate.
+    /// The stream does not give its rate.
     #[error(
         "{address} does not say how many pictures it has per second: set `frame_rate_hz` of the camera"
     )]

@@ -80,8 +80,8 @@ impl Phase {
         self.measured.back().map(|measured| measured.1.saturating_sub(self.added))
     }
 
-    /// By how much the camera falls behind the instants, parts per billion: negative for one that is faster. `None` while it was
-    /// measured for too short a time.
+    /// Amount by which the camera falls behind the instants, parts per billion: negative for one that is faster. `None`
+    /// while it was measured for too short a time.
     pub(crate) fn drift_ppb(&self) -> Option<i64> {
         let ends = self.measured.front().zip(self.measured.back())?;
         if ends.1.0.saturating_sub(ends.0.0) < LEAST_NANOS {

@@ -37,7 +37,7 @@ SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax-la
 Versions: fmp (every view alone, then triangulation), geometry, appearance (also part types), adaptive \
 (parts of large expected error switched off). They combine pairs of views by their mean, as in the paper. \
 geometry+consensus takes the poses that most views support; geometry+all-views supports each view by all others at \
-once, geometry+all-views-mean by the mean of their terms. Without --versions: all whose inputs are given \
+once, geometry+all-views-mean by the mean of their terms. Without --versions: all versions whose inputs are given \
 (tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), with pairs and with all views.
 
 --network FILE predicts the errors of the same single views, as the service `quality` does. The report then has its accuracy: \

@@ -117,7 +117,7 @@ impl Data {
         Ok(data)
     }
 
-    /// Decodes every image once, to know that it can be.
+    /// Decodes every image once, to check that this is possible.
     fn negatives(&mut self, folders: &[PathBuf], progress: &Progress) -> Result<(), Failure> {
         let images = in_folders(folders)?;
         let read: Vec<_> = images.par_iter().map(|image| Picture::read(image).err()).collect();

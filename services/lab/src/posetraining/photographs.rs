@@ -16,7 +16,7 @@ use crate::failures::dataset_failure;
 use crate::orientation::facing;
 use crate::person::{deal, read_options, sides_of};
 
-/// Pairs that tell who is seen from behind: hips and shoulders, the right one first.
+/// Pairs that show who is seen from behind: hips and shoulders, the right one first.
 const PAIRS: [[usize; 2]; 2] = [[2, 3], [8, 9]];
 const NECK: usize = 12;
 /// Shortest trunk, pixels of the square picture.

@@ -24,7 +24,7 @@ impl People {
         self.0.len()
     }
 
-    /// Adds those of a sequence in a folder of that name.
+    /// Adds the people of a sequence that lies in a folder of that name.
     pub(super) fn append(&mut self, folder: &str, others: Self) {
         self.0.extend(others.0.into_iter().map(|(mut person, name, behind)| {
             person.image = Path::new(folder).join(&person.image);

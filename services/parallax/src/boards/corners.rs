@@ -8,7 +8,7 @@ use calibration::board::Sight;
 use failure::{ExitKind, Failure};
 use nalgebra::Point2;
 
-/// The largest number of a corner that is believed.
+/// The largest number of a corner that is accepted.
 const MOST_CORNERS: usize = 100_000;
 
 /// Sights by camera, and the points of the board.

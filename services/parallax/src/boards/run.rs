@@ -57,9 +57,9 @@ pub enum Back {
 
 /// Origin of mirrored codes.
 enum Mirrored {
-    /// There are none, or it is said, or a camera saw both sides.
+    /// No mirrored codes were seen, or the option says it, or a camera saw both sides.
     Known,
-    /// A board with two sides, or the pictures of these cameras: the adjustment tells.
+    /// A board with two sides, or the pictures of these cameras: the adjustment decides.
     Asked(Vec<usize>),
 }
 

@@ -146,7 +146,7 @@ impl Arguments {
     ///
     /// An option of the one, where the other does it.
     fn network(&self) -> Result<Option<&Path>, Failure> {
-        /// So many of the options also say that the filters find the parts.
+        /// Number of the options, from the first, that also choose the filters.
         const N_IMPLY: usize = 3;
         let of_filters = [
             (self.joints.is_some(), "--joints"),

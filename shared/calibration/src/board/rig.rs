@@ -200,7 +200,7 @@ fn each_alone(
     Ok(outcome)
 }
 
-/// The intrinsics that are known, or those that the camera's own boards tell.
+/// The intrinsics that are known, or those that the camera's own boards give.
 fn first_intrinsics(
     task: &Task,
     camera: usize,
@@ -238,7 +238,7 @@ fn first_intrinsics(
         .ok_or_else(|| BoardError::NoStart { camera: name() })
 }
 
-/// A sight with the pose of the board, one for each way in which the board may have been taken for itself.
+/// A sight with the pose of the board, one for each orientation in which the board looks the same.
 #[derive(Clone)]
 struct Placed {
     sight: Sight,

@@ -44,7 +44,7 @@ pub struct Board {
     pub is_legacy: bool,
 }
 
-/// Why a text is no board.
+/// Why a text is not a board.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoardError {
     /// Not enough parts, or an unknown kind.
@@ -63,7 +63,7 @@ pub enum BoardError {
         /// Rows.
         rows: usize,
     },
-    /// A length that is none.
+    /// A text that is not a length.
     #[error(
         "{text:?} is not a length: expected a number above 0 with mm, cm, m or in, such as 40mm"
     )]

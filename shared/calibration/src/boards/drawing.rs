@@ -54,7 +54,7 @@ pub enum Paper {
     Sized([f64; 2]),
 }
 
-/// A board that does not fit on its page, or a page that is none.
+/// A board that does not fit on its page, or an unknown page.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PaperError {
     /// Too small.

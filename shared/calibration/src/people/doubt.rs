@@ -80,7 +80,7 @@ pub enum Doubt {
         /// The most.
         limit: f64,
     },
-    /// Too few bones are seen to tell scale and vertical.
+    /// Too few bones are seen to determine scale and vertical.
     NoBody,
 }
 

@@ -45,7 +45,7 @@ pub enum PeopleError {
         /// Sides.
         sides: usize,
     },
-    /// A length that is none.
+    /// A length that cannot be used.
     #[error("a length of {metres} m cannot be used")]
     Length {
         /// The number.

@@ -8,7 +8,7 @@ use super::bias::share_of;
 const LEAST: usize = 30;
 /// The least expected error, pixels.
 const LEAST_PX: f64 = 0.3;
-/// The median length of a residual in the plane is so many standard deviations of one axis.
+/// The median length of a residual in the plane is this many standard deviations of one axis.
 const MEDIAN: f64 = 1.1774;
 /// Joints take part in what they are measured by: four views of eight numbers determine three.
 const FITTED: f64 = 1.25;

@@ -60,7 +60,7 @@ pub enum Doubt {
     Still {
         /// The camera.
         camera: usize,
-        /// By how much less the best offset costs than the mean of all, as a share.
+        /// Amount by which the best offset costs less than the mean of all, as a share.
         gain: f64,
         /// The least that is accepted.
         least: f64,
@@ -78,7 +78,7 @@ pub enum Doubt {
     Pair {
         /// The cameras.
         cameras: [usize; 2],
-        /// By how much the pair's own offset is away, seconds.
+        /// Amount by which the pair's own offset is away, seconds.
         away_s: f64,
         /// The gain of the common offset as a share of the pair's best.
         share: f64,
@@ -129,7 +129,7 @@ pub enum Doubt {
         /// The largest that is accepted.
         most_s: f64,
     },
-    /// Two parts of the footage tell different offsets.
+    /// Two parts of the footage give different offsets.
     Parts {
         /// The camera.
         camera: usize,

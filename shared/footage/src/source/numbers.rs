@@ -113,7 +113,7 @@ impl Counting {
     }
 }
 
-/// By how much numbers rise from frame to frame; none where most frames would have no picture of any camera.
+/// Amount by which numbers rise from frame to frame; none where most frames would have no picture of any camera.
 ///
 /// * `firsts`: the number of frame 0 of every camera.
 fn step_of(firsts: &[u64], cameras: &[Vec<u64>]) -> Option<u64> {

@@ -204,7 +204,7 @@ impl Equations {
         all.all(|value| value.is_finite()).then_some(Step { shared, locals })
     }
 
-    /// By how much the quadratic says that a step lowers the cost.
+    /// Amount by which the quadratic says that a step lowers the cost.
     pub(super) fn gain(&self, step: &Step) -> f64 {
         let shared = DVector::from_column_slice(&step.shared);
         let mut gain = -2.0 * self.gradient.dot(&shared) - shared.dot(&(&self.shared * &shared));

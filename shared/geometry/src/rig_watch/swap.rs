@@ -14,8 +14,8 @@ const MIN_POINTS: usize = 5;
 /// With more cameras, exchanged left and right are not tried: it would take too long.
 const MAX_TO_MIRROR: usize = 8;
 /// Two cameras were exchanged if the angular residual is at least `MIN_DEGREES` as configured, and with the two
-/// exchanged at most `MAX_DEGREES` and smaller by `FACTOR`. Which two is certain if every other exchange leaves a
-/// residual larger by `LEAD`.
+/// exchanged at most `MAX_DEGREES` and smaller by `FACTOR`. The exchanged pair is certain if every other exchange leaves
+/// a residual larger by the factor `LEAD`.
 const MIN_DEGREES: f64 = 0.75;
 const MAX_DEGREES: f64 = 1.5;
 const FACTOR: f64 = 2.5;

@@ -91,7 +91,7 @@ impl Gathered {
 ///
 /// # Errors
 ///
-/// The file cannot be read, or a line is none.
+/// The file cannot be read, or a line is not valid.
 pub fn read_lines(
     folder: &Path,
     mut each: impl FnMut(usize, FrameLine) -> Result<(), Failure>,
@@ -145,7 +145,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 ///
 /// # Errors
 ///
-/// A file cannot be read, a line is none, or times do not ascend.
+/// A file cannot be read, a line is not valid, or times do not ascend.
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     let mut people: BTreeMap<u64, Gathered> = BTreeMap::new();

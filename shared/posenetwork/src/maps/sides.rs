@@ -1,4 +1,4 @@
-//! Left and right of maps: exchanged, or named by what one view tells.
+//! Left and right of maps: exchanged, or named by what one view shows.
 
 use super::JointMaps;
 use crate::network::PoseNetwork;

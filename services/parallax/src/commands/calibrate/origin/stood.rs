@@ -14,7 +14,7 @@ use terminal::output;
 
 /// How far the skeletons of a run may be from what its cameras saw, as a share of the size of the person in the picture.
 const MOST_OFF: f64 = 0.15;
-/// The fewest joints in pictures that tell it.
+/// The fewest joints in pictures for this check.
 const LEAST_SEEN: usize = 50;
 
 /// Finds the floor, after checking that the run was made with this rig. Of several people it uses the followed person,
