@@ -254,8 +254,8 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
             let brightest = first.as_ref()?.brightest();
             (brightest < LEAST_BRIGHTEST).then(|| {
                 format!(
-                    "the first pictures of {} ({}) use a small part of their range: the brightest value is {brightest} of 255; are they of \
-                     10 or 12 bits, in 16?",
+                    "the first pictures of {} ({}) use a small part of their range: the brightest value is {brightest} of 255; do \
+                     they have 10 or 12 bits, stored in 16?",
                     camera.name, camera.source
                 )
             })

@@ -64,8 +64,8 @@ impl Kind {
         Self::Sides,
     ];
 
-    /// Returns the limit of what is tolerated. Chosen so that single persons who are seen whole by calibrated cameras stay below:
-    /// balancing and synthetic people reach two thirds of each at most.
+    /// Returns the limit of what is tolerated. Chosen so that one person who is seen whole by calibrated cameras stays
+    /// below these limits: balancing and synthetic people reach at most two thirds of each.
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,

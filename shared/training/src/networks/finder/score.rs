@@ -16,7 +16,7 @@ pub struct Score {
     pub pictures: usize,
     /// People in them who should be found.
     pub people: usize,
-    /// Share of these that are.
+    /// Share of these who are found.
     pub recall: f32,
     /// Boxes without a person, for each picture.
     pub false_boxes: f32,
