@@ -147,7 +147,7 @@ fn listen(
     })
 }
 
-/// The state of all hosts, as the one that fuses tells it; none if it does not answer within a time.
+/// The state of all hosts, as the fusing host reports it; `None` if it does not answer within `limit`.
 ///
 /// # Errors
 ///

@@ -41,7 +41,7 @@ impl Link {
         Ok(Self(session.map_err(|error| failed(error.to_string()))?))
     }
 
-    /// Sends something; what there is no room for is dropped: what must not be lost is acknowledged.
+    /// Sends a message, or drops it if there is no room; messages that must not be lost are acknowledged.
     pub(crate) fn send(&self, key: &str, bytes: Vec<u8>, is_urgent: bool) {
         let priority = if is_urgent {
             Priority::RealTime
@@ -106,7 +106,8 @@ impl Link {
     }
 }
 
-/// The settings of Zenoh. Nothing looks for others on the network, nobody is told of others, and only the host that fuses listens.
+/// The settings of Zenoh. Nothing searches the network for other hosts or announces them, and only the host that fuses
+/// listens.
 fn config(address: &Address) -> Value {
     let text = |path: &Path| Value::from(path.display().to_string());
     let protocol = if address.keys.is_some() { "tls" } else { "tcp" };

@@ -236,7 +236,7 @@ impl Receiving<'_> {
         self.end_if_over(index)
     }
 
-    /// Says of frames whose time is over why they have nothing.
+    /// Sends the reason for frames whose time is over without a message.
     fn give_up_overdue(&mut self) -> Result<(), Failure> {
         let now = now_nanos();
         for index in 0..self.views.len() {

@@ -1,4 +1,4 @@
-//! Footage of a camera without pictures: grey frames, of which there are as many as something else tells of.
+//! Footage of a camera without pictures: grey frames, as many as its keypoints need.
 
 use core::fmt;
 
@@ -26,7 +26,7 @@ pub struct Blank {
     pub rate_hz: f64,
 }
 
-/// Why an address is none of grey footage.
+/// Why an address is not one of grey footage.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BlankError {
     /// Something is missing, or strange.

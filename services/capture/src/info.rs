@@ -7,7 +7,7 @@ use footage::{Depth, Size, Turn};
 pub struct FeedInfo {
     /// Size of every picture, as it is handed out.
     pub size: Size,
-    /// By how much it was shrunk ([`footage::SourceSpec::most_shrink`]).
+    /// Factor by which it was shrunk ([`footage::SourceSpec::most_shrink`]).
     pub shrink: usize,
     /// Number of frames.
     pub n_frames: u64,

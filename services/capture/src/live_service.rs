@@ -151,7 +151,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Says that there is no picture for the next instant.
+    /// Sends that there is no picture for the next instant.
     fn send_nothing(&mut self, status: Status) -> Result<(), Failure> {
         let index = self.index(self.at);
         self.say_why(index, status);

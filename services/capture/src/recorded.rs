@@ -36,7 +36,7 @@ pub enum RecordedError {
     /// The file cannot be opened.
     #[error("cannot open the recording")]
     Open(#[from] std::io::Error),
-    /// It is no recording, or cannot be read.
+    /// It is not a recording, or cannot be read.
     #[error("cannot read the recording")]
     Read(#[from] ReadError),
     /// It has no pictures of this camera.

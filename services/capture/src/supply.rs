@@ -154,7 +154,7 @@ impl Supply {
         step
     }
 
-    /// Says once what the decoder has complained about.
+    /// Logs the complaints of the decoder once.
     fn complain(&mut self) {
         let Some(feed) = self.feed.take() else { return };
         let complaints = feed.complaints();

@@ -26,7 +26,7 @@ pub struct WhoJob {
     pub patience: Duration,
 }
 
-/// Says who is who in every frame, until the footage of all views ends or a stop is requested.
+/// Determines who is who in every frame, until the footage of all views ends or a stop is requested.
 ///
 /// # Errors
 ///

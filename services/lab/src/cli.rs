@@ -57,7 +57,7 @@ pub(crate) enum Command {
     Model(model::Command),
     /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
-    /// Compare the methods that smooth a finished run with the truth.
+    /// Compare the smoothing methods, applied to a finished run, with the truth.
     Smooth(smooth::Arguments),
     /// Predict the cores, the network and the latency that a deployment needs.
     #[command(subcommand)]

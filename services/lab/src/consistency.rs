@@ -25,7 +25,7 @@ impl Sequences {
     /// Reads sequences.
     ///
     /// * `hold_out`: subjects to hold out; without any the last fourth of them.
-    /// * `every`, `frames`: takes the first and every so many-th frame after it, at most so many of each sequence.
+    /// * `every`, `frames`: takes the first frame and every `every`-th frame after it, at most `frames` of each sequence.
     /// * `rig`: what the cameras are called by, if all sequences are of one rig.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! The training of the network that finds people in whole pictures: its pictures, and what comes out.
 //!
-//! Three sources of pictures: photographs with marked people, in which a teacher, another detector, finds everybody else;
-//! photographs of nobody; and scenes that do not exist, with boxes around everybody.
+//! Three sources of pictures: photographs with marked people, in which a teacher (another detector) finds everybody else;
+//! photographs without people; and synthetic scenes, with boxes around everybody.
 
 mod judge;
 mod photographs;
@@ -31,17 +31,17 @@ pub struct Sources {
     pub photographs: Chosen,
     /// The teacher, once for every thread that asks it, or none.
     pub teachers: Vec<Detector>,
-    /// A folder of photographs of nobody.
+    /// A folder of photographs without people.
     pub empty: Option<PathBuf>,
     /// Scenes that do not exist.
     pub scenes: Scenes,
 }
 
-/// One of so many blocks of photographs in a row, and of so many subjects of scenes, is kept apart.
+/// One of this many blocks of photographs in a row, and of this many subjects of scenes, is kept apart.
 const KEPT: usize = 12;
 /// Photographs in a row that are kept apart together: neighbours often show the same event.
 const BLOCK: usize = 20;
-/// By how much hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+/// Amount by which hands, feet and hair reach beyond the joints: share of the longer side, on each side.
 const BEYOND: f64 = 0.05;
 
 /// The pictures to learn from, and those that are kept apart.

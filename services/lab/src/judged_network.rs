@@ -135,7 +135,7 @@ impl NetworkReader {
     }
 }
 
-/// The joints at the maxima of their maps; not finite where the keypoints do not tell a joint.
+/// The joints at the maxima of their maps; not finite if a joint does not follow from the keypoints.
 fn at_peaks(peaks: &[Option<Keypoint>]) -> Joints {
     core::array::from_fn(|joint| {
         let peak = peaks.get(joint).copied().flatten();

@@ -1,4 +1,4 @@
-//! The network that tells from the picture in which direction a person faces: its samples, and its training.
+//! The network that sees in the picture in which direction a person faces: its samples, and its training.
 //!
 //! Two sources of people whose direction is known: photographs with marked joints, if left and right are marked as
 //! their owner would call them, and scenes that do not exist, searched as the pipeline does.
@@ -42,7 +42,7 @@ pub struct Judged {
     pub on: String,
     /// People.
     pub n: usize,
-    /// Share of them of whom it tells the direction from its opposite, from 0 to 1.
+    /// Share of them for whom it distinguishes the direction from its opposite, from 0 to 1.
     pub right: f64,
     /// 95 % interval of that share (Wilson).
     pub interval: [f64; 2],
@@ -55,7 +55,7 @@ pub struct Judged {
 pub struct Report {
     /// Photographs learned from.
     pub n_photographs: usize,
-    /// Those of them that show somebody from behind.
+    /// Those of them that show a person from behind.
     pub n_behind: usize,
     /// Pictures of scenes learned from.
     pub n_rendered: usize,

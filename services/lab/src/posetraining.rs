@@ -24,7 +24,7 @@ pub use train::{Pass, train};
 #[derive(Debug)]
 pub struct People {
     /// Photographs of marked people. Left and right are those of the people themselves; where the choice asks for sides as
-    /// seen, the marks say nothing of the direction in which somebody faces.
+    /// seen, the marks say nothing of the direction in which a person faces.
     pub photographs: Chosen,
     /// For every thread that asks them, other networks that help. The first helps with joints without a mark and with marks that
     /// are wrong; the others with the keypoints that those before them do not know.

@@ -55,7 +55,7 @@ pub(crate) struct Shown<'a> {
 /// Makes something of every picture of all scenes, in the order of the scenes, whatever the threads.
 ///
 /// * `make`: of one picture; nothing if it is of no use.
-/// * `watch`: told of the pictures of a camera: how many there are, and how many were of no use.
+/// * `watch`: called with the number of pictures of a camera, and the number of useless ones.
 pub(crate) fn of_pictures<T: Send>(
     scenes: &Scenes,
     make: impl Fn(&Shown<'_>) -> Result<Option<T>, Failure> + Sync,

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use fmp::{ImageTooSmall, Layout, Model};
 use pipeline::{ViewSettings, ViewStep};
 
-/// Prepared searches are kept for so many sizes: pictures of a data set are of many.
+/// Number of sizes for which prepared searches are kept: the pictures of a data set have many sizes.
 const MOST_SIZES: usize = 8;
 
 /// Searches with one model, by the size of the picture.

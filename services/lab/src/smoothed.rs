@@ -38,7 +38,7 @@ pub struct Row {
     pub acceleration_m_s2: Option<Mean>,
     /// Change of the error from instant to instant, mm.
     pub jitter_mm: Option<Mean>,
-    /// By how much it is late, ms.
+    /// Amount by which it is late, ms.
     pub lag_ms: Option<Mean>,
     /// Distance from the true position where nothing was measured and it has a position, mm.
     pub filled_mm: Option<Mean>,
@@ -117,7 +117,7 @@ fn truth(
     }
     if n_known == 0 {
         let what = format!(
-            "{}: the truth is of none of the {} frames (from {}) and joints of the run",
+            "{}: the truth has none of the {} frames (from {}) or joints of the run",
             path.display(),
             frames.len(),
             frames.first().copied().unwrap_or_default()

@@ -190,7 +190,7 @@ fn absolute_path(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// A rig that is not there is an input, one that does not say what is up cannot be used.
+/// A missing rig is a failure of the input; a rig without an upward direction cannot be used.
 pub fn rig_failure(error: RigChoiceError) -> Failure {
     let kind = match error {
         RigChoiceError::NoUp | RigChoiceError::Rig(_) => ExitKind::Calibration,

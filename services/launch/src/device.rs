@@ -10,7 +10,7 @@ use pipeline::ViewStep;
 /// The GPU of this process; none before the first view asks for it.
 static OPENED: Mutex<Option<Arc<gpu::Device>>> = Mutex::new(None);
 
-/// Says which device a run takes and why; nothing where there is no choice.
+/// Returns a line about the device of a run and the reason; `None` if there is no choice.
 ///
 /// # Errors
 ///

@@ -98,7 +98,7 @@ impl Written {
     }
 }
 
-/// Name of the file that tells what was exported: `pose3d.export.json`.
+/// Name of the file that describes what was exported: `pose3d.export.json`.
 const MANIFEST: &str = ".export.json";
 
 /// Writes all formats of a run.
@@ -205,7 +205,7 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
     })
 }
 
-/// Refuses what the run does not tell.
+/// Refuses formats for which the run lacks data.
 fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     let lacks = |needs: fn(Format) -> bool| {
         let all = job.formats.iter().copied().filter(|format| needs(*format));
@@ -216,12 +216,12 @@ fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
         && let Some(formats) = lacks(Format::needs_rate)
     {
         let message = format!(
-            "the run does not tell how many frames a second it has, which {formats} must say"
+            "the run does not say how many frames per second it has, which {formats} must contain"
         );
         return Err(Failure::new(ExitKind::Usage, message).with_hint("give it: --rate 30"));
     }
     if let (Some(why), Some(formats)) = (&origin.up_unknown, lacks(Format::needs_up)) {
-        let message = format!("which way is up is not known, which {formats} must say: {why}");
+        let message = format!("which way is up is not known, and {formats} must say it: {why}");
         let failure = Failure::new(ExitKind::Input, message);
         return Err(failure.with_hint("give it in the world of the rig: --up 0,0,1"));
     }

@@ -125,7 +125,7 @@ pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failur
     let of_entry = |camera: &deployment::capture::Camera| {
         if crate::cameras::is_live(&camera.source) {
             let message = format!(
-                "camera {:?} is live: nothing of it can be compared with others",
+                "camera {:?} is live: it has no footage to compare with that of others",
                 camera.name
             );
             let failure = Failure::new(ExitKind::Config, message);
@@ -355,7 +355,7 @@ impl Reader<'_> {
 }
 
 impl Part {
-    /// The frames, of so many.
+    /// The range of frames, of `n_frames`.
     fn frames(self, n_frames: u64, rate_hz: f64) -> Range<u64> {
         let start = ((self.from_s * rate_hz).round() as u64).min(n_frames);
         let most = self.seconds.map(|second| (second * rate_hz).round() as u64);

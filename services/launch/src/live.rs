@@ -93,7 +93,7 @@ impl Live {
 ///
 /// # Errors
 ///
-/// The file cannot be read, the name is none, or not exactly one deployment runs.
+/// The file cannot be read, the name is not valid, or not exactly one deployment runs.
 pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     if let Some(named) = named {
         let is_file = Path::new(named).extension().is_some_and(|extension| extension == "toml");

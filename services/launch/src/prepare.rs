@@ -136,8 +136,8 @@ impl Prepared {
         let has_other_model = paper.model.is_some() && !is_shipped(paper.model.as_ref());
         if has_other_model && is_shipped(errors.and_then(Errors::network)) {
             tracing::warn!(
-                "paper.errors is the one that ships, which was trained on what the model that ships finds; \
-                 of another model's poses it knows nothing"
+                "paper.errors is the network that ships, which was trained on poses of the model that ships; it knows \
+                 nothing about those of another model"
             );
         }
         inputs::quality_network(errors, self.model.n_parts())?;
@@ -303,7 +303,7 @@ pub(crate) fn frame_scale(framing: &Framing) -> f64 {
     1.0 / (a * d - b * c).abs().sqrt()
 }
 
-/// Heat that half of the joints of somebody whom a view sees well have, 0 to 1.
+/// Heat that half of the joints of a person whom a view sees well have, 0 to 1.
 pub(crate) fn least_heat(deployment: &Deployment) -> f64 {
     2.0 * deployment.network.least_heat
 }

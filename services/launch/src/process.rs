@@ -185,7 +185,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     capture::run(service, &job)
 }
 
-/// By how much a decoder may shrink pictures of which smaller frames are made.
+/// Factor by which a decoder may shrink pictures of which smaller frames are made.
 fn most_shrink(framing: &Framing) -> usize {
     let [[a, _, _], [c, _, _]] = framing.source_from_output();
     (a.hypot(c) + 1e-9) as usize

@@ -134,7 +134,7 @@ fn hint(finding: &Finding) -> String {
     match finding {
         Finding::Distance { metres, .. } => format!(
             "say in the deployment what the numbers of the file are: `unit = \"mm\"` makes this {:.3} m, `unit = \"cm\"` {:.3} m, \
-             `unit = \"m\"` means that it is so",
+             `unit = \"m\"` says that it is right",
             metres / 1000.0,
             metres / 100.0
         ),
@@ -179,14 +179,14 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     ))
 }
 
-/// Names the cameras of which nothing says how many frames a second they have, beside others; none if there are none.
+/// Names the cameras whose frame rate nothing says, while it is known for others; none if there are none.
 fn without_rate(resolved: &Resolved) -> Option<String> {
     let views = resolved.deployment.cameras.iter().zip(&resolved.footage);
     let unknown = views.filter(|view| view.1.frame_rate_hz.is_none());
     let names: Vec<&str> = unknown.map(|unknown| unknown.0.name.as_str()).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "nothing says how many frames per second {} has: taken are those of the other cameras; `capture.frame_rate_hz` says it",
+            "nothing says how many frames per second {} has: the rate of the other cameras is used; `capture.frame_rate_hz` sets it",
             names.join(", ")
         )
     })
@@ -254,8 +254,8 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
             let brightest = first.as_ref()?.brightest();
             (brightest < LEAST_BRIGHTEST).then(|| {
                 format!(
-                    "the first pictures of {} ({}) use a small part of their range: the brightest value is {brightest} of 255; are they of \
-                     10 or 12 bits, in 16?",
+                    "the first pictures of {} ({}) use a small part of their range: the brightest value is {brightest} of 255; do \
+                     they have 10 or 12 bits, stored in 16?",
                     camera.name, camera.source
                 )
             })

@@ -369,7 +369,7 @@ impl Report {
         Ok(())
     }
 
-    /// Writes what a host with cameras can tell: the results are elsewhere.
+    /// Writes what a host with cameras knows: the results are elsewhere.
     fn write_far(&self, text: &mut String) -> core::fmt::Result {
         writeln!(text, "  results       on the host that fuses")?;
         self.write_live(text);

@@ -49,7 +49,8 @@ struct Hypothesis {
 
 /// Finds the vertical of a deployment. None if the rig or the deployment gives it, or if frames are not turned upright.
 ///
-/// The keypoints of files tell at once. A search of pictures takes a while; what it finds is kept beside the rig, and not searched again.
+/// With keypoint files the answer is immediate. A search of pictures takes a while; what it finds is kept beside the
+/// rig, and not searched again.
 ///
 /// # Errors
 ///
@@ -80,7 +81,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     }
     tracing::warn!(
         "the calibration does not say which way is up: looking for people in the first pictures of {} cameras, which takes up to half a \
-         minute; `up` in the deployment spares it",
+         minute; `up` in the deployment spares this",
         images.views.len()
     );
     let mut tried: Vec<Hypothesis> = Vec::new();
@@ -136,14 +137,14 @@ fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String
         next.and_then(|hypothesis| Some((hypothesis.up, hypothesis.score?))),
     ) {
         (Some(score), Some((up, other))) => format!(
-            "people are found with a score of {score:.2}, with up = {} of {other:.2}",
+            "people are found with a score of {score:.2}; with up = {} the score is {other:.2}",
             text(&up)
         ),
         (Some(score), None) => format!("people are found with a score of {score:.2}"),
         (None, _) => "nobody was found in the first pictures".to_owned(),
     };
     format!(
-        "the calibration does not say which way is up; taken is up = {}: cameras are held within {off:.0} degrees of level, and \
+        "the calibration does not say which way is up; up = {} is used: cameras are held within {off:.0} degrees of level, and \
          {people}; give `up` in the deployment if it is wrong, or to begin sooner",
         text(&best.up)
     )

@@ -80,7 +80,7 @@ pub(crate) enum Command {
     Replay(replay::Arguments),
     /// Write a finished run, or a recording, in the formats of other tools.
     Export(export::Arguments),
-    /// Inject faults into a deployment: kill and stop processes, disturb cameras; and check limits.
+    /// Inject faults into a deployment (kill and stop processes, disturb cameras), and check limits.
     Chaos(chaos::Arguments),
     /// Measure how fast messages travel, and how fast whole deployments are.
     #[command(subcommand)]
@@ -109,7 +109,7 @@ pub(crate) enum Command {
     Publish(publish::Arguments),
     /// Print the layout of messages, for programs in other languages.
     Messages(messages::Arguments),
-    /// Deployments of several machines: their state, and their keys.
+    /// Show the state of a deployment on several machines, or make its keys.
     #[command(subcommand)]
     Hosts(hosts::Command),
     /// List running deployments and the leftovers of dead ones in shared memory, or show the processes of one.

@@ -6,11 +6,11 @@ use deployment::Stage;
 /// The messages that a replay from a stage takes from the recording, in addition to those of the stage before.
 fn taken(from: Stage) -> &'static str {
     match from {
-        Stage::Capture => "From the footage; no recorded messages are sent",
-        Stage::Pose => "With the recorded frames",
-        Stage::Quality => "And the single-view poses and their evidence",
-        Stage::Fuse => "And the expected errors",
-        Stage::Triangulate => "And the pair poses",
+        Stage::Capture => "Start from the footage, and send no recorded messages",
+        Stage::Pose => "Send the recorded frames",
+        Stage::Quality => "Also send the recorded single-view poses and their evidence",
+        Stage::Fuse => "Also send the recorded expected errors",
+        Stage::Triangulate => "Also send the recorded pair poses",
     }
 }
 

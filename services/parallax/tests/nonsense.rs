@@ -306,7 +306,7 @@ fn an_unspecified_vertical_is_estimated_and_reported() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     // The planted figure looks like a person whichever way it is turned: what is said is what counts.
     for said in [
-        "the calibration does not say which way is up; taken is up = [",
+        "the calibration does not say which way is up; up = [",
         "people are found with a score of",
     ] {
         assert!(ended.stderr.contains(said), "{}", ended.stderr);

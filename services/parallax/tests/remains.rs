@@ -99,7 +99,7 @@ fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
         "photos: not a deployment: left alone",
         "folder clean photos: 1",
         "folder run deployment.toml: 1",
-        "is no directory of a deployment (files in it: 1;",
+        "is not the directory of a deployment (files in it: 1;",
         "link clean: 1",
         "link clean photos: 1",
         "link status: 1",

@@ -8,8 +8,8 @@ use crate::memory::KeypointState;
 use crate::view::{Found, View};
 
 impl View<'_> {
-    /// Takes the people of a frame. A frame whose file cannot be read is refused, with a warning the first time; one that no file
-    /// tells of has nobody in it.
+    /// Takes the people of a frame. A frame whose file cannot be read is refused, with a warning the first time; a frame
+    /// without a file has nobody in it.
     pub(crate) fn take(
         &self,
         keypoints: &Keypoints,

@@ -28,7 +28,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads the people of a frame, pixels of the frame; nobody where no file tells of it.
+    /// Reads the people of a frame, pixels of the frame; nobody if no file has it.
     ///
     /// * `people`: replaced by them.
     ///

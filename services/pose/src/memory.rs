@@ -20,9 +20,9 @@ const LONG_NANOS: u64 = 60_000_000_000;
 #[derive(Debug, Default)]
 pub(crate) struct NetworkState {
     pub(crate) memory: NetworkMemory,
-    /// When somebody was seen last, or a warning was given, and the number of frames since.
+    /// When a person was seen last, or a warning was given, and the number of frames since.
     pub(crate) nobody: Option<(u64, u64)>,
-    /// True if a failure of the network was told.
+    /// True if a failure of the network was reported.
     pub(crate) has_failed: bool,
 }
 
@@ -51,6 +51,6 @@ impl NetworkState {
 pub(crate) struct KeypointState {
     pub(crate) memory: NetworkMemory,
     pub(crate) people: Vec<SeenKeypoints>,
-    /// True if a file that cannot be read was told.
+    /// True if a file that cannot be read was reported.
     pub(crate) has_failed: bool,
 }

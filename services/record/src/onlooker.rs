@@ -23,7 +23,7 @@ pub struct Kept {
     pub n_lost: u64,
 }
 
-/// Writes every message of a deployment until its last result, or until it is told to end. No sender waits: what does not
+/// Writes every message of a deployment until its last result, or until it is asked to end. No sender waits: what does not
 /// fit into the queues is missing in the file, and counted.
 ///
 /// * `bus`: of an onlooker ([`Bus::as_onlooker`]).

@@ -73,7 +73,7 @@ impl Calibration {
         }
     }
 
-    /// Estimates by how much every camera is late, and logs once that one is out of step.
+    /// Estimates the delay of every camera, and logs once that one is out of step.
     fn follow_steps(
         &mut self,
         scene: &Scene,

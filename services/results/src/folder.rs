@@ -242,13 +242,16 @@ pub fn remove_pictures(path: &Path) -> Result<(), FolderError> {
     if !path.join(MARK).is_file()
         && let Some(other) = other_than_pictures(path, 2).map_err(failed)?
     {
-        let text = format!("{} is no picture of a run; move it away", other.display());
+        let text = format!(
+            "{} is not a picture of a run; move it away",
+            other.display()
+        );
         return Err(failed(io::Error::other(text)));
     }
     fs::remove_dir_all(path).map_err(failed)
 }
 
-/// Something in a folder that is no numbered picture.
+/// Something in a folder that is not a numbered picture.
 ///
 /// * `deep`: folders that may lie in each other.
 fn other_than_pictures(folder: &Path, deep: usize) -> io::Result<Option<PathBuf>> {
@@ -309,7 +312,7 @@ mod tests {
         let errors = folder.finish();
         let text = format!("{} {}", errors[0], errors[0].source);
         assert!(
-            text.contains("holiday.png is no picture of a run"),
+            text.contains("holiday.png is not a picture of a run"),
             "{text}"
         );
         assert!(own.exists() && pictures.join("left/000001.png").exists());

@@ -94,8 +94,8 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
-    /// The person who is followed; `None` if there is nobody. What is compared with the best candidates of the views, which are not named,
-    /// is compared with this one.
+    /// The followed person; `None` if there is nobody. Candidates of the views have no names, so their best ones are
+    /// compared with this person.
     pub fn followed(&self) -> Option<&SkeletonMessage> {
         self.skeletons.followed()
     }

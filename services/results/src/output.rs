@@ -248,7 +248,7 @@ impl Output {
         self.folder.remove_smoothed();
         for error in self.folder.finish() {
             let is_first = self.tally.failed(&error);
-            tracing::error!(%error, is_first, "a file keeps the name of a part");
+            tracing::error!(%error, is_first, "a file keeps its name of an unfinished file");
         }
         self.tally.summary()
     }

@@ -1,4 +1,4 @@
-//! Everybody over the run: how many people there are besides the one who is followed, and a summary of each.
+//! Everybody over the run: how many people there are besides the followed person, and a summary of each.
 
 use std::collections::{BTreeMap, BTreeSet};
 

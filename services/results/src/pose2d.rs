@@ -1,4 +1,4 @@
-//! `pose2d.jsonl`: the person who is followed in every view, before and after fusion, in pixels of the footage.
+//! `pose2d.jsonl`: the followed person in every view, before and after fusion, in pixels of the footage.
 
 use messages::{FusedView, MAX_PARTS, Status};
 use runfiles::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};

@@ -28,7 +28,7 @@ pub struct Scene {
     pub views: Vec<View>,
     /// True if the candidates of a view are the people that a network sees: fusion decides which of them is the person.
     pub has_maps: bool,
-    /// Heat that half of the joints of a person have who tells whether the cameras stand where they should, 0 to 1.
+    /// Least heat of half of the joints of a person who serves to check the places of the cameras, 0 to 1.
     pub least_heat: f64,
     /// The joints of the result.
     pub joints: &'static JointSet,

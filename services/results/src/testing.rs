@@ -113,7 +113,7 @@ pub(crate) fn skeletons(frame: u64) -> Box<Skeletons> {
     skeletons
 }
 
-/// A frame in which both views found somebody.
+/// A frame in which both views found a person.
 pub(crate) fn record(frame: u64) -> FrameRecord {
     let pose = Pose {
         score: 0.5,

@@ -1,4 +1,4 @@
-//! How far the results can be trusted: what they themselves tell of the person who is followed, frame by frame.
+//! Judges how far the results can be trusted, from the results of the followed person, frame by frame.
 
 use std::collections::BTreeMap;
 

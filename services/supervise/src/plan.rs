@@ -68,7 +68,7 @@ pub enum Role {
 /// How much patience there is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Policy {
-    /// A process that has worked for so long is restarted at once.
+    /// A process that has worked for this long is restarted at once.
     pub steady_after: Duration,
     /// Pause before the restart of one that died sooner; doubles with every such death.
     pub first_pause: Duration,

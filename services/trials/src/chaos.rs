@@ -41,7 +41,7 @@ pub use options::{Limits, Options};
 pub use scenario::Scenario;
 
 /// The hang limit of the `spin-...` scenarios with lossless delivery: a main loop reports progress every second, and three
-/// reports may be missing. With realtime delivery the processor time of an iteration tells.
+/// reports may be missing. With realtime delivery the processor time of an iteration counts.
 const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 
 /// The outcome of the scenarios.

@@ -12,7 +12,7 @@ use runtime::Service;
 use stage::{Frame, Item, Stage};
 use wire::{SolvedPerson, WireError};
 
-/// Identity of the person by the paper's method, which names nobody: the one who is followed.
+/// Identity of the followed person, the only one by the paper's method, which gives no identities.
 const UNNAMED: u64 = 1;
 
 /// Task of the process.

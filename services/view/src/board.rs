@@ -174,7 +174,7 @@ impl Board {
         inner.recorder = on.then_some(page);
     }
 
-    /// Asks again for what could not be begun yet.
+    /// Asks again for the recording if it could not be begun yet.
     pub(crate) fn ask_again(&self) {
         let mut inner = self.lock();
         inner.record = inner.recorder.map(|_| true);
@@ -209,7 +209,7 @@ impl Board {
         self.n_pages.load(Ordering::Relaxed) > 0
     }
 
-    /// Counts the pages that show the pictures of a view; none for a view that cannot be.
+    /// Counts the pages that show the pictures of a view; `None` for a view that does not exist.
     pub(crate) fn wanted(&self, view: usize) -> Option<&AtomicUsize> {
         self.wanted.get(view)
     }

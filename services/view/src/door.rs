@@ -14,7 +14,7 @@ use rustix::process::geteuid;
 
 /// Most connections at the same time.
 const MOST_CONNECTIONS: usize = 256;
-/// How long a connection lives that is no page: a request that is not finished by then never will be.
+/// How long a connection without a page lives: a request that is not finished by then never will be.
 pub(crate) const LONGEST_REQUEST: Duration = Duration::from_secs(10);
 /// Pause after a failure to accept, for example for want of descriptors.
 const PAUSE: Duration = Duration::from_millis(100);

@@ -14,7 +14,7 @@ use crate::scene::Scene;
 use folder::Folder;
 use tape::Tape;
 
-/// Most pieces of the time line that the page is told about.
+/// Most pieces of the time line that the page gets.
 const MOST_PIECES: usize = 600;
 
 /// A finished run.
@@ -40,7 +40,7 @@ impl Finished {
     ///
     /// # Errors
     ///
-    /// The file is no recording, or has no result.
+    /// The file is not a recording, or has no result.
     pub(crate) fn tape(path: &Path) -> Result<Self, Failure> {
         Tape::open(path).map(Self::Tape)
     }

@@ -53,7 +53,7 @@ pub(crate) struct Asked {
     pub(crate) rest: Vec<u8>,
 }
 
-/// Reads a request, or returns the answer to what is none.
+/// Reads a request, or returns the answer to something that is not a request.
 ///
 /// # Errors
 ///

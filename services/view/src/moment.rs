@@ -38,7 +38,7 @@ pub(crate) struct Moment {
     pub latency_ms: Option<f64>,
 }
 
-/// A person beside the one who is followed.
+/// A person other than the followed one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Other {
     /// Identity.

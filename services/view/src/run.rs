@@ -59,7 +59,12 @@ pub fn run(options: &Options, stop: &Stop, say: &mut dyn FnMut(&str)) -> Result<
     let served = door::open(&listener, stop, move |stream| server::talk(stream, &site));
     stop.request();
     if let Some(looker) = looker {
-        let panicked = |_| Failure::new(ExitKind::Run, "the thread that looks on panicked");
+        let panicked = |_| {
+            Failure::new(
+                ExitKind::Run,
+                "the thread that watches the deployment panicked",
+            )
+        };
         looker.join().map_err(panicked)?;
     }
     served.or_fail(ExitKind::Run)

@@ -24,7 +24,7 @@ pub(crate) struct Scene {
     pub up: [f64; 3],
     /// Frames per second of the footage, where known.
     pub frame_rate_hz: Option<f64>,
-    /// True if results tell which views see the person from behind: those of the filters do.
+    /// True if results say which views see the person from behind: those of the filters do.
     pub tells_facing: bool,
     /// Why the cameras are not known, if they are not.
     pub problem: Option<String>,

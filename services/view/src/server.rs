@@ -111,14 +111,14 @@ fn file(path: &str) -> Answer {
     }
 }
 
-/// The token in what stands behind `?`; tokens have no characters that are written in another way there.
+/// The token in the query after `?`; tokens have no characters that are escaped there.
 fn token_in(query: Option<&str>) -> &str {
     let pairs = query.unwrap_or_default().split('&');
     let mut tokens = pairs.filter_map(|pair| pair.strip_prefix("token="));
     tokens.next().unwrap_or_default()
 }
 
-/// Compares in a time that does not tell how much of it is right.
+/// Compares in a time that does not reveal how many characters are right.
 fn is_same(token: &str, other: &str) -> bool {
     let differences = token.bytes().zip(other.bytes());
     let differences = differences.fold(0, |sum, (a, b)| sum | (a ^ b));

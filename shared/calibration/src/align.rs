@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 pub struct Similarity {
     /// The turn.
     pub rotation: UnitQuaternion<f64>,
-    /// By how much lengths grow.
+    /// Amount by which lengths grow.
     pub scale: f64,
     /// Added last, units of the target.
     pub translation: Vector3<f64>,
@@ -32,7 +32,7 @@ impl Similarity {
     }
 }
 
-/// By how much two rigs differ in a camera.
+/// Amount by which two rigs differ in a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
     /// Angle between the two rotations, radians.
@@ -43,7 +43,7 @@ pub struct Difference {
 
 /// Lays the first rig upon the second: the turn that all cameras want in the mean, then scale (if asked for) and place by the centres.
 ///
-/// Well defined for two cameras, too. Rigs have the same cameras in the same order. None for no camera.
+/// Well defined for two cameras, too. Rigs have the same cameras in the same order. `None` if there is no camera.
 pub fn aligned(from: &[Camera], to: &[Camera], with_scale: bool) -> Option<Similarity> {
     let n = from.len().min(to.len()) as f64;
     let mut sum = Matrix3::zeros();

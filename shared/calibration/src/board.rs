@@ -3,7 +3,7 @@
 //! | step | where |
 //! |---|---|
 //! | frames that cover the pictures, distances and tilts | `choose` |
-//! | the intrinsics of every camera by itself (Zhang, *A flexible new technique for camera calibration*, 2000) | `intrinsics`, `pose` |
+//! | the intrinsics of every camera separately (Zhang, *A flexible new technique for camera calibration*, 2000) | `intrinsics`, `pose` |
 //! | how pairs stand that saw the board together, and all along the strongest pairs | `graph` |
 //! | all of it, in this order | `rig` |
 //! | everything adjusted at once, wrong corners left out | `adjust`, `problem`, `outcome` |

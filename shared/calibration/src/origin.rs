@@ -10,7 +10,7 @@ use nalgebra::{
 use crate::board::{Sight, standing_board};
 use crate::people::Floor;
 
-/// Three points whose triangle is flatter than this (sine of its angle at the origin) tell no floor.
+/// Three points whose triangle is flatter than this (sine of its angle at the origin) do not determine the floor.
 const FLATTEST: f64 = 0.05;
 
 /// Why there is no new origin.

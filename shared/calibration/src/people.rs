@@ -2,11 +2,11 @@
 //!
 //! The joints that two cameras see at one instant give the relative pose of both (essential matrix by eight points within
 //! RANSAC, robust refinement from several starts); other cameras are put where they see the joints that are known then
-//! (resection); and all cameras, joints, lengths of bones and time offsets are adjusted together. Pictures tell no lengths: the
+//! (resection); and all cameras, joints, lengths of bones and time offsets are adjusted together. Pictures have no scale: the
 //! scale is that of a person's height, of one distance, or of the rig that was given. The vertical and the floor are those of
 //! the feet that stand. One person is enough; the one that the cameras see longest is used.
 //!
-//! The honest check is that two halves of the recording, each by itself from the beginning, give the same rig.
+//! The honest check is that two halves of the recording, each separately from the beginning, give the same rig.
 
 pub(crate) mod adjust;
 pub(crate) mod begin;

@@ -1,9 +1,9 @@
 //! An existing rig made better by a recording, or put right after a camera was moved.
 //!
-//! The rig that is given is believed with stated deviations; a camera that was moved breaks away from them (the belief in a
-//! camera's pose has a loss that saturates). Only what the joints tell better than that moves: a camera that they do not is held.
-//! The new rig is judged on blocks of the recording that it was not fitted to: each camera's joints against where the other
-//! cameras see them.
+//! The given rig is trusted to within stated deviations; a camera that was moved breaks away from them (the belief in a
+//! camera's pose has a loss that saturates). Only cameras that the joints determine better than that move; the others
+//! are held. The new rig is judged on blocks of the recording that it was not fitted to: each camera's joints against
+//! where the other cameras see them.
 
 mod held_out;
 
@@ -27,8 +27,8 @@ use held_out::{Blocks, chosen};
 
 /// A camera moves where its deviation is less than this share of what was believed.
 const TOLD: f64 = 0.8;
-/// A camera was moved where the joints fit by this share better without its pose, and so many times more than without that of
-/// another camera.
+/// A camera was moved where the joints fit by this share better without its pose, and this many times more than without
+/// that of another camera.
 const SUSPECT: [f64; 2] = [0.15, 1.5];
 
 /// Settings of a refinement.
@@ -53,11 +53,11 @@ pub struct Settings {
 /// Change of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// By how much it has moved: degrees, metres.
+    /// Amount by which it has moved: degrees, metres.
     pub moved: [f64; 2],
     /// Standard deviation of its pose now: degrees, metres.
     pub sd: [f64; 2],
-    /// True if the joints tell its pose; held if not.
+    /// True if the joints determine its pose; if not, it is held.
     pub is_told: bool,
     /// Median residual of the rig fitted to everything, pixels.
     pub residual_px: f64,
@@ -96,7 +96,7 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// [`PeopleError`]: what cannot be looked at. Where too little can be told there is an [`Outcome`] with doubts.
+/// [`PeopleError`]: what cannot be looked at. If too little can be determined, the result is an [`Outcome`] with doubts.
 pub fn refine(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
     let Recording { cameras, films } = *recording;
     if cameras.len() < 2 || cameras.len() != films.len() {
@@ -210,7 +210,7 @@ fn better(
 /// Which cameras move.
 #[derive(Debug, Clone)]
 struct Moving {
-    /// One that was moved: nothing is believed of its pose.
+    /// A camera that was moved: nothing is assumed about its pose.
     suspect: Option<usize>,
     /// The others are held.
     told: Vec<bool>,
@@ -253,7 +253,7 @@ fn suspect(
     Ok(is_one.then_some(best.1))
 }
 
-/// The rig that fits best, what is given being believed; cameras that are not told are held.
+/// The rig that fits best together with the given rig; cameras that the joints do not determine are kept.
 fn fitted(
     study: &Study<'_>,
     choices: &[Choice],
@@ -307,7 +307,7 @@ fn deviations(all: &Solved) -> Vec<[f64; 2]> {
     (0..cameras.cameras().len()).map(of).collect()
 }
 
-/// Which cameras the joints tell better than what was believed.
+/// Finds the cameras that the joints determine better than the given rig.
 fn told(all: &Solved, settings: &Settings) -> Vec<bool> {
     let each = deviations(all).into_iter();
     each.map(|sd| sd[0] < TOLD * settings.pose_sd[0] || sd[1] < TOLD * settings.pose_sd[1])

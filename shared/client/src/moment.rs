@@ -93,7 +93,7 @@ impl Skeletons {
         self.message.status
     }
 
-    /// The people, the one who is followed first.
+    /// The people, the followed person first.
     pub fn people(&self) -> impl Iterator<Item = Skeleton<'_>> {
         let people = self.message.listed().iter();
         people.map(|message| Skeleton {
@@ -102,7 +102,7 @@ impl Skeletons {
         })
     }
 
-    /// The person who is followed; `None` if there is nobody.
+    /// The followed person; `None` if there is nobody.
     pub fn followed(&self) -> Option<Skeleton<'_>> {
         self.people().next()
     }
@@ -257,7 +257,7 @@ impl Drop for Picture {
 }
 
 impl Moment {
-    /// The person who is followed; `None` if there is nobody, or skeletons were not asked for.
+    /// The followed person; `None` if there is nobody, or skeletons were not asked for.
     pub fn followed(&self) -> Option<Skeleton<'_>> {
         self.skeletons.as_ref()?.followed()
     }

@@ -45,7 +45,7 @@ pub enum State {
 /// Counts of what was not given to the caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Losses {
-    /// Messages of another run, or with counts or numbers that cannot be.
+    /// Messages of another run, or with impossible counts or numbers.
     pub refused: u64,
     /// Parts that came after their frame, and frames without a skeleton where one was asked for.
     pub late: u64,
@@ -75,7 +75,7 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// [`ClientError`]; that no such deployment runs is told with the names of those that do.
+    /// [`ClientError`]; if no such deployment runs, it has the names of those that do.
     pub fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         check_wish(wish)?;
         let connection = Connection::open(deployment, wish)?;
@@ -211,7 +211,7 @@ impl Reader {
         }
     }
 
-    /// Tries to join the deployment. What fails for another reason than that it does not run is told to the caller.
+    /// Tries to join the deployment. Failures other than that it does not run are returned to the caller.
     fn join(&self) -> Option<Connection> {
         match Connection::open(&self.deployment, &self.wish) {
             Ok(connection) => {

@@ -5,7 +5,7 @@ use core::fmt::Display;
 use crate::ConfigError;
 use crate::ranges::range;
 
-/// A value that cannot be.
+/// A value that is not allowed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Complaint {
     /// The key, with its section.

@@ -21,7 +21,7 @@ pub enum ConfigError {
         /// Reason why it is malformed.
         message: String,
     },
-    /// A value that cannot be.
+    /// A value that is not allowed.
     #[error("{place}: `{key}` is {got}, expected {expected}")]
     Value {
         /// File and line.

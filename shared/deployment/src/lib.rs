@@ -96,7 +96,7 @@ pub struct Deployment {
     /// How pixels get in.
     #[serde(default)]
     pub capture: capture::Config,
-    /// The person who is followed, and the joints.
+    /// The followed person, and the joints.
     #[serde(default)]
     pub person: person::Config,
     /// Keys of the network's method.

@@ -8,7 +8,7 @@ use crate::lists::fits;
 use crate::places::{malformed, of_set, place, span_of};
 use crate::{Complaint, ConfigError, Deployment, Machine, live, method, rules};
 
-/// A deployment, and what of it was said by whom.
+/// A deployment, and the origin of every value.
 #[derive(Debug)]
 pub struct Loaded {
     /// The deployment, paths resolved, defaults filled in.
@@ -22,7 +22,7 @@ pub struct Loaded {
 impl Loaded {
     /// Reads the text of a deployment file; `set` are `key=value` pairs that replace what it says.
     ///
-    /// * `file`: where the text comes from. Relative paths are relative to it, whoever gives them.
+    /// * `file`: where the text comes from. Relative paths are relative to it, wherever they are given.
     ///
     /// # Errors
     ///
@@ -125,7 +125,7 @@ impl Loaded {
     ///
     /// # Errors
     ///
-    /// [`ConfigError`] where `set` gives what cannot be.
+    /// [`ConfigError`] if `set` gives a value that is not allowed.
     pub fn defaults(set: &[String]) -> Result<Self, ConfigError> {
         let mut table = Table::new();
         let on_command_line = overrides(set)?;

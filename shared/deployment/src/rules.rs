@@ -178,7 +178,7 @@ fn eyes(camera: &capture::Camera) -> Result<(), Complaint> {
 ///
 /// # Errors
 ///
-/// The first number that cannot be.
+/// The first number that is not allowed.
 pub fn energy_numbers(config: &paper::Config) -> Result<(), Complaint> {
     whole("paper.workers", config.workers)?;
     not_negative("paper.alpha", config.alpha.unwrap_or(0.0))?;

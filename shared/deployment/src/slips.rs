@@ -20,7 +20,7 @@ pub(super) fn other_file(text: &str) -> Option<&'static str> {
     let n = sections.iter().filter(|section| begins(section)).count();
     (n >= 3 && !begins("[[camera]]")).then_some(
         "this is a configuration of Pose2Sim: a deployment names the cameras, their videos and the calibration. `parallax new FOLDER \
-         --camera cam01=videos/cam01.mp4 --camera cam02=videos/cam02.mp4 --rig calibration/Calib.toml` writes one of the same files",
+         --camera cam01=videos/cam01.mp4 --camera cam02=videos/cam02.mp4 --rig calibration/Calib.toml` writes one from these files",
     )
 }
 

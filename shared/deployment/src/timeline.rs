@@ -11,7 +11,7 @@ pub struct OwnClock {
     pub rate_hz: f64,
     /// Offset that is added to its times at its first frame, seconds.
     pub offset_s: f64,
-    /// By how much a second of it is too long, as a share.
+    /// Amount by which a second of it is too long, as a share.
     pub drift: f64,
 }
 

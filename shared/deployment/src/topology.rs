@@ -66,8 +66,8 @@ const RECORD: &str = "record";
 /// The process that carries messages between hosts.
 const BRIDGE: &str = "bridge";
 
-/// The services whose processes a deployment file may give cores and a priority, each with the most processes that are
-/// told apart by their number. What records is none of them: no file says whether it runs.
+/// The services whose processes a deployment file may give cores and a priority, each with the largest number of
+/// processes, which are numbered. The recording process is not among them: no file says whether it runs.
 pub(crate) fn services(deployment: &Deployment) -> Vec<(&'static str, usize)> {
     let n_views = deployment.cameras.len();
     let of_stage = |stage: Stage| match stage {

@@ -33,7 +33,7 @@ pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamer
     canvas.label([2.0, 2.0], text.trim_end(), CENTRE);
 }
 
-/// The trial whose status is that of the frame: of somebody who is there, if anybody is.
+/// The trial whose status is that of the frame: of a person who is there, if anybody is.
 fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
     let is_there = |trial: &&Trial| trial.slots[slot].points.iter().any(Result::is_ok);
     trials.iter().find(is_there).or(trials.first())

@@ -164,12 +164,14 @@ fn notes(
     is_there: &[bool; N_NODES],
     held: &Held,
 ) -> Notes {
-    let mut notes =
-        vec!["how a bone is turned about itself is not seen: it turns with its parent".to_owned()];
+    let mut notes = vec![
+        "the joints do not show how a bone turns about its own axis: it turns with its parent"
+            .to_owned(),
+    ];
     if trial.first_frame > 0 {
         let (frame, time_s) = (trial.first_frame, trial.time_s(0).unwrap_or_default());
         notes.push(format!(
-            "the format begins at 0: its first line is frame {frame}, at {time_s:.3} s"
+            "the format counts from 0: its first line is frame {frame} of the run, at {time_s:.3} s"
         ));
     }
     if held.n_frames > 0 {
@@ -199,12 +201,12 @@ fn notes(
     let missing: Vec<&str> = missing.filter_map(|node| node.1.landmark).collect();
     if !missing.is_empty() {
         notes.push(format!(
-            "never seen with what they hang on, and left out: {}",
+            "never seen together with the joint before them, and left out: {}",
             missing.join(", ")
         ));
     }
     if !trial.extras.is_empty() {
-        notes.push("keypoints beside the joints are left out: they hang on nothing".to_owned());
+        notes.push("extra keypoints are left out: they belong to no bone".to_owned());
     }
     let known = lengths.iter().zip(NODES).filter_map(|bone| Some((bone.1.name, (*bone.0)?)));
     let known = known.map(|(name, length)| format!("{name} {:.1}", CM * length));

@@ -100,7 +100,8 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     });
     chunks(out, &document, &store.bytes)?;
     Ok(vec![
-        "how a bone is turned about itself is not seen: it turns with its parent".to_owned(),
+        "the joints do not show how a bone turns about its own axis: it turns with its parent"
+            .to_owned(),
     ])
 }
 

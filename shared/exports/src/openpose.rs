@@ -13,7 +13,7 @@ use crate::{Seen, Trial, ViewCamera};
 /// Suffix of the file of a frame.
 pub const SUFFIX: &str = "_keypoints.json";
 
-/// The file of a view and a frame; whoever was not found is not in it. `person_id` is -1 in a run of one person.
+/// The file of a view and a frame; people who were not found are not in it. `person_id` is -1 in a run of one person.
 pub fn frame(trials: &[Trial], slot: usize, view: &ViewCamera) -> String {
     let id = |trial: &Trial| (trials.len() > 1).then_some(trial.id());
     let people = trials.iter().filter_map(|trial| person(trial, id(trial), slot, view));

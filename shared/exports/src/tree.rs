@@ -2,7 +2,8 @@
 //!
 //! At rest the person stands with arms out, y up, looking along +z, the left hand at +x. Nodes without a landmark of their own lie
 //! where their parent is, and turn so that their child lies where it was seen: so every bone has a rotation of its own, and only the
-//! lengths of bones can differ from what was seen. How a bone is turned about itself is not seen; it turns with its parent.
+//! lengths of bones can differ from what was seen. Joints do not show how a bone turns about its own axis; it turns with
+//! its parent.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 

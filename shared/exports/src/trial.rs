@@ -54,7 +54,7 @@ pub struct Gap(pub Box<str>);
 /// A place on the grid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Slot {
-    /// Identity of whom the points are of; `None` where nobody is.
+    /// Identity of the person whose points these are; `None` where nobody is.
     pub person: Option<u64>,
     /// `ok`, or why there is no skeleton; empty where the run left no line.
     pub status: Box<str>,
@@ -62,13 +62,13 @@ pub struct Slot {
     pub points: Vec<Result<Point, Gap>>,
 }
 
-/// One person of a run. The trials of a run have the same places, in which whoever is not there has no point.
+/// One person of a run. The trials of a run have the same slots; a person who is not there has no point in a slot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Name of the run in the files.
     pub name: String,
-    /// Identities of the person within the run, ascending: more than one where never two people were there, and whoever was followed had
-    /// one after the other.
+    /// Identities of the person within the run, ascending: more than one if no frame had two people and the followed
+    /// person had several, one after the other.
     pub ids: Vec<u64>,
     /// Naming of the points in the files.
     pub naming: Naming,
@@ -203,7 +203,7 @@ pub enum TrialError {
         frames: usize,
     },
     /// The joints are those of no set.
-    #[error("the joints are of no known set: {0}")]
+    #[error("the joints are not those of a known set: {0}")]
     Joints(String),
     /// Two frames are farther apart than can be.
     #[error(
@@ -426,7 +426,7 @@ impl Gathering {
 
     /// Puts a person in its places.
     ///
-    /// * `is_one`: never two are there, so that whoever is there is the one.
+    /// * `is_one`: no frame has two people, so the person who is there is the followed one.
     fn trial(&mut self, mut trial: Trial, is_one: bool) -> Trial {
         let n_points = trial.n_points();
         for line in &mut self.frames {

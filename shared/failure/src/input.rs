@@ -19,7 +19,7 @@ pub fn read_text(file: &Path) -> Result<String, Failure> {
 
 /// A file that should be text and is not UTF-8.
 pub fn no_text(file: &Path) -> Failure {
-    let message = format!("{} is no text: it is not UTF-8", file.display());
+    let message = format!("{} is not text: it is not UTF-8", file.display());
     Failure::new(ExitKind::Input, message)
 }
 

@@ -139,7 +139,7 @@ impl Stop {
     }
 
     /// After a signal that is not from the supervisor: waits until it ends the process, or stop is requested. Such a
-    /// signal interrupts a wait inside iceoryx2, which then reports an error that is none.
+    /// signal interrupts a wait inside iceoryx2, which then reports an error without a cause.
     pub fn wait_for_unasked_end(&self) {
         let limit = Duration::from_secs(u64::from(UNASKED_SECONDS) + 1);
         let begin = Instant::now();

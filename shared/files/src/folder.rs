@@ -1,5 +1,5 @@
-//! A folder that is written to. Everything in it is opened beneath its descriptor, and no link in it is followed: whoever else may
-//! write there cannot lead a file astray.
+//! A folder that is written to. Everything in it is opened beneath its descriptor, and no link in it is followed: other
+//! users who may write there cannot redirect a file.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -77,7 +77,7 @@ impl Folder {
         &self.path
     }
 
-    /// Why what is written here may be changed by somebody else: `belongs to user mallory (4001)`, or
+    /// Why what is written here may be changed by another user: `belongs to user mallory (4001)`, or
     /// `may be written to by every user`.
     ///
     /// # Errors
@@ -209,7 +209,7 @@ impl Folder {
         })
     }
 
-    /// The error for a name under which something lies that is not written to.
+    /// The error for a name that is taken by something that must not be written to.
     fn in_the_way(&self, name: &OsStr) -> io::Error {
         let text = match self.kind(name) {
             Ok(kind) => format!(

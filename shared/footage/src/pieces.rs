@@ -84,7 +84,7 @@ mod id {
 struct Cutter<R> {
     input: R,
     head: Vec<u8>,
-    /// A picture that waits for its head to be told.
+    /// A picture that waits for its head to be read.
     after_head: Option<Piece>,
 }
 

@@ -78,7 +78,8 @@ struct Told {
     unix: i64,
 }
 
-/// Tells times of a camera, whose distance to those of the stream stays, from those at which packets were written.
+/// Distinguishes times of a camera, whose distance to those of the stream is constant, from the times at which packets
+/// were written.
 #[derive(Debug, Default)]
 struct Offsets(Vec<i64>);
 
@@ -113,7 +114,7 @@ impl<R: Read> Boxes<R> {
         }
     }
 
-    /// The next time that is told; none at the end of the stream.
+    /// The next time that is stated; `None` at the end of the stream.
     fn next(&mut self) -> io::Result<Option<Told>> {
         loop {
             let Some((kind, length)) = self.head()? else {

@@ -47,7 +47,7 @@ pub enum SourceKind {
 pub struct SourceInfo {
     /// Size of every frame, as it is handed out.
     pub size: Size,
-    /// By how much it was shrunk ([`SourceSpec::most_shrink`]).
+    /// Factor by which it was shrunk ([`SourceSpec::most_shrink`]).
     pub shrink: usize,
     /// Number of frames to be read. A damaged video may have fewer; that is an error while reading.
     pub n_frames: u64,

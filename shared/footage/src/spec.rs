@@ -9,7 +9,7 @@ use crate::{FootageError, Rotation};
 pub struct PictureNumbers {
     /// The number of frame 0.
     pub first: u64,
-    /// By how much it rises from frame to frame, at least 1.
+    /// Amount by which it rises from frame to frame, at least 1.
     pub step: u64,
 }
 
@@ -35,8 +35,9 @@ pub struct SourceSpec {
     pub numbers: Option<PictureNumbers>,
     /// How pictures are turned.
     pub rotation: Rotation,
-    /// By how much the pictures of a video may be shrunk as they are decoded: they are handed out smaller by the largest whole number up
-    /// to this that divides both of their sides, each pixel the mean of those that it covers. 1: as they are.
+    /// Factor by which the pictures of a video may be shrunk as they are decoded: they are handed out smaller by the
+    /// largest whole number up to this that divides both of their sides, each pixel the mean of those that it covers. 1:
+    /// as they are.
     pub most_shrink: usize,
     /// Smallest width and height accepted of pictures that are not shrunk, pixels.
     pub min_side: usize,

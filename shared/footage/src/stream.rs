@@ -201,7 +201,7 @@ impl StreamSpec {
     ///
     /// # Errors
     ///
-    /// [`FootageError::FfmpegMissing`]. Whether somebody answers shows at the first frame.
+    /// [`FootageError::FfmpegMissing`]. Whether the address answers shows at the first frame.
     pub fn open(&self, size: Size) -> Result<LiveStream, FootageError> {
         let not_started = |source| missing(&self.ffmpeg, self.shown().as_ref(), source);
         // The third pipe that a child has is its standard input, which it can write to as to any other.

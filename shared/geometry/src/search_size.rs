@@ -13,7 +13,7 @@ pub const AIM_PX: f64 = 200.0;
 pub const GOOD_PX: [f64; 2] = [150.0, 250.0];
 /// Heights of a person that the search still does well, pixels of the searched frame.
 pub const USABLE_PX: [f64; 2] = [110.0, 350.0];
-/// Most pixels of a frame that is searched unless somebody asks for more, which cost about 0.41 CPU-seconds.
+/// Most pixels of a frame that is searched unless more is asked for, which cost about 0.41 CPU-seconds.
 ///
 /// Four views of 1088x1920 with all defaults took, processor time per frame and view of all processes together (Intel
 /// Xeon, two cores, AVX-512): 0.22 s at 272x480, 0.32 s at 363x640, 0.43 s at 435x768 and 0.63 s at 544x960. Full HD

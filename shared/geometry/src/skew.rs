@@ -12,10 +12,10 @@ use nalgebra::{Point2, Vector2};
 
 /// How many frames are remembered: enough to see whether two velocities in a row agree.
 const N_NOTED: usize = 3;
-/// A point that is faster is another one: heights of the person per second. The foot of a jogger does 5.
+/// A point that moves faster is taken for another point: heights of the person per second. The foot of a jogger does 5.
 const MOST_SPEED: f64 = 9.0;
-/// A velocity that changes by more from one interval to the next is not believed, for one of the two tells of another point:
-/// heights per second.
+/// A velocity that changes by more from one interval to the next is not believed, because one of the two belongs to
+/// another point: heights per second.
 const MOST_CHANGE: f64 = 6.0;
 /// Pictures that are further apart say nothing of the velocity, seconds.
 const LONGEST_GAP_S: f64 = 0.15;
@@ -39,8 +39,8 @@ pub struct Velocity {
 }
 
 impl Velocity {
-    /// By how much the point moves in a time, pixels; `None` for more time than the velocity was measured over: nobody moves
-    /// evenly for so long.
+    /// Amount by which the point moves in a time, pixels; `None` for more time than the velocity was measured over:
+    /// nobody moves evenly for so long.
     pub fn shift(&self, seconds: f64) -> Option<Vector2<f64>> {
         (seconds.abs() <= self.gap_s).then(|| self.px_per_s * seconds)
     }

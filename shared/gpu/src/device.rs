@@ -134,7 +134,7 @@ impl Device {
         &self.limits
     }
 
-    /// Says if it takes kernels in SPIR-V, whose arithmetic can be decorated.
+    /// Returns true if it takes kernels in SPIR-V, whose arithmetic can be decorated.
     pub(crate) fn takes_spirv(&self) -> bool {
         self.takes_spirv
     }

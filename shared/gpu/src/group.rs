@@ -123,7 +123,7 @@ pub(crate) fn split(device: &Device, layout: &Layout) -> Result<Vec<Range<usize>
     Ok(groups)
 }
 
-/// The things that a group is made with.
+/// Everything that is needed to make a group.
 pub(crate) struct Parts<'a> {
     pub(crate) device: &'a Device,
     pub(crate) programs: &'a Programs,

@@ -249,7 +249,7 @@ impl<'a> Finding<'a> {
             return Err("its padding or kernel is too large");
         }
         if channels != inputs || reach[0] < down || reach[1] < across {
-            return Err("its sides do not fit its input");
+            return Err("its shape does not fit its input");
         }
         let size = ConvSize {
             inputs,
@@ -260,7 +260,7 @@ impl<'a> Finding<'a> {
         };
         let bias = bias.ok_or("its bias is not a constant")?;
         let conv = Conv::new(size, &weights.values, &bias, input.stack == 0);
-        let conv = conv.map_err(|_error| "its weights do not fit its sides")?;
+        let conv = conv.map_err(|_error| "its weights do not fit its shape")?;
         self.front.border = self.front.border.max(most);
         let operation = Operation::Conv {
             conv,
@@ -308,7 +308,7 @@ impl<'a> Finding<'a> {
         let [sides, [channels, rows, cols]] = of.map(|value| self.front.sides[value.stack]);
         let fits = of[0].repeat == 1 && sides == [channels, rows * repeat, cols * repeat];
         if of[0].stack == 0 || of[1].stack == 0 || !fits {
-            return Err("it does not add stacks of the same sides");
+            return Err("it does not add stacks of the same shape");
         }
         self.give(Operation::Sum { of, repeat }, sides)
     }
@@ -365,7 +365,7 @@ impl<'a> Finding<'a> {
     }
 }
 
-/// Says whether memory is enough for a stack of channels.
+/// Returns true if memory is enough for a stack of channels.
 fn fits([channels, rows, cols]: [usize; 3]) -> bool {
     let padded = [channels.div_ceil(16), rows, cols].map(|side| side.saturating_add(16));
     let n = padded.into_iter().fold(1_usize, usize::saturating_mul);

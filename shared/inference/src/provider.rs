@@ -14,7 +14,7 @@ pub enum Provider {
 }
 
 impl Provider {
-    /// Says if CUDA is tried.
+    /// Returns true if CUDA is tried.
     pub fn is_cuda(self) -> bool {
         self != Self::Processor
     }
@@ -23,7 +23,7 @@ impl Provider {
 /// Where ONNX Runtime runs a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
-    /// On one thread of the processor, as it was asked to.
+    /// On one thread of the processor, as requested.
     Processor,
     /// On the first GPU of NVIDIA's.
     Cuda,

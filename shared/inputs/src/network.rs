@@ -59,7 +59,7 @@ impl NetworkFile {
     ///
     /// # Errors
     ///
-    /// It is no network that can be run, or its card is none.
+    /// It is not a network that can be run, or its card is not valid.
     pub fn built_in(name: &Path, bytes: &[u8], library: &Library) -> Result<Self, Failure> {
         Self::of(OnnxFile::built_in(name, bytes, library)?)
     }

@@ -13,9 +13,9 @@ use crate::memory::check_memory;
 /// Which frames of a video are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frames {
-    /// The first and every so many-th frame after it.
+    /// Uses the first frame and every n-th frame after it.
     pub every: u64,
-    /// At most so many; all if not given.
+    /// At most this many; all if not given.
     pub most: Option<u64>,
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use failure::{ExitKind, Failure};
 
-/// Says that a network cannot be run, and why.
+/// Returns the failure of a network that cannot be run, with the reason.
 pub(crate) fn refused(path: &Path, error: &(dyn Error + 'static)) -> Failure {
     let message = format!(
         "{}: {}",

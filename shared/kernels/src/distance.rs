@@ -32,7 +32,7 @@ impl ScoredPoints {
     ///
     /// # Panics
     ///
-    /// If there is none, or not one score for each.
+    /// If there are no points, or not one score for each.
     pub fn new(points: impl ExactSizeIterator<Item = [f64; 3]>, scores: &[f64]) -> Self {
         let n = points.len();
         assert!(n > 0 && n == scores.len(), "a score for each point");

@@ -38,7 +38,7 @@ impl Isa {
         Self(Kind::Portable)
     }
 
-    /// Says whether it is the baseline of the target, that every machine has.
+    /// Returns true if it is the baseline of the target, which every machine has.
     pub fn is_portable(self) -> bool {
         self.0 == Kind::Portable
     }

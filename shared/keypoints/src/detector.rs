@@ -67,9 +67,9 @@ pub enum Boxes {
         /// The output.
         boxes: String,
     },
-    /// A grid over the picture, `[1, 5, rows, columns]`: log-odds that the middle of somebody's box lies in a cell, and the natural
-    /// logarithms of the distances from the middle of the cell to the left, top, right and bottom of the box, in cells. Every cell
-    /// that is higher than its eight neighbours is somebody (`parallax-lab train finder`).
+    /// A grid over the picture, `[1, 5, rows, columns]`: log-odds that the middle of a person's box lies in a cell, and
+    /// the natural logarithms of the distances from the middle of the cell to the left, top, right and bottom of the
+    /// box, in cells. Every cell that is higher than its eight neighbours is a person (`parallax-lab train finder`).
     Centres {
         /// The output; left out: the only one.
         boxes: Option<String>,

@@ -82,7 +82,8 @@ pub const BODY_25: [&str; 25] = [
     "right heel",
 ];
 
-/// Those of OpenPose's experimental model: COCO's, then those of MPII and of feet. Files do not tell them from [`BODY_25`].
+/// Those of OpenPose's experimental model: COCO's, then those of MPII and of feet. Files do not distinguish them from
+/// [`BODY_25`].
 pub const BODY_25B: [&str; 25] = [
     "nose",
     "left eye",

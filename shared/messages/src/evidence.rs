@@ -34,7 +34,7 @@ pub struct EvidenceHeader {
     pub width: u32,
     /// Height of the image, pixels.
     pub height: u32,
-    /// Tells that there is evidence, or why not.
+    /// Says that there is evidence, or why there is none.
     pub status: Status,
     /// Number of valid entries of `levels`.
     pub n_levels: u32,

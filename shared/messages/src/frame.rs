@@ -22,7 +22,7 @@ pub struct FrameHeader {
     pub width: u32,
     /// Height, pixels; 0 if there is no image.
     pub height: u32,
-    /// Tells that there is an image, or why not.
+    /// Says that there is an image, or why there is none.
     pub status: Status,
     /// Explicit padding.
     pub reserved: u32,

@@ -42,7 +42,7 @@ pub struct Health {
     /// Processor time of all threads of the process, milliseconds, modulo 2^32; 0 where the system
     /// does not report it.
     pub cpu_millis: u32,
-    /// Total amount of work, if the process can tell it (capture: frames in the footage), else 0.
+    /// Total amount of work, if the process knows it (capture: frames in the footage), else 0.
     pub n_total: u64,
     /// Number of frames that the processor computed because the GPU was lost.
     pub n_without_gpu: u64,

@@ -101,11 +101,11 @@ pub struct CameraCounts {
     pub off_grid_nanos: i64,
     /// The median of that over the last pictures, nanoseconds, or [`UNMEASURED`].
     pub skew_nanos: i64,
-    /// By how much the camera falls behind the common instants, parts per billion, negative for one that is faster; or
+    /// Amount by which the camera falls behind the common instants, parts per billion, negative for one that is faster; or
     /// [`UNMEASURED`].
     pub drift_ppb: i64,
-    /// The shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds; [`UNMEASURED`]
-    /// where it does not tell.
+    /// The shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds;
+    /// [`UNMEASURED`] if it is not known.
     pub delay_nanos: i64,
     /// Source of the time at which the last picture was taken.
     pub timed_by: TimedBy,
@@ -124,12 +124,12 @@ impl TimedBy {
     pub const DRIVER: Self = Self(1);
     /// The clock of the camera.
     pub const CAMERA: Self = Self(2);
-    /// Their arrival: they were taken earlier, by how long they are under way.
+    /// Their arrival: they were taken earlier, by the time that they were on their way.
     pub const ARRIVAL: Self = Self(3);
-    /// Their arrival, since the time that the camera tells is not believed.
+    /// Their arrival, because the time that the camera gives is not plausible.
     pub const DISBELIEVED: Self = Self(4);
 
-    /// The name for people.
+    /// Name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -231,7 +231,7 @@ impl Span {
         Self::END_TO_END,
     ];
 
-    /// The name for people.
+    /// Name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -270,7 +270,7 @@ impl Cause {
         Self::Malformed,
     ];
 
-    /// The name for people.
+    /// Name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

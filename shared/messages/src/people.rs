@@ -14,14 +14,14 @@ pub const NO_CANDIDATE: u8 = u8::MAX;
 #[type_name("PersonMessage.v1")]
 #[repr(C)]
 pub struct PersonMessage {
-    /// Identity within the run, from 1; never used for somebody else.
+    /// Identity within the run, from 1; never used for another person.
     pub id: u64,
     /// Index of the person among the candidates of every view; [`NO_CANDIDATE`] where the view does not show the person, and beyond the
     /// last view.
     pub candidates: [u8; MAX_VIEWS],
 }
 
-/// The people of one frame, the one who is followed first.
+/// The people of one frame, the followed person first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("People.v1")]
 #[repr(C)]
@@ -30,7 +30,7 @@ pub struct People {
     pub stamp: Stamp,
     /// When it was received and sent.
     pub timing: Timing,
-    /// Tells that there is at least one person, or why not.
+    /// Says that there is at least one person, or why there is none.
     pub status: Status,
     /// Number of valid people.
     pub n_people: u32,

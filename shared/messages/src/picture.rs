@@ -25,7 +25,7 @@ pub struct PictureHeader {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// Tells that there is a picture, or why not: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
+    /// Says that there is a picture, or why there is none: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
     pub status: Status,
     /// Format of the bytes, four letters: those of Linux (`MJPG`, `YUYV`), `MKV0` for the head of a Matroska stream, `MKV1` for a
     /// cluster of it with one picture.

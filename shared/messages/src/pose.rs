@@ -72,7 +72,7 @@ pub struct ViewPose {
     pub stamp: Stamp,
     /// When it was received and sent.
     pub timing: Timing,
-    /// Tells that there is a candidate, or why not.
+    /// Says that there is a candidate, or why there is none.
     pub status: Status,
     /// Number of valid candidates.
     pub n_candidates: u32,
@@ -146,7 +146,7 @@ pub struct PairPose {
     pub stamp: Stamp,
     /// When it was received and sent.
     pub timing: Timing,
-    /// Tells that there is a hypothesis, or why not.
+    /// Says that there is a hypothesis, or why there is none.
     pub status: Status,
     /// Number of valid hypotheses.
     pub n_hypotheses: u32,

@@ -14,7 +14,7 @@ pub struct ViewQuality {
     pub stamp: Stamp,
     /// When it was received and sent.
     pub timing: Timing,
-    /// Tells that there is a prediction, or why not; without one, fusion treats every part as usable.
+    /// Says that there is a prediction, or why there is none; without one, fusion treats every part as usable.
     pub status: Status,
     /// Number of valid parts.
     pub n_parts: u32,

@@ -20,7 +20,7 @@ pub struct Joint3d {
     pub reprojection_px: f64,
     /// Bit `v` is set if view `v` was used.
     pub views_used: u32,
-    /// Tells that there is a position, or why not.
+    /// Says that there is a position, or why there is none.
     pub status: Status,
 }
 
@@ -33,7 +33,7 @@ pub struct FusedView {
     pub energy: f64,
     /// Pairs that were averaged; 0 if the pose is the view's own, or if there is none.
     pub n_pairs: u32,
-    /// Tells that there is a pose, or why not.
+    /// Says that there is a pose, or why there is none.
     pub status: Status,
     /// 1 if the view sees the person from behind, and left and right have been exchanged.
     pub exchanged: u32,
@@ -196,7 +196,7 @@ impl Skeletons {
         &self.people[..(self.n_people as usize).min(MAX_PEOPLE)]
     }
 
-    /// The person who is followed; `None` if there is nobody.
+    /// The followed person; `None` if there is nobody.
     #[must_use]
     pub fn followed(&self) -> Option<&SkeletonMessage> {
         self.listed().first()

@@ -62,7 +62,7 @@ impl Status {
     /// The picture cannot be decoded.
     pub const DAMAGED: Self = Self(14);
 
-    /// The body that was found is none that a person can have.
+    /// The body that was found is not one that a person can have.
     pub const IMPLAUSIBLE: Self = Self(15);
 
     /// It did not come from its host in time.

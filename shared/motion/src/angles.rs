@@ -17,9 +17,9 @@ use spread::Place;
 
 /// The sine of the least bend of a knee or elbow that shows about which axis it bends: 20 degrees.
 const LEAST_BEND: f64 = 0.342;
-/// The sine of the least angle between a limb and an axis about which its direction is told: 10 degrees.
+/// The sine of the least angle between a limb and an axis about which its direction is determined: 10 degrees.
 const LEAST_TILT: f64 = 0.1736;
-/// An angle that is less certain is none, degrees.
+/// An angle that is less certain is not reported, degrees.
 pub const MOST_SD_DEGREES: f64 = 45.0;
 
 /// Why an angle has no value.

@@ -35,7 +35,7 @@ fn needed_hz(cutoff_hz: f64) -> f64 {
 /// which passes half of the power at the cutoff.
 ///
 /// Gaps between measurements up to `fill_s` are filled by cubic curves before; longer ones cut a track into pieces, filtered
-/// each by itself. Instants that are not uniform are interpolated (cubic) to a uniform grid and back;
+/// each separately. Instants that are not uniform are interpolated (cubic) to a uniform grid and back;
 /// [`Report::resampled_s`] says how far off they are. Nothing is rejected but joints with a side where sides are not certain. There are no
 /// covariances.
 ///

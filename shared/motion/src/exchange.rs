@@ -5,7 +5,7 @@ use crate::recorded::{Recorded, Sides};
 use crate::rts::{GATE, Usable, distance2};
 use crate::track::usable;
 
-/// Least odds that make one of two sides believed, natural logarithm.
+/// Least odds at which one of two sides is chosen, natural logarithm.
 const LEAST_ODDS: f64 = 3.0;
 /// A measurement contradicts what others say by at most this: it may be wrong for many reasons.
 const MOST_DISTANCE2: f64 = 40.0;

@@ -51,7 +51,8 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// Files that cannot be read or written, lines that are none, times that do not ascend, a cutoff above what the rate allows.
+/// Files that cannot be read or written, lines that are not valid, times that do not ascend, a cutoff above what the
+/// rate allows.
 pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure> {
     console.begin("", "reading");
     let run = read(&request.folder, request.rate_hz)?;

@@ -40,7 +40,7 @@ pub struct Errors {
     pub velocity_m_s: Sum,
     /// Errors of the acceleration by second differences, m/s².
     pub acceleration_m_s2: Sum,
-    /// By how much the error changes from one instant to the next, metres.
+    /// Amount by which the error changes from one instant to the next, metres.
     pub jitter_m: Sum,
     /// Error along the true velocity, times that velocity (m²/s), and the square of the velocity (m²/s²): summed over instants, the first
     /// over the second is by how much the track is late, in seconds.

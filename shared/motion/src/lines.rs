@@ -28,7 +28,7 @@ pub fn sides(person: &PersonLine) -> Sides {
 
 /// A person of a line with the joints smoothed; `None` who was neither there nor is anywhere now.
 ///
-/// * `person`: as measured; `None` for somebody who is not in the line.
+/// * `person`: as measured; `None` for a person who is not in the line.
 /// * `joints`: by name; whether it is an extra keypoint; what it was smoothed to. Others are left out.
 pub fn smoothed<'a>(
     id: u64,

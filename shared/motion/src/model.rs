@@ -88,7 +88,7 @@ impl Belief {
         Self { mean, covariance }
     }
 
-    /// How a measurement fits, before it is used; `None` if the numbers do not allow to tell.
+    /// How a measurement fits, before it is used; `None` if it cannot be computed from the numbers.
     pub(crate) fn innovation(
         &self,
         position: &Vector3<f64>,

@@ -114,8 +114,8 @@ impl Recorded {
         Ok(())
     }
 
-    /// Says of a joint and an instant whether its measurement is left out because its side is not certain. Where no instant's sides are,
-    /// nothing is left out: it would be everything.
+    /// Returns a predicate of a joint and an instant: true if the measurement is left out because its side is not
+    /// certain. Where no instant's sides are, nothing is left out: it would be everything.
     pub(crate) fn withheld(&self) -> impl Fn(usize, usize) -> bool {
         let others = self.other_sides();
         let is_some_sure = self.sides.contains(&Sides::Sure);
@@ -139,8 +139,8 @@ impl Recorded {
         self.joints.iter().map(other).collect()
     }
 
-    /// The indices at which somebody else, or the same person elsewhere, begins: the whole body is somewhere else than a person
-    /// can have gone, and stays there.
+    /// The indices at which another person, or the same person elsewhere, begins: the whole body is somewhere else than
+    /// a person can have gone, and stays there.
     ///
     /// The limit is half a metre and 12 m/s, which nobody runs; the body is the median of its joints in each axis.
     pub(crate) fn breaks(&self) -> Vec<usize> {
@@ -200,7 +200,7 @@ pub struct Report {
     pub noise: Vec<Option<Noise>>,
     /// Counts of the states of every joint's instants.
     pub counts: Vec<Counts>,
-    /// Instants at which somebody else began.
+    /// Instants at which another person began.
     pub breaks: Vec<usize>,
     /// Instants whose sides were not certain: how many were kept as measured, exchanged, and left out.
     pub unsure: [usize; 3],
@@ -208,7 +208,7 @@ pub struct Report {
     pub bones: Vec<([usize; 2], f64)>,
     /// Largest difference of an instant from its place on the uniform grid, seconds; `None` where there is none.
     pub resampled_s: Option<f64>,
-    /// By how much a causal method lags, seconds; 0 for those that look ahead.
+    /// Amount by which a causal method lags, seconds; 0 for those that look ahead.
     pub delay_s: f64,
 }
 

@@ -12,7 +12,7 @@ pub(crate) type Usable = Option<(Vector3<f64>, Matrix3<f64>)>;
 pub(crate) const FREEDOM: f64 = 4.0;
 /// A measurement whose squared Mahalanobis distance from what all others say is larger is rejected: 1 of 10 000 good ones.
 pub(crate) const GATE: f64 = 21.11;
-/// By how much movement may be less predictable at times than over the whole track, as a factor of the covariance of what
+/// Amount by which movement may be less predictable at times than over the whole track, as a factor of the covariance of what
 /// others say: a punch is no outlier. At high rates it hardly counts, the measurement's own covariance is most of the sum.
 const SURPRISE: f64 = 9.0;
 /// Times that weights are found anew; they have settled by then.
@@ -103,8 +103,8 @@ fn backwards(times: &[f64], forwards: &[Belief], noise: Noise) -> Vec<Known> {
     all
 }
 
-/// Squared Mahalanobis distance of a measurement from what all *other* measurements say, scaled; infinity where the numbers do
-/// not allow to tell.
+/// Squared Mahalanobis distance of a measurement from what all *other* measurements say, scaled; infinite if it cannot
+/// be computed from the numbers.
 ///
 /// * `weight`: that the measurement had in what is known; 0 if it had no part in it.
 pub(crate) fn distance2(

@@ -31,7 +31,7 @@ impl Default for Settings {
 
 /// Smooths a person's joints with everything before and after.
 ///
-/// 1. Where the person is suddenly somebody else, everything begins anew.
+/// 1. Where the person is suddenly another person, everything begins anew.
 /// 2. Of every joint the jerk density and the scale of the covariances are found from the measurements.
 /// 3. Every joint is smoothed; measurements that contradict all others are rejected. Joints with a side are left out where sides
 ///    are not certain.

@@ -71,8 +71,8 @@ pub type Smoothed = Result<Estimate, Absent>;
 
 /// Standard deviation that a measurement without a covariance is given before its scale is estimated, metres.
 const UNKNOWN_SD_M: f64 = 0.02;
-/// Standard deviations of a measurement are taken for at least this and at most that, metres: smaller ones are rounding,
-/// larger ones say nothing.
+/// Limits to which standard deviations of a measurement are clipped, metres: smaller ones are rounding, larger ones say
+/// nothing.
 const SD_M: [f64; 2] = [1e-5, 10.0];
 /// Farther from the origin there is no measurement, metres.
 const FARTHEST_M: f64 = 1e6;

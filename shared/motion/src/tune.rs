@@ -11,7 +11,7 @@ const MOST: f64 = 5.5;
 const STEP: f64 = 0.5;
 /// Standard deviation of the natural logarithm of the scale before anything is measured: covariances are right within a factor of 3.
 const SCALE_SD: f64 = 1.0;
-/// Share of the likelihood that counts: people do not move as the model says, so that the innovations tell less than they would.
+/// Share of the likelihood that counts: people do not move as the model says, so the innovations say less than they would.
 /// Without it, fast movement at a low rate is taken for noise.
 const SHARE: f64 = 0.1;
 /// Scales that are believed.
@@ -129,7 +129,7 @@ fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
     (score, scale)
 }
 
-/// By how much [`student_scale`] is smaller than the variance of noise that is Gaussian after all, in three dimensions.
+/// Amount by which [`student_scale`] is smaller than the variance of noise that is Gaussian after all, in three dimensions.
 const GAUSSIAN_SHARE: f64 = 0.757;
 
 /// The scale of squared distances that is right for Gaussian noise and hardly moved by outliers.

@@ -13,7 +13,7 @@ pub struct SidesSettings {
     pub front_weight: f64,
     /// Log-likelihood ratio per unit of anatomical evidence (trunk lengths), nats.
     pub anatomy_weight: f64,
-    /// Probability that somebody turns around from one frame to the next. It limits how much the earlier
+    /// Probability that a person turns around from one frame to the next. It limits how much the earlier
     /// frames weigh.
     pub turn: f64,
     /// Log-odds below which a decision is unsure, nats.

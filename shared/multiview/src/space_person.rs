@@ -1,5 +1,5 @@
-//! A person of whom nothing is known, solved in space: which views name left and right the other way round, which look elsewhere, and
-//! how tall the person is.
+//! A person about whom nothing is known, solved in space: which views name left and right the other way round, which
+//! look elsewhere, and how tall the person is.
 
 use geometry::Camera;
 use nalgebra::Point3;
@@ -20,7 +20,7 @@ pub struct SolvedPerson {
     pub views: Vec<Option<[bool; 2]>>,
 }
 
-/// Solves for a person of whom nothing is known.
+/// Solves for a person about whom nothing is known.
 ///
 /// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
 /// 2. Unless it fits every view: of three views or more, one whose exchange of left and right gives a better first solution is
@@ -28,7 +28,7 @@ pub struct SolvedPerson {
 ///    against those of the first; then what the views say of the direction in which the person faces counts as well.
 /// 3. The arms or the legs of any view that fit better exchanged are exchanged.
 /// 4. Unless the first solution fits every view: of four views or more, those that contradict all others are left out: their camera
-///    was moved, or they look at somebody else.
+///    was moved, or they look at another person.
 /// 5. The bones of a person of the first solution's stature, and finer and finer grids, give the second one.
 ///
 /// * Returns `None` if no joint is seen by two views.
@@ -176,7 +176,7 @@ impl<'a> FirstSolver<'a> {
     }
 
     /// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is
-    /// none, or for fewer than four views, of which it cannot be told.
+    /// none, or for fewer than four views, which cannot show it.
     ///
     /// A view of which half is covered fits with the other half; one whose camera was turned fits with nothing.
     fn contradicts(&mut self, used: &[Used]) -> Option<usize> {
@@ -256,8 +256,8 @@ fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
 const QUARTER: f64 = 0.25;
 const MOST: f64 = 0.75;
 
-/// By how much the joints that were found fit a view less than the best places that it knows for them: the smallest amount that
-/// holds for a share of them.
+/// Amount by which the joints that were found fit a view less than the best places that it knows for them: the smallest
+/// amount that holds for a share of them.
 fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
     let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
         let named = view.named(joint);

@@ -48,7 +48,7 @@ pub struct BoneLength {
 pub struct SpaceSettings {
     /// Weight of the springs (mu).
     pub springs: f64,
-    /// Most that a bone costs: half the square of so many standard deviations.
+    /// Most that a bone costs: half the square of this many standard deviations.
     pub cap: f64,
     /// Cost of a right and a left joint of a pair that lie at one place.
     pub apart: f64,
@@ -56,12 +56,13 @@ pub struct SpaceSettings {
     pub least_apart_m: f64,
     /// True if left and right follow the picture: every view may have them exchanged, whatever the others say.
     pub as_seen: bool,
-    /// By how much exchanged sides must fit a view better.
+    /// Amount by which exchanged sides must fit a view better.
     pub margin: f64,
-    /// The first solution fits a view if three quarters of its joints fit by at most so much less than their own best places: no
-    /// other is then looked for.
+    /// The first solution fits a view if three quarters of its joints fit by at most this much less than their own best
+    /// places: no other is then looked for.
     pub good_fit: f64,
-    /// A view contradicts all others if three quarters of its joints fit their solution by so much less than their own best places.
+    /// A view contradicts all others if three quarters of its joints fit their solution by this much less than their own
+    /// best places.
     pub most_misfit: f64,
     /// Most places of a joint at the start.
     pub n_places: usize,
@@ -98,7 +99,7 @@ pub struct SpacePose {
     pub energy: f64,
 }
 
-/// Stature of people of whom nothing is known, and its standard deviation, metres: our choice, wide enough for children.
+/// Stature of people about whom nothing is known, and its standard deviation, metres: our choice, wide enough for children.
 const STATURE: [f64; 2] = [1.65, 0.20];
 
 /// The bones of [`TREE`] of a person with these joints; without them, of any person.

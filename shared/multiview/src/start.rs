@@ -139,7 +139,7 @@ fn states(settings: &Settings, view_input: &ViewInput<'_>, view: usize) -> Vec<S
         .collect()
 }
 
-/// The candidates of a view that may be the start: the best ones that are not somebody else.
+/// The candidates of a view that may be the start: the best ones that are not another person.
 fn tried(settings: &Settings, view_input: &ViewInput<'_>) -> impl Iterator<Item = usize> {
     let all = 0..view_input.candidates.len();
     let own = all.filter(|candidate| !view_input.is_other(*candidate));

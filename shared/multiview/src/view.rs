@@ -138,7 +138,7 @@ pub struct ViewInput<'a> {
     pub plan: &'a ViewPlan,
     /// Its distinct candidates, best first; not empty.
     pub candidates: &'a [Pose],
-    /// Bit `c` is set if candidate `c` is somebody else than the person of the other views: it is no start. Never all.
+    /// Bit `c` is set if candidate `c` is another person than the person of the other views: it is no start. Never all.
     pub others: u64,
     /// Expected error of every part, pixels; `None` where there is no prediction.
     pub sigma_px: Option<&'a [f32]>,
@@ -153,7 +153,7 @@ impl ViewInput<'_> {
         candidate < u64::BITS as usize && self.others >> candidate & 1 == 1
     }
 
-    /// The best candidate that is not somebody else.
+    /// The best candidate that is not another person.
     pub(crate) fn best(&self) -> Option<&Pose> {
         let mut each = self.candidates.iter().enumerate();
         each.find(|candidate| !self.is_other(candidate.0)).map(|candidate| candidate.1)

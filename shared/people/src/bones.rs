@@ -2,7 +2,7 @@
 
 use skeleton::body::{BONES, Joints, Kind};
 
-/// A length counts as the mean of so many frames at most.
+/// A length counts as the mean of this many frames at most.
 const MOST_FRAMES: f64 = 100.0;
 /// Bodies with fewer kinds of bones in common cannot be compared.
 const LEAST_KINDS: usize = 6;

@@ -81,7 +81,7 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
     groups
 }
 
-/// Says if two groups have no view in common, and a mean distance below the gate.
+/// Returns true if two groups have no view in common, and a mean distance below the gate.
 fn may_join(
     free: &[Place],
     distances: &[Option<f64>],

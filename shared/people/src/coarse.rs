@@ -7,7 +7,7 @@ use crate::distance::{LEAST_JOINTS, named, to_person};
 use crate::sight::{Sight, meet};
 use crate::{Frame, N};
 
-/// A detection that is farther from the person whom the others see is somebody else: trimmed mean of the joints, metres.
+/// A detection that is farther from the person whom the others see is another person: trimmed mean of the joints, metres.
 const CONTRADICTS_M: f64 = 0.15;
 
 /// A person, coarsely.
@@ -29,7 +29,7 @@ impl Coarse {
         self.joints[..N - 1].iter().flatten().count()
     }
 
-    /// Says if the bones are those of a person.
+    /// Returns true if the bones are those of a person.
     pub(crate) fn is_body(&self) -> bool {
         skeleton::body::check(&self.joints, &self.covariances, None).nobody.is_none()
     }

@@ -8,7 +8,7 @@ use crate::{MIRROR, N};
 
 /// Detections with fewer joints in common cannot be compared.
 pub(crate) const LEAST_JOINTS: usize = 4;
-/// This share of the joints, the farthest ones, does not count: a limb may be covered, or somebody else's.
+/// This share of the joints, the farthest ones, does not count: a limb may be covered, or another person's.
 const TRIMMED: usize = 4;
 
 /// How well a detection fits.

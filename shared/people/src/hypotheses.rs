@@ -10,7 +10,7 @@ const APART: f64 = 3.0;
 const MOST: usize = 12;
 /// Places that are nearer are the same, metres.
 const SAME_M: f64 = 0.02;
-/// A joint is at most so far from where it was expected, metres.
+/// A joint is at most this far from where it was expected, metres.
 const RADIUS_M: f64 = 0.6;
 /// A single view proposes a place if it passes by as near as this, in standard deviations of what is expected.
 const BESIDE: f64 = 3.0;

@@ -74,7 +74,8 @@ pub struct Detection {
 pub struct View {
     /// The people.
     pub detections: Vec<Detection>,
-    /// Places of each joint that the detector gave to nobody, in the order of `skeleton::PARSE14`; empty if it does not tell.
+    /// Places of each joint that the detector assigned to no person, in the order of `skeleton::PARSE14`; empty if the
+    /// detector does not give them.
     pub loose: Vec<Vec<Keypoint>>,
 }
 
@@ -85,7 +86,7 @@ pub enum State {
     New,
     /// Seen by enough views.
     Tracked,
-    /// Seen by one view only, or too near to somebody else to tell the two apart.
+    /// Seen by one view only, or too near to another person to tell the two apart.
     Unsure,
     /// Not seen in this frame; the joints are where they are expected.
     Lost,
@@ -94,7 +95,7 @@ pub enum State {
 /// A person of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Lasting identity, from 1; never used for somebody else.
+    /// Lasting identity, from 1; never used for another person.
     pub id: u64,
     /// How well the person is known.
     pub state: State,

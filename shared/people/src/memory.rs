@@ -65,7 +65,7 @@ impl Memory {
 }
 
 impl Remembered {
-    /// Appends the person; a place, covariance or colour that is not known as numbers that are none.
+    /// Appends the person; a place, covariance or colour that is not known is stored as NaN.
     fn push_to(&self, numbers: &mut Vec<f64>) {
         numbers.push(self.id as f64);
         for joint in self.joints {
@@ -105,7 +105,7 @@ impl Remembered {
     }
 }
 
-/// An identity; `None` if the number is none.
+/// An identity; `None` if the number is not an identity.
 fn id(number: f64) -> Option<u64> {
     let is_id = number.fract() == 0.0 && (0.0..=2.0_f64.powi(53)).contains(&number);
     is_id.then_some(number as u64)

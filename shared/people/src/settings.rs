@@ -9,12 +9,12 @@ pub struct Settings {
     pub min_views: usize,
     /// Set if left and right follow the picture, so that two views may have them exchanged.
     pub as_seen: bool,
-    /// Half of the joints of somebody new have this heat in two views that agree on them, 0 to 1.
+    /// Half of the joints of a new person have this heat in two views that agree on them, 0 to 1.
     pub least_heat: f64,
 }
 
 impl Settings {
-    /// Says if detections may be of nobody: a network sees somebody in every box.
+    /// Returns true if detections may be of nobody: a network sees a person in every box.
     pub(crate) fn is_doubtful(&self) -> bool {
         self.least_heat > 0.0
     }

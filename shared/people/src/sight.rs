@@ -162,7 +162,7 @@ pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
     })
 }
 
-/// How far a place at so many standard deviations is supported, 0 to 1.
+/// Support for a place at this many standard deviations, 0 to 1.
 pub(crate) fn agreement(deviations: f64) -> f64 {
     (-0.5 * deviations * deviations).exp()
 }

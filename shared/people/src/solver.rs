@@ -12,7 +12,7 @@ use crate::sight::{Prior, Sight, Sights, settle, sights};
 use crate::tree::{Choice, Expectations, choose};
 use crate::{N, Person, View};
 
-/// How likely a place in a picture is a person's joint that the detector gave to somebody else, or to nobody.
+/// How likely a place in a picture is a person's joint that the detector gave to another person, or to nobody.
 const TRUST_OTHERS: f64 = 0.3;
 const TRUST_LOOSE: f64 = 0.6;
 /// A joint is expected where it goes; how well that is known, metres, and how much less for every second, metres a second.
@@ -21,14 +21,14 @@ const EXPECTED_SD_M_PER_S: f64 = 1.5;
 /// Share of a new velocity in the kept one, and of the kept one in what is expected.
 const NEW_VELOCITY: f64 = 0.5;
 const DAMPING: f64 = 0.5;
-/// A joint that no view sees is given for so long where it is expected, seconds.
+/// How long a joint that no view sees is reported at the place where it is expected, seconds.
 const CARRIED_S: f64 = 1.0;
-/// A place costs this much for every half squared standard deviation from where the joint is expected, and at most so much.
+/// A place costs this much for every half squared standard deviation from where the joint is expected, and at most this much.
 const MOVED: f64 = 0.25;
 const MOST_OF_MOVED: f64 = 0.5;
 /// Rays farther from the joint than this many standard deviations do not count.
 const OUTLYING: f64 = 3.0;
-/// The stature of somebody who does not show it, metres.
+/// The stature of a person who does not show it, metres.
 const ANY_STATURE_M: f64 = 1.7;
 
 /// The joints of a person.
@@ -163,7 +163,7 @@ impl Solver {
     }
 }
 
-/// Weighs what a place is worth for a joint.
+/// Weighs a place as a candidate for a joint.
 fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
     let moved = prior.map_or(0.0, |prior| {
         let z = (place.place - prior.point).norm() / prior.sd;

@@ -26,19 +26,19 @@ const SOON_S: f64 = 0.1;
 const FAST_M_PER_S: f64 = 4.0;
 /// A glimpse keeps this share of the velocity, and makes the time since the joints were seen shorter by it.
 const GLIMPSED: f64 = 0.5;
-/// And moves the person by no more, metres: one ray does not tell how far away somebody is.
+/// And moves the person by no more, metres: one ray does not show how far away a person is.
 const GLIMPSED_M: f64 = 0.1;
-/// A person is somebody who was seen in this many of the last five frames.
+/// A track is a person if it was seen in this many of the last five frames.
 const FRAMES_OF_BIRTH: u32 = 3;
 const RECENT: u32 = 0b1_1111;
-/// And who was seen in so many of the last eight is no meeting of the rays of two people, who move.
+/// A track that was seen in this many of the last eight frames is not a chance meeting of the rays of two people, who move.
 const FRAMES_OF_TWO_VIEWS: u32 = 6;
 const LONG: u32 = 0b1111_1111;
 
 /// A person from frame to frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Track {
-    /// `None` until it is clear that this is somebody.
+    /// `None` until it is clear that this is a person.
     pub(crate) id: Option<u64>,
     pub(crate) coarse: Coarse,
     /// Velocity of the trunk, metres a second.
@@ -124,17 +124,17 @@ impl Track {
         self.state = State::Lost;
     }
 
-    /// Says if this may still become somebody.
+    /// Returns true if this may still become a person.
     pub(crate) fn is_possible(&self) -> bool {
         self.history & 0b111 != 0
     }
 
-    /// Says if it was seen in enough of the last frames.
+    /// Returns true if it was seen in enough of the last frames.
     pub(crate) fn is_somebody(&self) -> bool {
         (self.history & RECENT).count_ones() >= FRAMES_OF_BIRTH
     }
 
-    /// Says if it was seen for so long that two views are enough.
+    /// Returns true if it was seen for so long that two views are enough.
     pub(crate) fn is_lasting(&self) -> bool {
         (self.history & LONG).count_ones() >= FRAMES_OF_TWO_VIEWS
     }
@@ -211,7 +211,7 @@ impl Track {
     }
 }
 
-/// By how much the trunk moved; by how much everything did, where nothing of the trunk is known.
+/// Amount by which the trunk moved; by how much everything did, where nothing of the trunk is known.
 fn moved(from: &Joints, to: &Joints) -> Option<Vector3<f64>> {
     let of = |joints: &[usize]| {
         let both = joints.iter().filter_map(|joint| Some(to[*joint]? - from[*joint]?));

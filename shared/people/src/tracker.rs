@@ -18,12 +18,12 @@ use crate::{Frame, N, Person, State, View};
 const LEAST_CORE: usize = 6;
 /// And of fewer are not where they were expected.
 const LEAST_SEEN: usize = 5;
-/// People whose trunks are nearer cannot be told apart, metres.
+/// People whose trunks are nearer cannot be distinguished, metres.
 const ONE_M: f64 = 0.3;
 /// Somebody who was not seen is looked for as far away, metres, beyond the reach of single detections.
 const TAKEN_UP_M: f64 = 0.25;
-/// Somebody new who is as near to somebody who is missed, metres, is who was missed, if the bones do not differ by more, mean of the
-/// logarithms.
+/// A new person who is as near as this to a missed person, metres, is the missed person, if the bones do not differ by
+/// more than this, mean of the logarithms.
 const MISSED_M: f64 = 1.5;
 const OTHER_BONES: f64 = 0.15;
 /// Nobody is kept for longer without being seen, seconds.
@@ -35,16 +35,18 @@ const REMEMBERED_S: f64 = 60.0;
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
-/// Somebody new is seen by so many views, or by all of fewer.
+/// A new person is seen by this many views, or by all views if there are fewer.
 const VIEWS_AT_ONCE: usize = 3;
 
-/// Tells who is who, frame by frame.
+/// Finds out who is who, frame by frame.
 ///
-/// 1. Everybody is expected where they go. 2. In every view detections are assigned to people, those whose rays pass nearest. 3. Of what
-///    is left, detections of different views whose rays pass near each other are one person. 4. A detection that contradicts its person
-///    goes back to 3, once; what has no bones of a person is nobody. 5. Somebody new is given whom three views see, or all of fewer: after three of
-///    five frames, and at once where nobody who is known is seen. Who was not seen for a second is gone, and known again by the bones and the colour of the
-///    trunk within a minute.
+/// 1. Everybody is expected where they go.
+/// 2. In every view, detections are assigned to the people whose rays pass nearest.
+/// 3. Of what is left, detections of different views whose rays pass near each other are one person.
+/// 4. A detection that contradicts its person goes back to 3, once; what does not have the bones of a person is not one.
+/// 5. A new person is one whom three views see, or all views if there are fewer: after three of five frames, and at once
+///    if no known person is seen. A person who was not seen for a second is gone, and is recognised by the bones and the
+///    colour of the trunk within a minute.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     cameras: Vec<Camera>,
@@ -100,7 +102,7 @@ impl Tracker {
         }
     }
 
-    /// Says who is in the next frame, in the order of their ids.
+    /// Returns the people of the next frame, in the order of their ids.
     ///
     /// * `time_s`: when the frame was taken; not before the last one.
     /// * `views`: in the order of the cameras; a view that is missing sees nobody.
@@ -133,8 +135,9 @@ impl Tracker {
         self.people(&frame, &births)
     }
 
-    /// Says if detections are given to somebody as to those who are known. What is doubtful goes to who has been seen for some frames, too:
-    /// a known person who is hidden would take the detections of somebody beside.
+    /// Returns true if detections are given to a track as to those of known people. Doubtful detections also go to
+    /// tracks that have been seen for some frames: a known person who is hidden would otherwise take the detections of a
+    /// person beside.
     fn is_established(&self, track: &Track) -> bool {
         track.id.is_some() || self.settings.is_doubtful() && track.is_somebody()
     }
@@ -286,7 +289,7 @@ impl Tracker {
         self.gone.retain(|person| time_s - person.seen_s <= REMEMBERED_S);
     }
 
-    /// Gives ids to those who are somebody by now.
+    /// Gives ids to the tracks that are people by now.
     fn births(&mut self, frame: &Frame, time_s: f64) -> Vec<u64> {
         let is_known = |track: &Track| track.id.is_some() && track.state != State::Lost;
         let is_empty = !self.tracks.iter().any(is_known);
@@ -326,7 +329,8 @@ impl Tracker {
         births
     }
 
-    /// The id of somebody new: that of who was missed there, of who is known again, or the next one. Bones that are known are taken over.
+    /// The id of a new person: that of the person who was missed there or is recognised, or the next one. Bones that are
+    /// known are taken over.
     fn identity(&mut self, nth: usize, time_s: f64) -> u64 {
         if let Some(missed) = self.missed(&self.tracks[nth]) {
             let bones = self.tracks[missed].bones;
@@ -342,7 +346,7 @@ impl Tracker {
         })
     }
 
-    /// The nearest of those who have been missed for some time, in whose reach somebody new has turned up.
+    /// The nearest of the people who have been missed for some time and in whose reach a new person has turned up.
     fn missed(&self, new: &Track) -> Option<usize> {
         let trunk = new.trunk()?;
         let each = self.tracks.iter().enumerate().filter_map(|(nth, track)| {
@@ -354,7 +358,7 @@ impl Tracker {
         each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|nearest| nearest.0)
     }
 
-    /// The one of those who are gone who has the same bones, and the same colour.
+    /// The person among those who are gone who has the same bones and the same colour.
     fn known_again(&self, track: &Track, time_s: f64) -> Option<usize> {
         let each = self.gone.iter().enumerate().filter_map(|(nth, person)| {
             let n = person.bones.n.iter().copied().fold(f64::INFINITY, f64::min);
@@ -370,7 +374,7 @@ impl Tracker {
         each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|nearest| nearest.0)
     }
 
-    /// Marks those who are too near to each other to be told apart.
+    /// Marks people who are too near to each other to be distinguished.
     fn mark_near(&mut self) {
         let trunks: Vec<_> = self
             .tracks

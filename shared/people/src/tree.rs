@@ -28,7 +28,7 @@ const HIP_WIDTH: usize = 2;
 
 /// Standard deviation of a bone's length between places of joints, metres, beside that of the length itself.
 const PLACE_SD_M: f64 = 0.04;
-/// A bone costs this much for every half squared standard deviation, and at most so much.
+/// A bone costs this much for every half squared standard deviation, and at most this much.
 const BONE: f64 = 0.25;
 const MOST_OF_BONE: f64 = 1.0;
 

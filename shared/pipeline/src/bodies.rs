@@ -25,7 +25,7 @@ pub struct Body {
     pub stature_m: Option<f64>,
     /// Root mean square deviation of the bones' lengths from those of people, standard deviations.
     pub deviation: f64,
-    /// Why the whole is no person; then no joint has a position.
+    /// Why the skeleton is not that of a person; then no joint has a position.
     pub nobody: Option<Reason>,
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct Bodies {
     n_without: u32,
 }
 
-/// After so many frames without a body, the next one is somebody else's.
+/// After this many frames without a body, the next one is another person's.
 const FORGET_AFTER: u32 = 30;
 
 /// Changes of each of the 14 joints.

@@ -23,7 +23,7 @@ pub struct NetworkEstimatorSettings {
     pub space: SpaceStepSettings,
     /// Frames per second, if that is known: without it nothing is moved from the time of its picture to the instant of its frame.
     pub frame_rate_hz: Option<f64>,
-    /// Most frames from one in which people are seen to the next one in which they are in their boxes.
+    /// Most frames between one in which people are seen and the next in which they are still in their boxes.
     pub most_apart: Option<f64>,
 }
 

@@ -36,8 +36,9 @@ pub(crate) struct FoundByViews<'a> {
 /// Measures the joints of a result that was solved in space against the poses that the views found by themselves.
 ///
 /// A view found the candidate that lies nearest, with its sides as they are or exchanged; so did a view that was left out, if it sees
-/// somebody there. A view that shows somebody else does not count, where two others agree. The residuals of every joint are set, and their
-/// root mean square; and to its covariance the disagreement is added of the two views that agree best on it (docs/method/three-d.md).
+/// a person there. A view that shows another person does not count, where two others agree. The residuals of every joint
+/// are set, and their root mean square; and the disagreement of the two views that agree best on it is added to its
+/// covariance (docs/method/three-d.md).
 ///
 /// * `motion`: of the solution, as the views would show it.
 pub(crate) fn measure(

@@ -16,17 +16,17 @@ use crate::skeleton_step::Skeleton;
 use crate::space::by_view;
 use crate::view_result::ExtraKeypoint;
 
-/// A candidate that lies further from the fused pose than this is somebody else: the median distance of the joints, share of the
-/// longer side of the fused pose.
+/// A candidate that lies further from the fused pose than this is another person: the median distance of the joints,
+/// share of the longer side of the fused pose.
 const SAME: f64 = 0.1;
-/// A view that is further off than so many standard deviations is left out.
+/// A view that is further off than this many standard deviations is left out.
 const MOST_SIGMAS: f64 = 3.0;
 /// Least distance at which a view is left out, share of the longer side of the fused pose.
 const LEAST_REACH: f64 = 0.02;
 /// No keypoint of a person is further from every joint, metres.
 const MOST_FROM_JOINTS_M: f64 = 0.5;
 
-/// Pairs of joints of `skeleton::PARSE14`, right and left, by which a view's names of sides are told: knees and ankles, elbows and
+/// Pairs of joints of `skeleton::PARSE14`, right and left, that show how a view names the sides: knees and ankles, elbows and
 /// wrists, hips and shoulders.
 const LEGS: [[usize; 2]; 2] = [SIDES[0], SIDES[1]];
 const ARMS: [[usize; 2]; 2] = [SIDES[3], SIDES[4]];
@@ -193,7 +193,7 @@ impl Match {
     }
 }
 
-/// The joints by which the side of a keypoint is told.
+/// The joints that show the side of a keypoint.
 fn sides_of(name: &str) -> [[usize; 2]; 2] {
     let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
     if has(&["toe", "heel", "foot", "ankle", "knee"]) {

@@ -21,11 +21,11 @@ pub enum Follow {
     Clearest,
 }
 
-/// Farther away than this from where the person was in the frame before it is somebody else, metres; and how much more for
+/// Farther away than this from where the person was in the frame before it is another person, metres; and how much more for
 /// every frame without the person.
 const REACH_M: f64 = 1.0;
 const REACH_PER_FRAME_M: f64 = 0.1;
-/// Another one is followed after as many frames without the person as there were with it, at most so many.
+/// Another one is followed after as many frames without the person as there were with it, at most this many.
 const MOST_PATIENCE: u32 = 30;
 
 /// Follows one person from frame to frame.
@@ -40,13 +40,13 @@ pub struct Following {
     id: u64,
 }
 
-/// The candidates of a frame that are other people than the one who is followed.
+/// The candidates of a frame that are not the followed person.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Others {
     of_views: Vec<u64>,
-    /// Bit `v` is set if view `v` sees others, but not the one who is followed.
+    /// Bit `v` is set if view `v` sees others, but not the followed person.
     without: u64,
-    /// The candidate of every view that is the one who is followed.
+    /// The candidate of each view that shows the followed person.
     own: Vec<Option<usize>>,
 }
 
@@ -61,17 +61,17 @@ impl Others {
         }
     }
 
-    /// Bit `c` is set if candidate `c` of a view is somebody else.
+    /// Bit `c` is set if candidate `c` of a view is another person.
     pub fn of_view(&self, view: usize) -> u64 {
         self.of_views.get(view).copied().unwrap_or(0)
     }
 
-    /// The candidate of a view that is the one who is followed; `None` if the view does not see it, or nobody is followed.
+    /// The candidate of a view that shows the followed person; `None` if the view does not see it, or nobody is followed.
     pub fn own(&self, view: usize) -> Option<usize> {
         self.own.get(view).copied().flatten()
     }
 
-    /// Returns true if a view sees others, but not the one who is followed: it has no part in the frame.
+    /// Returns true if a view sees others, but not the followed person: it has no part in the frame.
     pub fn only(&self, view: usize) -> bool {
         self.without >> view & 1 == 1
     }
@@ -96,7 +96,7 @@ impl Following {
         Others::new(&found, followed)
     }
 
-    /// The one who is followed; `None` if that is none of those who were found.
+    /// The followed person; `None` if that person was not found.
     fn choose(&mut self, found: &Found) -> Option<usize> {
         let people = || found.people.iter().enumerate();
         let first = people().next().map(|person| person.0);

@@ -143,7 +143,7 @@ impl FuseStep {
     /// Every fusion worker computes it for all views, from their (small) single-view results alone,
     /// so that all pairs start from the same person.
     ///
-    /// * `others`: candidates that are somebody else ([`Following::others`](crate::Following::others)).
+    /// * `others`: candidates that show other people ([`Following::others`](crate::Following::others)).
     pub fn start(
         &self,
         answers: &[Option<ViewResult>],
@@ -239,7 +239,7 @@ impl FuseStep {
     /// see the person from behind.
     ///
     /// * `evidence`: of the views with a result; should carry its bounds.
-    /// * `others`: candidates that are somebody else ([`Following::others`](crate::Following::others)).
+    /// * `others`: candidates that show other people ([`Following::others`](crate::Following::others)).
     /// * Returns `None` if fewer than two views have a result whose poses their evidence
     ///   [covers](Responses::covers).
     pub fn all_views(

@@ -14,7 +14,7 @@ const SAME_BOX: f64 = 0.85;
 const BEHIND: f64 = 0.2;
 /// Least number of joints of a person behind others that these do not cover.
 const LEAST_BEHIND: usize = 7;
-/// Somebody new who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
+/// A new person who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
 const FAINT: f64 = 0.7;
 /// Least heat of a joint that says where its person is, 0 to 1.
 const SURE: f64 = 0.2;
@@ -30,7 +30,7 @@ pub(crate) struct Looks<'a> {
     pub(crate) n_most: usize,
     /// Least mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) least_heat: f64,
-    /// By how much the score of a pose may be lower than those of its person usually are.
+    /// Amount by which the score of a pose may be lower than usual for its person.
     pub(crate) most_lost: f32,
 }
 
@@ -139,7 +139,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at the person in a box; where that is somebody who is known, at the one behind.
+    /// Looks at the person in a box; where that is a person who is known, at the one behind.
     fn see_box(
         &self,
         outline: [f64; 4],
@@ -166,7 +166,7 @@ impl Looks<'_> {
 
     /// Looks at the person in a box behind those who are known: these are painted over.
     ///
-    /// * `usual_score`: of somebody of the frame before.
+    /// * `usual_score`: of a person of the frame before.
     fn see_behind(
         &self,
         boxed: ([f64; 4], Turn),

@@ -78,8 +78,8 @@ impl Motion {
         })
     }
 
-    /// By how much the points of a view had moved from the instant of the frame when its picture was taken, pixels; `None` if
-    /// that was then.
+    /// Amount by which the points of a view had moved from the instant of the frame when its picture was taken, pixels;
+    /// `None` if that was then.
     ///
     /// * `skew_s`: of the picture; `taken_s`: when the points were there, seconds after the instant.
     pub(crate) fn since_instant(

@@ -14,9 +14,10 @@ const TWIN: f64 = 0.3;
 /// Nobody leaves the box of the last frame within this share of the time for which people can be followed without a frame: a person
 /// who runs moves 0.2 m in 0.07 s.
 const SOON: f64 = 1.0 / 6.0;
-/// For so long a person who stands still need not be looked at, share of that time: who begins to walk moves 0.1 m in 0.13 s.
+/// How long a person who stands still need not be looked at, as a share of that time: a person who begins to walk moves
+/// 0.1 m in 0.13 s.
 const HELD: f64 = 1.0 / 3.0;
-/// After so many times that time (2 s) a person may be anywhere.
+/// After this many times that time (2 s) a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
 /// State of the step from frame to frame: memory that is used again, and the boxes of the people it sees.
@@ -37,9 +38,9 @@ pub struct NetworkMemory {
     pub(crate) until: Option<u64>,
     /// Frames for which boxes are looked for often: people were near each other, or one of several was lost or found.
     n_unsettled: u64,
-    /// The number of the last frame, where it is told ([`Self::begin`]).
+    /// The number of the last frame, if it is known ([`Self::begin`]).
     last: Option<u64>,
-    /// True if the last frame is so short a time ago that nobody has left their box.
+    /// True if the last frame is so recent that nobody has left their box.
     pub(crate) is_soon: bool,
     /// Frames from the last one to this one, and most frames for which a person who stands still is not looked at; `None` where the
     /// frames' rate is not known.
@@ -71,11 +72,11 @@ pub(crate) struct Seen {
     pub(crate) outline: [f64; 4],
     /// How the picture was turned for the network.
     pub(crate) turn: Turn,
-    /// The score that the person's poses had in the frames before; `None` for somebody new.
+    /// The score that the person's poses had in the frames before; `None` for a new person.
     pub(crate) usual_score: Option<f32>,
     /// Mean heat of the joints at their peaks, 0 to 1.
     pub(crate) heat: f64,
-    /// In which direction the trunk faces, if the network tells.
+    /// Direction in which the trunk faces, if the network gives it.
     pub(crate) front: Option<FrontEvidence>,
 }
 
@@ -129,7 +130,7 @@ impl NetworkMemory {
         };
     }
 
-    /// Returns true if the last frame is so short a time ago that people are about in their boxes.
+    /// Returns true if the last frame is so recent that people are roughly in their boxes.
     pub(crate) fn is_followed(&self) -> bool {
         self.hold.is_some() && self.apart.is_none()
     }
@@ -162,7 +163,7 @@ impl NetworkMemory {
         self.last = Some(frame);
     }
 
-    /// Returns true if boxes are to be looked for in this frame, whoever is seen.
+    /// Returns true if boxes are to be looked for in this frame, no matter who is seen.
     pub(crate) fn is_due(&self) -> bool {
         self.until.is_none_or(|until| until == 0)
     }
@@ -176,7 +177,7 @@ impl NetworkMemory {
 impl Seen {
     /// Judges what is seen of a person who was looked at; returns whether the person is seen well, and in the frame.
     ///
-    /// * `size`: width and height of the frame; `least_heat`: mean heat of the joints of somebody who is seen well, 0 to 1.
+    /// * `size`: width and height of the frame; `least_heat`: mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) fn judge(&mut self, size: [usize; 2], least_heat: f64) -> bool {
         self.next = None;
         self.heat = self.maps.heat();

@@ -92,7 +92,7 @@ impl NetworkStep {
         }
     }
 
-    /// The step with keypoints that no joint follows from: they are told of every candidate.
+    /// The step with keypoints that no joint follows from: every candidate has them.
     ///
     /// * `extras`: of every wanted keypoint its number in the order of the card or of the file; `None` where these do not know it.
     #[must_use]
@@ -158,7 +158,7 @@ impl NetworkStep {
         Ok(())
     }
 
-    /// Says in how many frames boxes are looked for next.
+    /// Plans in how many frames boxes are searched for next.
     fn plan_search(&self, memory: &mut NetworkMemory) {
         let settings = &self.settings;
         let first = settings.find_every - settings.find_phase % settings.find_every;
@@ -207,7 +207,7 @@ impl NetworkStep {
         }
     }
 
-    /// By how much the score of a pose may be lower than those of its person usually are.
+    /// Amount by which the score of a pose may be lower than usual for its person.
     fn most_lost(&self) -> f32 {
         -MUCH_WORSE * self.settings.maps.floor()
     }
@@ -243,7 +243,7 @@ impl NetworkStep {
         people.filter_map(|seen| seen.maps.evidence())
     }
 
-    /// Says where a person who was looked at is looked for next.
+    /// Plans where to search next for a person who was looked at.
     fn track(&self, seen: &mut Seen, score: f32) {
         let before = ((seen.outline, seen.turn), seen.usual_score);
         let around = seen.maps.around();

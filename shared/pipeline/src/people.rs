@@ -192,7 +192,7 @@ fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     found
 }
 
-/// The best of the groups, and of the others those that are somebody else.
+/// The best of the groups, and of the others those that are another person.
 fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let mut kept: Vec<Person> = Vec::new();

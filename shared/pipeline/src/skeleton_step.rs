@@ -329,7 +329,7 @@ impl SkeletonStep {
 
     /// The poses of every view, one per pair or that of all views, under a facing assignment.
     ///
-    /// A view that was not fused keeps its own best pose, unless that may be somebody else's.
+    /// A view that was not fused keeps its own best pose, unless that may be another person's.
     fn candidates(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<Candidates>> {
         let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {

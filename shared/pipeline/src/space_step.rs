@@ -12,7 +12,7 @@ use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
-/// People of whom bone lengths and sides are remembered; of more the ones seen longest ago are forgotten.
+/// Number of people whose bone lengths and sides are remembered; beyond it, those seen longest ago are forgotten.
 const MOST_REMEMBERED: usize = 32;
 
 /// A person of a frame, solved.
@@ -72,7 +72,7 @@ impl SpaceStep {
         self.n_frames += 1;
     }
 
-    /// Solves for the people of a frame, each by itself, in their order.
+    /// Solves for the people of a frame, each separately, in their order.
     ///
     /// * `answers`: by view; `evidence`: by view the maps of its people. A view without either has no part.
     pub fn run(
@@ -99,7 +99,7 @@ impl SpaceStep {
         solved
     }
 
-    /// The step of a person, a new one for somebody new.
+    /// The step of a person, a new one for a new person.
     fn remembered(&mut self, id: u64) -> &mut PersonStep {
         let known = self.people.iter().position(|person| person.id == id);
         let index = known.unwrap_or_else(|| {

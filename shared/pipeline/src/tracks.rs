@@ -4,20 +4,20 @@ use posenetwork::Turn;
 
 /// Which share of the way to the box around a pose a side moves in a frame, inward.
 const INWARD: f64 = 0.5;
-/// A pose is much worse than usual if so many joints are lost that were seen at their best.
+/// A pose is much worse than usual if this many joints are lost that were seen at their best.
 pub(crate) const MUCH_WORSE: f32 = 1.5;
 /// Weight of a new score in the usual one.
 const NEW_SCORE: f32 = 0.1;
-/// By how much a box is enlarged to see whether there is more of a person, share of the longer side.
+/// Amount by which a box is enlarged to see whether there is more of a person, share of the longer side.
 const WIDER: f64 = 0.25;
-/// By how much it is enlarged for a person who may have moved on, share of the longer side for every time for which people are followed
-/// without a frame (0.4 s, in which who runs gets half of the own height on); and by how much at most.
+/// Amount by which it is enlarged for a person who may have moved on, share of the longer side for every time for which
+/// people are followed without a frame (0.4 s, in which who runs gets half of the own height on); and by how much at most.
 const MOVED: f64 = 0.5;
 const MOST_MOVED: f64 = 1.0;
 /// A person who has moved by less is where the last look saw them, share of the height of the network's window: less than the
 /// network is off by.
 const STILL: f64 = 0.01;
-/// A person who was seen so many times [`STILL`] from the last place has moved, whatever the mean velocity.
+/// A person who was seen this many times [`STILL`] from the last place has moved, whatever the mean velocity.
 const MOST_STEP: f64 = 3.0;
 /// Weight of the earlier velocity after a frame: from look to look the network errs by more than a person who stands moves.
 const KEPT: f64 = 0.7;
@@ -68,7 +68,7 @@ impl Pace {
         }
     }
 
-    /// Returns true if a person with this pace hardly moves in so many frames.
+    /// Returns true if a person with this pace hardly moves in `n_frames` frames.
     fn is_still(&self, n_frames: u64) -> bool {
         let [x, y] = self.velocity;
         self.step <= MOST_STEP * STILL && x.hypot(y) * n_frames as f64 <= STILL
@@ -82,7 +82,7 @@ impl Track {
     /// put it beyond the edge of the next one. One that is much worse than the person's poses usually are moves no side at all.
     ///
     /// * `looked_at`: the box of this frame, and how the picture was turned; `usual_score`: of the person's poses before; `None` for
-    ///   somebody new.
+    ///   a new person.
     /// * `around`, `score`: the box around the pose that was seen, and its score.
     /// * `most_lost`: by how much a score may be lower than usual.
     pub(crate) fn next(

@@ -3,8 +3,8 @@
 use fmp::{Pose, Responses};
 use multiview::FrontEvidence;
 
-/// Where a keypoint that is no joint was found, and the standard deviation of the place along one axis, both pixels of the frame;
-/// `None` where it was not.
+/// Where a keypoint that is not a joint was found, and the standard deviation of the place along one axis, both pixels
+/// of the frame; `None` where it was not.
 pub type ExtraKeypoint = Option<([f64; 2], f64)>;
 
 /// The single-view result of one frame, besides its evidence.

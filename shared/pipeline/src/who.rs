@@ -25,7 +25,7 @@ pub struct KnownPerson {
 /// The people of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FramePeople {
-    /// The people, the one who is followed first, even where no view sees that person but others are there.
+    /// The people, the followed person first, even where no view sees that person but others are there.
     pub people: Vec<KnownPerson>,
     /// Number of people that several views agree on.
     pub n_seen: usize,
@@ -38,7 +38,7 @@ pub struct WhoSettings {
     pub follow: Follow,
     /// True if left and right follow the picture, so that two views may have them exchanged.
     pub as_seen: bool,
-    /// Heat that half of the joints of somebody new have in two views, 0 to 1.
+    /// Heat that half of the joints of a new person have in two views, 0 to 1.
     pub least_heat: f64,
     /// Most people at once.
     pub n_people: usize,
@@ -116,7 +116,7 @@ impl WhoStep {
         }
     }
 
-    /// Says who is in the next frame.
+    /// Returns the people of the next frame.
     ///
     /// * `time_s`: when the frame was taken; not before the last one.
     /// * `answers`: by view.

@@ -7,13 +7,13 @@ use crate::outline::outline_of;
 /// Least heat of a joint that counts for the box around its person, 0 to 1.
 const FAINT: f64 = 0.02;
 
-/// Least heat of a joint that tells where the head points, 0 to 1.
+/// Least heat of a joint that shows where the head points, 0 to 1.
 const SURE: f64 = 0.2;
 /// Least number of joints of the legs, and least distance from them to the head, share of the longer side of the window.
 const LEGS: usize = 3;
 const LONG: f64 = 0.12;
-/// By how much the head of an upright person may point elsewhere, radians: 70 degrees. That of one whose trunk is level over upright legs
-/// points 63 degrees away.
+/// Amount by which the head of an upright person may point elsewhere, radians: 70 degrees. The trunk of a person who bends
+/// until it is level over upright legs points 63 degrees away.
 const MOST_LEAN: f64 = 7.0 / 18.0 * core::f64::consts::PI;
 
 impl JointMaps {
@@ -25,7 +25,7 @@ impl JointMaps {
     }
 
     /// How the picture should be turned for the network to see this person upright: by where neck and head are, seen from the legs, whose
-    /// direction does not change with the trunk when somebody bends down.
+    /// direction does not change with the trunk when a person bends down.
     ///
     /// * `now`: how it was turned; it stays so up to 70 degrees.
     pub fn turn(&self, now: Turn) -> Turn {

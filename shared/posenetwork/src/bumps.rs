@@ -6,7 +6,7 @@ use crate::MapSettings;
 use crate::maps::N_JOINTS;
 use crate::person_maps::PersonMaps;
 
-/// Least heat of a Gaussian: what is left below it is not told.
+/// Least heat of a Gaussian: what is left below it is ignored.
 const LEAST_HEAT: f64 = 0.03;
 /// Least height of a Gaussian whose neighbours take its heat over.
 const LEAST_HEIGHT: f64 = 0.002;

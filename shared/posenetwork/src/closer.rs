@@ -1,4 +1,4 @@
-//! Looking at people in boxes that may not fit: into several, and closer where somebody is seen.
+//! Looking at people in boxes that may not fit: into several, and closer where a person is seen.
 
 use kernels::Rgb8View;
 
@@ -6,9 +6,9 @@ use crate::maps::{JointMaps, MapSettings};
 use crate::network::{LookError, PoseNetwork, Turn, Workspace};
 use crate::outline::overlap;
 
-/// Boxes that cover each other by more show the same to a network: another look tells nothing new.
+/// Boxes that cover each other by more show the same to a network: another look shows nothing new.
 const FITS: f64 = 0.8;
-/// By how much the mean heat of the joints may be lower in a box that fits better, 0 to 1.
+/// Amount by which the mean heat of the joints may be lower in a box that fits better, 0 to 1.
 const FAINTER: f64 = 0.1;
 /// Most looks at one person beside the first.
 const MOST_MORE: usize = 2;
@@ -90,7 +90,7 @@ impl Looker<'_> {
 
     /// Judges what was seen in a box whose maps are read.
     ///
-    /// * `turn`: how the picture was turned; `front`: what was told of the direction in which the trunk faces.
+    /// * `turn`: how the picture was turned; `front`: what the network says of the direction in which the trunk faces.
     pub fn judge(
         &self,
         (outline, turn, front): ([f64; 4], Turn, Option<[f32; 2]>),

@@ -1,4 +1,4 @@
-//! How far off a network may be where it is so sure.
+//! How far off a network may be, given how sure it is.
 
 /// Heat, 0 to 1, and the standard deviation of the place along one axis, share of the height of the network's window: two thirds of
 /// the joints of 689 people of LSP-extended, seen by `TinyPose` in the true box, lie within as many as of a normal distribution (1.515

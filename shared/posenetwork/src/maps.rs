@@ -78,11 +78,11 @@ pub struct JointMaps {
     peaks: Vec<Option<Keypoint>>,
     /// All keypoints, pixels of the picture; scores as those of the peaks.
     keypoints: Vec<Option<Keypoint>>,
-    /// The expected error of each joint as the network tells it, pixels of the picture; empty if it tells nothing of it.
+    /// The expected error of each joint as the network gives it, pixels of the picture; empty if it does not.
     told: Vec<Option<f64>>,
     /// The same of each keypoint.
     errors: Vec<f64>,
-    /// Standard deviation of a keypoint whose score is 1 on the maps themselves; `None` where the heat tells it.
+    /// Standard deviation of a keypoint whose score is 1 on the maps themselves; `None` if it follows from the heat.
     sigma_px: Option<f64>,
 }
 
@@ -315,8 +315,8 @@ impl JointMaps {
         Some((found, self.sigma_px.or(told).unwrap_or_else(by_heat)))
     }
 
-    /// How far off a joint's peak may be: the standard deviation along one axis, pixels of the picture. As the network tells it, else
-    /// by the heat there ([`expected_error`]). `None` for a joint without a peak.
+    /// How far off a joint's peak may be: the standard deviation along one axis, pixels of the picture. As the network
+    /// gives it, else by the heat there ([`expected_error`]). `None` for a joint without a peak.
     pub fn expected_px(&self, joint: usize) -> Option<f64> {
         let peak = self.peaks.get(joint).copied().flatten()?;
         let told = self.told.get(joint).copied().flatten();
@@ -325,8 +325,8 @@ impl JointMaps {
         Some(told.map_or_else(by_heat, |value| value * ALONG_AN_AXIS))
     }
 
-    /// Where the network sees each of the 14 joints, pixels of the picture; scores from 0 to 1. `None` for a joint that its
-    /// keypoints do not tell.
+    /// Where the network sees each of the 14 joints, pixels of the picture; scores from 0 to 1. `None` for a joint that
+    /// does not follow from its keypoints.
     pub fn peaks(&self) -> &[Option<Keypoint>] {
         &self.peaks
     }

@@ -64,7 +64,7 @@ struct Tensor {
 }
 
 impl Tensor {
-    /// Channels, rows and columns of maps; `None` if they are none.
+    /// Channels, rows and columns of maps; `None` if the output does not have them.
     fn map_sides(&self, layout: Layout) -> Option<[usize; 3]> {
         let sides = match (layout, &self.shape[..]) {
             (Layout::Planes, &[_, channels, rows, columns])
@@ -387,8 +387,8 @@ impl<'a> Sight<'a> {
         at.values.as_slice().try_into().ok()
     }
 
-    /// The expected error of every keypoint, pixels of the picture, in the order of the card's names; `None` if it tells nothing of
-    /// it.
+    /// The expected error of every keypoint, pixels of the picture, in the order of the card's names; `None` if it does
+    /// not give them.
     pub fn errors(&self) -> Option<impl Iterator<Item = f64>> {
         let [_, height] = self.network.size();
         let height = height as f64 * self.window.step()[1];

@@ -1,6 +1,6 @@
 //! The box around a person whose joints are known.
 
-/// By how much hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+/// Amount by which hands, feet and hair reach beyond the joints: share of the longer side, on each side.
 const BEYOND: f64 = 0.05;
 
 /// The box around the joints of a person, widened for what lies beyond them: left, top, right, bottom, in the unit of the

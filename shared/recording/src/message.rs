@@ -137,7 +137,7 @@ pub struct Envelope {
     pub stamp: Stamp,
     /// Its times.
     pub timing: Timing,
-    /// Tells that the message contains a result, or why not.
+    /// Says that the message contains a result, or why it does not.
     pub status: Status,
 }
 

@@ -155,7 +155,7 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
-    /// Says of which run it is, and which topics there are.
+    /// Writes which run it is of, and which topics there are.
     fn say_about(&mut self) -> Result<(), WriteError> {
         let about = self.about.clone();
         about.into_iter().try_for_each(|(name, map)| self.describe(name, map))

@@ -16,7 +16,7 @@ pub const MOST_PEOPLE: usize = 8;
 pub struct FrameLine {
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// The people, each with an identity of its own, the one who is followed first; none in a line without a result.
+    /// The people, each with an identity of its own, the followed person first; none in a line without a result.
     #[serde(deserialize_with = "people")]
     pub people: Vec<PersonLine>,
     /// Why there is no result; only in a line without one.
@@ -43,7 +43,7 @@ pub struct PersonLine {
     /// How much the lengths of the bones differ from those of people, standard deviations; none where there is no body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_deviation: Option<f64>,
-    /// By how much the decision which views see the person from the same side was won; none where it was
+    /// Amount by which the decision which views see the person from the same side was won; none where it was
     /// not made.
     #[serde(deserialize_with = "nullable")]
     pub facing_margin: Option<f64>,
@@ -98,13 +98,13 @@ impl FrameLine {
         self.status == Self::OK
     }
 
-    /// The person who is followed; `None` if there is nobody.
+    /// The followed person; `None` if there is nobody.
     pub fn followed(&self) -> Option<&PersonLine> {
         self.people.first()
     }
 }
 
-/// At most so many people as fit, no two of one identity.
+/// Reads at most as many people as fit, no two with one identity.
 fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Error> {
     let people = Vec::<PersonLine>::deserialize(from)?;
     if people.len() > MOST_PEOPLE {

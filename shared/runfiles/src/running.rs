@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// Description of a running deployment by itself: the entry [`Running::KEY`] of the file `deployment.json` beside its sockets.
+/// Description that a running deployment gives of itself: the entry [`Running::KEY`] of the file `deployment.json`
+/// beside its sockets.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Running {
     /// Version of this description, [`Running::VERSION`].
     pub format: u64,
-    /// Every how many frames of the footage one is used: the numbers of frames go up by this.
+    /// Step between the frames of the footage that are used: frame numbers increase by it.
     pub frame_step: u64,
     /// Names of the joints, in the order of the messages.
     pub joints: Vec<String>,

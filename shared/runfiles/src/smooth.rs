@@ -12,7 +12,7 @@ use crate::read::{parse, to_text};
 pub struct SmoothReport {
     /// Cutoff of the low-pass filter, Hz, where there is one.
     pub cutoff_hz: Option<f64>,
-    /// By how much the positions are late, milliseconds; 0 for methods that look ahead.
+    /// Amount by which the positions are late, milliseconds; 0 for methods that look ahead.
     pub delay_ms: f64,
     /// Reasons to doubt the result, in words; an empty list is good.
     pub doubts: Vec<String>,
@@ -26,7 +26,7 @@ pub struct SmoothReport {
     pub people: Vec<SmoothedPerson>,
     /// Frames per second: the inverse of the median time between two.
     pub rate_hz: Option<f64>,
-    /// By how much the instants are off the uniform grid that they were interpolated to, at most, milliseconds.
+    /// Amount by which the instants are off the uniform grid that they were interpolated to, at most, milliseconds.
     pub resampled_ms: Option<f64>,
     /// [`crate::VERSION`].
     pub schema_version: u64,
@@ -37,9 +37,10 @@ pub struct SmoothReport {
 pub struct SmoothedPerson {
     /// Lengths of bones that were kept constant, by the names of both joints, metres.
     pub bones: BTreeMap<String, f64>,
-    /// Frames in which somebody else begins: nothing was smoothed across.
+    /// Frames in which another person begins: nothing was smoothed across.
     pub frames_of_breaks: Vec<u64>,
-    /// Identities within the run: more than one where never two people were there, and whoever was followed had one after the other.
+    /// Identities within the run: more than one if no frame had two people and the followed person had several, one
+    /// after the other.
     pub ids: Vec<u64>,
     /// Every joint and keypoint, by name.
     pub joints: BTreeMap<String, SmoothedJoint>,

@@ -181,7 +181,7 @@ pub struct CameraFit {
 pub struct Exchanged {
     /// The two.
     pub cameras: [String; 2],
-    /// By how much rays to the same part miss each other as it is, degrees: the median.
+    /// Amount by which rays to the same part miss each other as it is, degrees: the median.
     pub degrees: f64,
     /// The same with the two exchanged.
     pub exchanged_degrees: f64,
@@ -192,7 +192,7 @@ pub struct Exchanged {
 /// Cameras that do not see one person where the rig says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contradicted {
-    /// By how much rays to the same part miss each other, degrees: the median.
+    /// Amount by which rays to the same part miss each other, degrees: the median.
     pub degrees: f64,
     /// The two cameras whose exchange fits best, if any fits better.
     #[serde(deserialize_with = "nullable")]

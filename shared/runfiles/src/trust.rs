@@ -19,9 +19,9 @@ pub struct Trust {
     /// Mean distance of what the views found from the joints in space, metres, each at most 0.3.
     #[serde(deserialize_with = "nullable")]
     pub disagreement_m: Option<f64>,
-    /// Results in which somebody was found, whether as a body that people have or not.
+    /// Results in which a person was found, whether as a body that people have or not.
     pub frames: u64,
-    /// Share of these results whose body is none that people have.
+    /// Share of these results whose body is not one that people have.
     pub implausible: f64,
     /// Share of the joints of the skeletons that were left out, since no body has them there.
     pub joints_implausible: f64,
@@ -64,8 +64,8 @@ impl Kind {
         Self::Sides,
     ];
 
-    /// Returns the limit of what is tolerated. Chosen so that single persons who are seen whole by calibrated cameras stay below:
-    /// balancing and synthetic people reach two thirds of each at most.
+    /// Returns the limit of what is tolerated. Chosen so that one person who is seen whole by calibrated cameras stays
+    /// below these limits: balancing and synthetic people reach at most two thirds of each.
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,
@@ -172,12 +172,12 @@ impl fmt::Display for Doubt {
             ),
             Kind::Jumps => write!(
                 f,
-                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the one who is followed changes; `pose.follow` and \
-                 the space that is looked at say whom to follow"
+                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the one who is followed changes; `person.follow` \
+                 and the space that the cameras see say whom to follow"
             ),
             Kind::Implausible => write!(
                 f,
-                "{value:.0} % of what was found is no body that people have (more than {limit:.0} %): is one person seen whole, in the right size?"
+                "{value:.0} % of what was found is not a body that people have (more than {limit:.0} %): is one person seen whole, in the right size?"
             ),
             Kind::Joints => write!(
                 f,

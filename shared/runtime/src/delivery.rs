@@ -48,7 +48,7 @@ impl Limits {
         }
     }
 
-    /// The same, and so many onlookers besides.
+    /// The same, with this many onlookers in addition.
     #[must_use]
     pub fn with_onlookers(self, onlookers: usize) -> Self {
         Self { onlookers, ..self }

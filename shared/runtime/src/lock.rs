@@ -22,7 +22,7 @@ use failure::{ExitKind, Fault};
 
 /// The process of a deployment that holds its lock: the name with which it opens its [`Bus`](crate::Bus).
 pub const SUPERVISOR: &str = "supervisor";
-/// Tells observers that the deployment is ending.
+/// Shows observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
 /// The description until all of it is written.
 const UNFINISHED_FILE: &str = "deployment.json.new";

@@ -93,8 +93,8 @@ pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     [health.without_wake_up(), metrics.without_wake_up()]
 }
 
-/// Checks that the pools of all topics fit into the free part of `/dev/shm`, and that the supervisor, which
-/// has all topics open, may open so many files.
+/// Checks that the pools of all topics fit into the free part of `/dev/shm`, and that the supervisor, which has all
+/// topics open, may open enough files.
 ///
 /// # Errors
 ///

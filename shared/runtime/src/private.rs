@@ -71,7 +71,7 @@ pub enum PrivacyError {
     },
     /// It holds files, but not the marker file of a deployment.
     #[error(
-        "{path:?} is no directory of a deployment (files in it: {n_files}; none is its {MARK_FILE:?})"
+        "{path:?} is not the directory of a deployment (files in it: {n_files}; none is named {MARK_FILE:?})"
     )]
     Unmarked {
         /// The directory.

@@ -205,7 +205,7 @@ mod tests {
         assert_eq!(names, [("other", true), ("photos", false)]);
         let error = found[1].remove().unwrap_err().to_string();
         assert!(
-            error.contains("photos\" is no directory of a deployment"),
+            error.contains("photos\" is not the directory of a deployment"),
             "{error}"
         );
         assert!(photos.join("one.jpg").exists());

@@ -12,14 +12,14 @@ use crate::subject::Subject;
 use crate::truth::N_JOINTS;
 use crate::wear::Wear;
 
-/// Distance from the middle of the stage, metres: beyond the path of somebody who walks there.
+/// Distance from the middle of the stage, metres: beyond the path of a person who walks there.
 const AWAY_M: [f64; 2] = [1.7, 2.1];
 
-/// Centre of the way of somebody who passes, metres from the middle of the stage, around which the subject walks.
+/// Centre of the way of a person who passes, metres from the middle of the stage, around which the subject walks.
 const BESIDE_M: [f64; 2] = [0.4, 0.9];
 /// People who pass each other are not nearer, trunk to trunk, where such a way is found.
 const NEAREST_M: f64 = 0.6;
-/// So many ways are tried, and looked at for so long, seconds.
+/// Number of paths that are tried, and the time for which each is checked, seconds.
 const N_WAYS: u64 = 60;
 const WATCHED_S: f64 = 20.0;
 const WATCHED_EVERY_S: f64 = 0.2;
@@ -45,7 +45,7 @@ impl Way {
         frames.map(|frame| self.on_stage * frame)
     }
 
-    /// Somebody who walks around a place beside the middle.
+    /// A person who walks around a place beside the middle.
     fn walking(subject: &Subject, mut random: Random) -> Self {
         let bearing = random.range(0.0, core::f64::consts::TAU);
         let away = random.range(BESIDE_M[0], BESIDE_M[1]);

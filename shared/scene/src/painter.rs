@@ -32,7 +32,7 @@ pub(crate) struct Painter {
     eye: Vector3<f32>,
 }
 
-/// A posed body. Triangles and corners of all bodies are numbered through.
+/// A posed body. Triangles and corners of all bodies are numbered consecutively.
 #[derive(Debug, Clone)]
 struct Body {
     posed: Posed,

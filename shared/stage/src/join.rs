@@ -62,7 +62,7 @@ struct Input {
 }
 
 impl Input {
-    /// Says if its sender was restarted after a frame began, and had time to send what it still knows of the frame.
+    /// Returns true if its sender was restarted after a frame began, and had time to send what it still knows of the frame.
     fn has_forgotten(&self, began_at: u64, now: u64) -> bool {
         self.restarted_at
             .is_some_and(|at| began_at < at && now.saturating_sub(at) >= TAKEN_UP_NANOS)

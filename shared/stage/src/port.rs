@@ -131,8 +131,8 @@ impl<R> Port<R> {
         Ok(None)
     }
 
-    /// Says if the sender, once it is restarted, has forgotten frames that others have received: it answers what views send. A process of a
-    /// view is given the frame again, and a fusion worker holds what the others wait for.
+    /// Returns true if the sender, once it is restarted, has forgotten frames that others have received: it answers what
+    /// views send. A process of a view is given the frame again, and a fusion worker holds what the others wait for.
     pub(crate) fn forgets(&self) -> bool {
         self.sender == Sender::All
     }

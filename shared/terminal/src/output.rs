@@ -51,7 +51,7 @@ pub fn failure(failure: &Failure) {
     drop(failure.report(&mut io::stderr().lock()));
 }
 
-/// The style of a progress bar; none if the template is none of `indicatif`.
+/// The style of a progress bar; `None` if the template is not one of `indicatif`.
 ///
 /// * `template`: `{left}` is a comma and the time that is left, nothing while that is not known.
 pub fn bar_style(template: &str) -> Option<ProgressStyle> {

@@ -56,13 +56,13 @@ pub fn sightings_to_message(
     Ok(message)
 }
 
-/// Reads the people that a view sees; `None` unless the status is [`Status::OK`] and there is somebody.
+/// Reads the people that a view sees; `None` unless the status is [`Status::OK`] and there is a person.
 ///
-/// * `n_extras`: extra keypoints of a person. The last people may have none: there is room for some.
+/// * `n_extras`: extra keypoints of a person. The last people may lack them, because the room in a message is limited.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people than fit, or a number or the time of the picture is none that a view sends.
+/// [`WireError`] if there are more people than fit, or a number or the time of the picture is not one that a view sends.
 pub fn sightings_from_message(
     message: &ViewPose,
     n_extras: usize,
@@ -136,7 +136,8 @@ pub fn maps_to_message(
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people than fit, a grid is none, the values are not as many as its cells, or one of them is no number.
+/// [`WireError`] if there are more people than fit, a grid is not valid, the values are not as many as its cells, or one
+/// of them is not finite.
 pub fn maps_from_message<'a>(
     message: &EvidenceHeader,
     values: &'a [f32],
@@ -159,7 +160,7 @@ pub fn maps_from_message<'a>(
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people than fit, or a grid is none.
+/// [`WireError`] if there are more people than fit, or a grid is not valid.
 pub fn grids_from_message(message: &EvidenceHeader) -> Result<Vec<MapGrid>, WireError> {
     let n = count("n_people", message.n_people as usize, MAX_CANDIDATES)?;
     let people = message.people[..n].iter().enumerate();

@@ -23,7 +23,7 @@ pub struct SolvedPerson<'a> {
 
 /// Writes the people of a frame; the caller fills in stamp and timing.
 ///
-/// * `people`: the one who is followed first.
+/// * `people`: the followed person first.
 /// * `n_seen`: number of people that several views agree on.
 /// * `views_present`: bit `v` is set if view `v` delivered what it found in time.
 ///

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 const N_PARTS: usize = 12;
 /// Length of a part, nanoseconds.
 const PART_NANOS: u64 = 5_000_000_000;
-/// A drift is estimated from exchanges that are so far apart, nanoseconds.
+/// A drift is estimated from exchanges that are this far apart, nanoseconds.
 const LEAST_SPAN: u64 = 5_000_000_000;
 /// The most that two clocks may drift apart where nothing is known: the kernel slews either by 500 ppm at most.
 const MOST_DRIFT: f64 = 1e-3;
@@ -32,7 +32,7 @@ pub struct Exchange {
     pub heard_at: u64,
 }
 
-/// Four times that cannot be.
+/// Four times that contradict each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExchangeError {
     /// One of the clocks went back.
@@ -46,7 +46,7 @@ pub enum ExchangeError {
         /// From question to answer here, nanoseconds.
         outside: u64,
     },
-    /// The round trip was too long to tell anything.
+    /// The round trip was too long to compare the clocks.
     #[error("the round trip took {trip} ns, too long to compare the clocks")]
     Slow {
         /// Its length, nanoseconds.
@@ -59,7 +59,7 @@ pub enum ExchangeError {
 pub struct Estimate {
     /// Difference between their time and ours, added to ours to have theirs, nanoseconds.
     pub offset_nanos: i64,
-    /// By how much a second of theirs is shorter than ours, billionths.
+    /// Amount by which a second of theirs is shorter than ours, billionths.
     pub drift_ppb: f64,
     /// How far the offset can be from the truth, nanoseconds: half of the best round trip, and what the drift may have added.
     pub bound_nanos: u64,
@@ -90,8 +90,8 @@ impl Estimate {
         (share > max_share).then(|| {
             format!(
                 "its clock is known to {:.3} ms only, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %): \
-                 the network's round trips take {:.3} ms at best; a quieter network helps, and where cameras stamp their \
-                 pictures themselves `chrony` or `linuxptp` on all hosts",
+                 the network's round trips take {:.3} ms at best; a quieter network helps; if cameras stamp their \
+                 pictures themselves, run `chrony` or `linuxptp` on all hosts",
                 self.bound_nanos as f64 * 1e-6,
                 100.0 * share,
                 100.0 * max_share,

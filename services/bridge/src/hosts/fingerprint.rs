@@ -3,7 +3,7 @@
 use formats::checksum::fnv1a;
 use serde::{Deserialize, Serialize};
 
-/// Hashes of what must be the same on all hosts, by name. They tell mistakes, not attacks: those are for the keys.
+/// Hashes of what must be the same on all hosts, by name. They detect mistakes; the keys protect against attacks.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Fingerprint(Vec<(String, String)>);
 

@@ -46,7 +46,7 @@ pub struct Maps {
 /// Bytes that are no maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MapsError {
-    /// They are cut off, or longer than they say.
+    /// The maps are cut off, or longer than their header says.
     #[error("maps of {len} bytes, expected {expected}")]
     Length {
         /// Their length.
@@ -140,7 +140,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Checks that there are so many bytes more.
+    /// Checks that at least this many bytes are left.
     fn needs(&self, n: usize) -> Result<(), MapsError> {
         let end = self.at + n;
         if self.bytes.len() < end {

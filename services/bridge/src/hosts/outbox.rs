@@ -94,7 +94,8 @@ impl<T> Outbox<T> {
         })
     }
 
-    /// A parcel has arrived. Those of its lane before it that were not acknowledged are lost: the link keeps the order.
+    /// A parcel has arrived. Earlier messages of its lane that were not acknowledged are lost, because the link keeps
+    /// the order.
     ///
     /// Returns how long after it was sent, nanoseconds; none if it was not on its way.
     pub fn acknowledge(&mut self, lane: usize, sequence: u64, now_nanos: u64) -> Option<u64> {

@@ -127,7 +127,7 @@ pub enum PacketError {
         /// Hash by its head.
         expected: u64,
     },
-    /// A number that cannot be.
+    /// A number out of range.
     #[error("{field} is {got}, expected {expected}")]
     Value {
         /// Name of the field.

@@ -186,7 +186,7 @@ impl Publisher {
         Ok(())
     }
 
-    /// Says that there is nothing for a frame, and why; or that the stream has ended.
+    /// Sends that there is nothing for a frame, and why; or that the stream has ended.
     pub(super) fn send_nothing(
         &self,
         service: &Service,

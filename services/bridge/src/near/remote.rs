@@ -7,7 +7,7 @@ use crate::hosts::{Clock, Difference, Estimate, Exchange};
 use crate::job::NearHost;
 use crate::join::listed;
 
-/// A host that has not been heard for so long does not answer, nanoseconds.
+/// A host that has not been heard for this long does not answer, nanoseconds.
 const SILENT_AFTER: u64 = 1_200_000_000;
 
 /// Another host. Shared with the threads of the link.
@@ -107,7 +107,7 @@ impl Remote {
         state.welcomed = None;
     }
 
-    /// Something came from it that is no packet.
+    /// It sent something that is not a packet.
     pub(super) fn malformed(&self, why: &dyn core::fmt::Display) {
         let mut state = self.state();
         state.n_malformed += 1;

@@ -22,7 +22,7 @@ pub struct LiveCamera {
     pub controls: BTreeMap<String, i64>,
     /// How packets of an RTSP camera travel.
     pub transport: Option<Transport>,
-    /// True if the times that an RTSP camera tells of its pictures are used, where they can be right.
+    /// True if the times that an RTSP camera gives for its pictures are used, if they are plausible.
     pub has_own_clock: bool,
 }
 
@@ -41,9 +41,9 @@ pub enum LiveError {
         /// As asked for, or as the device is set.
         format: String,
     },
-    /// The stream does not tell its rate.
+    /// The stream does not give its rate.
     #[error(
-        "{address} does not tell how many pictures it has in a second: give it as `frame_rate_hz` of the camera"
+        "{address} does not say how many pictures it has per second: set `frame_rate_hz` of the camera"
     )]
     NoRate {
         /// Without a password.

@@ -7,10 +7,10 @@ const WINDOW_NANOS: u64 = 10_000_000_000;
 /// A change of the offset by which the camera's clock was set, nanoseconds.
 const JUMP_NANOS: u64 = 2_000_000_000;
 
-/// Shortest and longest delay that is believed of the clock of a camera, nanoseconds: nothing arrives before it was taken, and
-/// what comes much later is not waited for.
+/// Shortest and longest plausible delay by the clock of a camera, nanoseconds: no picture arrives before it was taken,
+/// and nothing waits for one that comes much later.
 const DELAYS_NANOS: [i64; 2] = [0, 150_000_000];
-/// By how much a clock that was believed may leave these, so that it is not left for a moment.
+/// Amount by which a trusted clock may leave these limits, nanoseconds, so that a short excursion does not count.
 const SLACK_NANOS: i64 = 5_000_000;
 /// Pictures before the clock of a camera is believed or not.
 const N_FOR_VERDICT: u32 = 30;
@@ -70,10 +70,10 @@ pub(super) enum Verdict {
     Wrong,
 }
 
-/// Judges the clock of a camera that tells when its pictures were taken, by their delays.
+/// Judges the clock of a camera that stamps its pictures, by their delays.
 ///
-/// How far a clock is off cannot be told from how long a picture is under way, if it is off by little; by much, pictures would
-/// come from the future, or so late that nobody waits for them.
+/// A small error of a clock cannot be distinguished from the time that a picture is on its way. With a large error,
+/// pictures would come from the future, or so late that nobody waits for them.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
     least: Least,

@@ -233,7 +233,7 @@ pub(super) struct Stream {
     decoder: LiveStream,
     kept: Option<KeptStream>,
     clock: ClockMap,
-    /// The clock of a camera that tells when its pictures were taken; none if it is not used.
+    /// The clock of a camera that stamps its pictures; `None` if it is not used.
     own_clock: Option<OwnClock>,
     /// Without a password.
     address: String,

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 const N_PICTURES: usize = 15;
 const WINDOW_NANOS: u64 = 60_000_000_000;
 const MOST_MEASUREMENTS: usize = 240;
-/// For how long a camera must have been measured before its drift is told, nanoseconds.
+/// Least time for which a camera must have been measured before its drift is reported, nanoseconds.
 const LEAST_NANOS: u64 = 5_000_000_000;
 
 /// Follows the skew of a camera. Reads no clock.
@@ -80,8 +80,8 @@ impl Phase {
         self.measured.back().map(|measured| measured.1.saturating_sub(self.added))
     }
 
-    /// By how much the camera falls behind the instants, parts per billion: negative for one that is faster. `None` while it was
-    /// measured for too short a time.
+    /// Amount by which the camera falls behind the instants, parts per billion: negative for one that is faster. `None`
+    /// while it was measured for too short a time.
     pub(crate) fn drift_ppb(&self) -> Option<i64> {
         let ends = self.measured.front().zip(self.measured.back())?;
         if ends.1.0.saturating_sub(ends.0.0) < LEAST_NANOS {

@@ -16,7 +16,7 @@ use super::originals::Originals;
 
 /// Pictures that wait at most: an older one makes room for a newer one, so that nothing is ever late by more.
 const N_WAITING: usize = 4;
-/// Pictures from which on a rate is told.
+/// Least number of pictures before a rate is reported.
 const LEAST_FOR_RATE: u64 = 30;
 /// After this long without a picture a decoder is ended that has no limit of its own, or does not keep it.
 const LONGEST_SILENCE: Duration = Duration::from_secs(15);
@@ -294,7 +294,7 @@ impl Keeper {
         overtaken
     }
 
-    /// Says why there are no pictures, and waits before the next attempt.
+    /// Sends why there are no pictures, and waits before the next attempt.
     fn rest(&self, status: Status, pause: Duration) {
         let mut state = self.shared.state();
         state.trouble = Some(status);

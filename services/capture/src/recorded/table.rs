@@ -126,7 +126,9 @@ impl Table {
         table.parts.sort_by_key(|part| (part.connection[0], part.number));
         table.place(heads);
         if table.pictures.is_empty() {
-            return Err(malformed("none is whole and at an instant of the run"));
+            return Err(malformed(
+                "no picture is complete and lies at an instant of the run",
+            ));
         }
         Ok(table)
     }

@@ -37,10 +37,10 @@ SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax-la
 Versions: fmp (every view alone, then triangulation), geometry, appearance (also part types), adaptive \
 (parts of large expected error switched off). They combine pairs of views by their mean, as in the paper. \
 geometry+consensus takes the poses that most views support; geometry+all-views supports each view by all others at \
-once, geometry+all-views-mean by the mean of their terms. Without --versions: all whose inputs are given \
-(tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), pairs and all views.
+once, geometry+all-views-mean by the mean of their terms. Without --versions: all versions whose inputs are given \
+(tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), with pairs and with all views.
 
---network FILE predicts the errors of the same single views as the service does. The report then has its accuracy: \
+--network FILE predicts the errors of the same single views, as the service `quality` does. The report then has its accuracy: \
 area under the ROC and rank correlation, part by part. Its thresholds are used if --paper sets no tau; \
 without any, a tenth of the person's size.
 
@@ -63,8 +63,8 @@ selects cameras. --run RUN judges all people in a finished run of a folder of `p
 triangulation, with cameras left out, and in space over its maps, without and with the bones of a body. \
 --stress adds problems of real rooms. OUT then holds evidence.txt and evidence.json.
 
-Exit codes: 0 done; 2 the command line, 3 a setting is wrong; 4 a sequence or a model; 5 a calibration; \
-7 done, but footage ended before the truth; 130 interrupted.
+Exit codes: 0 done; 2 the command line is wrong; 3 a setting is wrong; 4 a sequence or a model cannot be used; 5 a \
+calibration cannot be used; 7 done, but footage ended before the truth; 130 interrupted.
 
 Examples:
     parallax-lab eval configs/sequences/pose2sim-balancing.toml --model parse.mat --size 272x480 --every 5 --out out/eval
@@ -97,8 +97,8 @@ pub(crate) struct Arguments {
     /// Learned consistency (`train consistency`), instead of that of --paper; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// Network of directions in which people face, for left and right (`train orientation`); "shipped": the one that ships;
-    /// "none": nothing.
+    /// Network that sees in which direction people face, for left and right (`train orientation`); "shipped": the one
+    /// that ships; "none": no network.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     orientation: PathBuf,
     /// Table of expected errors, in the authors' format.

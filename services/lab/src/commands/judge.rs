@@ -36,7 +36,7 @@ is printed.
 With --json one object:
     {\"images\", \"left_out\", \"best\" | \"on_person\":
      {\"missed\", \"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}}
-Percentages, of every stick or joint and in \"total\".
+The values are percentages, of every stick or joint, and of all in \"total\".
 
 \"joints\" has the places of joints among the parts. With --offsets also \"offsets\": for every joint of the best detection on the
 person, found within 0.2 of the person's size, the mean along its bone (positive beyond the mark, seen from the trunk) and
@@ -62,7 +62,7 @@ Examples:
 pub(crate) struct Arguments {
     /// The model file, of 26 parts; or a network that finds keypoints or people (.onnx).
     model: PathBuf,
-    /// The data set: people with 14 joints; of a detector, pictures of `train finder-pictures`.
+    /// The data set: people with 14 joints; for a detector, pictures of `train finder-pictures`.
     dataset: PathBuf,
     /// The people to evaluate, all if not given.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]

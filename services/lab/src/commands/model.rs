@@ -16,8 +16,8 @@ use super::network;
 const NETWORKS: &str = "\
 For a network (.onnx) it prints inputs and outputs and, by its card, their meaning: preparation, codec, keypoints, the resulting \
 joints, licence. For a detector of people it prints the rule for boxes, and with --image the boxes. A network that \
-does not fit its card is refused with the differences, and the exit code is 4. Without a card the nearest of configs/networks and \
-configs/detectors is named. Cards: docs/networks.md.
+does not fit its card is refused with the differences, and the exit code is 4. Without a card it names the nearest \
+card of configs/networks and configs/detectors. Cards: docs/networks.md.
 
 Examples:
     parallax-lab model show person.fmp

@@ -206,7 +206,7 @@ fn ports_in_words(description: &Description) -> Result<(), Failure> {
     ] {
         for it in ports {
             let sides = match &it.sides[..] {
-                [] => "of sides that the file does not tell".to_owned(),
+                [] => "of a shape that the file does not give".to_owned(),
                 sides => written(sides),
             };
             output::line(format_args!("  {what:<6} `{}` {sides}", it.name))?;
@@ -226,7 +226,7 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
     let networks = network::nearest(description);
     let detectors = network::nearest_detectors(description);
     if networks.is_empty() && detectors.is_empty() {
-        output::line("  none of configs/networks and configs/detectors comes near")?;
+        output::line("  no card in configs/networks or configs/detectors comes near")?;
     }
     for (folder, of, nearest) in [
         ("networks", "networks that find keypoints", networks),
@@ -242,7 +242,7 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
             _ => "come equally near",
         };
         output::line(format_args!(
-            "  of the cards of {of} {} {come}, by the sides of input and outputs",
+            "  of the cards of {of} {} {come}, by the shapes of input and outputs",
             files.join(", ")
         ))?;
     }

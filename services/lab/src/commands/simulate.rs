@@ -35,9 +35,9 @@ pub(crate) enum Command {
 /// Options of `parallax-lab simulate hosts`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-This is a model, not a measurement: it multiplies the costs of one frame of one view. Without --report they are those of the machine in the guide.
-With --report they are those of your run, of a minute or more: processor time of every stage, and for a run with hosts bytes
-and codec. Values of single options take precedence.
+This is a model, not a measurement: it multiplies the costs of one frame of one view. Without --report they are those of the machine that the guide measured.
+With --report they are those of your run, of a minute or more: processor time of every stage, and for a run with hosts
+also the bytes and times of the link. Values of single options take precedence.
 
 Examples:
     parallax run my.toml --json > run.json

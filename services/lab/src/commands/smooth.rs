@@ -17,7 +17,7 @@ This compares all methods of `parallax smooth` with the true joints, at the inst
 TRUTH is a sequence for `parallax-lab eval`: a folder of `parallax-lab synth`, or a file like configs/sequences/pose2sim-balancing.toml.
 docs/guide/smooth.md explains.
 
-Exit codes: 0 done; 4 the folder or the truth cannot be read, or the truth is of none of the frames or joints of the run.
+Exit codes: 0 done; 4 the folder or the truth cannot be read, or the truth has none of the frames or joints of the run.
 
 With --json one object:
     {\"compared\", \"methods\": [{\"method\", \"position_mm\", \"velocity_m_s\", \"acceleration_m_s2\", \"jitter_mm\", \"lag_ms\", \
@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let run = finished::read(&arguments.folder, None)?;
     if let [first, _, ..] = &run.people[..] {
         output::message(format_args!(
-            "{} people are in the run, one in the truth: compared is person {}",
+            "the run has {} people, the truth has one: person {} is compared",
             run.people.len(),
             first.ids[0]
         ));

@@ -30,7 +30,7 @@ RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]
 given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
 
 With --motion the subjects move as recorded in a C3D or TRC file: limbs have the recorded directions and the lengths of \
-the subject, and the path is moved to the middle of the room. Joints have no limits. A table (--markers) maps \
+the subject, and the path is moved to the middle of the room. The angles of the joints are not limited. A table (--markers) maps \
 markers to joints. Gaps up to --motion-gap seconds are interpolated. Longer ones are refused, with their frames, and so \
 are impossible motions: implausible lengths of the legs, a head below the feet, knees that bend forward.
 
@@ -89,7 +89,7 @@ pub(crate) struct Arguments {
     /// and visible joints are the subject's alone.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     passers: u64,
-    /// Their actions: names separated by commas, or all.
+    /// Actions of the subjects: names separated by commas, or all.
     #[arg(long, value_name = "LIST", default_value = "walking", value_parser = actions)]
     actions: Actions,
     /// Seed of the motion, the room and the lighting.

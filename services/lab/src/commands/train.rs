@@ -37,8 +37,8 @@ The model knows left and right by the side of the picture, as PARSE is marked. L
 LSP-extended mark people seen from behind by their own sides; --sides LSP=seen \
 corrects that.
 
-Rows of a data set count from 1. With several data sets, --only, --without, --rotate and --sides name \
-one of them, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
+Rows of a data set count from 1. With several data sets, --only, --without, --rotate and --sides name one of them, as \
+written on the command line: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
 a file with a row, a range of rows or the file name of an image on each line; all of these must exist.
 
 The training is a list of steps. After each one its state is in OUT.checkpoint. After Ctrl-C or a kill, \
@@ -46,13 +46,13 @@ The training is a list of steps. After each one its state is in OUT.checkpoint. 
 ends with the same model, bit for bit, on any number of threads.
 
 Kinds of bad labels, for --fatal: syntax, count, unknown, not-finite, zero-size, image, outside, \
-twice, same-name. People with others are reported with file and row, and left out.
+twice, same-name. People with faults of other kinds are reported with file and row, and left out.
 
 With --json, one object a line on standard output, nothing else:
     {\"event\": \"left-out\" | \"unreadable\" | \"data\" | \"resumed\" | \"step\" | \"summary\", ...}
 
 Exit codes: 0 the model is written; 2 the command line is wrong, or an interrupted training is in \
-the way; 3 a setting is wrong; 4 a data set, a fatal label, a checkpoint; 130 stopped by Ctrl-C.
+the way; 3 a setting is wrong; 4 a data set or the checkpoint cannot be used, or a label is wrong in a way that --fatal names; 130 stopped by Ctrl-C.
 
 Examples:
     parallax-lab train fmp PARSE --only 1-100 --rotate -15,-7.5,7.5,15 \\

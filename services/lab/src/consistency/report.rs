@@ -54,7 +54,8 @@ fn text(out: &Path, done: &Done) -> String {
         done.seconds
     )];
     lines.push(
-        "bins of half the circle, and what tables of so many know of people held out:".to_owned(),
+        "bins of half the circle, and the score of tables with that many on people held out:"
+            .to_owned(),
     );
     for (n, lift) in &done.bins {
         let lift = lift.map_or_else(|| "-".to_owned(), |lift| format!("{lift:.4}"));

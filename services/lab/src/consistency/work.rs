@@ -51,7 +51,7 @@ pub struct Learning<'a> {
 pub struct Done {
     /// Content of the file.
     pub learned: Learned,
-    /// Number of bins, and what so many know of the types of people held out.
+    /// Number of bins, and the score of tables with that many bins on the types of people held out.
     pub bins: Vec<(usize, Option<f64>)>,
     /// Ridge, and root mean square error of joints of people held out; without a map the first one.
     pub joints: Vec<(Option<f64>, f64)>,

@@ -73,7 +73,7 @@ pub struct EvidenceRow {
     pub limbs_mm: f64,
     /// Its interval.
     pub limbs_mm_interval: [f64; 2],
-    /// By how much the last method of the table finds more, per cent, and the interval over the same frames.
+    /// Amount by which the last method of the table finds more, per cent, and the interval over the same frames.
     pub last_finds_more: [f64; 3],
     /// By how many millimetres it errs less, and the interval.
     pub last_errs_less_mm: [f64; 3],

@@ -72,7 +72,7 @@ pub struct Done {
 }
 
 impl Job<'_> {
-    /// Solves all sequences, until it is told to stop, on rayon's current pool.
+    /// Solves all sequences, until it is asked to stop, on rayon's current pool.
     ///
     /// # Errors
     ///

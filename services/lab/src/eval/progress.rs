@@ -7,7 +7,7 @@ use failure::Console;
 /// How long a line of progress lasts where there is no bar.
 const EVERY: Duration = Duration::from_secs(10);
 
-/// Tells a console how far the run is: its bar, or a message now and then where there is none.
+/// Shows on a console how far the run is: by a bar, or by a message now and then if there is no bar.
 pub(super) struct Progress<'a> {
     console: &'a dyn Console,
     begin: Instant,

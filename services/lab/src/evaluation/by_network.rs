@@ -70,7 +70,7 @@ impl NetworkView {
         }
     }
 
-    /// The view with what the network tells of the direction in which the person faces.
+    /// The view with the direction in which the person faces, as the network gives it.
     #[must_use]
     pub fn with_front(self, front: Option<FrontEvidence>) -> Self {
         Self { front, ..self }

@@ -58,7 +58,7 @@ pub fn pictures_latex(sets: &[Pictures], bootstrap: &Bootstrap) -> String {
     out
 }
 
-/// A number with so many digits after the point, or a dash.
+/// A number with `digits` digits after the point, or a dash.
 pub fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
 }

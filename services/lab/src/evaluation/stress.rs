@@ -10,13 +10,13 @@ use geometry::Camera;
 pub enum Stress {
     /// Nothing.
     Clean,
-    /// In so many views half of the person is covered by grey: the left, right, upper or lower half in turn.
+    /// In this many views half of the person is covered by grey: the left, right, upper or lower half in turn.
     Covered(usize),
-    /// Only so many views are there, others from frame to frame.
+    /// Only this many views exist, others from frame to frame.
     Views(usize),
-    /// One camera was turned by so many degrees about its vertical axis since it was calibrated.
+    /// One camera was turned by this many degrees about its vertical axis since it was calibrated.
     Turned(f64),
-    /// One view looks at somebody else: the same person, half a height beside.
+    /// One view looks at another person: the same person, half a height beside.
     Bystander,
     /// One view names left and right the wrong way.
     Exchanged,

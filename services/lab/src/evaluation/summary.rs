@@ -195,7 +195,7 @@ fn correct(frame: &FrameScore) -> Share {
     Share::of(judged.map(|judged| percent(*judged <= GAMMA)))
 }
 
-/// The gain of a frame over another, percent.
+/// The gain of one version over another in a frame, percent.
 fn gain(own: &FrameScore, first: &FrameScore) -> Share {
     let (own, first) = (correct(own), correct(first));
     Share {

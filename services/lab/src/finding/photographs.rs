@@ -1,4 +1,4 @@
-//! Photographs: of marked people, whom a teacher adds everybody else to, and of nobody.
+//! Photographs of marked people, to whom a teacher adds everybody else, and photographs without people.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -28,7 +28,7 @@ struct Photograph {
     marked: Option<Vec<[f64; 4]>>,
 }
 
-/// The photographs of every data set, then those of nobody.
+/// The photographs of every data set, then those without people.
 pub(super) fn pictures(
     sources: &Sources,
     go_on: &(dyn Fn() -> Result<(), Failure> + Sync),

@@ -3,7 +3,7 @@
 use kernels::Rgb8View;
 use training::networks::finder::{Around, Picture, SIDE};
 
-/// A box around somebody, pixels, and whether that person should be found.
+/// A box around a person, pixels, and whether that person should be found.
 pub(super) type Box4 = ([f64; 4], bool);
 
 /// A picture with its boxes, reduced until its longer side is at most [`SIDE`]: every pixel is the mean of those that it covers.

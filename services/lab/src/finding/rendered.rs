@@ -7,7 +7,7 @@ use super::around_joints;
 use super::reduced::reduced;
 use crate::scenes::{Scenes, Shown, of_pictures};
 
-/// Share of a box that shows its person, below which the person is hidden: of whom nothing is hidden it is about a third.
+/// Share of a box that shows its person, below which the person is hidden; it is about a third if nothing is hidden.
 const HIDDEN: f64 = 0.08;
 
 /// The pictures of all scenes, with the numbers of the subjects.

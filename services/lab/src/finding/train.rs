@@ -84,7 +84,7 @@ fn drawn(passes: &[Pass]) -> String {
     curves::svg(&panels, None)
 }
 
-/// Says how a pass ended.
+/// Returns a line about the end of a pass.
 fn words(pass: &Pass) -> String {
     let learnt = format!("heat {:.3}, sides {:.3}", pass.cost.heat, pass.cost.sides);
     let Some(score) = pass.score else {

@@ -77,7 +77,7 @@ impl Data {
     ///
     /// # Errors
     ///
-    /// A data set or a selection cannot be read, somebody has a fault that was called fatal, or nobody
+    /// A data set or a selection cannot be read, a person has a fault that was called fatal, or nobody
     /// or no image without people is left.
     pub(super) fn read(
         arguments: &Chosen,
@@ -117,7 +117,7 @@ impl Data {
         Ok(data)
     }
 
-    /// Decodes every image once, to know that it can be.
+    /// Decodes every image once, to check that this is possible.
     fn negatives(&mut self, folders: &[PathBuf], progress: &Progress) -> Result<(), Failure> {
         let images = in_folders(folders)?;
         let read: Vec<_> = images.par_iter().map(|image| Picture::read(image).err()).collect();
@@ -142,7 +142,10 @@ impl Data {
 /// All images of folders, by name.
 pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     if let Some(folder) = folders.iter().find(|folder| !folder.is_dir()) {
-        let message = format!("{}: no folder of images without people", folder.display());
+        let message = format!(
+            "{}: not a folder of images without people",
+            folder.display()
+        );
         return Err(Failure::new(ExitKind::Input, message));
     }
     images::listed(folders)

@@ -13,7 +13,7 @@ pub(super) enum Whose<'a> {
     One(usize, &'a str),
 }
 
-/// Tells whom a value is for: `DATASET=VALUE` with the data set as it was written, else all of them.
+/// Finds the data set that a value is for: `DATASET=VALUE` with the data set as it was written, else all of them.
 ///
 /// The longer one is meant where one data set begins with the other and `=`.
 pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use training::datasets::Problem;
 use training::{Event, Gap, Step, Watch};
 
-/// Tells a console what is being done, and how long it will take.
+/// Shows on a console what is being done, and how long it will take.
 #[derive(Debug)]
 pub struct Progress {
     console: Box<dyn Console>,
@@ -56,7 +56,7 @@ impl Progress {
         }
     }
 
-    /// Tells of a person who was left out.
+    /// Reports a person who was left out.
     pub(super) fn left_out(&self, problem: &Problem) -> Result<(), Failure> {
         self.console.message(&format!(
             "left out: {}",
@@ -71,7 +71,7 @@ impl Progress {
         }))
     }
 
-    /// Tells of an image without people that cannot be read.
+    /// Reports an image without people that cannot be read.
     pub(super) fn unreadable(
         &self,
         image: &Path,
@@ -83,7 +83,7 @@ impl Progress {
             .event(&json!({ "event": "unreadable", "file": image, "message": message }))
     }
 
-    /// Tells what is trained on.
+    /// Reports the data of the training.
     pub(super) fn data(&self, text: &str, mut event: Value) -> Result<(), Failure> {
         self.console.message(text);
         event["event"] = "data".into();
@@ -95,7 +95,7 @@ impl Progress {
         self.console.begin(&format!("going on after step {n_done}"), "");
     }
 
-    /// Tells that a training goes on.
+    /// Reports that a training continues.
     pub(super) fn resumed(&self, n_done: usize, n_steps: usize) -> Result<(), Failure> {
         self.console.message(&format!("going on after step {n_done} of {n_steps}"));
         self.console
@@ -139,7 +139,7 @@ impl Progress {
         self.console.advance(1);
     }
 
-    /// A failure if somebody stopped it.
+    /// A failure if the user stopped it.
     pub(super) fn go_on_or_stop(&self) -> Result<(), Failure> {
         if self.go_on() {
             Ok(())

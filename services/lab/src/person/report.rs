@@ -141,7 +141,7 @@ impl Report {
         if let Some(n_lost) = self.n_lost {
             writeln!(
                 text,
-                "  lost        {n_lost} images, on no level of which the model fits"
+                "  lost        {n_lost} images: the model fits on no level of them"
             )?;
         }
         writeln!(

@@ -51,8 +51,8 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// There is no place for the model, another training is writing it, or there is a checkpoint that is not
-    /// to be gone on from.
+    /// There is no place for the model, another training is writing it, or there is a checkpoint that the training does
+    /// not continue from.
     pub fn new(out: &Path, resume: bool) -> Result<Self, Failure> {
         let wrong = |what: &str| {
             let message = format!("--out {}: {what}", out.display());

@@ -60,7 +60,7 @@ impl Crop {
         1.0 / self.step
     }
 
-    /// The picture in it, red first: means of so many points that no pixel of the picture is passed over.
+    /// The picture in it, red first: means of enough points that no pixel of the picture is skipped.
     pub(super) fn rgb(&self, picture: Rgb8View<'_>) -> Vec<u8> {
         let n = (self.step.ceil() as usize).clamp(1, 8);
         let mut rgb = Vec::with_capacity(3 * SIDE * SIDE);

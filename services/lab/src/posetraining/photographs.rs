@@ -16,7 +16,7 @@ use crate::failures::dataset_failure;
 use crate::orientation::facing;
 use crate::person::{deal, read_options, sides_of};
 
-/// Pairs that tell who is seen from behind: hips and shoulders, the right one first.
+/// Pairs that show who is seen from behind: hips and shoulders, the right one first.
 const PAIRS: [[usize; 2]; 2] = [[2, 3], [8, 9]];
 const NECK: usize = 12;
 /// Shortest trunk, pixels of the square picture.
@@ -69,8 +69,8 @@ pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Per
 
 /// The people who can be used, with their places.
 ///
-/// Threads of our own: one of rayon that waited for a network, whose threads are rayon's as well, would begin with somebody else
-/// meanwhile, and so on, until its stack is full.
+/// Threads of our own: one of rayon that waited for a network, whose threads are rayon's as well, would begin with
+/// another person meanwhile, and so on, until its stack is full.
 fn of_all(
     people: &[Annotated],
     (sides, teachers): (Sides, &[Vec<PoseNetwork>]),
@@ -187,8 +187,8 @@ fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
     })
 }
 
-/// The direction in which somebody faces, by marks in the upright picture; 0 where the hips and shoulders say something else than how
-/// wide they are.
+/// The direction in which a person faces, by marks in the upright picture; 0 where the hips and shoulders say something
+/// else than how wide they are.
 fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
     let marked = |joint: usize| marks.marked[joint].map(f64::from);
     let joints: [[f64; 2]; N_JOINTS] = core::array::from_fn(marked);
@@ -200,7 +200,7 @@ fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
     }
 }
 
-/// A direction by an upright trunk, in the picture where the trunk leans.
+/// Turns a direction relative to an upright trunk into one in the picture, in which the trunk leans.
 fn in_picture([aside, towards]: [f32; 2], lean: f32) -> [f32; 3] {
     let aside = if aside.is_finite() { aside } else { 0.0 };
     let towards = if towards.is_finite() { towards } else { 0.0 };

@@ -27,7 +27,7 @@ pub(super) enum NoSample {
     #[error("the model is not one of 26 parts")]
     Model,
     /// The evidence cannot be written.
-    #[error("the search does not fit a network")]
+    #[error("the results of the search do not fit a network of expected errors")]
     Evidence(#[from] EvidenceError),
 }
 

@@ -15,7 +15,7 @@ use super::judge::{FOUND_M, Put, Score};
 use super::report::{ActorReport, measured, of_actor};
 use super::shelf::{N_TRUE, TruePerson};
 
-/// A person who was put out is right at these mean distances of the joints, millimetres; as `VoxelPose` judges Panoptic.
+/// A person in the output is right at these mean distances of the joints, millimetres; as `VoxelPose` judges Panoptic.
 const RIGHT_MM: [u32; 6] = [25, 50, 75, 100, 125, 150];
 
 /// The score of a run.
@@ -30,7 +30,7 @@ pub struct Everybody {
     /// Average precision, percent, by the distance at which a person is right, millimetres. People are ordered by the deviations that the
     /// run states.
     pub ap: BTreeMap<u32, f64>,
-    /// Share of the people who were put out within half a metre, percent.
+    /// Share of the people for whom the output has a person within half a metre, percent.
     pub recall: f64,
     /// How often an id changed, and that in a minute.
     pub switches: usize,
@@ -38,13 +38,13 @@ pub struct Everybody {
     pub switches_a_minute: f64,
     /// Number of ids that were given.
     pub ids: usize,
-    /// People put out in each frame, mean; and people who were there.
+    /// Mean number of people in the output of a frame, and of people who were there.
     pub put_out: f64,
     /// See [`put_out`](Self::put_out).
     pub there: f64,
 }
 
-/// A person who was put out.
+/// A person in the output.
 struct Candidate {
     frame: usize,
     /// Mean of the stated deviations, metres.
@@ -157,7 +157,7 @@ fn joints(person: &PersonLine) -> Joints {
     })
 }
 
-/// Mean of the deviations that a run states, metres; infinite of nobody.
+/// Mean of the deviations that a run states, metres; infinite if there is no person.
 fn deviation(person: &PersonLine) -> f64 {
     let placed = person.joints.values().filter_map(|joint| joint.placed());
     let (mut sum, mut n) = (0.0, 0.0);

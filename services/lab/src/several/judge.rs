@@ -28,7 +28,7 @@ const EARS: f64 = 1.0 / 1.8;
 /// The average is over the first three actors.
 pub(super) const ACTORS: usize = 3;
 
-/// A person as it was put out.
+/// A person in the output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Put {
     /// Identity.
@@ -99,14 +99,14 @@ pub struct Score {
     pub actors: BTreeMap<usize, Actor>,
     /// Parts that are right, frame by frame.
     pub frames: Vec<Vec<PartsOfFrame>>,
-    /// All ids that were put out.
+    /// All ids in the output.
     pub ids: BTreeSet<u64>,
-    /// People put out, in all frames together.
+    /// People in the output, in all frames together.
     pub n_put: usize,
 }
 
 impl Score {
-    /// Adds a frame: for every person who was there the nearest one that was put out, the closest pairs first.
+    /// Adds a frame: for every person who was there the nearest one in the output, the closest pairs first.
     pub fn add(&mut self, truth: &[TruePerson], put: &[Put]) {
         self.ids.extend(put.iter().map(|person| person.id));
         self.n_put += put.len();

@@ -55,7 +55,7 @@ pub struct Report {
     pub switches: usize,
     /// Number of ids that were given.
     pub ids: usize,
-    /// People put out in each frame, mean.
+    /// Mean number of people in the output of a frame.
     pub put_out: f64,
     /// Time of the association alone, milliseconds a frame: median and 99th percentile.
     pub association_ms: [f64; 2],

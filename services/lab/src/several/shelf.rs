@@ -27,9 +27,9 @@ const FIELDS: [[usize; 26]; 2] = [
 ];
 /// Most candidates of a keypoint, and people of a frame.
 const MOST: usize = 1000;
-/// A person has so many keypoints at least.
+/// Least number of keypoints of a person.
 const LEAST_KEYPOINTS: usize = 5;
-/// Keypoints of less confidence are none.
+/// Keypoints of less confidence do not count.
 const LEAST_CONFIDENCE: f64 = 0.05;
 /// Standard deviation of a keypoint of full confidence, as a share of the size of the picture of the person; of a lower confidence, more.
 const SD_SHARE: f64 = 0.02;
@@ -58,7 +58,7 @@ pub enum ShelfError {
     Number {
         /// The file.
         path: PathBuf,
-        /// Which number of the file, from 1.
+        /// Position of the number in the file, from 1.
         number: usize,
         /// A description of what it should be.
         expected: &'static str,
@@ -74,7 +74,7 @@ pub struct TruePerson {
     pub joints: [Point3<f64>; N_TRUE],
 }
 
-/// Says if a folder has this layout.
+/// Returns true if a folder has this layout.
 pub fn is_one(folder: &Path) -> bool {
     ["calibration.json", "gt.txt", "detection/0.txt"]
         .iter()

@@ -15,7 +15,7 @@ pub(super) struct People(Vec<(Person, String, bool)>);
 const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
 
 impl People {
-    /// Adds somebody.
+    /// Adds a person.
     pub(super) fn add(&mut self, person: Person, name: String, is_from_behind: bool) {
         self.0.push((person, name, is_from_behind));
     }
@@ -24,7 +24,7 @@ impl People {
         self.0.len()
     }
 
-    /// Adds those of a sequence in a folder of that name.
+    /// Adds the people of a sequence that lies in a folder of that name.
     pub(super) fn append(&mut self, folder: &str, others: Self) {
         self.0.extend(others.0.into_iter().map(|(mut person, name, behind)| {
             person.image = Path::new(folder).join(&person.image);

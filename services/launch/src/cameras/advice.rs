@@ -29,7 +29,7 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
             | FootageError::BadRate { .. }
             | FootageError::StartBeyondEnd { .. },
         ) => format!(
-            "`capture.start_frame`, `frame_step`, `n_frames` and `frame_rate_hz` say which frames are used; this is of {camera}"
+            "`capture.start_frame`, `frame_step`, `n_frames` and `frame_rate_hz` say which frames are used; this concerns {camera}"
         ),
         FeedError::Footage(FootageError::FfmpegMissing { .. }) => format!(
             "this is for the `source` of {camera}; ffmpeg and ffprobe come in one package, and both are needed; folders of pictures \

@@ -146,8 +146,8 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     if info.is_interlaced {
         let file = failure::wording::shell(&camera.source);
         tracing::warn!(
-            "camera {:?}: {} is interlaced: every picture is two halves of different moments, so that whoever moves has combs for \
-             edges; `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` makes whole pictures of them",
+            "camera {:?}: {} is interlaced: every picture consists of two halves from different moments, so that \
+             people who move have edges like combs; `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` makes whole pictures of them",
             camera.name,
             camera.source
         );

@@ -86,7 +86,7 @@ impl Origin {
             gathering = lines(source, given.lines, views, &mut flaws)?;
         } else if given.lines == Lines::Smooth {
             let message = format!(
-                "{} is no folder: recordings hold what was measured",
+                "{} is not a folder: recordings hold only what was measured",
                 source.display()
             );
             return Err(Failure::new(ExitKind::Usage, message));
@@ -175,12 +175,14 @@ fn of_times(trial: &Trial, n_lines: usize) -> Vec<String> {
     let mut flaws = Vec::new();
     if trial.n_repeated > 0 {
         let n = trial.n_repeated;
-        flaws.push(format!("{n} of {n_lines} lines are about a frame that an earlier line is about, and are left out"));
+        flaws.push(format!(
+            "{n} of {n_lines} lines repeat the frame of an earlier line, and are left out"
+        ));
     }
     if trial.n_irregular > 0 {
         let n = trial.n_irregular;
         flaws.push(format!(
-            "the times of {n} frames are a quarter of the frame interval or more off the frame rate"
+            "the times of {n} frames are off the grid of the frame rate by a quarter of an interval or more"
         ));
     }
     flaws

@@ -34,7 +34,7 @@ pub(super) fn openpose(
     }
     placed?;
     let mut notes = vec![
-        "BODY_25 without what no joint is (nose, eyes, ears, toes, heels, unless a network names them)".to_owned(),
+        "BODY_25 without the points that no joint gives (nose, eyes, ears, toes, heels, unless a network names them)".to_owned(),
         "the confidence is the share of the views that a joint was triangulated from; `pose_keypoints_sd_px` beside it is its \
          standard deviation in the picture"
             .to_owned(),

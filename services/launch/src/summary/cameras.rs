@@ -135,8 +135,8 @@ fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {
         String::new()
     };
     Some(format!(
-        "  clock         the times of {} are those of capture, the times of {} those of arrival: later by how long a picture is under \
-         way{remedy}\n",
+        "  clock         the times of {} are those of capture, the times of {} those of arrival: later by the time \
+         that a picture is on its way{remedy}\n",
         told.join(", "),
         late.join(", "),
     ))

@@ -1,7 +1,7 @@
 //! The vertical by keypoints of files: people have their heads above their ankles.
 //!
-//! In a picture the head and the ankles of a person span a plane with the camera, and the vertical lies in it: whoever leans, leans one way
-//! in one picture and another way in the next. No person has to be known in two pictures.
+//! In a picture the head and the ankles of a person span a plane with the camera, and the vertical lies in it: a person
+//! who leans does so one way in one picture and another way in the next. No person has to be known in two pictures.
 
 use ::keypoints::Keypoint;
 use deployment::Deployment;
@@ -96,7 +96,7 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     }
     let up = snapped(up);
     let why = format!(
-        "the calibration does not say which way is up; taken is up = {}: there {:.0} % of {} people in the keypoints have their heads above \
+        "the calibration does not say which way is up; up = {} is used: there {:.0} % of {} people in the keypoints have their heads above \
          their ankles, and half of them lean by less than {lean:.0} degrees; give `up` in the deployment if it is wrong",
         text(&up),
         100.0 * share,

@@ -8,7 +8,7 @@ use calibration::board::Sight;
 use failure::{ExitKind, Failure};
 use nalgebra::Point2;
 
-/// The largest number of a corner that is believed.
+/// The largest number of a corner that is accepted.
 const MOST_CORNERS: usize = 100_000;
 
 /// Sights by camera, and the points of the board.
@@ -73,7 +73,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         let (frame, id) = (whole(0)?, whole(2)?);
         if id >= MOST_CORNERS {
             return Err(format!(
-                "row {}: corner {id} is no number of a corner",
+                "row {}: {id} is not the number of a corner",
                 nth + 2
             ));
         }

@@ -67,7 +67,7 @@ fn table(text: &str) -> Result<FrameTable, String> {
     Ok(FrameTable { frames })
 }
 
-/// The frame of a picture where no table tells: its time in steps of the slowest camera's rate if rates differ, else its number.
+/// The frame of a picture without a table: its time in steps of the slowest camera's rate if rates differ, else its number.
 pub(crate) fn by_clock(index: u64, time_s: Option<f64>, slowest_hz: Option<f64>) -> usize {
     match (time_s, slowest_hz) {
         (Some(time_s), Some(rate_hz)) => (time_s * rate_hz).round().max(0.0) as usize,

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::frames::{beside, by_clock, slowest};
 use super::{CameraFootage, FrameTable, Looked, Seen, footage_failure};
 
-/// Pictures in which the board was read in one way before it is believed of the camera.
+/// Number of pictures in which the board must be read in one way before this is assumed of the camera.
 const SURE: usize = 3;
 
 /// How footage is looked at.
@@ -112,7 +112,7 @@ pub fn look(
     Ok(agreed(&finder, raw))
 }
 
-/// Which pictures belong together, if a table tells.
+/// Pictures that belong together, if a table says so.
 fn frame_table(
     cameras: &[CameraFootage],
     settings: &LookSettings,

@@ -57,9 +57,9 @@ pub enum Back {
 
 /// Origin of mirrored codes.
 enum Mirrored {
-    /// There are none, or it is said, or a camera saw both sides.
+    /// No mirrored codes were seen, or the option says it, or a camera saw both sides.
     Known,
-    /// A board with two sides, or the pictures of these cameras: the adjustment tells.
+    /// A board with two sides, or the pictures of these cameras: the adjustment decides.
     Asked(Vec<usize>),
 }
 
@@ -129,8 +129,8 @@ pub fn calibrate(
     if let Some(it) = outcome.out_of_step {
         notes.push(format!(
             "boards fit each camera alone to {:.2} px, all together to {:.2} px with focal lengths changed by up to {:.1} %: the pictures of a frame \
-             were not taken at the same time. What each camera saw alone tells its lens, and the frames in which the board moves least tell where \
-             cameras stand",
+             were not taken at the same time. The lens of each camera follows from its own pictures, and the places of \
+             the cameras from the frames in which the board moves least",
             it.alone_px,
             it.together_px,
             100.0 * it.bent
@@ -267,7 +267,7 @@ fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
         "{which} saw the codes of the board mirrored: its back has the mirror image of the front, or the pictures are mirrored"
     );
     let more = if is_all {
-        "; or --mirrored, which calibrates footage as it is that is mirrored in all recordings"
+        "; or pass --mirrored, which calibrates mirrored footage as it is, if all recordings are mirrored"
     } else {
         ""
     };
@@ -375,10 +375,10 @@ fn reasons(looked: &Looked) -> String {
             "a chessboard of {columns}x{rows} inner corners is there: inner corners are counted, not squares"
         ),
         Some(Nothing::Elsewhere { n_markers }) => format!(
-            "markers are there (up to {n_markers} in a picture), not where this board has them: are its counts and dictionary right?"
+            "markers are there (up to {n_markers} in a picture), but not where this board has them: are its counts and dictionary right?"
         ),
         Some(Nothing::NoCorners) => {
-            "the board is there, its corners are not sharp: move it slower, with more light".to_owned()
+            "the board is there, but its corners are not sharp: move it more slowly, with more light".to_owned()
         }
         _ => "is it the right kind of board, and large enough in the pictures (squares of 15 px and more)?".to_owned(),
     }

@@ -37,7 +37,7 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Convert a calibration into a rig file, or another program's.
+    /// Convert a calibration into a rig file, or into another program's format.
     #[command(after_help = "\
 Examples:
     parallax calib convert Calib.qca.txt --out rig.toml
@@ -50,7 +50,7 @@ Examples:
         /// The file to write; for `humaneva` and `umpm` a folder that exists.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
-        /// Its format.
+        /// Format of the file to write.
         #[arg(long, value_enum, default_value_t = To::Rig)]
         to: To,
     },

@@ -20,16 +20,16 @@ for, except two that the process may have held; no other process failed; the run
 shared memory.
 
 hang-...: a stopped process is noticed within three heartbeats (450 ms, or \
-supervise.missed_beats of the deployment) plus a second, and may be away longer by that limit.
+supervise.missed_beats of the deployment) plus a second; the time of the heartbeats is added to --max-return-ms.
 
-spin-...: a process in an endless loop sends heartbeats but makes no progress. With realtime delivery it is noticed once an iteration has taken as \
-much processor time as that limit, and three times that of any frame before; with lossless delivery, once its main loop \
+spin-...: a process in an endless loop sends heartbeats but makes no progress. With realtime delivery it is noticed once an iteration has \
+taken as much processor time as that limit, and three times as much as any frame before; with lossless delivery, once its main loop \
 has made no progress for three seconds, which the scenario sets (supervise.hang_limit_s).
 
 kill-random: every killed \
-process comes back (--max-return-ms for 99 of 100). In a long run (nine samples, a second apart, at which all \
-processes worked), memory (at equal ages of the processes), descriptors and files at the end exceed those at the start by \
-at most a tenth, 32 MB and 8 files. A run longer than --part-seconds is also reported in parts.
+process comes back (--max-return-ms for 99 of 100). In a long run (one with nine samples, a second apart, at which all \
+processes worked), memory may grow from start to end by a tenth and 32 MB, compared at equal ages of the processes; \
+descriptors and files may grow by a tenth and 8. A run longer than --part-seconds is also reported in parts.
 
 kill-supervisor: its processes end \
 within a second, and the next start of the same deployment removes the leftovers, and works.
@@ -77,7 +77,7 @@ pub(crate) struct Arguments {
     /// Seed of the choice of processes and cameras, and of the synthetic scene.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Length of the footage of every run, seconds; starting takes some of it on a busy machine.
+    /// Length of the footage of every run, seconds; on a busy machine the start uses up some of it.
     #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u32).range(4..=36_000))]
     seconds: u32,
     /// Length of the parts in which a run of kill-random is reported, seconds.

@@ -18,7 +18,7 @@ real time. A measurement of about two seconds chooses the frame rate: frames are
 cores, beside any other load. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
 or busy machine is reported with numbers. Below 2.5 frames a second every frame is searched for the person, which takes \
 longer. Every stage and camera is a separate process, as in `parallax run`. After two \
-fifths of the frames, the process of camera c3 is killed (SIGKILL), like a crash: the other three go on, the \
+fifths of the frames, the process of camera c3 is killed (SIGKILL), as in a crash: the other three go on, the \
 supervisor restarts it, and it continues with the current frame.
 
 OUT holds report.html (open it in a browser: the skeleton in space, beside the truth; the views of every \

@@ -26,7 +26,7 @@ const SIZE: usize = 1280;
 /// Default of `--overlap`.
 const OVERLAP: f64 = 0.1;
 
-/// The default detection threshold of the shipped model where its parts are told, chosen by measurement; see [`Arguments`].
+/// The default detection threshold of the shipped model if its parts are printed, chosen by measurement; see [`Arguments`].
 const SHIPPED_THRESHOLD: f64 = -0.5;
 
 /// The least heat where the detector that ships finds boxes.
@@ -43,7 +43,7 @@ The detector that ships finds boxes, at most --max, and the network that ships f
 People with less heat than --heat (mean over the joints) are left out. \
 Each person is printed once, in order of heat. --network and --detector name your own (docs/networks.md); --box gives the box.
 
-The detector that ships did not learn people who are lower than an eighth of the picture: cut the picture, or give --box.
+The detector that ships did not learn people who are less than an eighth of the picture high: crop the picture, or give --box.
 
 With --network none, and with --model, --joints or --joint-map, the parts of the filters are printed. A picture with a \
 side longer than --size is then reduced to that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
@@ -57,7 +57,7 @@ With --json one line per image, best detection first:
 and by the filters alone
     {\"image\", \"frame\", \"width\", \"height\", \"searched\": [width, height], \"detections\": [{\"score\", \"level\", \"scale\",
      \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
-Pixels of the whole image as it is seen, the centre of its top-left pixel is (0, 0); types and levels count from 1.
+Coordinates are pixels of the whole image, turned as its tag says; the centre of its top-left pixel is (0, 0). Types and levels count from 1.
 
 Examples:
     parallax detect photo.jpg
@@ -119,7 +119,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     joint_map: Option<PathBuf>,
     /// Find keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
-    /// ships, unless --model, --joints or --joint-map is.
+    /// ships, unless --model, --joints or --joint-map is given.
     #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,
     /// The card of the network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
@@ -146,7 +146,7 @@ impl Arguments {
     ///
     /// An option of the one, where the other does it.
     fn network(&self) -> Result<Option<&Path>, Failure> {
-        /// So many of the options also say that the filters find the parts.
+        /// Number of the options, from the first, that also choose the filters.
         const N_IMPLY: usize = 3;
         let of_filters = [
             (self.joints.is_some(), "--joints"),

@@ -24,7 +24,7 @@ Formats, their use and content:
     bvh        animation             bones of fixed length (medians), cm, y up; in a gap the last rotation stays
     csv        tables                a row for each frame, m, axes of the rig; standard deviations
     csv-long   tables                a row for each joint of each frame: covariance, views, the reason for a gap
-    parquet    tables                the same, for builds with `--features parquet`
+    parquet    tables                the same; needs a build with `--features parquet`
     openpose   other pipelines       BODY_25 of the reprojected pose: a JSON file for each view and frame
     mp4        video players         every camera's pictures with the pose and its uncertainty; needs ffmpeg
     all        all of these
@@ -33,7 +33,7 @@ With --from raw nothing is filled or smoothed: a joint that was not found or was
 holds a bone. Frames are on the grid of the frame rate; dropped frames are gaps. NAME.export.json describes the \
 files, with the gaps of every joint. Files get their names when they are complete.
 
-For several people every format of one file has a file for each: NAME-person2.trc for the person with id 2. Keypoints and videos \
+For several people every format that writes one file writes one for each person: NAME-person2.trc for the person with id 2. Keypoints and videos \
 hold all people. If no frame has two people, the files hold the followed person, and `ids` says who.
 
 With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"first_frame\", \
@@ -53,7 +53,7 @@ Examples:
 pub(crate) struct Arguments {
     /// The folder that a run has written, or a recording (MCAP).
     source: PathBuf,
-    /// The formats, separated by commas; or all.
+    /// The formats, separated by commas, or `all`.
     #[arg(long, value_name = "LIST", value_parser = formats)]
     to: Formats,
     /// Trajectories of the run: as found, or as smoothed by `parallax smooth`.
@@ -192,7 +192,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// Where files go that are not told.
+/// Folder of the files if `--out` is not given.
 fn beside(source: &Path) -> PathBuf {
     if source.is_dir() {
         return source.join("export");
@@ -207,7 +207,7 @@ fn found(trials: &[Trial]) -> String {
         let found = format!("{} of them have joints", only.n_with_points());
         return match &only.ids[..] {
             [_] => found,
-            ids => format!("{found}, of who was followed one after the other: people {ids:?}"),
+            ids => format!("{found}, of the people who were followed one after the other: {ids:?}"),
         };
     }
     let one = |trial: &Trial| format!("person {} in {}", trial.id(), trial.n_with_points());

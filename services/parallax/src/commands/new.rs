@@ -16,8 +16,8 @@ use crate::commands::calibrate::height;
 /// Options of `parallax new`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every step is a command, which is printed before it runs. Files of finished steps are kept, so that `new` continues
-where it ended. A step that fails ends it, with its exit code; an answer with doubts (7) also ends it, unless --go-on is given.
+Every step is a command, which is printed before it runs. Files of finished steps are kept, so that `new`, started
+again, continues after them. A step that fails ends it, with its exit code; an answer with doubts (7) also ends it, unless --go-on is given.
 
     1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
     2  the floor: --floor puts the rig on it (`parallax calibrate origin`)

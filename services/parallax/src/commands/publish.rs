@@ -13,7 +13,7 @@ use terminal::{Globals, output};
 #[command(after_help = "\
 Reads the deployment like any other program: no process of the deployment waits for this command, which may come and go at any time. Every person of
 a frame is one datagram of at most 1400 bytes, JSON on one line, or OSC bundles. A joint without a position is sent with the reason,
-never as zeros. Datagrams that nobody receives are lost. docs/guide/programs.md describes both forms.
+never as zeros. Datagrams that nobody receives are lost. docs/guide/programs.md describes both formats.
 
 Examples:
     parallax publish demo udp://127.0.0.1:9000

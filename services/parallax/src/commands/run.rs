@@ -19,7 +19,7 @@ A second Ctrl-C, half a second or more after the first, ends the run at once. Th
 pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
 overlays/. Only the user can read them; they are called *.part until they are complete. --force replaces the results of an earlier run
 when the new ones are complete; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
-in order: its result, or status \"no result\" and the reason. pose3d.trc has a row of NaN then; it is written only if
+in order: its result, or status \"no result\" and the reason. pose3d.trc has a row of NaN for a frame without a result; it is written only if
 the frame rate is known. The folder belongs to one run at a time. A run without
 any result is degraded, and says why.
 

@@ -40,8 +40,8 @@ Examples:
 pub(crate) struct Arguments {
     /// The results of a run.
     folder: PathBuf,
-    /// The method: `rts` looks ahead, on the measured covariances; `butterworth` is a zero-phase low-pass filter; `kalman` is the
-    /// live method; `none` only computes angles.
+    /// The method: `rts` looks ahead, and uses the measured covariances; `butterworth` is a zero-phase low-pass filter;
+    /// `kalman` is the live method; `none` only computes angles.
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
     /// Cutoff of `butterworth`, Hz; 6 if not given.

@@ -218,7 +218,7 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
         By::Sound => "sounds",
     };
     output::line(format_args!(
-        "offsets against {} from {:.1} s of footage; what is added to a camera's times to have the common ones",
+        "offsets against {} from {:.1} s of footage, to be added to a camera's times to get common times",
         names[reference], outcome.length_s
     ))?;
     let mut table = Table::new([
@@ -248,9 +248,9 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     }
     output::line(table)?;
     if outcome.cameras.iter().all(|camera| camera.drift_error.is_none()) {
-        output::line("drift: the footage does not determine it, 0 is taken")?;
+        output::line("drift: the footage does not determine it, 0 is used")?;
     } else if outcome.cameras.iter().any(|camera| camera.drift == 0.0) {
-        output::line("drift: one that is not significant is 0")?;
+        output::line("drift: 0 if it is not significant")?;
     }
     output::line(format_args!(
         "{:<25} {:>9} {:>15} {:>12} {:>8}",
@@ -362,11 +362,11 @@ fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     let failure = Failure::new(ExitKind::Degraded, message);
     Err(failure.with_hint(match by {
         By::Movement => {
-            "footage in which people walk through the view of all cameras tells most; --window searches further; --by sound compares \
+            "footage in which people walk through the view of all cameras helps most; --window searches further; --by sound compares \
              what the cameras heard; `parallax calib check` looks at the calibration"
         }
         By::Sound => {
-            "sounds that all cameras hear tell most: clap a few times, unevenly; --window searches further; without --by sound the \
+            "sounds that all cameras hear help most: clap a few times, unevenly; --window searches further; without --by sound the \
              movement of people is compared"
         }
     }))

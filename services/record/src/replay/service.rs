@@ -112,7 +112,8 @@ fn end_after(
 /// The last frame of a track; none if the track holds no message of the session.
 ///
 /// It is that of the last message that can be read, or of a damaged one after it: most numbers in a damaged chunk are right, and
-/// without them the last frames of a run would be missing. A number counts only if so many frames can be in the damaged messages.
+/// without them the last frames of a run would be missing. A number counts only if that many frames fit into the damaged
+/// messages.
 ///
 /// * `recorded`: the session, and the distance of two frames.
 fn last_of(file: &mut File, kind: Kind, entries: &[Entry], recorded: [u64; 2]) -> Option<Stamp> {

@@ -139,7 +139,7 @@ impl Watch<'_> {
         serde_json::from_str(&std::fs::read_to_string(&self.state).ok()?).ok()
     }
 
-    /// Waits until the state of the hosts is so; none if it is not within a time.
+    /// Waits until the state of the hosts satisfies `is_so`; `None` if it does not within `limit`.
     fn until(&self, limit: Duration, is_so: impl Fn(&Value) -> bool) -> Option<Value> {
         let begin = Instant::now();
         while begin.elapsed() < limit && !self.testbed.stop.is_requested() {

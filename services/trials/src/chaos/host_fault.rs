@@ -18,11 +18,11 @@ impl HostFault {
         match self {
             Self::Cut => [
                 "cut-link",
-                "of two hosts on this machine the link is cut for three seconds",
+                "the link between two hosts on this machine is cut for three seconds",
             ],
             Self::Kill => [
                 "kill-host",
-                "of two hosts on this machine the one with cameras is killed, and started again",
+                "one of two hosts on this machine, the one with cameras, is killed and started again",
             ],
         }
     }

@@ -57,7 +57,7 @@ impl RunOutcome {
             none_of("processes that failed by themselves", &self.failed),
             none_of("left in shared memory", &self.leftovers),
             none_of(
-                "cameras accused that stand where they should",
+                "cameras reported as moved that stand where they should",
                 &self.suspected,
             ),
         ]
@@ -267,7 +267,7 @@ mod tests {
             ),
             (
                 |_, outcome| outcome.suspected = vec!["c1".to_owned()],
-                &["cameras accused that stand where they should"],
+                &["cameras reported as moved that stand where they should"],
             ),
             (
                 |_, outcome| outcome.failure = Some("it broke".to_owned()),

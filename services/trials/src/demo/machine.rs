@@ -29,7 +29,7 @@ const LOOKS: f64 = 4.0;
 /// The duration of a measurement.
 const SPAN: Duration = Duration::from_secs(2);
 
-/// The least number of its frames: in so many every camera looks for the person once.
+/// The least number of its frames, in which every camera searches for the person once.
 const LEAST_FRAMES: u64 = 10;
 
 /// Renders frames of all cameras and finds the person in them, as the processes of the run do.

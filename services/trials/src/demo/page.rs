@@ -140,8 +140,8 @@ fn number(value: Option<f64>, digits: usize) -> String {
 
 fn of_cost(cost: &Cost, camera: &str) -> Table {
     let note = format!(
-        "The process of {camera} was killed (SIGKILL) while it worked. Times are counted from there; only frames that \
-         a result has count as back."
+        "The process of {camera} was killed (SIGKILL) while it worked. Times are counted from the kill; only frames \
+         that a result uses count as back."
     );
     let mut table = table("What the killed camera cost", &note, ["", ""]);
     let ms = |value: Option<f64>| {
@@ -153,7 +153,7 @@ fn of_cost(cost: &Cost, camera: &str) -> Table {
         ("its death was noticed after", ms(cost.noticed_ms)),
         ("it was started again after", ms(cost.restarted_ms)),
         (
-            "it sent a frame that has a result again after",
+            "its first frame that a result uses again came after",
             ms(cost.back_ms),
         ),
         ("its last frame before", count(cost.last_frame)),

@@ -39,7 +39,7 @@ pub(crate) enum EpochSource {
     Pose(usize),
     /// The process makes the results.
     Result,
-    /// Nowhere; only its health messages tell.
+    /// Nowhere; only its health messages show it.
     Unrecorded,
 }
 

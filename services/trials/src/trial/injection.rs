@@ -136,7 +136,7 @@ impl Injector {
         }
     }
 
-    /// The process whose health messages tell when it is time: the one that makes the results; for `Spin` the process
+    /// The process whose health messages show when it is time: the one that makes the results; for `Spin` the process
     /// itself, which does not get beyond its frame.
     fn trigger(&self) -> &str {
         match self.fault {

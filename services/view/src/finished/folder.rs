@@ -163,7 +163,7 @@ fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Opti
             Ok(file) => {
                 if name == part {
                     notes.push(format!(
-                        "the run was cut short, or goes on: {name} is not finished"
+                        "the run was cut short, or has not ended: {name} is not finished"
                     ));
                 }
                 return Ok(Some(file));

@@ -134,7 +134,7 @@ fn read_pose(file: &mut File, entry: &Entry) -> Result<Box<Skeletons>, Failure> 
 /// Adds the faults of a recording to the notes.
 fn note(recording: &Recording, notes: &mut Vec<String>) {
     if !recording.extent.is_complete {
-        notes.push("the recording was cut off, or goes on".to_owned());
+        notes.push("the recording was cut off, or is still being written".to_owned());
     }
     if !recording.extent.damage.is_empty() || recording.extent.n_malformed > 0 {
         notes.push("the recording is damaged; what cannot be read is left out".to_owned());

@@ -1,4 +1,4 @@
-//! Events in a deployment, as lines for its user: told by the differences between two looks.
+//! Events in a deployment, as lines for its user: found from the differences between two looks.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -145,7 +145,7 @@ fn tell(board: &Board, name: &str, known: Seen, seen: Seen) {
     }
 }
 
-/// Says what was lost, not more often than every few seconds.
+/// Reports losses, at most once every few seconds.
 fn lost(board: &Board, name: &str, seen: &mut Seen, now: &[u64; Cause::ALL.len()]) {
     // Counts of a process that was started again begin at 0.
     let is_less = now.iter().zip(&seen.dropped).any(|counts| counts.0 < counts.1);

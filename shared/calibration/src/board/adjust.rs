@@ -9,7 +9,7 @@ use super::outcome::{Adjusted, Shown, middle, outcome};
 use super::problem::{BoardProblem, Observation};
 use super::{BoardError, CornerLoss, Outcome, Task};
 
-/// Corners further off than this many standard deviations are wrong, and so few pixels never.
+/// Corners further off than this many standard deviations are wrong; those within this many pixels never are.
 const WRONG_SIGMAS: f64 = 5.0;
 const WRONG_PX: f64 = 0.7;
 /// The median length of a residual in standard deviations along an axis.

@@ -8,13 +8,13 @@ use super::Sight;
 const APART: f64 = 0.5;
 /// Corners of a board that stands still move by less between two pictures, in standard deviations of a corner.
 const STILL_SIGMAS: f64 = 2.0;
-/// The speed of a board of which no other picture tells it, pixels a frame.
+/// The assumed speed of a board that no other picture shows, pixels a frame.
 const UNKNOWN_PX: f64 = 100.0;
 
-/// By how much the standard deviation of a corner is larger than that of a board that stands still.
+/// Amount by which the standard deviation of a corner is larger than that of a board that stands still.
 ///
-/// All corners of a board that moved between two pictures of a frame are off together, so that a sight tells no more of that than one
-/// corner would.
+/// All corners of a board that moved between two pictures of a frame are off together, so that a sight says no more
+/// about that than one corner would.
 ///
 /// * `speeds`: of the board, pixels a frame, by camera and frame.
 /// * `sigma_px`: standard deviation of a corner, pixels.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-/// A board before two cameras at the same time: `a_from_b` by each way in which the board may have been taken for itself.
+/// A board before two cameras at the same time: `a_from_b` for each orientation in which the board looks the same.
 #[derive(Debug, Clone)]
 pub(crate) struct Meeting {
     /// Every pose that the pair may have by this board; the first is the most likely.

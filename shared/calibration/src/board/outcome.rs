@@ -97,7 +97,7 @@ fn rms(off: impl Iterator<Item = nalgebra::Vector2<f64>>) -> f64 {
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
-/// Every free number with its standard deviation; infinite where the pictures do not tell it.
+/// Every free number with its standard deviation; infinite where the pictures do not determine it.
 ///
 /// The larger of two deviations: of corners that err independently, and by how parts of the recording differ, whatever successive
 /// frames have in common (a board that moves is blurred, scanned row by row, and elsewhere in the next camera's picture).

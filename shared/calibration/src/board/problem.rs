@@ -5,8 +5,8 @@ use geometry::{Camera, LensModel};
 use nalgebra::{Isometry3, Matrix2x3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// Prior on any camera, as standard deviations: pixels are square to half a percent, the principal point is within a few
-/// percent of the middle, lenses are centred. It holds what few pictures leave open; where pictures cover much it is not felt:
-/// they tell each of these ten times better and more.
+/// percent of the middle, lenses are centred. It holds what few pictures leave open; where pictures cover much it has no
+/// influence: they determine each of these at least ten times better.
 const PRINCIPAL_POINT: f64 = 0.04;
 const ASPECT: f64 = 0.005;
 const RADIAL: f64 = 0.5;
@@ -21,7 +21,7 @@ pub(crate) struct Observation {
     pub(crate) on_board: Point3<f64>,
     /// In the picture, pixels.
     pub(crate) seen: Point2<f64>,
-    /// By how much its standard deviation is larger than that of a corner of a board that stands still.
+    /// Amount by which its standard deviation is larger than that of a corner of a board that stands still.
     pub(crate) spread: f64,
 }
 
@@ -113,7 +113,7 @@ impl Problem for BoardProblem<'_> {
     }
 }
 
-/// The residual of what is believed of a parameter, and its derivative; `None` of poses and focal lengths.
+/// The residual of the prior of a parameter, and its derivative; `None` of poses and focal lengths.
 fn prior(camera: &Camera, name: &str) -> Option<(f64, f64)> {
     let intrinsics = &camera.intrinsics;
     let number = name.rsplit(": ").next()?;

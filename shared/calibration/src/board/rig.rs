@@ -15,7 +15,8 @@ use super::{
 
 /// The most pictures that intrinsics of one camera are begun with.
 const MOST_FOR_START: usize = 60;
-/// Cameras are out of step where residuals of all together are so many times those of each by itself, and at least so large.
+/// Cameras are out of step if the residuals of all together are this many times those of each camera alone, and at least
+/// this large.
 const OUT_OF_STEP: f64 = 1.4;
 const OUT_OF_STEP_PX: f64 = 0.4;
 
@@ -88,8 +89,9 @@ fn out_of_step(alone: &Outcome, together: &Outcome) -> Option<OutOfStep> {
 
 /// Places cameras whose pictures of one frame were not taken at the same time.
 ///
-/// Such pictures put boards where they were not, and an adjustment bends lenses to fit. So what each camera sees tells its lens by boards
-/// of its own, as it does alone; and a sight tells of places the less the faster the board moves in it.
+/// Such pictures put boards where they were not, and an adjustment bends lenses to fit. Each camera therefore finds its
+/// lens from board poses of its own, as it does alone, and a sight of a faster board counts less for the places of the
+/// cameras.
 fn in_step(
     task: &Task,
     (cameras, alone): (Vec<Camera>, &Outcome),
@@ -163,7 +165,7 @@ fn camera_of(
     }
 }
 
-/// Every camera by itself.
+/// Every camera separately.
 fn each_alone(
     task: &Task,
     sights: &[Sight],
@@ -198,7 +200,7 @@ fn each_alone(
     Ok(outcome)
 }
 
-/// The intrinsics that are known, or those that the camera's own boards tell.
+/// The intrinsics that are known, or those that the camera's own boards give.
 fn first_intrinsics(
     task: &Task,
     camera: usize,
@@ -236,7 +238,7 @@ fn first_intrinsics(
         .ok_or_else(|| BoardError::NoStart { camera: name() })
 }
 
-/// A sight with the pose of the board, one for each way in which the board may have been taken for itself.
+/// A sight with the pose of the board, one for each orientation in which the board looks the same.
 #[derive(Clone)]
 struct Placed {
     sight: Sight,

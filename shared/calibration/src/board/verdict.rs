@@ -7,11 +7,12 @@ const FEW_BOARDS: usize = 6;
 const LITTLE_COVERED: f64 = 0.2;
 const LARGE_PX: f64 = 3.0;
 const FOCAL_SHARE: f64 = 0.01;
-/// A lens that its camera alone tells to this share tells whether cameras are out of step.
+/// A lens shows whether cameras are out of step if its own camera determines it to this share.
 const TOLD_SHARE: f64 = 0.1;
-/// Lenses are the same within so many standard deviations.
+/// Lenses are the same within this many standard deviations.
 const SAME_SIGMAS: f64 = 3.0;
-/// Cameras out of step: a place that is known less well, share of the distance from the first camera, or a turn, degrees, is a doubt.
+/// Cameras out of step: least certainty of a place, as a share of the distance from the first camera, and of a turn,
+/// degrees; anything less is a doubt.
 const PLACE_SHARE: f64 = 0.02;
 const TURN_DEGREES: f64 = 0.5;
 const WRONG_SHARE: f64 = 0.15;
@@ -52,7 +53,7 @@ pub enum Doubt {
         /// Its standard deviation as a share of it.
         share: f64,
     },
-    /// Pictures of one frame were not taken at the same time, and too little tells where the camera stands.
+    /// Pictures of one frame were not taken at the same time, and too little shows where the camera stands.
     Place {
         /// The camera.
         camera: usize,
@@ -149,7 +150,7 @@ pub(super) fn is_spread(sight: &Sight) -> bool {
     finite && eigenvalues.min() > 0.01 * eigenvalues.max()
 }
 
-/// Standard deviation of a focal length, share of it; infinite where it is not told.
+/// Standard deviation of a focal length, share of it; infinite if it is not determined.
 fn focal_share(camera: &CameraOutcome) -> f64 {
     let focal = camera.numbers.iter().find(|number| number.name == "focal length");
     focal.map_or(f64::INFINITY, |focal| focal.sd / focal.value)

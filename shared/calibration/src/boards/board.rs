@@ -44,12 +44,12 @@ pub struct Board {
     pub is_legacy: bool,
 }
 
-/// Why a text is no board.
+/// Why a text is not a board.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoardError {
     /// Not enough parts, or an unknown kind.
     #[error(
-        "{text:?} is no board: expected KIND:COLUMNSxROWS:SIDE such as charuco:7x5:40mm (squares), chessboard:9x6:25mm (inner corners) or aprilgrid:6x6:88mm (tags)"
+        "{text:?} is not a board: expected KIND:COLUMNSxROWS:SIDE such as charuco:7x5:40mm (squares), chessboard:9x6:25mm (inner corners) or aprilgrid:6x6:88mm (tags)"
     )]
     Shape {
         /// The text.
@@ -63,7 +63,7 @@ pub enum BoardError {
         /// Rows.
         rows: usize,
     },
-    /// A length that is none.
+    /// A text that is not a length.
     #[error(
         "{text:?} is not a length: expected a number above 0 with mm, cm, m or in, such as 40mm"
     )]
@@ -352,9 +352,9 @@ mod tests {
     #[test]
     fn what_is_no_board_is_refused_with_what_was_expected() {
         for (text, said) in [
-            ("", "is no board"),
-            ("charuco:7:40mm", "is no board"),
-            ("charuco:7x5", "is no board"),
+            ("", "is not a board"),
+            ("charuco:7:40mm", "is not a board"),
+            ("charuco:7x5", "is not a board"),
             ("charuco:7x5:40", "is not a length"),
             ("charuco:7x5:-1mm", "is not a length"),
             ("charuco:7x5:NaNmm", "is not a length"),

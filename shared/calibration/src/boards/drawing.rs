@@ -54,7 +54,7 @@ pub enum Paper {
     Sized([f64; 2]),
 }
 
-/// A board that does not fit on its page, or a page that is none.
+/// A board that does not fit on its page, or an unknown page.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PaperError {
     /// Too small.
@@ -70,7 +70,7 @@ pub enum PaperError {
     },
     /// Not the name of a page.
     #[error(
-        "{text:?} is no page: expected a4, a3, a2, a1, a0, letter, legal, tabloid, fit or WIDTHxHEIGHT in mm"
+        "{text:?} is not a page: expected a4, a3, a2, a1, a0, letter, legal, tabloid, fit or WIDTHxHEIGHT in mm"
     )]
     Unknown {
         /// The text.

@@ -22,7 +22,7 @@ pub struct Found {
     pub variant: usize,
     /// White is black.
     pub is_inverted: bool,
-    /// Left is right. Only markers tell.
+    /// Left is right. Only markers show it.
     pub is_mirrored: bool,
     /// Markers that were read.
     pub n_markers: usize,

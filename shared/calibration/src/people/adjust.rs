@@ -184,7 +184,7 @@ impl Adjustment {
         &self.cameras
     }
 
-    /// By how much the offset of each camera has changed, seconds.
+    /// Amount by which the offset of each camera has changed, seconds.
     pub(crate) fn offset_steps_s(&self) -> Vec<f64> {
         self.offsets.iter().map(|offset| offset.1).collect()
     }

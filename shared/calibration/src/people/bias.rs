@@ -1,7 +1,8 @@
 //! Constant error of a joint in a camera: a hip is marked elsewhere from the front than from the side.
 //!
-//! Such errors do not average out over a recording in which somebody stays in one place. Each is an unknown of its own, believed
-//! to be near 0 by a standard deviation that the residuals tell: where people walk about it comes out as next to nothing.
+//! Such errors do not average out over a recording in which a person stays in one place. Each is an unknown of its own,
+//! believed to be near 0 by a standard deviation that the residuals tell: where people walk about it comes out as next
+//! to nothing.
 
 use geometry::bundle::{Loss, Term};
 use nalgebra::Vector2;
@@ -13,7 +14,7 @@ use super::instant::Instant;
 const LEAST: usize = 6;
 /// The most that a joint is believed to err by all the time, as a share of the size of the person.
 const MOST: f64 = 0.02;
-/// And the least, below which nothing is to be told.
+/// And the least, below which it cannot be determined.
 const NOTHING: f64 = 0.0005;
 /// The median of the squares of a normal number.
 const MEDIAN_SQUARE: f64 = 0.4549;

@@ -22,8 +22,8 @@ const GOOD_SD: [f64; 2] = [0.3, 0.01];
 pub(crate) const MOST_HALVES: [f64; 2] = [2.0 * MOST_SD[0], 2.0 * MOST_SD[1]];
 /// Blocks of the recording, which the halves take in turns, are at least so long, seconds.
 pub(crate) const BLOCK_S: f64 = 1.0;
-/// Blocks that tell the standard deviations, at least and at most: with 8 a deviation is known to 27 %, with 16 to 18 %, and the longer
-/// a block the more of what errors have in common is within it.
+/// Numbers of blocks that give the standard deviations, at least and at most: with 8 a deviation is known to 27 %, with
+/// 16 to 18 %, and the longer a block the more of what errors have in common is within it.
 const BLOCKS: [f64; 2] = [8.0, 16.0];
 
 /// Blocks of time to which the local blocks of an adjustment belong.
@@ -72,8 +72,9 @@ fn distances(outcome: &Outcome) -> Vec<f64> {
     each.map(|camera| (camera.centre_in_world() - middle).norm()).collect()
 }
 
-/// Adds to the deviations of the rotations what no block of the recording tells: where a network finds the joints, rigs of few cameras
-/// come out turned alike in every block, by a few tenths of a degree. The median residual as an angle is as much.
+/// Adds to the deviations of the rotations an error that no block of the recording shows: where a network finds the
+/// joints, rigs of few cameras come out turned alike in every block, by a few tenths of a degree. The median residual as
+/// an angle is as much.
 fn add_common(outcome: &mut Outcome) {
     for (report, camera) in outcome.reports.iter_mut().zip(&outcome.cameras) {
         let focal_px = 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy);
@@ -102,7 +103,8 @@ pub(super) fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) 
     }
 }
 
-/// Lets the deviations be as large as halves that differ more than these tell: each camera's by the share of all cameras together.
+/// Enlarges the deviations if the two halves differ by more than they suggest: each camera's by the share of all cameras
+/// together.
 fn widen(outcome: &mut Outcome, apart: &[Difference]) {
     let of = |difference: &Difference| [0.5 * difference.turn.to_degrees(), 0.5 * difference.way];
     for axis in 0..2 {

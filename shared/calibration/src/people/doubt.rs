@@ -50,7 +50,7 @@ pub enum Doubt {
         /// Which of it.
         what: String,
     },
-    /// A camera is known too badly.
+    /// The pose of a camera is too uncertain.
     Uncertain {
         /// Which.
         camera: usize,
@@ -80,12 +80,12 @@ pub enum Doubt {
         /// The most.
         limit: f64,
     },
-    /// Too few bones are seen to tell scale and vertical.
+    /// Too few bones are seen to determine scale and vertical.
     NoBody,
 }
 
 impl Doubt {
-    /// That the joints of a camera do not fit, if so.
+    /// The doubt that the joints of a camera do not fit, if they do not.
     ///
     /// * `residual_px`: the median; `size_px`: of the person in the camera's pictures.
     pub(crate) fn of_fit(camera: usize, residual_px: f64, size_px: f64) -> Option<Self> {
@@ -162,7 +162,7 @@ impl Doubt {
             ),
             Self::NoHalf { why } => format!("half of the recording gives no rig: {}", why.text(names)),
             Self::Bones { spread, limit } => format!(
-                "bones change their lengths by {:.0} %, more than {:.0} %: the joints in space are no person",
+                "bones change their lengths by {:.0} %, more than {:.0} %: the joints in space are not those of a person",
                 100.0 * spread,
                 100.0 * limit
             ),

@@ -37,7 +37,7 @@ pub enum PeopleError {
         /// Films.
         films: usize,
     },
-    /// Fewer joints than a body has, or sides of another number.
+    /// The joints are fewer than those of a body, or the number of sides is another.
     #[error("{joints} joints with {sides} sides: at least {least} are needed, each with its side", least = N_JOINTS)]
     Joints {
         /// Joints.
@@ -45,7 +45,7 @@ pub enum PeopleError {
         /// Sides.
         sides: usize,
     },
-    /// A length that is none.
+    /// A length that cannot be used.
     #[error("a length of {metres} m cannot be used")]
     Length {
         /// The number.
@@ -57,7 +57,7 @@ pub enum PeopleError {
 ///
 /// # Errors
 ///
-/// [`PeopleError`]: what cannot be looked at. Where too little can be told there is an [`Outcome`] with doubts.
+/// [`PeopleError`]: what cannot be looked at. If too little can be determined, the result is an [`Outcome`] with doubts.
 pub fn estimate(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
     let Recording { cameras, films } = *recording;
     check(cameras, films, settings)?;

@@ -13,7 +13,7 @@ const STANDING_M_S: f64 = 0.25;
 const FLOOR_M: [f64; 2] = [0.3, 0.06];
 /// The normal of the floor is within so much of the direction of bodies, radians.
 const FROM_BODIES: f64 = 0.5;
-/// Legs straighter than this are those of someone who stands, radians.
+/// Legs bent by less than this belong to a person who stands, radians.
 const STRAIGHT: f64 = 0.35;
 /// Height of the ankle above the floor as a share of the stature (Drillis & Contini 1966).
 pub(crate) const ANKLE: f64 = 0.039;
@@ -55,11 +55,11 @@ pub(crate) struct World {
     pub(crate) to_metres: Similarity,
     pub(crate) up: Option<UnitVector3<f64>>,
     pub(crate) vertical: Vertical,
-    /// Standard deviation of the scale, as a share, as far as bones tell it.
+    /// Standard deviation of the scale, as a share, as far as bones determine it.
     pub(crate) scale_sd: f64,
 }
 
-/// None where nothing tells the scale: too few bones.
+/// `None` if too few bones are seen to determine the scale.
 pub(crate) fn world(
     cameras: &[Camera],
     given: (&[Camera], Option<UnitVector3<f64>>),
@@ -148,7 +148,7 @@ pub(crate) fn stature_of(skeletons: &Skeletons) -> Option<(f64, f64)> {
     Some((metres, sd))
 }
 
-/// Metres in a unit such that the person is so tall, with the relative deviation.
+/// Metres in a unit such that the person is `metres` tall, with the relative deviation.
 fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
     // Shares of the stature depend on the stature a little, so the factor is found by bisection.
     let tall = |factor: f64| {

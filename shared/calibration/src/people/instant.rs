@@ -5,9 +5,9 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::sightings::Sight;
 
-/// Residuals beyond so many standard deviations lose their weight.
+/// Residuals beyond this many standard deviations lose their weight.
 pub(super) const WIDTH: f64 = 2.0;
-/// Rays that meet at a smaller angle tell no depth, radians.
+/// Rays that meet at a smaller angle do not determine depth, radians.
 const LEAST_ANGLE: f64 = 0.02;
 
 /// A joint that a camera sees.

@@ -8,7 +8,7 @@ use super::bias::share_of;
 const LEAST: usize = 30;
 /// The least expected error, pixels.
 const LEAST_PX: f64 = 0.3;
-/// The median length of a residual in the plane is so many standard deviations of one axis.
+/// The median length of a residual in the plane is this many standard deviations of one axis.
 const MEDIAN: f64 = 1.1774;
 /// Joints take part in what they are measured by: four views of eight numbers determine three.
 const FITTED: f64 = 1.25;
@@ -17,8 +17,8 @@ pub(crate) const CELLS: usize = 8;
 
 /// Expected errors from the residuals, by camera and joint.
 ///
-/// Each joint has one, as a share of the size of the person, which all cameras together tell: errors of every camera by itself would
-/// let one camera have its way in all.
+/// Each joint has one, as a share of the size of the person, which all cameras together tell: errors of every camera
+/// separately would let one camera have its way in all.
 ///
 /// * `sizes_px`: the size of the person in each camera.
 pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {

@@ -7,7 +7,7 @@ use statistics::Sorted;
 
 use super::frame::Skeletons;
 
-/// The fewest joints of a person that tell how it fits.
+/// The fewest joints of a person that show how well it fits.
 const LEAST: usize = 6;
 /// Two pictures of a camera are at least so far apart, seconds.
 const APART_S: f64 = 0.5;
@@ -19,7 +19,7 @@ pub struct Fitted<'a> {
     pub cameras: &'a [Camera],
     /// Film of each camera.
     pub films: &'a [Film],
-    /// Offset added to the times of each camera to have common ones, seconds.
+    /// Offset added to the times of each camera to get common times, seconds.
     pub offsets_s: &'a [f64],
     /// The mirror of each joint on the other side of the body.
     pub sides: &'a [usize],

@@ -36,7 +36,7 @@ pub struct Outcome {
     pub up: Option<UnitVector3<f64>>,
     /// Where that comes from.
     pub vertical: Vertical,
-    /// Standard deviation of the scale as a share, as far as the bones tell it.
+    /// Standard deviation of the scale as a share, as far as the bones determine it.
     pub scale_sd: f64,
     /// The standing height of the person by the lengths of the bones, metres.
     pub stature_m: Option<f64>,

@@ -7,7 +7,7 @@ use super::instant::place;
 use super::sightings::{Sight, Sightings};
 use super::two_view::{Match, essential_of, normalised, sampson};
 
-/// By how much the cost has to be less the other way round.
+/// Amount by which the cost has to be less the other way round.
 const CLEARLY: f64 = 4.0;
 /// The fewest joints with sides that are compared.
 pub(crate) const LEAST_JOINTS: usize = 4;

@@ -5,11 +5,11 @@ use geometry::{Camera, Lens};
 use nalgebra::{Point2, Vector2};
 use statistics::Sorted;
 
-/// Standard deviation of the kernel that smooths places over time: so many intervals between pictures, and seconds.
+/// Standard deviation of the kernel that smooths places over time: this many intervals between pictures, and seconds.
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
-/// Two tracks of a camera can be one person where the second begins within so many seconds.
+/// Two tracks of a camera can be one person where the second begins within this many seconds.
 const LONGEST_GAP_S: f64 = 3.0;
-/// Or so many seconds before the first ends, in one place: a person whose pose is seen in two ways for a while.
+/// Or this many seconds before the first ends, in one place: a person whose pose is seen in two ways for a while.
 const LONGEST_OVERLAP_S: f64 = 0.25;
 /// Two tracks are in one place where joints of the one end nearer than this to where those of the other begin, sizes of the person.
 const ONE_PLACE: f64 = 0.3;

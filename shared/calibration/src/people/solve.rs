@@ -63,8 +63,8 @@ pub(crate) struct Wanted {
 
 /// A rig from nothing, with the clocks that were given unless the joints contradict them.
 ///
-/// For someone who walks in a circle another clock of a camera is the same as another place of it, but for the swing of the limbs: what
-/// little tells them apart are errors of the joints as much as clocks. Clocks that do not matter to how well joints fit are left alone.
+/// If a person walks in a circle, only the swing of the limbs distinguishes another clock of a camera from another place
+/// of it, and errors of the joints look much the same. Clocks that do not matter to how well joints fit are left alone.
 ///
 /// * `search`: whether clocks are searched far around.
 pub(crate) fn with_clocks(

@@ -12,9 +12,9 @@ use crate::people::sides::{exchange, of_pair, point};
 
 /// A rig is better only where the distance becomes less by this share.
 const LEAST_GAIN: f64 = 0.02;
-/// And where the mean gain of a block is so many standard errors.
+/// The mean gain of a block must also be this many standard errors.
 const CERTAIN: f64 = 2.0;
-/// A block has at least so many joints.
+/// A block has at least this many joints.
 const LEAST: usize = 20;
 
 /// Returns for each camera the chain that fits the other cameras best, by the rig that is given.
@@ -47,8 +47,8 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     chains.map(|(camera, it)| choice((camera, it.1))).collect()
 }
 
-/// How far joints of somebody in one camera are from where another one sees somebody, median, as a share of the size there; infinite
-/// where too few are seen by both.
+/// How far joints of a person in one camera are from where another one sees a person, median, as a share of the size
+/// there; infinite where too few are seen by both.
 ///
 /// * `pair`: each a camera and a chain.
 fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) -> f64 {

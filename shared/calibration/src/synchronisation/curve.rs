@@ -71,7 +71,7 @@ pub(crate) struct Costs {
 }
 
 impl Costs {
-    /// By how much an offset costs less than the others do; none where it has no cost.
+    /// Amount by which an offset costs less than the others do; none where it has no cost.
     pub(crate) fn gain(&self, nth: usize) -> Option<f64> {
         let cost = f64::from(*self.each.get(nth)?);
         cost.is_finite().then_some(self.mean - cost)
@@ -91,7 +91,7 @@ pub struct Curve {
     pub step_s: f64,
     /// The offset of the first entry, seconds: what is added to a time of the first camera to have that of the second.
     pub first_s: f64,
-    /// By how much each offset costs less than the mean of all, over all samples.
+    /// Amount by which each offset costs less than the mean of all, over all samples.
     pub gain: Vec<f64>,
     /// The mean cost by offset; not a number where nothing overlaps.
     pub cost: Vec<f64>,

@@ -60,7 +60,7 @@ pub enum Doubt {
     Still {
         /// The camera.
         camera: usize,
-        /// By how much less the best offset costs than the mean of all, as a share.
+        /// Amount by which the best offset costs less than the mean of all, as a share.
         gain: f64,
         /// The least that is accepted.
         least: f64,
@@ -78,7 +78,7 @@ pub enum Doubt {
     Pair {
         /// The cameras.
         cameras: [usize; 2],
-        /// By how much the pair's own offset is away, seconds.
+        /// Amount by which the pair's own offset is away, seconds.
         away_s: f64,
         /// The gain of the common offset as a share of the pair's best.
         share: f64,
@@ -129,7 +129,7 @@ pub enum Doubt {
         /// The largest that is accepted.
         most_s: f64,
     },
-    /// Two parts of the footage tell different offsets.
+    /// Two parts of the footage give different offsets.
     Parts {
         /// The camera.
         camera: usize,
@@ -277,7 +277,7 @@ impl Worded<'_> {
                 least_share,
             } => write!(
                 f,
-                "{} and {}: by themselves sure of {:+.0} ms away from what all cameras say, which is {:.0} % as good (at least {:.0} %)",
+                "{} and {}: alone they give an offset {:+.0} ms away from that of all cameras, which is {:.0} % as good for them (at least {:.0} % is needed)",
                 name(a),
                 name(b),
                 1e3 * *away_s,
@@ -301,7 +301,7 @@ impl Worded<'_> {
                 most_s,
             } => write!(
                 f,
-                "{}: parts of the footage tell offsets {:.0} ms apart, at most {:.0} ms is accepted: frames missing, or another speed",
+                "{}: parts of the footage give offsets {:.0} ms apart, at most {:.0} ms is accepted: frames missing, or another speed",
                 name(camera),
                 1e3 * *away_s,
                 1e3 * *most_s
@@ -342,7 +342,7 @@ impl Worded<'_> {
                 most_s,
             } => write!(
                 f,
-                "{} and {}: by themselves {:+.0} ms away from what all cameras say, at most {:.0} ms is accepted",
+                "{} and {}: alone they give an offset {:+.0} ms away from that of all cameras, at most {:.0} ms is accepted",
                 name(a),
                 name(b),
                 1e3 * *away_s,

@@ -12,7 +12,7 @@ use crate::synchronisation::refine::{Clock, Fit, Problem};
 use crate::synchronisation::search::{peak, search, second};
 use crate::synchronisation::track::{Track, tracks};
 
-/// Standard deviation of the kernel that smooths places over time: so many intervals between pictures, and seconds.
+/// Standard deviation of the kernel that smooths places over time: this many intervals between pictures, and seconds.
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
 /// Length of footage that is searched in full, seconds: the part with most movement. The rest is for the drift.
 const SEARCHED_S: f64 = 60.0;
@@ -22,7 +22,7 @@ const LEAST_SEEN_S: f64 = 0.5;
 const LEAST_DRIFT_S: f64 = 10.0;
 /// A drift is determined where its error makes less than this over the footage, seconds.
 const MOST_DRIFT_ERROR_S: f64 = 0.005;
-/// A drift is taken as such if it is so many standard errors away from none.
+/// A drift is taken as such if it is this many standard errors away from none.
 const SURE_DRIFT: f64 = 4.0;
 
 /// How clocks are estimated.
@@ -45,8 +45,8 @@ pub struct CameraClock {
     pub offset_s: f64,
     /// Standard error of the offset in the middle of the footage, seconds; infinite where nothing is known.
     pub error_s: f64,
-    /// By how much a second of it is longer than one of the common clock: 1e-6 is one part per million. 0 where it is not
-    /// determined, or is not told from none.
+    /// Amount by which a second of it is longer than one of the common clock: 1e-6 is one part per million. 0 if it is not
+    /// determined, or cannot be distinguished from 0.
     pub drift: f64,
     /// Standard error of the drift; none where the footage is too short to determine it.
     pub drift_error: Option<f64>,
@@ -98,7 +98,8 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// [`FilmError`]: films that cannot be used at all. What can be used but tells too little is an [`Outcome`] with doubts.
+/// [`FilmError`]: films that cannot be used at all. Usable footage that determines too little gives an [`Outcome`] with
+/// doubts.
 pub fn estimate(
     cameras: &[Camera],
     films: &[Film],

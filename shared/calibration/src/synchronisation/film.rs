@@ -61,7 +61,7 @@ pub enum FilmError {
         /// Its time.
         time_s: f64,
     },
-    /// A setting is no number that can be used.
+    /// A setting is not a usable number.
     #[error("a window of {window_s} s, expected 0.1 to 60")]
     Window {
         /// The setting.

@@ -20,10 +20,10 @@ const MOST_REACH: f64 = 0.05;
 const MOVED_S: f64 = 0.005;
 /// How often, at most.
 const MOST_PASSES: usize = 4;
-/// Joints of a pair of cameras have one bias over so many seconds: finders of joints put them aside by the direction that they see a person
-/// from.
+/// Joints of a pair of cameras have one bias over this many seconds: finders of joints put them aside by the direction
+/// that they see a person from.
 const BIAS_S: f64 = 20.0;
-/// Errors of a joint are independent after so many seconds.
+/// Errors of a joint are independent after this many seconds.
 const INDEPENDENT_S: f64 = 0.25;
 /// The standard deviation of a normal distribution in medians of its absolute values.
 const NORMAL: f64 = 1.4826;
@@ -171,7 +171,7 @@ impl Problem<'_> {
         each.map(|camera| residuals(&table.residuals, camera)).collect()
     }
 
-    /// All joints in all pairs, at the times that the clocks tell.
+    /// All joints in all pairs, at the times that the clocks give.
     fn table(&self, clocks: &[Clock], span: [f64; 2], reach_s: f64) -> Table {
         let mut all = Vec::new();
         let mut biased = BTreeMap::<(usize, usize, i64), Vec<Timed>>::new();

@@ -6,7 +6,7 @@ use crate::synchronisation::curve::{Curve, STEP_S};
 const PRIOR_SAMPLES: f64 = 20.0;
 /// Where the curve has fallen to this share of its best, the basin of the best offset ends.
 const BASIN: f64 = 0.6;
-/// An entry is a peak if none of so many to each side is higher.
+/// An entry is a peak if none of this many to each side is higher.
 const NEAR: usize = 3;
 /// Length of the blocks of time whose gains are taken as independent, seconds.
 const BLOCK_S: f64 = 0.5;

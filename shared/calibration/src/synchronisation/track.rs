@@ -17,7 +17,7 @@ const TURNING: f64 = 0.25;
 const NEIGHBOURS: usize = 3;
 /// Joints of lower score are not used.
 const LEAST_SCORE: f64 = 0.05;
-/// The kernel of the smoothing ends at so many standard deviations.
+/// The kernel of the smoothing ends at this many standard deviations.
 const KERNEL_END: f64 = 2.5;
 /// The fewest joints of a person that is used.
 pub(crate) const LEAST_JOINTS: usize = 3;

@@ -40,8 +40,8 @@ pub struct Place {
 }
 
 impl<'a> Frame<'a> {
-    /// The people of a moment, the one who is followed first; one frame with nobody if there is nobody. Empty if skeletons were not asked
-    /// for.
+    /// The people of a moment, the followed person first; one frame with nobody if there is nobody. Empty if skeletons
+    /// were not asked for.
     pub fn people(moment: &'a Moment) -> Vec<Self> {
         let Some(skeletons) = &moment.skeletons else {
             return Vec::new();

@@ -18,7 +18,7 @@ use crate::publish::target::{Form, Target};
 const MOST_WAITING: usize = 64;
 /// Longest wait for a moment, so that a stop request is seen.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// How often names are told that are left out of the lines.
+/// Interval at which names that are left out of the lines are sent.
 const NAMES: Duration = Duration::from_secs(1);
 
 /// Counts of what was sent.

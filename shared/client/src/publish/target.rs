@@ -25,7 +25,7 @@ pub struct Target {
 pub enum TargetError {
     /// It is not written as one.
     #[error(
-        "{text:?} is no target: {why}; expected udp://127.0.0.1:9000, udp://127.0.0.1:9000?format=osc or osc://127.0.0.1:9000"
+        "{text:?} is not a target: {why}; expected udp://127.0.0.1:9000, udp://127.0.0.1:9000?format=osc or osc://127.0.0.1:9000"
     )]
     Malformed {
         /// Text as it was written.

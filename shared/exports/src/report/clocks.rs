@@ -35,7 +35,7 @@ pub fn html(page: &Page<'_>) -> String {
     about_table(&mut out, page.about);
     cameras(&mut out, page);
     let cost = if page.is_heard {
-        "One less the cosine between the beginnings of sounds"
+        "One minus the cosine between the beginnings of sounds"
     } else {
         "Mean cost of a joint, log(1 + (residual / expected error)&#178;)"
     };

@@ -1,4 +1,5 @@
-//! A rig that people told, as one HTML page: the verdict, what is known of every camera, where in its picture people were, and the rig in space.
+//! A rig calibrated from people, as one HTML page: the verdict, what is known of every camera, where in its picture
+//! people were, and the rig in space.
 
 use calibration::people;
 use calibration::refine;
@@ -154,7 +155,7 @@ pub fn of_refinement(
             if it.is_told {
                 ""
             } else {
-                "held: the joints do not tell it"
+                "kept: the joints do not determine it"
             }
         );
     }

@@ -1,4 +1,4 @@
-//! Small models for tests, every number of them told apart.
+//! Small models for tests, in which all numbers differ.
 
 pub(crate) mod mat;
 mod text;

@@ -7,7 +7,7 @@ use crate::{Edge, Filter, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spring, S
 /// A released model, as it lies in the file; nothing is known to hold yet.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Released {
-    /// All biases; which is whose is told by [`ReleasedPart::bias_ids`].
+    /// All biases; [`ReleasedPart::bias_ids`] assigns them to parts.
     pub(super) biases: Vec<f64>,
     /// All filters.
     pub(super) filters: Vec<Filter>,

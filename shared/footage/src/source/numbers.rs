@@ -14,7 +14,7 @@ pub(super) struct Numbered {
     pub(super) frame: u64,
 }
 
-/// The frames of pictures: by their numbers where they are told, else one after the other.
+/// The frames of pictures: by their numbers if these are given, else one after the other.
 ///
 /// Pictures in front of the first frame, and between two frames, are left out.
 pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Vec<Numbered> {
@@ -113,7 +113,7 @@ impl Counting {
     }
 }
 
-/// By how much numbers rise from frame to frame; none where most frames would have no picture of any camera.
+/// Amount by which numbers rise from frame to frame; none where most frames would have no picture of any camera.
 ///
 /// * `firsts`: the number of frame 0 of every camera.
 fn step_of(firsts: &[u64], cameras: &[Vec<u64>]) -> Option<u64> {

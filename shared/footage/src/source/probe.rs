@@ -39,7 +39,7 @@ pub(super) struct Probe {
 const ENTRIES: &str = "program_version=version:\
     stream=index,codec_name,width,height,nb_frames,avg_frame_rate,r_frame_rate,duration,start_time,has_b_frames,field_order:\
     stream_disposition=attached_pic,timed_thumbnails,still_image:stream_side_data:format=format_name,duration,start_time";
-/// A rate that nobody has, to see whether a stream without a container repeats what it is told.
+/// A rate that nobody has, to see whether ffprobe repeats it for a stream without a container.
 const ODD_RATE: &str = "225/32";
 /// Codecs of pictures that stand alone; the first four are also those of cover pictures.
 const INTRA: [&str; 9] = [

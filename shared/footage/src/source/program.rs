@@ -1,4 +1,4 @@
-//! How ffmpeg and ffprobe are told of a file.
+//! How a file is named to ffmpeg and ffprobe.
 
 use std::io;
 use std::path::Path;

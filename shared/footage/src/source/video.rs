@@ -17,7 +17,7 @@ pub(super) struct Video {
     pub(super) probe: Probe,
     /// Size of the pictures, turned and shrunk.
     pub(super) size: Size,
-    /// By how much they are shrunk.
+    /// Factor by which they are shrunk.
     pub(super) shrink: usize,
     spec: SourceSpec,
     /// Expected frames, from the index of the container.
@@ -29,7 +29,7 @@ pub(super) struct Video {
     n_given: u64,
     /// Index in the footage of the frame that was read last.
     last_index: u64,
-    /// The last frame whose time was told.
+    /// The last frame whose time was given.
     last_told: Option<u64>,
     /// Pictures that the decoder had left out at the last gap.
     n_undecoded: u64,
@@ -245,7 +245,7 @@ fn turned_size(probe: &Probe, spec: &SourceSpec) -> Size {
     spec.rotation.turn(probe.tag).size(probe.stored)
 }
 
-/// By how much the pictures are shrunk.
+/// Factor by which the pictures are shrunk.
 fn shrink(probe: &Probe, spec: &SourceSpec) -> usize {
     let Size { width, height } = probe.stored;
     let divides = |by: &usize| width.is_multiple_of(*by) && height.is_multiple_of(*by);

@@ -19,7 +19,7 @@ pub enum C3dError {
         /// The byte.
         got: u8,
     },
-    /// The processor type is none of the three.
+    /// The processor type is not one of the three.
     #[error("processor {code} is not 84 (Intel), 85 (DEC) or 86 (MIPS)")]
     Processor {
         /// The code in the file.

@@ -2,7 +2,7 @@
 
 /// FNV-1a, 64 bits.
 ///
-/// Tells files and settings apart; it is no protection against somebody who forges them. Every step is a bijection
+/// Distinguishes files and settings; it does not protect against forgery. Every step is a bijection
 /// of the state, so two inputs of one length that differ in one byte never agree.
 ///
 /// ```

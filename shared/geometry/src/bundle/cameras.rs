@@ -1,4 +1,4 @@
-//! The cameras of a problem: which of their numbers are free, and the terms of what they see.
+//! The cameras of a problem: which of their parameters are free, and the terms of their observations.
 
 use nalgebra::{
     Isometry3, Matrix2, Matrix2x3, Point2, Point3, Translation3, UnitQuaternion, Vector3,

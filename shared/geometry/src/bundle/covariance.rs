@@ -6,7 +6,7 @@ use super::Problem;
 use super::equations::Equations;
 
 /// An eigenvalue of the information, every parameter measured by what is known of it alone, that is less than this share of
-/// the largest: the data do not tell of that direction.
+/// the largest: the data do not determine that direction.
 const LEAST_EIGENVALUE: f64 = 1e-11;
 /// A parameter is named where it has at least this share of the largest part of such a direction.
 const NAMED: f64 = 0.2;

@@ -4,8 +4,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::{Problem, Step, Term};
 
-/// A diagonal entry counts as at least this share of the largest one of its block where it is damped, so that a parameter
-/// that nothing tells of stays where it is.
+/// A diagonal entry counts as at least this share of the largest one of its block where it is damped, so that a
+/// parameter that nothing determines stays where it is.
 const LEAST_DIAGONAL: f64 = 1e-12;
 
 /// The equations of one local block.
@@ -204,7 +204,7 @@ impl Equations {
         all.all(|value| value.is_finite()).then_some(Step { shared, locals })
     }
 
-    /// By how much the quadratic says that a step lowers the cost.
+    /// Amount by which the quadratic says that a step lowers the cost.
     pub(super) fn gain(&self, step: &Step) -> f64 {
         let shared = DVector::from_column_slice(&step.shared);
         let mut gain = -2.0 * self.gradient.dot(&shared) - shared.dot(&(&self.shared * &shared));

@@ -14,15 +14,15 @@ const MIN_POINTS: usize = 5;
 /// With more cameras, exchanged left and right are not tried: it would take too long.
 const MAX_TO_MIRROR: usize = 8;
 /// Two cameras were exchanged if the angular residual is at least `MIN_DEGREES` as configured, and with the two
-/// exchanged at most `MAX_DEGREES` and smaller by `FACTOR`. Which two is certain if every other exchange leaves a
-/// residual larger by `LEAD`.
+/// exchanged at most `MAX_DEGREES` and smaller by `FACTOR`. The exchanged pair is certain if every other exchange leaves
+/// a residual larger by the factor `LEAD`.
 const MIN_DEGREES: f64 = 0.75;
 const MAX_DEGREES: f64 = 1.5;
 const FACTOR: f64 = 2.5;
 const LEAD: f64 = 1.5;
-/// With a larger angular residual the cameras do not see one person where the rig says.
+/// With a larger angular residual, the cameras do not see one person at the place that the rig gives.
 const CONTRADICTION_DEGREES: f64 = 2.5;
-/// With a larger one this is so however few the frames are: no detection of a person is as far off.
+/// With a residual larger than this, a few frames are enough to say so: no detection of a person is as far off.
 const IMPOSSIBLE_DEGREES: f64 = 5.0;
 
 /// Computes, frame by frame, the angular residual of the rays with the footage of two cameras exchanged.

@@ -69,7 +69,7 @@ struct Sample {
 /// The offset of a camera by the samples of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Estimate {
-    /// By how much later than it says it took its pictures, against the median of all, seconds.
+    /// Delay of its pictures with respect to the times that it states, against the median of all, seconds.
     pub(super) offset_s: f64,
     /// Its variance, as far as the samples tell.
     pub(super) variance: f64,
@@ -159,7 +159,7 @@ impl Block {
     }
 }
 
-/// By how much the second view of a pair is later than the first, and the reciprocal of the variance of that.
+/// Amount by which the second view of a pair is later than the first, and the reciprocal of the variance of that.
 #[derive(Debug, Clone, Copy)]
 struct Slope {
     offset_s: f64,

@@ -131,7 +131,7 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
     Some(2 * output? + input + names + usize::from(named_input))
 }
 
-/// How well an output agrees with maps of keypoints; `None` if it is none.
+/// How well an output agrees with maps of keypoints; `None` if it has no maps.
 fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<usize> {
     /// Fewest rows and columns of maps.
     const LEAST_SIDE: usize = 8;

@@ -26,7 +26,7 @@ fn bits(stack: &Blocked) -> Vec<u32> {
     stack.values().iter().map(|value| value.to_bits()).collect()
 }
 
-/// A layer that somebody could ask for.
+/// A layer that a user could ask for.
 #[derive(Debug, Clone)]
 struct Case {
     size: ConvSize,

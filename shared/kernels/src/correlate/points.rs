@@ -116,7 +116,7 @@ impl Points {
         (0..placements).map(row).collect()
     }
 
-    /// By how much the terms of the sums are larger than those of the direct sum, at most:
+    /// Amount by which the terms of the sums are larger than those of the direct sum, at most:
     /// the largest over placements `i` and taps `c` of `sum over a, j of |A_ij| |G_jc| |B_ja|`.
     pub(super) fn amplification(&self, taps: usize) -> f64 {
         let (a, b) = (self.of_products(self.tile() + 1 - taps), self.of_cells());

@@ -66,7 +66,7 @@ pub enum FileError {
         /// Description of the values that are accepted.
         expected: String,
     },
-    /// The number of keypoints tells no set.
+    /// The number of keypoints does not identify a set.
     #[error(
         "`{entry}` has {n} keypoints; 17, 18, 25, 26, 133, 135 or 136 say what they are called by their number: else give `keypoint_names`, \
          one of {}",
@@ -183,7 +183,7 @@ pub(crate) fn person(
     })
 }
 
-/// The set of names that a number of numbers tells.
+/// The set of names that follows from the number of values.
 pub(crate) fn told_by(n_values: usize, entry: impl Fn() -> String) -> Result<NameSet, FileError> {
     if !n_values.is_multiple_of(3) {
         return Err(FileError::Length {

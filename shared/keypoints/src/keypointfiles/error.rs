@@ -66,7 +66,7 @@ pub enum KeypointFileError {
         /// Most frames.
         most: u64,
     },
-    /// No file has a person, so that nothing tells what keypoints are called.
+    /// No file has a person, so that nothing says what keypoints are called.
     #[error("no file of {} has a person: say what the keypoints are called (`keypoint_names`)", path.display())]
     Nobody {
         /// The folder.

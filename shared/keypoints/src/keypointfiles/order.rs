@@ -6,8 +6,8 @@
 use crate::BODY_25;
 use crate::files::SeenKeypoints;
 
-/// A pelvis that is farther than this from the middle of the hips, in half of the people, is none: share of the longer side of
-/// their box. In the demonstration of Pose2Sim, which is `body-25b`, the median of a camera is 0.17 to 0.51.
+/// A point that is farther than this from the middle of the hips, in half of the people, is not the pelvis: share of the
+/// longer side of their box. In the demonstration of Pose2Sim, which is `body-25b`, the median of a camera is 0.17 to 0.51.
 const MOST_OFF: f64 = 0.1;
 
 /// How far from the middle of the hips half of the people have their pelvis, at least; `None` where it is near enough, or nobody

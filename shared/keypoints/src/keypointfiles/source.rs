@@ -36,11 +36,11 @@ enum Frames {
 impl KeypointSource {
     /// Opens a folder of JSON files in OpenPose's layout, or one JSON file in COCO's.
     ///
-    /// A file's frame is the last number in its name, counted from the lowest one of the folder. Numbers that no file has are
-    /// frames that tell nothing. Files that do not end in `.json` are passed over.
+    /// A file's frame is the last number in its name, counted from the lowest one of the folder. Numbers that no file
+    /// has are frames without keypoints. Files that do not end in `.json` are passed over.
     ///
-    /// * `names`: what the keypoints are called; `None`: what the files tell by their number or their category. Then the files of
-    ///   a folder are read up to the first person, or a few more.
+    /// * `names`: what the keypoints are called; `None`: as their number or their category in the files says. Then the
+    /// files of   a folder are read up to the first person, or a few more.
     ///
     /// # Errors
     ///
@@ -79,7 +79,7 @@ impl KeypointSource {
         &self.names
     }
 
-    /// Number of frames: one more than the highest number that the files tell of.
+    /// Number of frames: one more than the highest number in the files.
     pub fn n_frames(&self) -> u64 {
         self.n_frames
     }
@@ -87,7 +87,7 @@ impl KeypointSource {
     /// The people of a frame, from 0, in the order of its file.
     ///
     /// * `people`: replaced by them; empty where there are none.
-    /// * Returns how many there are; `None` where nothing tells of the frame: a gap, or beyond the end.
+    /// * Returns how many there are; `None` if the files do not have the frame: a gap, or beyond the end.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ impl KeypointSource {
     }
 }
 
-/// The names that the first file with a person tells.
+/// The names that follow from the first file with a person.
 fn told(folder: &Path, files: &[(u64, PathBuf)]) -> Result<NameSet, KeypointFileError> {
     let mut told: Option<NameSet> = None;
     let mut people = Vec::new();

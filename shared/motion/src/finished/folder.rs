@@ -28,8 +28,8 @@ pub struct Run {
 /// A person of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Identities within the run, ascending: more than one where never two people were there, and whoever was followed had one after the
-    /// other.
+    /// Identities within the run, ascending: more than one if no frame had two people and the followed person had
+    /// several, one after the other.
     pub ids: Vec<u64>,
     /// Identity at every instant; where the person is not there, the one before.
     pub id_at: Vec<u64>,
@@ -91,7 +91,7 @@ impl Gathered {
 ///
 /// # Errors
 ///
-/// The file cannot be read, or a line is none.
+/// The file cannot be read, or a line is not valid.
 pub fn read_lines(
     folder: &Path,
     mut each: impl FnMut(usize, FrameLine) -> Result<(), Failure>,
@@ -145,7 +145,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 ///
 /// # Errors
 ///
-/// A file cannot be read, a line is none, or times do not ascend.
+/// A file cannot be read, a line is not valid, or times do not ascend.
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     let mut people: BTreeMap<u64, Gathered> = BTreeMap::new();

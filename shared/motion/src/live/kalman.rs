@@ -207,7 +207,8 @@ fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
     })
 }
 
-/// By how much a filter with this gain delays movement at [`DELAY_HZ`], seconds: its phase there. Negative where it runs ahead.
+/// Amount by which a filter with this gain delays movement at [`DELAY_HZ`], seconds: its phase there. Negative where it
+/// runs ahead.
 fn delay_s(gain: Vector3<f64>, dt: f64) -> f64 {
     let transition = Matrix3::new(1.0, dt, 0.5 * dt * dt, 0.0, 1.0, dt, 0.0, 0.0, 1.0);
     let seen = Matrix3::identity() - gain * RowVector3::new(1.0, 0.0, 0.0);

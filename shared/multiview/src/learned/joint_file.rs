@@ -55,7 +55,7 @@ pub struct JointRow {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointsLearned {
-    /// Bones between a joint's own part and the farthest that tells where it lies.
+    /// Bones between a joint's own part and the farthest one that determines where it lies.
     pub reach: usize,
     /// Cost of weights.
     pub ridge: f64,
@@ -158,7 +158,7 @@ impl JointFile {
 
     /// The map from the 26 parts to the joints of a set, all of which are made of those of `skeleton::PARSE14`.
     ///
-    /// * Returns `None` for a set with a part that is no joint there.
+    /// * Returns `None` for a set with a part that is not a joint there.
     pub fn map(&self, set: &JointSet) -> Option<Arc<JointMap>> {
         let of_part = |part: &usize| {
             let joint = (0..self.joints.len()).find(|i| own(*i) == *part)?;

@@ -1,13 +1,13 @@
-//! Where a joint lies among the parts around it, learned from marked people of whom some are badly found.
+//! Where a joint lies among the parts around it, learned from marked people, some of whom are badly found.
 
 use nalgebra::{DMatrix, DVector};
 use skeleton::{MIRROR, N_PARTS, PARENT, PARSE14};
 
 /// Joints of `skeleton::PARSE14`.
 const N_JOINTS: usize = 14;
-/// Parts of shoulders and hips: where one lies, the other one tells too.
+/// Parts of shoulders and hips: the other one also shows where one lies.
 const ACROSS_TRUNK: [usize; 4] = [2, 9, 14, 21];
-/// An error counts at most so much, as a share of the person's size: beyond, the joint was not found at all.
+/// An error counts at most this much, as a share of the person's size: beyond, the joint was not found at all.
 const LIMIT: f64 = 0.1;
 /// Most rounds of reweighting, and the change of weights at which there are no more.
 const MOST_ROUNDS: usize = 50;
@@ -15,7 +15,7 @@ const SETTLED: f64 = 1e-9;
 /// Shares that people are dealt into for choosing the settings.
 const FOLDS: usize = 5;
 
-/// A person of whom parts were found and joints are marked.
+/// A person with found parts and marked joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
     /// Centres of the 26 parts, pixels.
@@ -27,7 +27,7 @@ pub struct Marked {
 /// How joints are learned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Local {
-    /// Parts up to so many bones away from the joint's own tell where it lies.
+    /// Parts up to this many bones away from the joint's own part determine where it lies.
     pub reach: usize,
     /// How much a weight off a joint's own part costs: squared, per person, in units of the person's size.
     pub ridge: f64,

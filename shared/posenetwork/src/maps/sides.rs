@@ -1,4 +1,4 @@
-//! Left and right of maps: exchanged, or named by what one view tells.
+//! Left and right of maps: exchanged, or named by what one view shows.
 
 use super::JointMaps;
 use crate::network::PoseNetwork;
@@ -18,11 +18,11 @@ impl JointMaps {
         }
     }
 
-    /// Makes left and right those of the person, where they are those of the picture, by what the network alone tells of the direction
-    /// of the trunk: whoever is seen from behind has them exchanged. Over several views more is known (`multiview`).
+    /// Makes left and right those of the person, where they are those of the picture, by the direction of the trunk that
+    /// the network alone gives: a person seen from behind has them exchanged. Over several views more is known (`multiview`).
     ///
     /// * `network`: what the maps were read from.
-    /// * `front`: what it told of the direction ([`Sight::front`](crate::Sight::front)).
+    /// * `front`: what it said of the direction ([`Sight::front`](crate::Sight::front)).
     pub fn name_sides(&mut self, network: &PoseNetwork, front: Option<[f32; 2]>) {
         let is_as_seen = network.card().keypoints.sides == keypoints::Sides::Seen;
         let is_from_behind = front.is_some_and(|[_, towards]| towards < 0.0);

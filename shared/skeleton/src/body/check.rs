@@ -29,7 +29,7 @@ const MOST: f64 = 10.0;
 
 /// Judges a skeleton.
 ///
-/// A skeleton is nobody if it has fewer than [`MIN_BONES`] bones, a stature beyond [`STATURES`] or more than
+/// A skeleton is not that of a person if it has fewer than [`MIN_BONES`] bones, a stature beyond [`STATURES`] or more than
 /// 28 % from that of the learned lengths, or if more than half of its bones are impossible. Otherwise an impossible
 /// bone loses its worst joint: the one that also spoils other bones, else the one farther from the trunk, else the one
 /// with the larger covariance; and so on until what is left is possible. Impossible are
@@ -138,7 +138,7 @@ impl<'a> Judgement<'a> {
         (self.z.iter().flatten().map(capped).sum::<f64>() / n as f64).sqrt()
     }
 
-    /// Why it is nobody, whatever its proportions.
+    /// Why it is not a person, whatever its proportions.
     fn reason(&self) -> Option<Reason> {
         let Some(stature) = self.stature else {
             return Some(Reason::TooFewBones {

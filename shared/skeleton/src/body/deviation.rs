@@ -9,7 +9,7 @@ use crate::body::{Joints, N_BONES};
 /// as many.
 pub const DEVIATION_CAP: f64 = 9.0;
 
-/// Statures that cost nothing, metres: from a child of three years to a man of whom there are few taller.
+/// Statures that cost nothing, metres: from a child of three years to a man taller than almost all.
 const USUAL: [f64; 2] = [0.95, 2.0];
 /// Standard deviation beyond them, metres.
 const UNUSUAL_SD: f64 = 0.05;

@@ -55,7 +55,7 @@ impl Lengths {
         self.learned = [None; Kind::ALL.len()];
     }
 
-    /// Adds a frame: the bones whose joints the verdict keeps; nothing of a skeleton that is nobody.
+    /// Adds a frame: the bones whose joints the verdict keeps; nothing of a skeleton that is not that of a person.
     ///
     /// * `joints`: as they were triangulated; not refined, or the lengths confirm themselves.
     /// * `verdict`: of [`check`](crate::body::check) on these joints.

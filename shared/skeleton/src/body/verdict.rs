@@ -1,4 +1,4 @@
-//! Judgement of a skeleton, and the reason why it is nobody.
+//! Judgement of a skeleton, and the reason why it is not a person.
 
 use core::fmt;
 
@@ -6,7 +6,7 @@ use crate::body::bone::clean;
 use crate::body::stature::Stature;
 use crate::body::{Joints, N_JOINTS};
 
-/// Why a skeleton is nobody.
+/// Why a skeleton is not that of a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
     /// There is too little of it.
@@ -42,7 +42,7 @@ impl fmt::Display for Reason {
                 let [low, high] = limits;
                 write!(
                     f,
-                    "it would be {metres:.2} m tall, possible are {low:.2} to {high:.2} m"
+                    "it would be {metres:.2} m tall; {low:.2} to {high:.2} m are possible"
                 )
             }
             Self::Impossible { impossible, bones } => {
@@ -55,14 +55,14 @@ impl fmt::Display for Reason {
 /// Judgement of a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// The standing height, from the joints that are kept; from all if it is nobody. `None` with too few bones.
+    /// The standing height, from the joints that are kept; from all if it is not a person. `None` with too few bones.
     pub stature: Option<Stature>,
     /// Root mean square of the deviations of the bones' lengths from the expected ones, in standard deviations: 0 to 1
-    /// is ordinary. Of the joints that are kept; of all if it is nobody; 0 without bones.
+    /// is ordinary. Of the joints that are kept; of all if it is not a person; 0 without bones.
     pub deviation: f64,
     /// The joints that must not be reported: those of impossible bones. A missing joint is not dropped.
     pub dropped: [bool; N_JOINTS],
-    /// Why it is nobody; then no joint is to be reported.
+    /// Why it is not a person; then no joint is to be reported.
     pub nobody: Option<Reason>,
 }
 

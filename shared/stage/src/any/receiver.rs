@@ -17,7 +17,7 @@ pub struct Received {
     pub frame: u64,
     /// When it was sent, nanoseconds; 0 if unknown.
     pub sent_at: u64,
-    /// Tells that the message carries a result, or why not; heartbeats always do.
+    /// Says that the message carries a result, or why it does not; heartbeats always do.
     pub status: Status,
     /// Heartbeats, and pictures of cameras, which are numbered: the epoch of the process, and how many messages it has sent in this
     /// epoch.

@@ -110,7 +110,7 @@ pub enum Fault {
         at[0], at[1]
     )]
     Outside {
-        /// Which, from 1: the one that lies farthest outside.
+        /// The joint, from 1, that lies farthest outside.
         joint: usize,
         /// Where, pixels.
         at: [f64; 2],

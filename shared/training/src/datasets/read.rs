@@ -17,7 +17,7 @@ use crate::datasets::{
 pub enum DatasetError {
     /// The layout is not known.
     #[error(
-        "{} is no data set: expected a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a \
+        "{} is not a data set: expected a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a \
          file of JSON lines",
         path.display()
     )]

@@ -105,7 +105,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         }
     }
 
-    /// By how much an example misses its margin: the slope of the dual objective along its share.
+    /// Amount by which an example misses its margin: the slope of the dual objective along its share.
     pub(super) fn slope(&self, at: usize) -> f64 {
         let Entry { margin, x, .. } = &self.entries[at];
         margin - x.dot(&self.solution)

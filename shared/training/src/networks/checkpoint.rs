@@ -1,4 +1,4 @@
-//! Files of trainings: a checked header, and what it is about behind it.
+//! Files of trainings: a header with a checksum, then the content.
 //!
 //! | bytes | content |
 //! |---|---|

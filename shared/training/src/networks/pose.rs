@@ -8,7 +8,7 @@
 //! * [`file()`]: a trained network as an ONNX file; [`card()`] says how it is used.
 //! * [`Score`]: how good it is on people.
 //!
-//! Labels are **as seen**: whoever is seen from behind has the joints of left and right exchanged, so that the label follows
+//! Labels are **as seen**: a person seen from behind has the joints of left and right exchanged, so that the label follows
 //! the picture. In which direction the person faces is an output of its own.
 //!
 //! Pixels have their centres at integers.

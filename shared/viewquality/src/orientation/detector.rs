@@ -8,7 +8,7 @@ use crate::orientation::features::{Buffers, features};
 use crate::orientation::network::Network;
 use crate::orientation::tile::{Crop, Tile};
 
-/// Tells from the picture in which direction a person faces.
+/// Finds from the picture in which direction a person faces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     network: Network,

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 use crate::orientation::detector::{Detector, Workspace};
 use crate::orientation::train::Sample;
 
-/// How often a detector tells a direction from its opposite.
+/// How often a detector distinguishes a direction from its opposite.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Score {
     /// People.
     pub n: usize,
-    /// Those of whom the true direction is the more likely one.
+    /// Those whose true direction is the more likely one.
     pub n_right: usize,
     /// Mean surprise, nats; `ln 2` for a detector that says nothing.
     pub surprise: f64,

@@ -72,7 +72,7 @@ const MOMENTUM: f32 = 0.9;
 
 /// Learns a network from samples, on rayon's current pool; the same bits on any number of threads.
 ///
-/// * `watch`: told after every pass; ends the training by `false`.
+/// * `watch`: called after every pass; ends the training by `false`.
 /// * Returns `None` without samples, or if `watch` ended it.
 pub fn train(
     samples: &[Sample],

@@ -35,7 +35,8 @@ pub(super) struct Options {
     #[arg(long, value_name = "FILE", requires = "detector")]
     detector_card: Option<PathBuf>,
     /// Problems to add, separated by commas: clean, covered:N (half of the person in N views), views:N (only so many),
-    /// turned:DEGREES (a camera), bystander, exchanged (sides in a view); all: the whole set. Only with --network-evidence.
+    /// turned:DEGREES (of one camera), bystander, exchanged (sides in a view); all: the whole set. Only with
+    /// --network-evidence.
     #[arg(
         long,
         value_name = "LIST",

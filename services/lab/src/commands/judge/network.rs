@@ -66,7 +66,7 @@ pub(super) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-/// How well the heat of the maps tells how far off a joint is.
+/// How well the heat of the maps predicts the error of a joint.
 struct Expected {
     n_joints: usize,
     n_far: usize,

@@ -12,7 +12,7 @@ use super::DEFAULT;
 ///
 /// # Errors
 ///
-/// The file is no report of a run, or no frame passed in it.
+/// The file is not the report of a run, or the run passed no frame.
 pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
     let refused = |what: &str| {
         let failure = Failure::new(ExitKind::Input, format!("{}: {what}", file.display()));
@@ -30,12 +30,12 @@ pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
 
 fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     let spent = report["processor_s"].as_object();
-    let spent = spent.ok_or("it has no `processor_s`: no report of a run")?;
+    let spent = spent.ok_or("it has no `processor_s`: it is not the report of a run")?;
     let n_views = report["views"].as_array().map_or(0, Vec::len);
     let n_frames = report["frames_in_footage"].as_f64().unwrap_or(0.0);
     if n_views == 0 || n_frames < 1.0 {
         return Err(format!(
-            "{n_frames} frames of {n_views} views: nothing can be told from it"
+            "{n_frames} frames of {n_views} views: no costs can be computed from that"
         ));
     }
     // A process of a service, milliseconds for each frame.
@@ -67,7 +67,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
 }
 
-/// The costs with what the link took.
+/// Adds the measured costs of the link to the costs.
 ///
 /// * `hosts`: what `hosts.json` says; `carries_poses`: whether poses cross, and no frames.
 fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
@@ -159,7 +159,7 @@ mod tests {
             change(&mut it);
             of_run(&it, None).unwrap_err()
         };
-        assert!(refused(&|value| value["processor_s"] = json!(null)).contains("no report"));
+        assert!(refused(&|value| value["processor_s"] = json!(null)).contains("not the report"));
         assert!(
             refused(&|value| value["frames_in_footage"] = json!(0)).contains("0 frames of 3 views")
         );

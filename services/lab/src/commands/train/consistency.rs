@@ -15,8 +15,8 @@ use terminal::{Globals, Terminal, output};
 const HELP: &str = "\
 SEQUENCE is a sequence for `parallax-lab eval`: a folder of HumanEva-I, of UMPM, of `parallax-lab synth`, or a description. \
 Every view is solved alone. From the parts near the truth it learns which types occur together in \
-two views, by the angle between the cameras as seen from the person, and with --rig NAME also for the pairs of \
-that rig by the cameras' names. The median error of every part is its threshold (tau); joints are a linear \
+two views, by the angle between the cameras as seen from the person, and with --rig NAME also for each pair of cameras \
+of that rig, by their names. The median error of every part is its threshold (tau); joints are a linear \
 map of the parts by least squares. Then it chooses alpha, the cap on distances and beta on \
 held-out subjects, by the largest area under the curve of PCP3D.
 
@@ -26,8 +26,8 @@ of a deployment, or --consistency of `eval`. Its format: cargo doc -p consistenc
 With --json one object: the weights, every choice that was tried and its score, tau, the score of the tables on held-out \
 people by the number of bins, the error of joints with and without the map.
 
-Exit codes: 0 done; 2 the command line; 4 a sequence or a model, or nothing could be learned; 5 a calibration; 130 \
-interrupted; OUT then holds the tables with the default weights, if weights were being tried.
+Exit codes: 0 done; 2 the command line is wrong; 4 a sequence or a model cannot be used, or nothing could be learned; \
+5 a calibration cannot be used; 130 interrupted; OUT then holds the tables with the default weights, if weights were being tried.
 
 Examples:
     parallax-lab synth out/ring --rig ring:6 --subjects 1-8 --actions walking,boxing,gestures --frames 6 --rate 1

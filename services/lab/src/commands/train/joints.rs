@@ -14,14 +14,14 @@ use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
 By default a joint is the centre of one part. This command searches the pictures of marked people with the \
-model, takes the best detection that covers 30 % of the box around a person's joints, and learns every joint as a weighted \
-sum of the parts around its own. Left and right are mirror images. Joints farther than a tenth of the \
+model, takes the best detection that covers 30 % of the box around a person's joints, and learns every joint as a \
+weighted sum of that part and the parts around it. Left and right are mirror images. Joints farther than a tenth of the \
 person's size from their mark are ignored: there the limb was not found. Every data set has the same weight, however many \
 people it has. The number of parts and the ridge are chosen by the error on people who are left out in turn.
 
 DATASETs are those of `train fmp`, of people with 14 joints: usually the same as for the model, with the same --only, --sides \
 and --without. The file fits this model only. Name it by `paper.joint_map` of a deployment, or by --joint-map of \
-`detect`, `eval` and `judge`. A file for the model that ships ships too.
+`detect`, `eval` and `judge`. The file for the model that ships is part of Parallax.
 
 The file is the same on any number of threads.
 

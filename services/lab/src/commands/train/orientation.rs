@@ -1,4 +1,4 @@
-//! `parallax-lab train orientation`: trains the network that tells in which direction a person faces.
+//! `parallax-lab train orientation`: trains the network that sees in which direction a person faces.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -8,7 +8,7 @@ use super::{EXITS, Output};
 const HELP: &str = "\
 Searches frames with the model that ships, and measures the time from the picture to poses and evidence: at rates of cameras, where a \
 card may slow its clock between frames, and as fast as possible (0). All views of a frame are searched at once, by threads of one \
-process, which share the GPU. The picture is made up.";
+process, which share the GPU. The picture is artificial.";
 
 /// Options of the benchmark of the GPU.
 #[derive(Debug, Args)]
@@ -20,10 +20,10 @@ pub(crate) struct Arguments {
     /// Numbers of views.
     #[arg(long, value_name = "N,..", value_delimiter = ',', default_value = "1,4", value_parser = clap::value_parser!(u64).range(1..=64))]
     views: Vec<u64>,
-    /// Rates of frames, hertz; 0 for as fast as possible.
+    /// Frames per second; 0 for as fast as possible.
     #[arg(long, value_name = "HZ,..", value_delimiter = ',', default_value = "0,60,30,10", value_parser = rate)]
     rates: Vec<f64>,
-    /// Frames of every row.
+    /// Frames to measure for every row of the table.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     frames: u64,
     /// Use software Vulkan if there is no GPU, to check that the search works.

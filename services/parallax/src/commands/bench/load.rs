@@ -12,8 +12,8 @@ use terminal::rate;
 const HELP: &str = "\
 Every run is a deployment of real processes, started like `parallax run`. Without a deployment file its cameras are \
 synthetic, 320x240 pixels, `--rate` frames a second. Their pictures are rendered in advance into OUT/pictures; \
-with --live the capture processes render them during the run, and compete with the others for the cores. They are \
-searched near the last pose (`--set paper.search=full`: everywhere).
+with --live the capture processes render them during the run, and compete with the others for the cores. The pictures \
+are searched near the last pose (`--set paper.search=full`: everywhere).
 
 latency     --views cameras in real time; then the same with the process of the last camera killed
 throughput  --views cameras, every frame, as fast as possible

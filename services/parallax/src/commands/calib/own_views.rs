@@ -24,7 +24,7 @@ pub(super) struct Agreement {
 ///
 /// # Errors
 ///
-/// The file cannot be read, or no two views of a frame found somebody by themselves.
+/// The file cannot be read, or no two views of a frame found a person by themselves.
 pub(super) fn agreement(rig: &Rig, file: &Path) -> Result<Agreement, Failure> {
     let frames = frames(rig, file)?;
     let n_seen = |views: &&Vec<Option<Points>>| views.iter().flatten().count();

@@ -33,8 +33,8 @@ A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
 
 Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. At least two \
 cameras at a time must see it. Pictures that were taken together are named by timestamps.csv beside the first video (Caliscope's: \
-the n-th row of a camera is its n-th picture) or by --timestamps. Without such a table they are those of one number, or of one time \
-if frame rates differ.
+the n-th row of a camera is its n-th picture) or by --timestamps. Without such a table, pictures with the same number \
+belong together, or with the same time if frame rates differ.
 
 The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. If there are doubts,
 the files are written, the report and the rig state the doubts, and the exit code is 7. If there is no answer, the exit code is 5,
@@ -96,7 +96,7 @@ pub(crate) struct Arguments {
     /// Write the calibration; with --print the board (.pdf or .svg; both if not given).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Its format.
+    /// Format of the calibration to write.
     #[arg(long, value_enum, default_value_t = To::Rig)]
     to: To,
     /// Write a page with residuals and coverage, every number with its uncertainty, the rig, the worst pictures.

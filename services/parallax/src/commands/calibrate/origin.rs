@@ -19,10 +19,10 @@ use terminal::{Globals, Terminal, output};
 /// Options of `parallax calibrate origin`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-With a board on the floor, its print up: the origin is its upper left corner, x along its rows, y against its columns, z up.
+With a board on the floor, its printed side up: the origin is its upper left corner, x runs along its rows, y against its columns, z up.
 With three points on the floor: the origin, one along x, and any other; each as pixels of at least two cameras.
-With --people the floor is below the feet of people who stand, in a finished run of this rig. The origin is in \
-the middle of their places, and x is as near to the old x as possible. If a person walked about, the plane of the standing feet \
+With --people the floor is below the feet of people who stand, in a finished run of this rig. The origin is in the \
+middle of the places where they stood, and x is as near to the old x as possible. If a person walked about, the plane of the standing feet \
 gives the vertical. Otherwise upright people do, less surely: the file is written, and the exit code is 7.
 
 Examples:
@@ -116,7 +116,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let below = new.cameras().iter().find(|camera| camera.centre_in_world().z < 0.0);
     match below {
         None if by_bodies => {
-            let message = "the vertical is that of people who stand upright, some degrees sure: their feet stood on one spot";
+            let message = "the vertical is that of people who stand upright, known to some degrees: their feet stood on one spot";
             let hint = "a run in which a person walks about gives it by the feet";
             Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
         }
@@ -124,7 +124,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         Some(camera) => Err(Failure::new(
             ExitKind::Degraded,
             format!(
-                "camera {} is now below the floor: is it the floor?",
+                "camera {} is now below the floor: is what was given the floor?",
                 camera.name
             ),
         )),
@@ -158,7 +158,7 @@ fn by_board(
     from_board(rig, &looked.layout.points, &sights).map_err(|error| {
         let hint = match error {
             OriginError::BoardApart { .. } => "--frames says how many frames show it lying still",
-            _ => "does it lie flat, in the sight of a camera, in the first frames?",
+            _ => "does it lie flat, in view of a camera, in the first frames?",
         };
         Failure::new(ExitKind::Calibration, error).with_hint(hint)
     })

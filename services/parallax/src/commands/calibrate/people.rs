@@ -114,7 +114,7 @@ fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
 
 pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     if arguments.height_m.is_none() && arguments.distance.is_none() && arguments.scale.is_none() {
-        let message = "pictures tell no lengths: say how tall the person is (--height-m), how far apart two cameras are (--distance), \
+        let message = "pictures have no scale: say how tall the person is (--height-m), how far apart two cameras are (--distance), \
                        or that the rig of the deployment is to be kept (--scale rig)";
         return Err(Failure::new(ExitKind::Usage, message));
     }
@@ -232,7 +232,7 @@ fn vertical(outcome: &Outcome) -> &'static str {
         Vertical::Feet => "the feet that stand",
         Vertical::Bodies => "bodies that stand upright",
         Vertical::Leaning => {
-            "bodies in the mean: nobody stood upright, it may be off by many degrees"
+            "the mean of all bodies: nobody stood upright, so it may be off by many degrees"
         }
         Vertical::Rig => "the rig before",
     }

@@ -104,7 +104,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     refuse(&outcome.doubts, &names, HINT)?;
     if !outcome.is_better {
         let message = format!(
-            "no better: held out, joints are {:.2} px from where the other cameras see them with the rig that is there, and {:.2} px \
+            "no better: held-out joints are {:.2} px from where the other cameras see them with the present rig, and {:.2} px \
              with the new one; keep the rig",
             outcome.held_out_px[0], outcome.held_out_px[1]
         );
@@ -148,7 +148,7 @@ fn about(arguments: &Arguments, walk: &Walk) -> Vec<(String, String)> {
 
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     output::line(format_args!(
-        "{} instants; held out, joints are {:.2} px from where the other cameras see them before, {:.2} px after; {} of {} blocks \
+        "{} instants; held-out joints are {:.2} px from where the other cameras see them before, {:.2} px after; {} of {} blocks \
          became better ({:.1} standard errors)",
         outcome.n_instants,
         outcome.held_out_px[0],

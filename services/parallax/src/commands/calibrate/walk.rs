@@ -37,7 +37,7 @@ pub(super) struct WalkArguments {
     /// Length of the footage to look at, seconds; all of it if not given.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) seconds: Option<f64>,
-    /// Most instants to use, evenly over the footage.
+    /// Most instants to use, spread evenly over the footage.
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(12..=5000))]
     pub(super) instants: u64,
     /// Replace a value of the deployment, for example `--set rig=lab.toml`; may be given several times.

@@ -53,7 +53,7 @@ struct Outline {
 struct Person {
     outline: Outline,
     keypoints: Vec<Value>,
-    /// By number in `skeleton::PARSE14`, pixels of the picture; not finite where the keypoints do not tell it.
+    /// By number in `skeleton::PARSE14`, pixels of the picture; not finite if it does not follow from the keypoints.
     joints: Vec<[f64; 2]>,
     score: f64,
 }

@@ -15,7 +15,7 @@ const NO_RIVAL: f64 = 0.3;
 const LEAST_T: f64 = 4.0;
 /// The largest standard error of an offset, seconds, and intervals between pictures.
 const MOST_ERROR: [f64; 2] = [0.006, 0.2];
-/// By how much less the best offset costs than the mean, as a share.
+/// Amount by which the best offset costs less than the mean, as a share.
 const LEAST_GAIN: f64 = 0.08;
 /// The largest median residual, expected errors.
 const MOST_RESIDUAL: f64 = 3.0;

@@ -170,7 +170,7 @@ impl<'a> Sums<'a> {
         (normal, gradient, blocks)
     }
 
-    /// Standard errors of offset and drift of every camera; infinite where nothing tells them.
+    /// Standard errors of offset and drift of every camera; infinite where nothing determines them.
     pub(super) fn errors(&self, found: &DVector<f64>) -> Vec<[f64; 2]> {
         let size = self.fixed.len();
         let (normal, _, blocks) = self.equations(found, &|_| true);

@@ -6,18 +6,18 @@ use super::Sound;
 pub(super) const HOP_S: f64 = 0.002;
 /// Share of the last sample that is taken from each: hum and rumble go.
 const EMPHASIS: f64 = 0.95;
-/// The loudness of so many hops after a time is compared with that of so many before it.
+/// The loudness of this many hops after a time is compared with that of this many before it.
 const AFTER: usize = 4;
 const BEFORE: usize = 12;
 /// A sound begins where the logarithm of the energy grows by more than this, and growth beyond the second does not count.
 const GROWTH: [f64; 2] = [0.5, 3.5];
 /// Hops between two beginnings that are counted.
 const APART: usize = 25;
-/// Beginnings at most so many hops apart are of one sound.
+/// Beginnings at most this many hops apart are of one sound.
 const TOGETHER: i64 = 6;
 /// Half the width of the kernel that makes peaks of the cosine smooth, hops: sources at different distances.
 const SMOOTH: i64 = 4;
-/// Another offset is at least so many hops from the best.
+/// Another offset is at least this many hops from the best.
 const OTHER: usize = 30;
 /// Both recordings have at least this share of their energy where they overlap.
 const LEAST_SHARE: f64 = 0.15;

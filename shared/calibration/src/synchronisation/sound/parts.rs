@@ -6,13 +6,13 @@ use crate::synchronisation::doubt::Doubt;
 
 /// Length of a part, seconds.
 const PART_S: f64 = 20.0;
-/// Least parts that tell an offset for there to be a drift.
+/// Least number of parts with an offset for an estimate of the drift.
 const LEAST_PARTS: usize = 5;
 /// How far from the offset of all it is searched in a part, seconds.
 const AROUND_S: f64 = 0.5;
 /// A drift is determined where its error makes less than this over the recording, seconds.
 const MOST_ERROR_S: f64 = 0.01;
-/// A drift is taken as such if it is so many standard errors away from none.
+/// A drift is taken as such if it is this many standard errors away from none.
 const SURE: f64 = 4.0;
 /// Largest share of parts that contradict the others.
 const MOST_AWAY: f64 = 0.25;
@@ -49,7 +49,7 @@ impl Drift {
         line.filter(|line| line.slope.abs() >= SURE * line.error)
     }
 
-    /// By how much a second of the camera is longer than one of the reference; 0 where that is not told from none.
+    /// Amount by which a second of the camera is longer than one of the reference; 0 if it cannot be distinguished from 0.
     pub(super) fn sure(&self) -> f64 {
         self.line().map_or(0.0, |line| line.slope)
     }

@@ -9,7 +9,7 @@ struct Room {
     centres: Vec<Point3<f64>>,
     /// When each camera began, seconds.
     begins_s: Vec<f64>,
-    /// By how much a second of each is longer.
+    /// Amount by which a second of each is longer.
     drifts: Vec<f64>,
     length_s: f64,
     /// Times of sounds.

@@ -25,7 +25,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// The state a share of the way to another.
+    /// The state at a share of the way to another state.
     pub(super) fn towards(&self, target: &Self, share: f64) -> Self {
         Self {
             joints: core::array::from_fn(|i| self.joints[i].lerp(&target.joints[i], share)),
@@ -77,7 +77,7 @@ pub(super) struct Linear {
 impl Row {
     /// The rows whose joints are there.
     ///
-    /// * `stature`: about how tall the person is, metres: for the spread among people.
+    /// * `stature`: rough height of the person, metres, which sets the spread among people.
     pub(super) fn all(
         joints: &Joints,
         stature: f64,

@@ -1,7 +1,8 @@
 //! The network that finds people.
 //!
-//! A whole picture goes in. Of every cell of four by four pixels it gives the log-odds that the middle of somebody's box lies in
-//! it, and the natural logarithms of the distances from the middle of the cell to the left, top, right and bottom of that box, in cells.
+//! A whole picture goes in. Of every cell of four by four pixels it gives the log-odds that the middle of a person's box
+//! lies in it, and the natural logarithms of the distances from the middle of the cell to the left, top, right and
+//! bottom of that box, in cells.
 
 use crate::networks::begun::{self, BeginError, Begun};
 use crate::networks::ops::{Dims, Network, Ops, Output};
@@ -21,7 +22,7 @@ pub(crate) const MULTIPLE: usize = 32;
 
 /// The log-odds of an untrained cell.
 const HEAT_BIAS: f32 = -4.6;
-/// Logarithms of the sides of an untrained box, cells: somebody who is as high as a third of the picture.
+/// Logarithms of the sides of an untrained box, cells: a person who is as high as a third of the picture.
 const SIDE_BIAS: [f32; 4] = [1.4, 2.3, 1.4, 2.3];
 
 /// The sizes of the network.

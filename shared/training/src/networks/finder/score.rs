@@ -6,7 +6,7 @@ use super::picture::Around;
 
 /// A found box and a true one that is the same share this of their union, at least.
 const SAME: f32 = 0.5;
-/// A box that shares this with somebody who does not count is not false.
+/// A box that shares this with a person who does not count is not false.
 const UNASKED: f32 = 0.3;
 
 /// How good a network is.
@@ -16,11 +16,11 @@ pub struct Score {
     pub pictures: usize,
     /// People in them who should be found.
     pub people: usize,
-    /// Share of these that are.
+    /// Share of these who are found.
     pub recall: f32,
-    /// Boxes of nobody, for each picture.
+    /// Boxes without a person, for each picture.
     pub false_boxes: f32,
-    /// Pictures of nobody.
+    /// Pictures without people.
     pub empty: usize,
     /// Share of these in which nobody is found.
     pub quiet: f32,
@@ -30,7 +30,7 @@ impl core::fmt::Display for Score {
     fn fmt(&self, to: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(
             to,
-            "{} pictures kept apart: {:.1} % of {} people found, {:.2} false boxes a picture, {:.1} % of {} pictures of nobody without any",
+            "{} pictures kept apart: {:.1} % of {} people found, {:.2} false boxes a picture, none in {:.1} % of {} pictures without people",
             self.pictures,
             100.0 * self.recall,
             self.people,

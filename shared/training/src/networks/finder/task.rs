@@ -82,7 +82,7 @@ impl<'a> FinderTask<'a> {
     ///
     /// # Panics
     ///
-    /// If the card that this crate writes is none.
+    /// If the card that this crate writes is not valid.
     pub fn new(
         settings: &'a Settings,
         [learnt, kept]: [&'a [Picture]; 2],

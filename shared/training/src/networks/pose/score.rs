@@ -45,7 +45,7 @@ pub struct Score {
     pub mean_of_ends: f32,
     /// Share of limbs of which both ends are at most half their length off.
     pub both_ends: f32,
-    /// Share of people of surely known direction of whom it tells the direction from its opposite.
+    /// Share of people with a surely known direction for whom it distinguishes the direction from its opposite.
     pub front: f32,
     /// Area under the curve: the probability that a joint that is off by more than half a head is expected to be farther off
     /// than one that is not.

@@ -105,7 +105,7 @@ impl<'a> KeptApart<'a> {
     }
 }
 
-/// There is nobody to learn from, or nobody is kept apart.
+/// There are no people to learn from, or none are kept apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{learnt} people to learn from and {kept} kept apart are too few")]
 pub struct TooFew {

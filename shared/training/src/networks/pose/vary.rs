@@ -10,7 +10,7 @@ use crate::networks::parameters::normal;
 
 /// The box around the joints is enlarged by it: what [`Shape`]'s card says to the program that uses the network.
 pub const MARGIN: f32 = 1.25;
-/// By how much hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+/// Amount by which hands, feet and hair reach beyond the joints: share of the longer side, on each side.
 const BEYOND: f32 = 0.05;
 /// Where there is no picture.
 pub const FILL: f32 = 110.0;
@@ -103,7 +103,7 @@ pub fn plain(person: &Person, shape: &Shape) -> Option<NetworkSample> {
 
 /// A person, varied at random.
 ///
-/// * `other`: somebody else, parts of whom may cover this one.
+/// * `other`: another person, who may cover parts of this one.
 pub fn varied(
     person: &Person,
     other: &Person,
@@ -217,7 +217,7 @@ fn colour(rgb: &[u8], [x, y]: [f32; 2]) -> [f32; 3] {
     sum
 }
 
-/// Covers a rectangle with one colour, or with a part of somebody else.
+/// Covers a rectangle with one colour, or with a part of another person.
 fn cover(rgb: &mut [[f32; 3]], other: &Person, [width, height]: [usize; 2], rng: &mut Rng) {
     let sides = [
         rng.usize(width / 8..=width / 3),

@@ -44,7 +44,7 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// A side up to which sums of products are computed here.
+/// Largest side for which sums of products are computed here.
 ///
 /// nalgebra multiplies matrices with fewer than six rows or columns column by column, and counts wrong there where the numbers of a
 /// column do not lie side by side (0.35: it reads and writes beyond them). Larger ones go to `matrixmultiply`.

@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     pictures: Option<PathBuf>,
     #[command(flatten)]
     learning: Learning,
-    /// Network of this command to start from, in place of random weights: for more steps, or your own pictures.
+    /// Network made by this command to start from, in place of random weights: for more steps, or your own pictures.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
 }

@@ -17,13 +17,14 @@ use crate::commands::train::subjects;
 const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} {msg}";
 
 const HELP: &str = "\
-Three sources: DATASETs of annotated people as for `parallax-lab train fmp`, whose boxes lie around the joints; photographs of nobody \
-(--empty DIR); and scenes of several people that do not exist (--scenes N). Of every picture at most 320 pixels across or down are kept.
+Three sources: DATASETs of annotated people as for `parallax-lab train fmp`, whose boxes lie around the joints; photographs \
+without people (--empty DIR); and synthetic scenes of several people (--scenes N). Every picture is reduced until its \
+longer side has at most 320 pixels.
 
-A teacher, a detector with a card, finds everybody else in the photographs of annotated people: what it is sure of is a person, and \
-where it is not, the network is not asked. Without a teacher everybody who is not marked counts as background.
+A teacher, a detector with a card, finds everybody else in the photographs of annotated people: a box that it is sure \
+of counts as a person, and a box that it is not sure of does not count in the training. Without a teacher everybody who is not marked counts as background.
 
-One picture in twelve is kept apart: the training is watched on them.
+One picture in twelve is kept apart, to watch the training.
 
 Exit codes: 0 the file is written; 2 the command line is wrong; 4 a data set or the teacher cannot be used; 130 stopped by Ctrl-C.
 
@@ -43,7 +44,7 @@ pub(crate) struct Arguments {
     /// The card of the detector; if not given, the file beside it.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Option<PathBuf>,
-    /// Photographs of nobody; also the background of every third scene.
+    /// Photographs without people; also the background of every third scene.
     #[arg(long, value_name = "DIR")]
     empty: Option<PathBuf>,
     /// Number of synthetic scenes; each gives some pictures of every camera.

@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     people: Option<PathBuf>,
     #[command(flatten)]
     learning: Learning,
-    /// Network of this command to start from, in place of random weights: for more steps, or your own people.
+    /// Network made by this command to start from, in place of random weights: for more steps, or your own people.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
 }

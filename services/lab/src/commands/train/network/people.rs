@@ -26,7 +26,7 @@ own (LSP; for PARSE pass --sides PARSE=seen).
 A teacher, another network with a card, helps: its joints replace missing marks, sides that it surely contradicts are \
 exchanged, and where it agrees with a mark the mean of both is learned. Nose, heels and big toes come from the first teacher whose card names them (`--teacher` again, with its card).
 
-One in twelve is held out: the training is watched on them, and the expected error is learned on them. Leave out the people to judge on \
+One person in twelve is held out, to watch the training and to learn the expected error. Leave out the people to judge on \
 with --without.
 
 Exit codes: 0 the file is written; 2 the command line is wrong; 4 a data set or the teacher cannot be used; 130 stopped by Ctrl-C.

@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     /// Samples to learn from and to validate on.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     samples: Vec<PathBuf>,
-    /// Samples to test the network on, which are not trained on; every file separately.
+    /// Samples to test the network on, each file separately; they are not used for training.
     #[arg(long, value_name = "FILE")]
     judge: Vec<PathBuf>,
     /// The ONNX file to write.
@@ -74,7 +74,7 @@ pub(crate) struct Arguments {
     /// Initial weights: torchvision's VGG-16, as .safetensors.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// The identity stored in the file; its name if not given.
+    /// The identity stored in the file; the file's name if not given.
     #[arg(long, value_name = "TEXT")]
     identity: Option<String>,
     /// Continue from the checkpoint of an interrupted training; start anew if there is none.

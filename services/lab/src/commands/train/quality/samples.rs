@@ -12,8 +12,8 @@ use crate::commands::train::subjects;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-Two sources, together or alone: synthetic scenes (--scenes N, of the subjects of --subjects, each with \
-another action, rig, room, noise, blur and exposure, by the seed), and DATASETs of annotated people as for \
+Two sources, together or alone: synthetic scenes (--scenes N, of the subjects of --subjects, each with another action, \
+rig, room, noise, blur and exposure, chosen by the seed), and DATASETs of annotated people as for \
 `parallax-lab train fmp`. Every picture is searched as in the pipeline. A sample is the tile around \
 the best pose with a margin, the results of the search, and the error of every part.
 
@@ -78,7 +78,7 @@ pub(crate) struct Arguments {
     /// The file of samples to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Threads; one per core if not given. The samples do not depend on it.
+    /// Threads; one per core if not given. The samples do not depend on their number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }

@@ -14,11 +14,11 @@ use terminal::output;
 
 /// How far the skeletons of a run may be from what its cameras saw, as a share of the size of the person in the picture.
 const MOST_OFF: f64 = 0.15;
-/// The fewest joints in pictures that tell it.
+/// The fewest joints in pictures for this check.
 const LEAST_SEEN: usize = 50;
 
-/// Finds the floor, after a look whether the run is one of this rig. Of several people it takes the one who is followed: that may be one after
-/// the other, who stand on the same floor.
+/// Finds the floor, after checking that the run was made with this rig. Of several people it uses the followed person,
+/// who may change: all of them stand on the same floor.
 ///
 /// * `rate_hz`: frames a second, for a run that does not know.
 pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
@@ -115,7 +115,7 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
         Some(share) if share > MOST_OFF => {
             let message = format!(
                 "{}: its joints are {:.0} % of the size of the person away from where the cameras of this rig saw them (median, at most \
-                 {:.0} %): it is no run of this rig",
+                 {:.0} %): it is not a run of this rig",
                 run.display(),
                 100.0 * share,
                 100.0 * MOST_OFF

@@ -8,7 +8,7 @@ use crate::networks::parameters::normal;
 const ASPECTS: [f32; 6] = [4.0 / 3.0, 16.0 / 9.0, 1.0, 3.0 / 4.0, 9.0 / 16.0, 4.0 / 3.0];
 /// Pixels of the sample for one of a picture, at most.
 const MOST_ENLARGED: f32 = 3.0;
-/// Share of pasted people who stand close to somebody.
+/// Share of pasted people who stand close to a person.
 const CLOSE: f32 = 0.5;
 
 /// A picture, and pastes over it.
@@ -97,7 +97,7 @@ fn cover<'a>(picture: &'a Picture, frame: [f32; 2], rng: &mut Rng) -> Layer<'a> 
     layer(picture, [at, to], (step, window(frame)), rng)
 }
 
-/// A picture with somebody as high as chance wants.
+/// A picture with a person as high as chance wants.
 fn scaled<'a>(picture: &'a Picture, frame: [f32; 2], vary: &Vary, rng: &mut Rng) -> Layer<'a> {
     let Some(person) = somebody(picture, rng) else {
         return cover(picture, frame, rng);
@@ -110,7 +110,7 @@ fn scaled<'a>(picture: &'a Picture, frame: [f32; 2], vary: &Vary, rng: &mut Rng)
     layer(picture, [at, to], (step, window(frame)), rng)
 }
 
-/// A part of a picture, with somebody or without.
+/// A part of a picture, with a person or without.
 ///
 /// * `beside`: who is in the sample already.
 fn pasted<'a>(

@@ -130,7 +130,7 @@ pub(super) fn painted(layers: &[Layer<'_>], side: usize) -> Vec<[f32; 3]> {
     rgb
 }
 
-/// The boxes of everybody of whom anything is seen, pixels of the sample.
+/// The boxes of all people who are visible at least in part, pixels of the sample.
 pub(super) fn boxes(layers: &[Layer<'_>]) -> Vec<Around> {
     let mut all = Vec::new();
     for (nth, layer) in layers.iter().enumerate() {
