@@ -6,6 +6,7 @@ use failure::Failure;
 use footage::{Counting, PictureNumbers, Rotation, Size, SourceSpec, Turn};
 use geometry::{Rig, upright_roll};
 use nalgebra::{UnitVector3, Vector3};
+use rayon::prelude::*;
 use scene::Address;
 
 use inputs::rig_of;
@@ -36,26 +37,26 @@ pub fn settled(deployment: &Deployment) -> Result<Deployment, Failure> {
 }
 
 fn turn(deployment: &mut Deployment, files: &[usize]) -> Result<(), Failure> {
-    let mut rig = None;
-    for &index in files {
-        let camera = &deployment.cameras[index];
-        if camera.rotate.is_some() {
-            continue;
-        }
-        let Some(tagged) = Tagged::read(&camera.source) else {
-            continue;
-        };
-        let rig = match &mut rig {
-            Some(rig) => rig,
-            empty => empty.insert(with_up(rig_of(deployment)?)),
-        };
-        let does_turn = tagged.does_turn(&camera.name, rig);
-        let rotate = if does_turn {
+    let cameras = &deployment.cameras;
+    let open = files.iter().filter(|file| cameras[**file].rotate.is_none());
+    // All at once: each answer takes as long as a program takes to start.
+    let open: Vec<usize> = open.copied().collect();
+    let tagged = open.par_iter().map(|&camera| Tagged::read(&cameras[camera].source));
+    let tagged: Vec<Option<Tagged<'_>>> = tagged.collect();
+    if tagged.iter().all(Option::is_none) {
+        return Ok(());
+    }
+    let rig = with_up(rig_of(deployment)?);
+    let turns = open.into_iter().zip(tagged).filter_map(|(camera, tagged)| {
+        let rotate = if tagged?.does_turn(&cameras[camera].name, &rig) {
             Rotate::Tag(Tag::Tag)
         } else {
             Rotate::Degrees(0)
         };
-        deployment.cameras[index].rotate = Some(rotate);
+        Some((camera, rotate))
+    });
+    for (camera, rotate) in turns.collect::<Vec<_>>() {
+        deployment.cameras[camera].rotate = Some(rotate);
     }
     Ok(())
 }
