@@ -10,6 +10,8 @@ from .errors import ClientError, Full, NotRunning, VersionMismatch
 
 DESCRIPTION_VERSION = 1
 """Version of the description that a deployment gives of itself."""
+SUPERVISOR = "supervisor"
+"""Name of the process that runs a deployment, for the transport."""
 MOST_GUESTS = 4
 """Programs that may read one deployment at the same time."""
 
@@ -30,7 +32,11 @@ def root(name):
 
 
 def supervisor(folder):
-    """The process that runs a deployment, from the kernel's list of locks; None if it does not run or is about to end."""
+    """The process that runs a deployment, from the kernel's list of locks; None if it does not run or is about to end.
+
+    The list leaves out holders in other pid namespaces (containers): there it is the living process with the supervisor's
+    name, with the process id that it has in its own.
+    """
     if (folder / "ending").exists():
         return None
     try:
@@ -44,6 +50,27 @@ def supervisor(folder):
         words = line.split()
         if len(words) >= 6 and words[1] == "FLOCK" and words[5] == place:
             return int(words[4])
+    return _elsewhere(folder)
+
+
+def _elsewhere(folder):
+    try:
+        import iceoryx2
+    except ImportError:  # the list of locks alone then
+        return None
+    file = folder / "config" / "iceoryx2.toml"
+    if not file.exists():
+        return None
+    iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
+    try:
+        config = iceoryx2.config.from_file(iceoryx2.FilePath.new(str(file)))
+        nodes = iceoryx2.Node.list(iceoryx2.ServiceType.Ipc, config)
+    except (iceoryx2.ConfigCreationError, iceoryx2.NodeListFailure):  # it ends meanwhile
+        return None
+    for node in nodes:
+        details = node[0].details if isinstance(node, iceoryx2.NodeState.Alive) else None
+        if details is not None and details.name.as_str() == SUPERVISOR:
+            return details.process_id
     return None
 
 

@@ -134,3 +134,21 @@ def test_the_folder_of_a_run_is_arrays(deploy):
     seen = run.status == "ok"
     assert seen.any() and np.isfinite(run.positions[seen]).any()
     assert np.isnan(run.positions[run.status == "no result"]).all()
+
+
+def test_a_deployment_of_another_pid_namespace_is_read(deploy):
+    within = ["unshare", "--map-current-user", "--pid", "--fork", "--mount-proc"]
+    if subprocess.run([*within, "true"], capture_output=True, check=False).returncode != 0:
+        pytest.skip("no pid namespace may be made here")
+    running = deploy()
+    read = (
+        "import os, sys, parallax_client\n"
+        "assert os.getpid() == 1, 'this is the other namespace'\n"
+        "with parallax_client.connect(sys.argv[1], wait=True) as client:\n"
+        f"    frame = next(client.moments(patience={PATIENCE})).frame\n"
+        "    assert sys.argv[1] in parallax_client.running_deployments()\n"
+        "    print(frame)\n"
+    )
+    ended = subprocess.run([*within, sys.executable, "-c", read, running.name], capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.strip().isdigit(), ended.stdout

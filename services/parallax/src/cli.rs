@@ -11,8 +11,8 @@ use terminal::{EXIT_CODES, Globals, completions};
 const LONG_ABOUT: &str = "\
 Calibrated, synchronised cameras in, 3D human skeletons out.
 
-A deployment file (ten lines: the cameras, their calibration, an output folder) describes a run. A run
-has one process per stage and camera; `parallax run` starts and watches all of them:
+A deployment file (ten lines: the cameras, their calibration, an output folder) describes a run.
+A run has one process per stage and camera; `parallax run` starts and watches all of them:
 
     capture -> pose -> (quality) -> fuse -> triangulate -> results
 

@@ -57,6 +57,27 @@ fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
 }
 
 #[test]
+fn a_room_that_is_kept_is_said_to_differ_from_new_options() {
+    let case = Case::new("new-kept", &[1, 1], "");
+    let new =
+        |camera: &str| case.start(&["new", "room", "--camera", camera, "--rig", "rig.toml"]).wait();
+    let ended = new("nobody=a.mp4");
+    assert!(!ended.status.success(), "{}", ended.stderr);
+    let ended = new("nobody=a.mp4");
+    assert!(
+        ended.stderr.contains("kept room/deployment.toml\n"),
+        "{}",
+        ended.stderr
+    );
+    let ended = new("somebody=a.mp4");
+    assert!(
+        ended.stderr.contains("differs from what these options"),
+        "{}",
+        ended.stderr
+    );
+}
+
+#[test]
 fn a_room_from_people_is_made_step_by_step() {
     let case = Case::new("new", &[1, 1], "");
     let cameras = ["--camera", "a=a.mp4", "--camera", "b=b.mp4"];

@@ -16,8 +16,9 @@ use crate::commands::calibrate::height;
 /// Options of `parallax new`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every step is a command, which is printed before it runs. Files of finished steps are kept, so that `new`, started
-again, continues after them. A step that fails ends it, with its exit code; an answer with doubts (7) also ends it, unless --go-on is given.
+Every step is a command, which is printed before it runs. Files of finished steps are kept, so
+that `new`, started again, continues after them; delete a file to have it made anew. A step that
+fails ends it, with its exit code; an answer with doubts (7) also ends it, unless --go-on is given.
 
     1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
     2  the floor: --floor puts the rig on it (`parallax calibrate origin`)
@@ -103,7 +104,13 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
     }
     if deployment.exists() {
-        output::message(format_args!("kept {}", deployment.display()));
+        let is_other = fs::read_to_string(&deployment).is_ok_and(|kept| kept != text);
+        let differs = if is_other {
+            ", which differs from what these options would make: edit it, or delete it to have it made anew"
+        } else {
+            ""
+        };
+        output::message(format_args!("kept {}{differs}", deployment.display()));
     } else if arguments.dry_run {
         output::line(format_args!("# writes {}\n{text}", deployment.display()))?;
     } else {
