@@ -311,7 +311,7 @@ impl StreamSpec {
     }
 }
 
-/// The pixels; and time and size of each frame on standard error.
+/// Time and size of each frame on standard error; and the pixels, after these as for files.
 ///
 /// * `version`: of `ffmpeg`.
 pub(crate) fn outputs(version: &str) -> Vec<String> {
@@ -336,11 +336,11 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
     let all = [
         &common[..],
         &alone,
-        &pixels,
-        &common,
-        &alone,
         &times,
         &["-f", "framecrc", "pipe:2"],
+        &common,
+        &alone,
+        &pixels,
     ];
     all.concat().into_iter().map(str::to_owned).collect()
 }

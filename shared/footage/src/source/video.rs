@@ -265,13 +265,13 @@ fn has_times(probe: &Probe) -> bool {
     probe.regular_hz().is_some() || probe.listed_s().is_some()
 }
 
-/// The outputs of the decoder: the pixels of the chosen frames and, where times tell frames, the times of
-/// all on standard error. A frame that cannot be decoded is missing in both.
+/// The outputs of the decoder: where times tell frames, the times of all on standard error, and the pixels of the chosen frames. A
+/// frame that cannot be decoded is missing in both.
+///
+/// Times come first. Of two frames that are decoded at once, the decoder writes all that belongs to its first output, then all that
+/// belongs to its second: who reads the pixels of one waits for its time before the pixels of the next.
 fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
-    let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
-    let turn = spec.rotation.turn(probe.tag).filters();
-    let filters = shrinking(probe, spec).into_iter().chain(turn);
-    let mut arguments = output(probe, spec, filters, &pixels);
+    let mut arguments = Vec::new();
     if has_times(probe) {
         let times = [
             "-enc_time_base",
@@ -291,6 +291,10 @@ fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
         let small = "crop=2:2:0:0:exact=1".to_owned();
         arguments.extend(output(probe, &all, [small], &times));
     }
+    let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
+    let turn = spec.rotation.turn(probe.tag).filters();
+    let filters = shrinking(probe, spec).into_iter().chain(turn);
+    arguments.extend(output(probe, spec, filters, &pixels));
     arguments
 }
 
@@ -389,11 +393,29 @@ mod tests {
         let counts: Vec<&str> = counts.map(|count| count[1].as_str()).collect();
         assert_eq!(
             counts,
-            ["4", "31"],
-            "pixels of the chosen frames, times of all"
+            ["31", "4"],
+            "times of all, pixels of the chosen frames"
+        );
+        assert!(
+            comes_before(&arguments, "framecrc", "rawvideo"),
+            "a time that comes after the pixels of the next frame is waited for in vain"
         );
         let counted = outputs(&probe(Some(vec![])), &spec);
         assert!(!counted.contains(&"framecrc".to_owned()), "{counted:?}");
+    }
+
+    fn comes_before(arguments: &[String], first: &str, second: &str) -> bool {
+        let place = |word: &str| arguments.iter().position(|argument| argument == word);
+        place(first).is_some() && place(first) < place(second)
+    }
+
+    #[test]
+    fn times_of_streams_come_before_pixels_as_well() {
+        assert!(comes_before(
+            &crate::stream::outputs("5.1"),
+            "framecrc",
+            "rawvideo"
+        ));
     }
 
     /// A second of video, too large for the pipe; `None`, with a message, without ffmpeg.
