@@ -3,7 +3,7 @@
 use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap};
 
-use crate::network_memory::{NetworkMemory, Seen, is_known, shift};
+use crate::network_memory::{Empty, NetworkMemory, Seen, is_known, shift};
 use crate::tracks::{Pace, Track, moved, wider};
 
 /// Boxes that overlap by more are of one person.
@@ -16,6 +16,8 @@ const BEHIND: f64 = 0.2;
 const LEAST_BEHIND: usize = 7;
 /// A new person who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
 const FAINT: f64 = 0.7;
+/// A box in which nobody is seen is looked into again after so many searches: chairs and posters stay where they are.
+const LOOKED_AGAIN: u32 = 4;
 /// Least heat of a joint that says where its person is, 0 to 1.
 const SURE: f64 = 0.2;
 
@@ -129,9 +131,17 @@ impl Looks<'_> {
         outlines: &[[f64; 4]],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
+        memory.empty.retain_mut(|empty| {
+            empty.n_searches += 1;
+            empty.n_searches < LOOKED_AGAIN
+        });
         for outline in outlines {
             let is_same = |seen: &Seen| overlap(seen.outline, *outline) > SAME_BOX;
-            if memory.n_seen == self.n_most || memory.people().iter().any(is_same) {
+            let is_empty = |empty: &Empty| overlap(empty.outline, *outline) > SAME_BOX;
+            if memory.n_seen == self.n_most
+                || memory.people().iter().any(is_same)
+                || memory.empty.iter().any(is_empty)
+            {
                 continue;
             }
             self.see_box(*outline, outlines.len() == 1, memory)?;
@@ -160,7 +170,12 @@ impl Looks<'_> {
         } else {
             look
         };
-        self.keep_look(&best, None, memory);
+        if !self.keep_look(&best, None, memory) {
+            memory.empty.push(Empty {
+                outline,
+                n_searches: 0,
+            });
+        }
         Ok(())
     }
 
@@ -336,29 +351,30 @@ impl Looks<'_> {
         memory.n_seen < self.n_most && !memory.people().iter().any(is_known)
     }
 
-    /// Keeps the next person, whose maps are read, as [`Self::keep`] does.
-    fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) {
+    /// Keeps the next person, whose maps are read, as [`Self::keep`] does; returns the same.
+    fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
         seen.outline = look.outline;
         seen.turn = look.turn;
         seen.front = look.front;
         seen.usual_score = usual_score;
         seen.pace = None;
-        self.keep(memory);
+        self.keep(memory)
     }
 
-    /// Keeps the next person if it is seen well and not known yet.
-    fn keep(&self, memory: &mut NetworkMemory) {
+    /// Keeps the next person if it is seen well and not known yet; returns whether somebody is seen well.
+    fn keep(&self, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
         if !seen.judge(self.size, self.least_heat) {
-            return;
+            return false;
         }
         let last = &memory.seen[memory.n_seen];
         if last.usual_score.is_none() && last.heat < FAINT * memory.best_heat() {
-            return;
+            return false;
         }
         let is_new = !is_known(&memory.seen, memory.n_seen);
         memory.n_seen += usize::from(is_new);
+        true
     }
 }
 

@@ -34,6 +34,8 @@ pub struct NetworkMemory {
     pub(crate) n_seen: usize,
     /// The people of the frame before.
     pub(crate) before: Vec<Seen>,
+    /// Boxes of the detector in which nobody was seen.
+    pub(crate) empty: Vec<Empty>,
     /// Frames until boxes are looked for; none before the first frame.
     pub(crate) until: Option<u64>,
     /// Frames for which boxes are looked for often: people were near each other, or one of several was lost or found.
@@ -59,6 +61,15 @@ pub(crate) struct Hold {
     pub(crate) gap: u64,
     /// Most frames from one look to the next.
     pub(crate) most: u64,
+}
+
+/// A box of the detector in which nobody was seen.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Empty {
+    /// The box, pixels.
+    pub(crate) outline: [f64; 4],
+    /// Searches since then.
+    pub(crate) n_searches: u32,
 }
 
 /// A person in a frame.

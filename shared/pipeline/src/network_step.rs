@@ -109,7 +109,7 @@ impl NetworkStep {
     ///
     /// Who stands still is held. Where boxes are looked for, they come before those of the frame before, so that no box shrinks or wanders off
     /// unnoticed. A person whose pose was much worse than usual is looked at in a wider box as well, and the better sight kept. Up to twice as many
-    /// people as are kept are looked at, and the largest kept.
+    /// people as are kept are looked at, and the largest kept. While somebody is seen, a box in which nobody was seen is left out of some searches.
     ///
     /// # Errors
     ///
@@ -150,6 +150,9 @@ impl NetworkStep {
         }
         memory.before = before;
         memory.keep_largest(self.settings.n_people);
+        if memory.n_seen == 0 {
+            memory.empty.clear();
+        }
         memory.note_company(tracks.len(), self.settings.find_every);
         self.plan_search(memory);
         // The memory of the list is kept.
