@@ -60,7 +60,7 @@ struct Evidence {
 }
 
 impl Evidence {
-    /// Adds the maps of its frame to the poses of a view. They were sent before.
+    /// Adds the maps of its frame to the poses of a view. The maps were published before the poses.
     fn add_to(&mut self, item: &mut Item, session: u64) -> Result<(), Failure> {
         while let Some(sample) = self.port.receive()? {
             let header = sample.header();

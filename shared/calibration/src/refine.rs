@@ -212,7 +212,7 @@ fn better(
 struct Moving {
     /// A camera that was moved: nothing is assumed about its pose.
     suspect: Option<usize>,
-    /// The others are held.
+    /// True for each camera whose pose the joints determine; the poses of the others are held.
     told: Vec<bool>,
 }
 

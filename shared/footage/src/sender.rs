@@ -84,7 +84,7 @@ struct Told {
 struct Offsets(Vec<i64>);
 
 impl Offsets {
-    /// The offset, once enough agree: their mean.
+    /// Adds a time. Returns the mean of the last offsets once there are enough and they agree.
     fn add(&mut self, time: Told) -> Option<i64> {
         if self.0.len() == N_EQUAL {
             self.0.remove(0);

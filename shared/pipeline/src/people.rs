@@ -251,7 +251,7 @@ fn person<'a>(
     Some(seen)
 }
 
-/// The person of these candidates, and the candidates that see it there.
+/// The person in space that these candidates give, with the candidate of each view that lies where that person projects.
 fn placed<'a>(
     cameras: &[&Camera],
     views: &'a [Vec<FoundBody>],

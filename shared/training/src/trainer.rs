@@ -249,7 +249,7 @@ impl<'a> Trainer<'a> {
         self.machine.bytes() + cells.values().map(|value| value.bytes()).sum::<usize>()
     }
 
-    /// Drops wrong poses without a share, and the features that no example uses.
+    /// Drops wrong poses whose share in the solution is 0, and the features that no remaining example uses.
     fn forget(&mut self) {
         let features = self.bytes() - self.machine.bytes();
         let room = (self.settings.cache_mib << 20).saturating_sub(features);

@@ -19,7 +19,7 @@ use parse::{actions, rig, subjects};
 const HELP: &str = "\
 OUT holds a recording with its truth: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
 (cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and in every picture, visibility, capture \
-times) and people.jsonl (the same as annotated people, for `train fmp` and `judge`; people-as-seen.jsonl with left \
+times) and people.jsonl (the same scenes in the format of annotated people, for `train fmp` and `judge`; people-as-seen.jsonl with left \
 and right as published models define them). The format is in shared/scene/TRUTH.md. For several subjects or actions, each has a \
 folder, OUT/s1-walking, and people.jsonl has all.
 

@@ -124,7 +124,10 @@ pub fn train(
         let samples = read(file)?;
         let all: Vec<&Sample> = samples.all.iter().collect();
         if samples.tile != settings.network.tile().unwrap_or(samples.tile) {
-            let message = format!("{}: its tiles are of another network", file.display());
+            let message = format!(
+                "{}: its tiles do not have the size that this network takes",
+                file.display()
+            );
             return Err(Failure::new(ExitKind::Input, message));
         }
         say.judged(&file.display().to_string(), &trainer.judge(&all))?;

@@ -32,9 +32,9 @@ meanwhile there are results of the others, if it was away for longer than the in
 stage, with no pause longer than --max-pause-ms; every frame of every view is accounted for, except two that the killed \
 process may have held; no other process failed; all results were written.
 Limits on times are for a machine that keeps up with 5 frames a second. At a lower frame rate --max-return-ms grows in \
-proportion to the interval of frames (by 20 at most). If a frame takes longer than 100 ms of all cores together, before or \
-after the run, --max-pause-ms, which is 20 such frames, grows in proportion; and a stage waits for 1.5 intervals of frames, \
-at least 500 ms. With --rate nothing is measured or scaled.
+proportion to the interval of frames (by 20 at most). The time that one frame takes on all cores is measured before \
+and after the run; if the longer one is above 100 ms, --max-pause-ms (20 times 100 ms) grows in proportion. A stage waits for \
+1.5 intervals of frames, at least 500 ms. With --rate nothing is measured or scaled.
 
 Exit codes: 0 all limits held; 6 a limit was missed (the report says which); 1 the run failed; 2 the command line is \
 wrong; 130 stopped by Ctrl-C.

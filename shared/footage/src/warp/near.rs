@@ -16,7 +16,7 @@ const PARTS: u16 = 1 << PART_BITS;
 /// Bits of the sum of all weights.
 const SUM_BITS: u32 = 2 * PART_BITS;
 
-/// Of the positions of a tile, a lane for each channel.
+/// A lane for each channel, for every position of a tile.
 type Lanes = [[u8; LANES]; TILE];
 
 /// A mean of the four source pixels around every position, weighted by how near they are.

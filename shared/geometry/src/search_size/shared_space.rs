@@ -34,7 +34,7 @@ const MIN_SPACE_SHARE: f64 = 0.03;
 /// not change.
 const MIN_FORESHORTENING: f64 = 0.7;
 
-/// How high a standing person is seen by every camera in the space that it shares with others.
+/// How tall a standing person appears in each camera, in the space which that camera shares with others.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heights {
     /// Median height of every camera, pixels of the calibrated image; `None` for a camera that shares no space.

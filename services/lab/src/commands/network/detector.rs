@@ -102,7 +102,7 @@ fn in_words(
     };
     output::line(format_args!("  card   {place}: {}", card.name))?;
     output::line(format_args!(
-        "  takes  {}; the whole picture in its shape, from the top-left corner on, {} beyond it",
+        "  takes  {}; the whole picture, its aspect ratio kept, placed at the top-left corner; the rest is filled with {}",
         prepared(&card.input),
         card.fill
     ))?;

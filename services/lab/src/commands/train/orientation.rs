@@ -14,8 +14,8 @@ use super::subjects;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-Exchanging left and right in all views changes no energy, so the sides must follow from seeing the person \
-from the front or from behind. The network learns that from two sources, together or alone: DATASETs of annotated \
+Exchanging left and right in all views changes no energy, so left and right must be decided by whether the \
+person is seen from the front or from behind. The network learns that from two sources, together or alone: DATASETs of annotated \
 people as for `parallax-lab train fmp`, with the person's own left and right (LSP; not PARSE), \
 and synthetic scenes (--scenes N), searched as in the pipeline.
 
@@ -44,13 +44,13 @@ pub(crate) struct Arguments {
     /// Number of synthetic scenes; each gives some pictures of every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
-    /// Numbers of the people in the scenes.
+    /// First and last number of the synthetic people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
     subjects: [u64; 2],
     /// Number of synthetic scenes to judge on.
     #[arg(long, value_name = "N", default_value_t = 0)]
     judge_scenes: u32,
-    /// Numbers of the people in these scenes.
+    /// First and last number of the synthetic people in the scenes to judge on.
     #[arg(long, value_name = "FROM-TO", default_value = "901-920", value_parser = subjects)]
     judge_subjects: [u64; 2],
     /// Frames per camera of a scene, some seconds apart.
@@ -59,7 +59,7 @@ pub(crate) struct Arguments {
     /// Photographs without people, as the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
-    /// Passes through all people.
+    /// Number of training passes over all people.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     passes: Option<u16>,
     /// Random seed.

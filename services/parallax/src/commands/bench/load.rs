@@ -59,7 +59,7 @@ pub(crate) struct Arguments {
     /// Name of the deployment, unique among those that run at the same time.
     #[arg(long, value_name = "NAME", default_value = "bench")]
     name: String,
-    /// Largest median latency end to end of the run with all cameras, milliseconds.
+    /// Limit on the median end-to-end latency, in the run with all cameras, milliseconds.
     #[arg(long, value_name = "MS")]
     max_p50_ms: Option<f64>,
     /// Largest 99th percentile of that latency, milliseconds.

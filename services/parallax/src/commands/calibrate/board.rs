@@ -93,7 +93,7 @@ pub(crate) struct Arguments {
     /// If not given, found from the pictures where possible.
     #[arg(long, value_enum, conflicts_with = "mirrored")]
     back: Option<BackName>,
-    /// Write the calibration; with --print the board (.pdf or .svg; both if not given).
+    /// File to write the calibration to; with --print, the board (.pdf or .svg; without --out both are written).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Format of the calibration to write.

@@ -14,8 +14,8 @@ use terminal::{Globals, Terminal, output};
 const HELP: &str = "\
 Two sources, together or alone: synthetic scenes (--scenes N, of the subjects of --subjects, each with another action, \
 rig, room, noise, blur and exposure, chosen by the seed), and DATASETs of annotated people as for \
-`parallax-lab train fmp`. Every picture is searched as in the pipeline. A sample is the tile around \
-the best pose with a margin, the results of the search, and the error of every part.
+`parallax-lab train fmp`. Every picture is searched as in the pipeline. A sample consists of the tile (the \
+best pose and a margin around it), the results of the search, and the error of every part.
 
 Put subjects and images for judging the network into a separate file.
 

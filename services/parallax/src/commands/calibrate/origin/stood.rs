@@ -114,8 +114,8 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
         }
         Some(share) if share > MOST_OFF => {
             let message = format!(
-                "{}: its joints are {:.0} % of the size of the person away from where the cameras of this rig saw them (median, at most \
-                 {:.0} %): it is not a run of this rig",
+                "{}: the distance of its joints from where the cameras of this rig saw them is {:.0} % of the person's size (median; \
+                 allowed: {:.0} %): it is not a run of this rig",
                 run.display(),
                 100.0 * share,
                 100.0 * MOST_OFF
