@@ -29,7 +29,7 @@ impl SpaceStepSettings {
     /// The settings for what views find.
     ///
     /// * `least_heat`: mean heat of the joints of a person who is seen in a view, 0 to 1. In space the views have to
-    /// agree: a person who is seen badly in one does not count there, and half of the joints need twice as much.
+    ///   agree: a person who is seen badly in one does not count there, and half of the joints need twice as much.
     /// * `as_seen`: left and right follow the picture, so that those of the whole body are to be decided.
     pub fn for_views(least_heat: f64, as_seen: bool) -> Self {
         let maps = MapSettings::default();

@@ -189,7 +189,7 @@ pub static UMPM15: JointSet = JointSet {
     ],
 };
 
-/// The 20 joint ends of HumanEva; elbows and knees appear as an end of two limbs.
+/// The 20 joint ends of `HumanEva`; elbows and knees appear as an end of two limbs.
 pub static HUMANEVA20: JointSet = JointSet {
     name: "humaneva20",
     joints: &[

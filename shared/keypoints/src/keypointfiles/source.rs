@@ -40,7 +40,7 @@ impl KeypointSource {
     /// has are frames without keypoints. Files that do not end in `.json` are passed over.
     ///
     /// * `names`: what the keypoints are called; `None`: as their number or their category in the files says. Then the
-    /// files of   a folder are read up to the first person, or a few more.
+    ///   files of a folder are read up to the first person, or a few more.
     ///
     /// # Errors
     ///
