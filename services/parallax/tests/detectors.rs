@@ -172,7 +172,7 @@ fn a_detector_is_explained_by_its_card_and_its_boxes_are_drawn() {
         "`dets` [1, 3, 5]",
         "card.toml: Three boxes always",
         "64 wide, 64 high, rgb, planes, f32",
-        "114 beyond it",
+        "the rest is filled with 114",
         "`dets`, a list of boxes",
         "a score of at least 0.3",
         "licence CC0",
