@@ -16,8 +16,6 @@ const BEHIND: f64 = 0.2;
 const LEAST_BEHIND: usize = 7;
 /// A new person who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
 const FAINT: f64 = 0.7;
-/// A box in which nobody is seen is looked into again after so many searches: chairs and posters stay where they are.
-const LOOKED_AGAIN: u32 = 4;
 /// Least heat of a joint that says where its person is, 0 to 1.
 const SURE: f64 = 0.2;
 
@@ -131,10 +129,7 @@ impl Looks<'_> {
         outlines: &[[f64; 4]],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        memory.empty.retain_mut(|empty| {
-            empty.n_searches += 1;
-            empty.n_searches < LOOKED_AGAIN
-        });
+        memory.age_empty_boxes();
         for outline in outlines {
             let is_same = |seen: &Seen| overlap(seen.outline, *outline) > SAME_BOX;
             let is_empty = |empty: &Empty| overlap(empty.outline, *outline) > SAME_BOX;

@@ -17,6 +17,8 @@ const SOON: f64 = 1.0 / 6.0;
 /// How long a person who stands still need not be looked at, as a share of that time: a person who begins to walk moves
 /// 0.1 m in 0.13 s.
 const HELD: f64 = 1.0 / 3.0;
+/// A box in which nobody is seen is looked into again in the fourth search after: chairs and posters stay where they are.
+const LOOKED_AGAIN: u32 = 4;
 /// After this many times that time (2 s) a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
@@ -114,6 +116,14 @@ impl NetworkMemory {
             self.seen.push(Seen::default());
         }
         (&mut self.look, &mut self.seen[self.n_seen])
+    }
+
+    /// Counts a search for the boxes in which nobody was seen; forgets those that are due again.
+    pub(crate) fn age_empty_boxes(&mut self) {
+        self.empty.retain_mut(|empty| {
+            empty.n_searches += 1;
+            empty.n_searches < LOOKED_AGAIN
+        });
     }
 
     /// Keeps the people of this frame who are seen largest and best.
@@ -291,6 +301,21 @@ mod tests {
         assert_eq!(n_often(&[0.0, 200.0], 3), 5, "one was lost");
         assert_eq!(n_often(&[0.0], 2), 5, "one of two was lost");
         assert_eq!(n_often(&[0.0], 0), 0, "a person alone");
+    }
+
+    #[test]
+    fn a_box_in_which_nobody_was_seen_is_due_again_in_the_fourth_search() {
+        let mut memory = NetworkMemory::default();
+        memory.empty.push(Empty {
+            outline: [0.0, 0.0, 40.0, 100.0],
+            n_searches: 0,
+        });
+        let is_left_out = |_: u32| {
+            memory.age_empty_boxes();
+            !memory.empty.is_empty()
+        };
+        let left_out: Vec<bool> = (1..=4).map(is_left_out).collect();
+        assert_eq!(left_out, [true, true, true, false]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! Bilinear samples in few steps, for maps that turn a picture and keep its scale.
+//! Bilinear samples in few steps, for maps that turn a picture and do not shrink it.
 //!
-//! [`Sampled`] is the readable reference: the same bits, in three times as long. It also takes the pixels at the border.
+//! [`Sampled`] is the readable reference: the same bits, in four times as long. It also takes the pixels at the border.
 
 use std::ops::Range;
 

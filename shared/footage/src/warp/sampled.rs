@@ -195,7 +195,7 @@ impl Sampled {
 
     /// Index of the first byte of the footprint, if all blocks of it lie in the source.
     #[inline(always)]
-    pub(super) fn inside(&self, place: &Place) -> Option<usize> {
+    fn inside(&self, place: &Place) -> Option<usize> {
         let (left, top) = (
             usize::try_from(place.left).ok()?,
             usize::try_from(place.top).ok()?,
