@@ -259,7 +259,17 @@ impl<'a> Finding<'a> {
             pad: [top, left],
         };
         let bias = bias.ok_or("its bias is not a constant")?;
-        let conv = Conv::new(size, &weights.values, &bias, input.stack == 0);
+        let out = [0, 1].map(|axis| (reach[axis] - size.kernel[axis]) / stride[axis] + 1);
+        let is_picture = input.stack == 0;
+        let has_tiles = !is_picture && is_large(size, out);
+        let weights = &weights.values;
+        let conv = if has_tiles {
+            Conv::in_tiles(size, weights, &bias)
+        } else {
+            Ok(None)
+        };
+        let conv = conv
+            .and_then(|conv| conv.map_or_else(|| Conv::new(size, weights, &bias, is_picture), Ok));
         let conv = conv.map_err(|_error| "its weights do not fit its shape")?;
         self.front.border = self.front.border.max(most);
         let operation = Operation::Conv {
@@ -267,11 +277,7 @@ impl<'a> Finding<'a> {
             input,
             residual: None,
         };
-        let rows = (reach[0] - down) / stride[0] + 1;
-        self.give(
-            operation,
-            [outputs, rows, (reach[1] - across) / stride[1] + 1],
-        )
+        self.give(operation, [outputs, out[0], out[1]])
     }
 
     /// The number of times that a `Resize` repeats pixels, down and across.
@@ -363,6 +369,16 @@ impl<'a> Finding<'a> {
             what,
         }
     }
+}
+
+/// Fewest channels, read and written, at which a convolution in tiles is faster than the direct one.
+const FEWEST_CHANNELS: usize = 32;
+/// Fewest outputs of a channel; below, reading the transformed weights takes longer than the products.
+const FEWEST_OUTPUTS: usize = 64;
+
+/// Returns true if a convolution is large enough to be faster in tiles.
+fn is_large(size: ConvSize, [rows, cols]: [usize; 2]) -> bool {
+    size.inputs.min(size.outputs) >= FEWEST_CHANNELS && rows * cols >= FEWEST_OUTPUTS
 }
 
 /// Returns true if memory is enough for a stack of channels.

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use kernels::{Blocked, BlockedShape, Conv, Isa, Outputs, add_repeated};
+use kernels::{Blocked, BlockedShape, Conv, Isa, Outputs, Scratch, add_repeated};
 
 use crate::front::{Front, Operation, Value};
 
@@ -51,6 +51,7 @@ struct Memory {
     /// `None` while it is written.
     places: Vec<Option<Blocked>>,
     exits: Vec<Vec<f32>>,
+    scratch: Scratch,
 }
 
 /// While places are given out.
@@ -165,12 +166,13 @@ impl Plan {
         let mut memory = memory.unwrap_or_else(|| Memory {
             places: self.places.iter().map(|shape| Some(Blocked::new(*shape))).collect(),
             exits: vec![Vec::new(); self.exits.len()],
+            scratch: Scratch::default(),
         });
         if let Some(input) = &mut memory.places[0] {
             input.fill(picture);
         }
         for step in &self.steps {
-            self.step(step, &mut memory.places);
+            self.step(step, &mut memory);
         }
         for (exit, to) in self.exits.iter().zip(&mut memory.exits) {
             if let Some(from) = &memory.places[exit.place] {
@@ -184,7 +186,13 @@ impl Plan {
         result
     }
 
-    fn step(&self, step: &Step, places: &mut [Option<Blocked>]) {
+    fn step(
+        &self,
+        step: &Step,
+        Memory {
+            places, scratch, ..
+        }: &mut Memory,
+    ) {
         let [mut raw, mut relu] = step.outputs.map(|place| places[place?].take());
         let outputs = Outputs {
             raw: raw.as_mut(),
@@ -198,7 +206,7 @@ impl Plan {
             } => {
                 let residual = residual.and_then(|place| places[place].as_ref());
                 if let Some(input) = &places[*input] {
-                    conv.run(self.isa, input, residual, outputs);
+                    conv.run(self.isa, (input, residual), outputs, scratch);
                 }
             }
             Work::Sum { places: of, repeat } => {

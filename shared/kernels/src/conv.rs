@@ -7,9 +7,11 @@ mod blocked;
 mod fast;
 mod reference;
 mod sum;
+mod tiles;
 
 pub use blocked::{Blocked, BlockedShape};
 pub use sum::add_repeated;
+pub use tiles::Scratch;
 
 use crate::isa::Isa;
 use crate::simd::{ROW, Row, flat};
@@ -51,10 +53,12 @@ pub struct Conv {
     size: ConvSize,
     /// Channels in a block of the input.
     width: usize,
-    /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs.
+    /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs. Empty in tiles.
     weights: Vec<Row>,
     /// Filled up with zeros, as the outputs in the weights are: to pairs of blocks.
     bias: Vec<Row>,
+    /// In tiles: the convolution by 1 x 1 of each position. Otherwise empty.
+    positions: Vec<Conv>,
 }
 
 /// Stacks that a convolution or a sum writes: its values as they are, with zeros in place of negative ones, or both.
@@ -67,6 +71,11 @@ pub struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
+    fn shape(&self) -> Option<BlockedShape> {
+        let any = self.raw.as_deref().or(self.relu.as_deref());
+        any.map(Blocked::shape)
+    }
+
     fn sides(&self) -> [[usize; 3]; 2] {
         let given = [&self.raw, &self.relu].map(|out| out.as_ref().map(|out| out.shape().sides()));
         let any = given[0].or(given[1]).unwrap_or_default();
@@ -123,6 +132,7 @@ impl Conv {
             width,
             weights: vec![Row::ZERO; (n_outputs / BLOCK * per_block).div_ceil(ROW)],
             bias: vec![Row::ZERO; n_outputs / ROW],
+            positions: Vec::new(),
         };
         let packed = crate::simd::flat_mut(&mut conv.weights);
         for (output, weights) in weights.chunks_exact(size.inputs * taps).enumerate() {
@@ -138,6 +148,36 @@ impl Conv {
         Ok(conv)
     }
 
+    /// Packs weights for a convolution by tiles of 2 x 2 outputs, which takes 16 products in place of 36. `None` unless the kernel is
+    /// 3 x 3 and the stride 1. Outputs are rounded otherwise than those of [`Self::new`]. The input has blocks of 16 channels.
+    ///
+    /// * `weights`: `outputs x inputs x 3 x 3`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn in_tiles(
+        size: ConvSize,
+        weights: &[f32],
+        bias: &[f32],
+    ) -> Result<Option<Self>, ConvSizeError> {
+        if size.kernel != [3; 2] || size.stride != [1; 2] {
+            return Ok(None);
+        }
+        let mut conv = Self::new(size, weights, bias, false)?;
+        let at_one = ConvSize {
+            kernel: [1; 2],
+            pad: [0; 2],
+            ..size
+        };
+        let no_bias = vec![0.0; size.outputs];
+        let positions = tiles::positions(size, weights);
+        let positions = positions.iter().map(|weights| Self::new(at_one, weights, &no_bias, false));
+        conv.positions = positions.collect::<Result<_, _>>()?;
+        conv.weights = Vec::new();
+        Ok(Some(conv))
+    }
+
     /// Its sides.
     pub fn size(&self) -> ConvSize {
         self.size
@@ -149,9 +189,19 @@ impl Conv {
     ///
     /// If the sides of the stacks do not fit: the channels, a border of the input below what the kernel reaches over, a
     /// residual unlike the outputs, also in its border.
-    pub fn run(&self, isa: Isa, input: &Blocked, residual: Option<&Blocked>, outputs: Outputs<'_>) {
+    pub fn run(
+        &self,
+        isa: Isa,
+        (input, residual): (&Blocked, Option<&Blocked>),
+        outputs: Outputs<'_>,
+        scratch: &mut Scratch,
+    ) {
         self.check(input, residual, &outputs);
-        fast::run(isa, self, (input, residual), outputs);
+        if self.positions.is_empty() {
+            fast::run(isa, self, (input, residual), outputs);
+        } else {
+            tiles::run(isa, self, (input, residual), outputs, scratch);
+        }
     }
 
     /// As [`Self::run`], in plain loops.
@@ -161,7 +211,11 @@ impl Conv {
     /// As [`Self::run`].
     pub fn run_plain(&self, input: &Blocked, residual: Option<&Blocked>, outputs: Outputs<'_>) {
         self.check(input, residual, &outputs);
-        reference::run(self, input, residual, outputs);
+        if self.positions.is_empty() {
+            reference::run(self, input, residual, outputs);
+        } else {
+            tiles::run_plain(self, (input, residual), outputs);
+        }
     }
 
     fn check(&self, input: &Blocked, residual: Option<&Blocked>, outputs: &Outputs<'_>) {
@@ -197,6 +251,12 @@ impl Conv {
     #[inline(always)]
     fn packed_weights(&self) -> &[f32] {
         flat(&self.weights)
+    }
+
+    /// The weight of a kernel of 1 x 1.
+    fn plain_weight(&self, output: usize, input: usize) -> f32 {
+        let n_inputs = self.size.inputs.next_multiple_of(BLOCK);
+        self.packed_weights()[(output / BLOCK * n_inputs + input) * BLOCK + output % BLOCK]
     }
 
     #[inline(always)]

@@ -32,7 +32,9 @@ const fn sized(usual: usize, interpreted: usize) -> usize {
     if cfg!(miri) { interpreted } else { usual }
 }
 
-pub use conv::{Blocked, BlockedShape, Conv, ConvSize, ConvSizeError, Outputs, add_repeated};
+pub use conv::{
+    Blocked, BlockedShape, Conv, ConvSize, ConvSizeError, Outputs, Scratch, add_repeated,
+};
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
 pub use dispatch::{Body, dispatch};
 pub use distance::{LengthSpring, ScoredPoints};

@@ -7,7 +7,7 @@
 use super::blocked::BLOCK;
 use super::{Blocked, BlockedShape, Conv, Outputs};
 use crate::isa::Isa;
-use crate::simd::{Kernel, Row, Simd};
+use crate::simd::{Kernel, Simd};
 
 /// Most pixels whose sums are under way at once.
 const MOST_PIXELS: usize = 8;
@@ -21,12 +21,10 @@ pub(super) fn run(
     (input, residual): (&Blocked, Option<&Blocked>),
     outputs: Outputs<'_>,
 ) {
-    let Outputs { raw, relu } = outputs;
-    let part = |stack: &Blocked| stack.shape();
-    let shapes = [raw.as_deref(), relu.as_deref()].map(|stack| stack.map(part));
-    let ([Some(shape), _] | [None, Some(shape)]) = shapes else {
+    let Some(shape) = outputs.shape() else {
         return;
     };
+    let Outputs { raw, relu } = outputs;
     isa.run(Layer {
         conv,
         from: input.shape(),
@@ -38,15 +36,15 @@ pub(super) fn run(
     });
 }
 
-struct Layer<'a> {
-    conv: &'a Conv,
-    from: BlockedShape,
-    input: &'a [f32],
-    residual: Option<&'a [f32]>,
+pub(super) struct Layer<'a> {
+    pub(super) conv: &'a Conv,
+    pub(super) from: BlockedShape,
+    pub(super) input: &'a [f32],
+    pub(super) residual: Option<&'a [f32]>,
     /// The shape of the outputs and the residual.
-    shape: BlockedShape,
-    raw: Option<&'a mut [f32]>,
-    relu: Option<&'a mut [f32]>,
+    pub(super) shape: BlockedShape,
+    pub(super) raw: Option<&'a mut [f32]>,
+    pub(super) relu: Option<&'a mut [f32]>,
 }
 
 /// Consecutive pixels, row by row, and what is added to their sums.
@@ -76,7 +74,6 @@ impl Kernel for Layer<'_> {
         let n_blocks = self.from.n_blocks();
         let at_once = (CHUNK / self.per_block()).max(1);
         let most = MOST_PIXELS.min(S::BLOCK);
-        let mut sums = [Row::ZERO; MOST_PIXELS];
         for lane in (0..self.shape.n_blocks() * BLOCK).step_by(2 * S::LANES) {
             for block in (0..n_blocks).step_by(at_once) {
                 let mut left = self.shape.rows * self.shape.cols;
@@ -89,7 +86,7 @@ impl Kernel for Layer<'_> {
                 };
                 while left > 0 {
                     let n = left.div_ceil(left.div_ceil(most));
-                    self.pixels(simd, n, &mut place, &mut sums);
+                    self.pixels(simd, n, &mut place);
                     left -= n;
                 }
             }
@@ -97,7 +94,7 @@ impl Kernel for Layer<'_> {
     }
 }
 
-impl Layer<'_> {
+impl<'a> Layer<'a> {
     /// Weights of a block of outputs for a block of the input.
     #[inline(always)]
     fn per_block(&self) -> usize {
@@ -106,23 +103,23 @@ impl Layer<'_> {
     }
 
     #[inline(always)]
-    fn pixels<S: Simd>(&mut self, simd: S, n: usize, place: &mut Place, sums: &mut [Row]) {
+    fn pixels<S: Simd>(&mut self, simd: S, n: usize, place: &mut Place) {
         match n {
-            1 => self.tile::<S, 1>(simd, place, sums),
-            2 => self.tile::<S, 2>(simd, place, sums),
-            3 => self.tile::<S, 3>(simd, place, sums),
-            4 => self.tile::<S, 4>(simd, place, sums),
-            5 => self.tile::<S, 5>(simd, place, sums),
-            6 => self.tile::<S, 6>(simd, place, sums),
-            7 if S::BLOCK >= 7 => self.tile::<S, 7>(simd, place, sums),
-            8 if S::BLOCK >= 8 => self.tile::<S, 8>(simd, place, sums),
+            1 => self.tile::<S, 1>(simd, place),
+            2 => self.tile::<S, 2>(simd, place),
+            3 => self.tile::<S, 3>(simd, place),
+            4 => self.tile::<S, 4>(simd, place),
+            5 => self.tile::<S, 5>(simd, place),
+            6 => self.tile::<S, 6>(simd, place),
+            7 if S::BLOCK >= 7 => self.tile::<S, 7>(simd, place),
+            8 if S::BLOCK >= 8 => self.tile::<S, 8>(simd, place),
             _ => unreachable!("at most {MOST_PIXELS} pixels, got {n}"),
         }
     }
 
     /// Sums at `N` pixels; moves the place behind them.
     #[inline(always)]
-    fn tile<S: Simd, const N: usize>(&mut self, simd: S, place: &mut Place, sums: &mut [Row]) {
+    fn tile<S: Simd, const N: usize>(&mut self, simd: S, place: &mut Place) {
         let (size, from) = (&self.conv.size, self.from);
         let corner = (from.border - size.pad[0]) * from.row()
             + (from.border - size.pad[1]) * from.width
@@ -146,14 +143,19 @@ impl Layer<'_> {
             is_first: block == 0,
             is_last: block + n_blocks == from.n_blocks(),
         };
-        self.begin(simd, &tile, 0, sums);
-        self.begin(simd, &tile, S::LANES, sums);
         let rows = [size.kernel[0], size.kernel[1] * from.width];
         // Two registers lie in one block of outputs, or in two.
         let weights = [
             self.weights(lane, block, n_blocks),
             self.weights(lane + S::LANES, block, n_blocks),
         ];
+        let ends = Ends {
+            bias: self.conv.packed_bias(),
+            residual: self.residual,
+            shape: self.shape,
+            raw: self.raw.as_deref_mut(),
+            relu: self.relu.as_deref_mut(),
+        };
         simd.apart(Products {
             inputs,
             weights,
@@ -162,83 +164,93 @@ impl Layer<'_> {
             n_rows: rows[0],
             row: from.row(),
             run: rows[1],
-            sums,
+            tile,
+            ends,
         });
-        self.end(simd, &tile, 0, sums);
-        self.end(simd, &tile, S::LANES, sums);
     }
 
     /// The weights of the outputs in a register for blocks of the input.
     #[inline(always)]
-    fn weights(&self, lane: usize, block: usize, n: usize) -> &[f32] {
+    fn weights(&self, lane: usize, block: usize, n: usize) -> &'a [f32] {
         let begin = lane / BLOCK * self.from.n_blocks() + block;
         let per_block = self.per_block();
-        let weights = &self.conv.packed_weights()[begin * per_block..];
+        let conv: &'a Conv = self.conv;
+        let weights = &conv.packed_weights()[begin * per_block..];
         &weights[..n * per_block][lane % BLOCK..]
     }
+}
 
+/// Where sums begin and where they go.
+struct Ends<'a> {
+    bias: &'a [f32],
+    residual: Option<&'a [f32]>,
+    shape: BlockedShape,
+    raw: Option<&'a mut [f32]>,
+    relu: Option<&'a mut [f32]>,
+}
+
+impl Ends<'_> {
     /// Biases, or what earlier blocks of the input gave.
     ///
-    /// * `from`: the first of a register of sums.
+    /// * `half`: the first or the second register of sums.
     #[inline(always)]
     fn begin<S: Simd, const N: usize>(
         &self,
         simd: S,
         tile: &Tile<N>,
-        from: usize,
-        sums: &mut [Row],
+        half: usize,
+        sums: &mut [[S::V; 2]; N],
     ) {
-        let lane = tile.lane + from;
+        let lane = tile.lane + half * S::LANES;
         let part = self.raw.as_deref().or(self.relu.as_deref());
         if let (false, Some(values)) = (tile.is_first, part)
             && lane / BLOCK < self.shape.n_blocks()
         {
             let part = &values[lane / BLOCK * self.shape.plane() + lane % BLOCK..];
             for at in 0..N {
-                simd.store(simd.load(&part[tile.pixels[at]..]), &mut sums[at].0[from..]);
+                sums[at][half] = simd.load(&part[tile.pixels[at]..]);
             }
         } else {
-            let bias = simd.load(&self.conv.packed_bias()[lane..]);
+            let bias = simd.load(&self.bias[lane..]);
             for at in 0..N {
-                simd.store(bias, &mut sums[at].0[from..]);
+                sums[at][half] = bias;
             }
         }
     }
 
     /// Writes sums, or the parts that they have so far.
     ///
-    /// * `from`: the first of a register of sums.
+    /// * `half`: the first or the second register of sums.
     #[inline(always)]
     fn end<S: Simd, const N: usize>(
         &mut self,
         simd: S,
         tile: &Tile<N>,
-        from: usize,
-        sums: &mut [Row],
+        half: usize,
+        sums: &mut [[S::V; 2]; N],
     ) {
-        let (block, lane) = ((tile.lane + from) / BLOCK, (tile.lane + from) % BLOCK);
+        let lane = tile.lane + half * S::LANES;
+        let (block, lane) = (lane / BLOCK, lane % BLOCK);
         if block >= self.shape.n_blocks() {
             return;
         }
         let begin = block * self.shape.plane() + lane;
         if let (true, Some(residual)) = (tile.is_last, self.residual) {
+            let residual = &residual[begin..];
             for at in 0..N {
-                let sum = simd.load(&sums[at].0[from..]);
-                let sum = simd.add(sum, simd.load(&residual[begin + tile.pixels[at]..]));
-                simd.store(sum, &mut sums[at].0[from..]);
+                sums[at][half] = simd.add(sums[at][half], simd.load(&residual[tile.pixels[at]..]));
             }
         }
         let is_part = !tile.is_last && self.raw.is_none();
         if let Some(raw) = &mut self.raw {
             for at in 0..N {
-                let sum = simd.load(&sums[at].0[from..]);
-                simd.store(sum, &mut raw[begin + tile.pixels[at]..]);
+                simd.store(sums[at][half], &mut raw[begin + tile.pixels[at]..]);
             }
         }
         if let Some(relu) = self.relu.as_mut().filter(|_| is_part || tile.is_last) {
             let least = simd.splat(if is_part { f32::NEG_INFINITY } else { 0.0 });
             for at in 0..N {
-                let sum = simd.max(least, simd.load(&sums[at].0[from..]));
+                let sum = simd.max(least, sums[at][half]);
                 simd.store(sum, &mut relu[begin + tile.pixels[at]..]);
             }
         }
@@ -257,17 +269,16 @@ struct Products<'a, const N: usize> {
     row: usize,
     /// Neighbouring values in a row of the kernel and a block of channels.
     run: usize,
-    sums: &'a mut [Row],
+    tile: Tile<N>,
+    ends: Ends<'a>,
 }
 
 impl<const N: usize> Kernel for Products<'_, N> {
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
+    fn run<S: Simd>(mut self, simd: S) {
         let mut sums = [[simd.splat(0.0); 2]; N];
-        for pixel in 0..N {
-            sums[pixel][0] = simd.load(&self.sums[pixel].0);
-            sums[pixel][1] = simd.load(&self.sums[pixel].0[S::LANES..]);
-        }
+        self.ends.begin(simd, &self.tile, 0, &mut sums);
+        self.ends.begin(simd, &self.tile, 1, &mut sums);
         let mut at = 0_usize;
         for block in 0..self.n_blocks {
             for row in 0..self.n_rows {
@@ -289,9 +300,7 @@ impl<const N: usize> Kernel for Products<'_, N> {
                 }
             }
         }
-        for pixel in 0..N {
-            simd.store(sums[pixel][0], &mut self.sums[pixel].0);
-            simd.store(sums[pixel][1], &mut self.sums[pixel].0[S::LANES..]);
-        }
+        self.ends.end(simd, &self.tile, 0, &mut sums);
+        self.ends.end(simd, &self.tile, 1, &mut sums);
     }
 }

@@ -33,6 +33,7 @@ struct Case {
     sides: [usize; 2],
     border: usize,
     is_packed: bool,
+    in_tiles: bool,
     has_residual: bool,
     gives: [bool; 2],
     seed: u64,
@@ -43,10 +44,16 @@ fn cases() -> impl Strategy<Value = Case> {
     let channels = 1..sized(70, 20);
     let kernel = ([1..4_usize, 1..4_usize], [1..4_usize, 1..4_usize]);
     let stacks = ([1..=side, 1..=side], 0..3_usize);
-    let flags = (any::<bool>(), any::<bool>(), 0..3_usize, any::<u64>());
+    let flags = (0..4_u8, any::<bool>(), 0..3_usize, any::<u64>());
     ([channels.clone(), channels], kernel, stacks, flags).prop_map(
         |([inputs, outputs], (kernel, stride), (sides, border), flags)| {
-            let (is_packed, has_residual, gives, seed) = flags;
+            let (form, has_residual, gives, seed) = flags;
+            let in_tiles = form > 1;
+            let (kernel, stride) = if in_tiles {
+                ([3; 2], [1; 2])
+            } else {
+                (kernel, stride)
+            };
             let size = ConvSize {
                 inputs,
                 outputs,
@@ -58,7 +65,8 @@ fn cases() -> impl Strategy<Value = Case> {
                 size,
                 sides: [0, 1].map(|axis| sides[axis].max(kernel[axis])),
                 border,
-                is_packed,
+                is_packed: form == 1,
+                in_tiles,
                 has_residual,
                 gives: [gives != 0, gives != 1],
                 seed,
@@ -79,8 +87,12 @@ impl Case {
     fn conv(&self) -> Conv {
         let size = self.size;
         let n = size.outputs * size.inputs * size.kernel.iter().product::<usize>();
-        let bias = noise(size.outputs, self.seed ^ 2);
-        Conv::new(size, &noise(n, self.seed ^ 1), &bias, self.is_packed).unwrap()
+        let (weights, bias) = (noise(n, self.seed ^ 1), noise(size.outputs, self.seed ^ 2));
+        if self.in_tiles {
+            Conv::in_tiles(size, &weights, &bias).unwrap().unwrap()
+        } else {
+            Conv::new(size, &weights, &bias, self.is_packed).unwrap()
+        }
     }
 
     fn input(&self) -> Blocked {
@@ -118,7 +130,7 @@ proptest! {
         });
         for isa in Isa::available() {
             let got = case.given(|conv, input, residual, outputs| {
-                conv.run(isa, input, residual, outputs);
+                conv.run(isa, (input, residual), outputs, &mut Scratch::default());
             });
             prop_assert_eq!(&got, &want, "{:?}", isa);
         }
@@ -196,8 +208,22 @@ fn what_is_no_number_stays_none() {
             raw: None,
             relu: Some(&mut relu),
         };
-        conv.run(isa, &input, None, outputs);
+        conv.run(isa, (&input, None), outputs, &mut Scratch::default());
         assert!(relu.get(0, [Some(0); 2]).is_nan(), "{isa:?}");
+    }
+}
+
+#[test]
+fn only_kernels_of_three_by_three_at_a_stride_of_one_come_in_tiles() {
+    for (kernel, stride) in [([3, 3], [2, 2]), ([3, 1], [1, 1]), ([1, 1], [1, 1])] {
+        let size = ConvSize {
+            inputs: 1,
+            outputs: 1,
+            kernel,
+            stride,
+            pad: [0; 2],
+        };
+        assert!(Conv::in_tiles(size, &[1.0; 9], &[0.0]).unwrap().is_none());
     }
 }
 
