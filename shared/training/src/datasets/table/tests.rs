@@ -15,7 +15,7 @@ fn upper_body() -> SkeletonTable {
 
 type Change = fn(&mut SkeletonSpec);
 
-/// The error after one change to the published skeleton.
+/// Returns the error after one change to the published skeleton.
 fn error_after(change: impl FnOnce(&mut SkeletonSpec)) -> String {
     let mut spec = SkeletonTable::published().0;
     change(&mut spec);
