@@ -1,4 +1,4 @@
-//! Small data sets of every layout, valid and invalid.
+//! Tests with small data sets of every layout, valid and invalid.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -16,7 +16,7 @@ use training::datasets::{
 
 const N_JOINTS: usize = 3;
 
-/// Joint of a person, pixels from 0.
+/// Position of a joint of a person, in pixels from 0.
 fn joint(person: usize, joint: usize) -> [f64; 2] {
     [
         (5 * person + 2 * joint) as f64,
@@ -33,7 +33,7 @@ fn write_image(path: &Path) {
     image::RgbImage::new(40, 20).save(path).unwrap();
 }
 
-/// Values of an array of three sizes, the first fastest.
+/// An array of three sizes, with the first index fastest.
 fn array(sizes: [usize; 3], value: impl Fn([usize; 3]) -> f64) -> Mat {
     let mut values = Vec::new();
     for plane in 0..sizes[2] {
@@ -189,7 +189,7 @@ fn ranges_and_lists_select_and_leave_out() {
     ));
 }
 
-/// A file of JSON lines with one of every fault.
+/// A file of JSON lines with one example of every fault.
 fn faulty() -> TempDir {
     let dir = tempfile::tempdir().unwrap();
     write_image(&dir.path().join("photos/a.png"));

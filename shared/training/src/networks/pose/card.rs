@@ -1,4 +1,4 @@
-//! The card of a trained network: what Parallax has to know to use it.
+//! The card of a trained network: the information that Parallax needs to use the network.
 
 use skeleton::PARSE14;
 
@@ -6,22 +6,22 @@ use super::network::{ERROR, EXTRAS, FRONT, MAPS, PICTURE, Shape};
 use super::score::Score;
 use super::vary::{DEVIATION, FILL, MARGIN, MEAN};
 
-/// Further contents of a card, beside how the network is used.
+/// Information for a card about the training.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct About {
-    /// People learned from, and kept apart.
+    /// Number of training people and of held-out people.
     pub people: [usize; 2],
-    /// Samples that the network was shown.
+    /// Number of samples used for training.
     pub samples: usize,
-    /// True if it went on from a network that was trained before.
+    /// True if the training started from a previously trained network.
     pub goes_on: bool,
-    /// Set where it learned the extra keypoints alone.
+    /// True if only the extra keypoints were trained.
     pub extras_alone: bool,
-    /// How good it is on those who were kept apart.
+    /// Quality of the network on the held-out people.
     pub score: Score,
 }
 
-/// The text of the card, TOML.
+/// The text of the card, in TOML.
 pub fn card(shape: &Shape, about: &About) -> String {
     let [learnt, kept] = about.people;
     let Score {
@@ -84,7 +84,7 @@ error = \"{ERROR}\"
     )
 }
 
-/// Names of the keypoints in a card.
+/// Names of the keypoints as written in a card.
 fn names() -> impl Iterator<Item = &'static str> {
     let of_cards = |name| if name == "head" { "head top" } else { name };
     let joints = PARSE14.joints.iter().map(|joint| joint.name);
