@@ -140,8 +140,7 @@ impl Tables {
     }
 
     /// Adds the samples that every shrunken pixel covers along an axis, with the weights of `kernels::resize_part`. Returns the index of
-    /// the
-    /// first entry, and the number of samples per pixel.
+    /// the first entry, and the number of samples per pixel.
     fn cover(&mut self, from: usize, to: usize) -> (u32, u32) {
         let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
         let n = (inverse.ceil() as usize + 1).min(from);

@@ -25,8 +25,7 @@ impl JointMaps {
     }
 
     /// Returns how to rotate the picture so that the network sees this person upright. The direction is that from the legs to the neck and
-    /// head.
-    /// It changes less than the direction of the trunk when a person bends down.
+    /// head. It changes less than the direction of the trunk when a person bends down.
     ///
     /// * `now`: rotation used so far; it is kept if the direction differs by at most 70 degrees.
     pub fn turn(&self, now: Turn) -> Turn {

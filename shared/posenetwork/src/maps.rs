@@ -303,8 +303,7 @@ impl JointMaps {
 
     /// Returns a keypoint as found by the network or the other program, and the standard deviation of its position along one axis. Both are
     /// in pixels of the picture. The standard deviation comes from the `sigma` of [`Self::of_keypoints`], from the network, or from the
-    /// score
-    /// ([`expected_error`]). Returns `None` if the keypoint was not found or no picture has been read.
+    /// score ([`expected_error`]). Returns `None` if the keypoint was not found or no picture has been read.
     ///
     /// * `keypoint`: its index in the order of the card or of the file.
     pub fn keypoint(&self, keypoint: usize) -> Option<(Keypoint, f64)> {

@@ -90,8 +90,7 @@ impl<'a> PersonMaps<'a> {
     }
 
     /// The evidence for a joint at a point of the picture, in pixels. It is interpolated between sixteen cells (Catmull & Rom 1974), so
-    /// that a
-    /// maximum may be between two cells. Outside the maps, it is the floor.
+    /// that a maximum may be between two cells. Outside the maps, it is the floor.
     pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
         let [x, y] = self.grid.cell(point);
         let [columns, rows] = self.grid.size;
@@ -103,8 +102,7 @@ impl<'a> PersonMaps<'a> {
     }
 
     /// The highest maxima of a joint's map, the best first: positions in pixels of the picture, and the evidence of their cells. Each
-    /// position
-    /// is the vertex of parabolas through the cell and its neighbours, because the logarithm of a Gaussian is a parabola.
+    /// position is the vertex of parabolas through the cell and its neighbours, because the logarithm of a Gaussian is a parabola.
     ///
     /// * `n`: largest number of maxima.
     /// * `is_wanted`: returns true for positions that count, in pixels of the picture.

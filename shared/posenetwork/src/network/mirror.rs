@@ -49,8 +49,7 @@ impl Mirror {
     }
 
     /// Replaces the outputs for the picture by the mean of both outputs. Outputs of an unexpected shape are not changed, because a later
-    /// check
-    /// refuses them.
+    /// check refuses them.
     pub(super) fn blend(&self, network: &PoseNetwork, outputs: &mut [Tensor], seen: &[Tensor]) {
         let card = &network.card;
         let n_outputs = if matches!(card.output, Codec::Simcc { .. }) {
@@ -121,8 +120,7 @@ impl Mirror {
     }
 
     /// * `bins`: number of bins per pixel of a distribution over columns. `None` for a distribution over rows, which is the same in a
-    ///   mirror
-    ///   image.
+    ///   mirror image.
     fn blend_bins(&self, to: &mut Tensor, from: &Tensor, bins: Option<usize>) {
         let n = to.values.len() / self.partner.len().max(1);
         for (at, &partner) in self.partner.iter().enumerate() {

@@ -141,8 +141,7 @@ impl Turn {
     }
 
     /// * `is_symmetric`: true if the cells of a rotated picture coincide with cells of the picture. Otherwise each cell is at the first of
-    ///   its
-    ///   pixels, and the rotated maps are moved by one cell. The remaining offset is less than half a cell.
+    ///   its pixels, and the rotated maps are moved by one cell. The remaining offset is less than half a cell.
     fn turn_maps(self, maps: &mut Tensor, (layout, is_symmetric, width): (Layout, bool, usize)) {
         let Some([channels, rows, columns]) = maps.map_sides(layout) else {
             return;

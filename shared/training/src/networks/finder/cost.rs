@@ -32,8 +32,8 @@ impl Truth {
     /// Returns the cost, and its gradient with respect to the output of the network.
     ///
     /// The cost of the heat is the focal loss with lower penalties around a middle (Law and Deng 2018, "`CornerNet`", equation 1). The cost
-    /// of
-    /// the boxes is the negative logarithm of the intersection over union (Yu et al. 2016, "`UnitBox`"), with cells weighted by their heat.
+    /// of the boxes is the negative logarithm of the intersection over union (Yu et al. 2016, "`UnitBox`"), with cells weighted by their
+    /// heat.
     ///
     /// * `cells`: columns times rows.
     /// * `weight`: weight of the boxes relative to the heat.

@@ -112,8 +112,7 @@ impl Truth {
     }
 
     /// Negative log-likelihood of the errors of the maxima of the maps. They are assumed to be exponentially distributed with the expected
-    /// error
-    /// as mean.
+    /// error as mean.
     pub(super) fn of_error(&self, logarithms: &[f32], maps: &[f32]) -> Part {
         let off = self.off(maps);
         let n_known = off.iter().flatten().count().max(1) as f32;

@@ -115,9 +115,8 @@ impl Marks {
     /// Returns the keypoints that the network should find.
     ///
     /// If mark and teacher agree, the target is their mean. If they differ and the teacher is certain, both positions are targets. Without
-    /// a
-    /// mark, the target is the teacher's position, weighted by its peak. An extra keypoint without a mark is taken from the teacher if the
-    /// teacher is certain of it and finds the joint near it at its mark.
+    /// a mark, the target is the teacher's position, weighted by its peak. An extra keypoint without a mark is taken from the teacher if
+    /// the teacher is certain of it and finds the joint near it at its mark.
     pub fn targets(&self) -> [Target; N_KEYPOINTS] {
         core::array::from_fn(|joint| {
             let marked = self.marked[joint];

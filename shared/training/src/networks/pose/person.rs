@@ -43,8 +43,7 @@ pub struct Person {
     /// Targets of the joints, in the order of `skeleton::PARSE14`, then of [`EXTRAS`](super::EXTRAS).
     pub targets: [Target; N_KEYPOINTS],
     /// Direction in which the person faces: components towards the right of the picture, downwards, and towards the camera. Its length is
-    /// the
-    /// certainty, 0 to 1.
+    /// the certainty, 0 to 1.
     pub front: [f32; 3],
 }
 

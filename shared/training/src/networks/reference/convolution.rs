@@ -82,8 +82,7 @@ impl Sizes {
     }
 
     /// Calls a function for every run of outputs in a row that use consecutive inputs. Its arguments are the first input within the
-    /// channel,
-    /// the first output within the map, and the number of outputs.
+    /// channel, the first output within the map, and the number of outputs.
     fn runs(&self, [down, across]: [usize; 2], mut run: impl FnMut(usize, usize, usize)) {
         let rows = self.seen([self.from[1], self.to[1]], down);
         let columns = self.seen([self.from[2], self.to[2]], across);
