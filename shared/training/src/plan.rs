@@ -48,7 +48,7 @@ struct Planned {
 pub enum PlanError {
     /// No person is large enough.
     #[error(
-        "of {n_people} people, none is large enough for filters of {filter_px} pixels: take larger pictures, or smaller filters"
+        "of {n_people} people, none is large enough for filters of {filter_px} pixels: use larger pictures or smaller filters"
     )]
     NoPeople {
         /// Number of people in the album.

@@ -31,7 +31,7 @@ pub enum TrainError {
     #[error("stopped")]
     Stopped,
     /// An image of a person cannot be read.
-    #[error("the image of person {person}")]
+    #[error("cannot read the image of person {person}")]
     Person {
         /// Number of the person in the album, from 1.
         person: usize,
@@ -40,7 +40,7 @@ pub enum TrainError {
         source: AlbumError,
     },
     /// A background image cannot be read.
-    #[error("image {image} of those without people")]
+    #[error("cannot read image {image} of the images without people")]
     Background {
         /// Number of the image in the album, from 1.
         image: usize,
@@ -58,7 +58,7 @@ pub enum TrainError {
         n_people: usize,
     },
     /// A pose is not on its image, which must have changed since the pose was found.
-    #[error("a pose does not lie on its image: an image has changed since the training began")]
+    #[error("a pose is outside its image: an image has changed since the training began")]
     Moved,
     /// The trained parameters are not a valid model.
     #[error("the result of the training is not a valid model")]

@@ -80,13 +80,13 @@ pub enum Fault {
         expected: usize,
     },
     /// A joint is unknown: `null` in JSON lines, both coordinates NaN in other files.
-    #[error("joint {joint} is not known")]
+    #[error("joint {joint} is unknown")]
     Unknown {
         /// Number of the joint, from 1.
         joint: usize,
     },
     /// A coordinate is infinite, or one of the two is NaN.
-    #[error("joint {joint} lies at ({}, {})", at[0], at[1])]
+    #[error("joint {joint} is at ({}, {})", at[0], at[1])]
     NotFinite {
         /// Number of the joint, from 1.
         joint: usize,
@@ -94,7 +94,7 @@ pub enum Fault {
         at: [f64; 2],
     },
     /// All joints are at the same position.
-    #[error("all joints lie within {extent_px:.3} px of ({:.1}, {:.1})", at[0], at[1])]
+    #[error("all joints are within {extent_px:.3} px of ({:.1}, {:.1})", at[0], at[1])]
     ZeroSize {
         /// Centre of the joints, in pixels.
         at: [f64; 2],
@@ -106,7 +106,7 @@ pub enum Fault {
     Image(#[from] FootageError),
     /// A joint is outside the image.
     #[error(
-        "joint {joint} at ({:.1}, {:.1}) lies {by_px:.1} px outside the image of {size}, more than {limit_px}",
+        "joint {joint} at ({:.1}, {:.1}) is {by_px:.1} px outside the image of {size}, more than {limit_px}",
         at[0], at[1]
     )]
     Outside {
@@ -128,7 +128,7 @@ pub enum Fault {
         before: String,
     },
     /// Another person has the same name.
-    #[error("the name {name:?} is already that of {before}")]
+    #[error("the name {name:?} is already used in {before}")]
     SameName {
         /// The duplicate name.
         name: String,

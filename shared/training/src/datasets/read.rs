@@ -26,7 +26,7 @@ pub enum DatasetError {
         path: PathBuf,
     },
     /// The folder has files of two layouts.
-    #[error("{} holds both labels.mat and joints.mat: name one of the two", path.display())]
+    #[error("{} contains both labels.mat and joints.mat: give the path of one of them", path.display())]
     Ambiguous {
         /// The folder.
         path: PathBuf,
@@ -48,7 +48,7 @@ pub enum DatasetError {
         source: MatLayoutError,
     },
     /// The number of images in the list is not the number of people.
-    #[error("{} names {got} images for {expected} people", path.display())]
+    #[error("{} lists {got} images for {expected} people", path.display())]
     ImageList {
         /// Path of the list.
         path: PathBuf,
@@ -61,7 +61,7 @@ pub enum DatasetError {
     #[error(transparent)]
     Select(#[from] SelectError),
     /// People have a fault of a fatal kind.
-    #[error("{n_fatal} of {n_people} people have a fault that was called fatal")]
+    #[error("{n_fatal} of {n_people} people have a fault of a fatal kind")]
     Fatal {
         /// Number of people with such a fault.
         n_fatal: usize,

@@ -37,7 +37,7 @@ pub enum SelectError {
         last: usize,
     },
     /// The list file is empty.
-    #[error("the list {} is empty: it names no rows or images", path.display())]
+    #[error("the list {} is empty: it has no rows or images", path.display())]
     EmptyList {
         /// The file.
         path: PathBuf,
@@ -217,7 +217,7 @@ mod tests {
         let empty = Selection::from_list(Path::new("l"), "\n \n").unwrap_err();
         assert_eq!(
             empty.to_string(),
-            "the list l is empty: it names no rows or images"
+            "the list l is empty: it has no rows or images"
         );
     }
 

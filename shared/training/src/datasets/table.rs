@@ -69,7 +69,7 @@ pub enum TableError {
     },
     /// The first part has a parent, or another part has none.
     #[error(
-        "part {part} ({name}) has {} parent: the first part and only the first is the root",
+        "part {part} ({name}) has {} parent: the first part, and no other, is the root",
         if *.part == 1 { "a" } else { "no" }
     )]
     Root {
@@ -90,7 +90,7 @@ pub enum TableError {
     },
     /// A mirror that is not its own inverse.
     #[error(
-        "the mirror of {what} {index} ({name}) is {other}, but not the other way round or not there"
+        "the mirror of {what} {index} ({name}) is {other}, but not vice versa, or it does not exist"
     )]
     Mirror {
         /// `part` or `joint`.
@@ -103,9 +103,7 @@ pub enum TableError {
         other: usize,
     },
     /// The mirror does not keep the tree.
-    #[error(
-        "the mirror of part {part} ({name}) hangs on another part than the mirror of its parent"
-    )]
+    #[error("the mirror of part {part} ({name}) is not a child of the mirror of its parent")]
     MirrorTree {
         /// Number of the part, from 1.
         part: usize,
@@ -114,7 +112,7 @@ pub enum TableError {
     },
     /// A part and its mirror image have different positions between the joints.
     #[error(
-        "part {part} ({name}) and its mirror image {other} do not lie between the same joints of either side"
+        "part {part} ({name}) and its mirror image {other} are not between corresponding joints"
     )]
     MirrorWeights {
         /// Number of the part, from 1.
@@ -125,7 +123,7 @@ pub enum TableError {
         other: String,
     },
     /// A part refers to a joint that does not exist.
-    #[error("part {part} ({name}) names joint {joint}, but there are {n_joints}")]
+    #[error("part {part} ({name}) uses joint {joint}, but there are only {n_joints}")]
     Joint {
         /// Number of the part, from 1.
         part: usize,

@@ -14,7 +14,9 @@ pub enum BeginError {
     #[error("it is not an ONNX file")]
     Read(#[from] rten_onnx::protobuf::ProtobufError),
     /// A layer is missing: the network is of another kind or smaller.
-    #[error("it has no constant {name}; the network of the settings needs it, {expected:?}")]
+    #[error(
+        "it has no constant {name}; the network in the settings needs one with the dimensions {expected:?}"
+    )]
     Missing {
         /// Name of the layer and its role.
         name: String,
@@ -22,7 +24,7 @@ pub enum BeginError {
         expected: Vec<usize>,
     },
     /// A layer has other dimensions than expected.
-    #[error("its {name} has the dimensions {got:?}, the network of the settings has {expected:?}")]
+    #[error("its {name} has the dimensions {got:?}, the network in the settings has {expected:?}")]
     Size {
         /// Name of the layer and its role.
         name: String,
@@ -32,7 +34,7 @@ pub enum BeginError {
         expected: Vec<usize>,
     },
     /// A constant has a value that is not finite, the wrong number of bytes, or another type.
-    #[error("its {name} does not hold {n} finite numbers of half or single precision")]
+    #[error("its {name} does not consist of {n} finite numbers of half or single precision")]
     Numbers {
         /// Name of the layer and its role.
         name: String,

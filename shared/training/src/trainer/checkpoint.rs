@@ -37,7 +37,7 @@ pub enum CheckpointError {
     )]
     Other,
     /// The checkpoint is damaged.
-    #[error("the checkpoint does not fit its own training: {what}")]
+    #[error("the checkpoint contradicts itself: {what}")]
     Damaged {
         /// The fault.
         what: &'static str,

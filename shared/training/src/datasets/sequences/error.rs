@@ -36,10 +36,10 @@ pub enum SequenceError {
         hint: &'static str,
     },
     /// The calibration cannot be read.
-    #[error("the calibration")]
+    #[error("cannot read the calibration")]
     Rig(#[from] RigFileError),
     /// The cameras are not a valid rig.
-    #[error("{}: the cameras", .path.display())]
+    #[error("{}: invalid cameras", .path.display())]
     Cameras {
         /// The calibration.
         path: PathBuf,
@@ -110,7 +110,7 @@ pub enum SequenceError {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SyncError {
     /// No camera has an offset.
-    #[error("no camera says when it began (.ofs)")]
+    #[error("no camera has a start offset (.ofs)")]
     Nothing,
     /// A rate is not positive.
     #[error(
@@ -121,7 +121,7 @@ pub enum SyncError {
         rate: f64,
     },
     /// A stream would begin before its first frame.
-    #[error("a camera would begin at its frame {offset}, before its first frame, 1")]
+    #[error("a camera would begin at frame {offset}, before its first frame, 1")]
     Before {
         /// Number of the frame, from 1.
         offset: f64,

@@ -40,7 +40,7 @@ pub enum SkeletonFileError {
         name: String,
     },
     /// The skeleton in the file is invalid.
-    #[error("the skeleton was refused")]
+    #[error("the skeleton is invalid")]
     Table(#[from] TableError),
 }
 

@@ -51,7 +51,7 @@ fn document(metadata: &[(String, String)]) -> Document {
 
 /// There are no training pictures, or no held-out pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{learnt} pictures to learn from and {kept} kept apart are too few")]
+#[error("{learnt} pictures for training and {kept} held out are too few")]
 pub struct NobodyShown {
     /// Number of training pictures.
     pub learnt: usize,

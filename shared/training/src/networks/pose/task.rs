@@ -107,7 +107,7 @@ impl<'a> KeptApart<'a> {
 
 /// There are no training people, or no held-out people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{learnt} people to learn from and {kept} kept apart are too few")]
+#[error("{learnt} people for training and {kept} held out are too few")]
 pub struct TooFew {
     /// Number of training people.
     pub learnt: usize,

@@ -25,7 +25,7 @@ pub enum SamplesError {
         file_says: String,
     },
     /// The evidence has an unknown layout.
-    #[error("its evidence has layout {got}, this Parallax knows {EVIDENCE_VERSION}")]
+    #[error("its evidence has layout {got}, but this Parallax supports layout {EVIDENCE_VERSION}")]
     Evidence {
         /// Version of the layout.
         got: u32,

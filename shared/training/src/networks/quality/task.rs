@@ -32,7 +32,7 @@ pub struct Validated {
 pub enum TaskError {
     /// There are no samples for training, or for validation.
     #[error(
-        "{learnt} samples to learn from and {validated} to validate on are too few: there must be several groups"
+        "{learnt} samples for training and {validated} for validation are too few: there must be several groups"
     )]
     TooFew {
         /// Number of training samples.
@@ -41,7 +41,7 @@ pub enum TaskError {
         validated: usize,
     },
     /// The samples have tiles of another size.
-    #[error("the samples have tiles of {} x {}, the network sees {} x {}", got[0], got[1], expected[0], expected[1])]
+    #[error("the samples have tiles of {} x {}, but the network takes {} x {}", got[0], got[1], expected[0], expected[1])]
     Tile {
         /// Height and width in the samples.
         got: [usize; 2],

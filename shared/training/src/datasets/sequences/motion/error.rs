@@ -55,7 +55,7 @@ pub enum MotionError {
         unit: String,
     },
     /// The file does not have the requested frames.
-    #[error("{}: frames {}-{} are not among its frames {}-{}", .path.display(), .asked[0], .asked[1], .has[0], .has[1])]
+    #[error("{}: frames {}-{} are not among the file's frames {}-{}", .path.display(), .asked[0], .asked[1], .has[0], .has[1])]
     Frames {
         /// The file.
         path: PathBuf,
@@ -74,7 +74,7 @@ pub enum MotionError {
     },
     /// No preset matches the names of the markers.
     #[error(
-        "{}: its markers are those of no preset ({}); name a marker table; it has {}",
+        "{}: its markers match no preset ({}): give a marker table; the markers are {}",
         .path.display(), super::PRESETS.join(", "), .markers.join(", ")
     )]
     NoPreset {
@@ -84,7 +84,7 @@ pub enum MotionError {
         markers: Vec<String>,
     },
     /// A marker of the table is missing.
-    #[error("{}: no marker {name:?}; it has {}", .path.display(), .markers.join(", "))]
+    #[error("{}: no marker {name:?}; the markers are {}", .path.display(), .markers.join(", "))]
     NoMarker {
         /// The file.
         path: PathBuf,

@@ -78,18 +78,18 @@ impl MarkerTable {
         let known = PARSE14.joints.iter().map(|joint| joint.name);
         let missing = known.clone().find(|joint| !file.joints.contains_key(*joint));
         if let Some(joint) = missing {
-            return Err(format!("nothing makes the joint {joint:?}"));
+            return Err(format!("no markers are given for the joint {joint:?}"));
         }
         let mut joints = BTreeMap::new();
         for (joint, markers) in file.joints {
             if !known.clone().chain(TOES).any(|known| known == joint) {
-                return Err(format!("{joint:?} is no joint"));
+                return Err(format!("{joint:?} is not a joint"));
             }
             let weights = weights(markers).map_err(|error| format!("{joint:?}: {error}"))?;
             joints.insert(joint, weights);
         }
         if joints.contains_key(TOES[0]) != joints.contains_key(TOES[1]) {
-            return Err("toes of one foot only".to_owned());
+            return Err("only one foot has toes".to_owned());
         }
         Ok(Self {
             up: file.up,
