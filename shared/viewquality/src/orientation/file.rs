@@ -182,7 +182,7 @@ mod tests {
         let mut network = network(2);
         network.mean[7] = f32::NAN;
         let error = Network::from_bytes(&network.to_bytes()).unwrap_err();
-        assert_eq!(error.to_string(), "number 7 is NaN");
+        assert_eq!(error.to_string(), "value 7 is NaN");
     }
 
     proptest! {
