@@ -28,7 +28,7 @@ pub enum Kind {
     Discrete,
 }
 
-/// Which adapters may be opened.
+/// Adapters that may be opened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
     /// The best one that is not software.

@@ -7,7 +7,7 @@ use crate::device::Device;
 /// Number of workgroups in a row if the first dimension alone cannot hold all of them. The kernels contain the same number.
 pub(crate) const ROW: u32 = 32768;
 
-/// A kernel, its buffers, and how often it runs.
+/// A kernel, its buffers, and its number of workgroups.
 #[derive(Debug)]
 pub(crate) struct Dispatch {
     pipeline: ComputePipeline,

@@ -1,7 +1,7 @@
 //! Convolutions and sums of stacks of channels, as used by the networks that find joints.
 //!
 //! Weights are packed once. The sum of an output begins with its bias. Products are added for one block of the
-//! input's channels after the other, tap by tap along rows, channel by channel; each product is rounded once together with its sum.
+//! input's channels after the other, tap by tap along rows, channel by channel. Each product is rounded once together with its sum.
 
 mod blocked;
 mod fast;

@@ -37,8 +37,8 @@ pub struct Look {
     pub outline: [f64; 4],
     /// Direction in which the trunk faces ([`Sight::front`](crate::Sight::front)).
     pub front: Option<[f32; 2]>,
-    /// Mean heat of the joints ([`JointMaps::heat`]). It says how well the person is seen, and can be compared between boxes of different
-    /// sizes.
+    /// Mean heat of the joints ([`JointMaps::heat`]). It measures how well the person is seen, and can be compared between boxes of
+    /// different sizes.
     pub heat: f64,
     /// Evidence of the joints at their peaks ([`JointMaps::score`]).
     pub score: f32,

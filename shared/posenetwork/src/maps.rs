@@ -13,7 +13,7 @@ use crate::person_maps::{MapGrid, PersonMaps};
 /// Number of joints; each has a map.
 pub(crate) const N_JOINTS: usize = PARSE14.joints.len();
 
-/// How a map becomes evidence: `lambda * ln(max(h, 0) + eps)`, where `h` is the heat from 0 to 1.
+/// Conversion of a map to evidence: `lambda * ln(max(h, 0) + eps)`, where `h` is the heat from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapSettings {
     /// Factor of the logarithm.
@@ -68,7 +68,7 @@ pub struct JointMaps {
     values: Vec<f32>,
     rows: usize,
     columns: usize,
-    /// Every how many rows and columns of the network's own maps are kept.
+    /// Interval between the kept rows and columns of the network's own maps.
     every: usize,
     /// Pixels of the input between two cells, across and down; the first cell is at the first pixel.
     step: [f64; 2],
@@ -171,8 +171,8 @@ impl JointMaps {
         Ok(())
     }
 
-    /// Makes maps from the keypoints of a person found by another program: around each joint, a Gaussian as high as the joint's score,
-    /// above the floor. If no person was found, all cells are at the floor and no joint has a peak.
+    /// Makes maps from the keypoints of a person found by another program. Each joint becomes a Gaussian as high as its score, above
+    /// the floor. If no person was found, all cells are at the floor and no joint has a peak.
     ///
     /// * `keypoints`: positions in pixels of the picture; `None`, or a score of 0, for keypoints that were not found.
     /// * `ways`: how the joints follow from the keypoints: [`joint_ways`](keypoints::joint_ways) of their names. A joint has a peak if all

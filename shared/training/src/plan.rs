@@ -1,4 +1,4 @@
-//! The plan of a training: sizes of the people and types of their parts, computed from the annotations without images.
+//! The plan of a training run: sizes of the people and types of their parts, computed from the annotations without images.
 
 use crate::latent::Marked;
 use crate::scale::{box_sides, filter_side};
@@ -43,7 +43,7 @@ struct Planned {
     types: Vec<usize>,
 }
 
-/// Reason why a training is not possible.
+/// Reason why a training run is not possible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// No person is large enough.

@@ -3,7 +3,7 @@
 use fmp::Model;
 use serde::{Deserialize, Serialize};
 
-/// All settings of a training, except the data.
+/// All settings of a training run, except the data.
 ///
 /// The defaults are those of Yang & Ramanan 2013, where known. The exceptions are `symmetric` and the settings
 /// that limit memory and time (`per_image`, `room`, `cache_mib`, `batch`, `passes`).

@@ -17,7 +17,7 @@ struct Span {
 /// The values of a run belong to the vector, or are in an array that many vectors share. The shared array holds the features of
 /// one image; each example refers to different windows of it.
 ///
-/// Two vectors in one operation ([`Self::dot_sparse`], [`Self::minus`]) must have the same kinds of runs: any two
+/// Two vectors in one operation ([`Self::dot_sparse`], [`Self::minus`]) must have the same kinds of runs. Any two
 /// runs either begin at the same coordinate and have the same length, or share no coordinate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sparse {

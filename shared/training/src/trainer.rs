@@ -24,7 +24,7 @@ use crate::watch::{Event, Step, Watch};
 
 pub use checkpoint::{Checkpoint, CheckpointBytesError, CheckpointError};
 
-/// Reason why a training failed.
+/// Reason why a training run failed.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
     /// The training was stopped.
@@ -65,7 +65,7 @@ pub enum TrainError {
     Model(#[from] ModelError),
 }
 
-/// A training in progress. It is deterministic: the same plan, images and settings give the same model, bit for
+/// A training run in progress. It is deterministic: the same plan, images and settings give the same model, bit for
 /// bit, on any number of threads, and whether or not the training was interrupted between steps.
 pub struct Trainer<'a> {
     plan: &'a Plan,
@@ -93,7 +93,7 @@ impl std::fmt::Debug for Trainer<'_> {
 }
 
 impl<'a> Trainer<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
     /// # Errors
     ///

@@ -1,8 +1,8 @@
-//! Progress of a training.
+//! Progress of a training run.
 
 use crate::dual::Gap;
 
-/// A step of a training.
+/// A step of a training run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
     /// Train a separate filter for every part and type.
@@ -25,7 +25,7 @@ pub enum Step {
     Judge,
 }
 
-/// An event of a training.
+/// An event of a training run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
     /// Progress within the step, in images.
@@ -59,7 +59,7 @@ pub enum Event {
     Gap(Gap),
 }
 
-/// Receives the progress of a training; its functions are called from several threads.
+/// Receives the progress of a training run; its functions are called from several threads.
 pub trait Watch: Sync {
     /// Receives an event.
     fn tell(&self, event: Event);

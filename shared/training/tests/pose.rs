@@ -1,4 +1,4 @@
-//! Tests that the network can be trained, and that a training can be saved, resumed and written.
+//! Tests that the network can be trained, and that a training run can be saved, resumed and written.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use training::networks::pose::{
@@ -84,7 +84,7 @@ fn small() -> Settings {
     }
 }
 
-/// A training from the start, or from a checkpoint.
+/// A training run from the start, or from a checkpoint.
 fn trainer<'a>(
     settings: &'a Settings,
     people: [&'a [Person]; 2],

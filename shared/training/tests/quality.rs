@@ -1,4 +1,4 @@
-//! Tests of trainings from samples to files, with synthetic errors.
+//! Tests of training runs from samples to files, with synthetic errors.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -51,7 +51,7 @@ fn settings(network: Kind) -> Settings {
     }
 }
 
-/// A training from the start, or from a checkpoint.
+/// A training run from the start, or from a checkpoint.
 fn begun<'a>(
     settings: &'a Settings,
     samples: &'a Samples,

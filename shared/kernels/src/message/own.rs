@@ -100,7 +100,7 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
     running
 }
 
-/// How the scores of a register are summed.
+/// Sums the scores of a register.
 struct Sum<'a, S: Simd> {
     simd: S,
     own: &'a OwnScores<'a>,

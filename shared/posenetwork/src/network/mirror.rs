@@ -4,7 +4,7 @@ use keypoints::{Card, Codec, Layout, mirrored};
 
 use super::{PoseNetwork, Tensor};
 
-/// How the output for a mirror image is mapped to the output for the picture.
+/// Mapping of the output for a mirror image to the output for the picture.
 #[derive(Debug)]
 pub(super) struct Mirror {
     /// For each keypoint of the mirror image, the index of the keypoint of the picture.

@@ -7,7 +7,7 @@ use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
 use crate::networks::parameters::{GAIN_OF_RELU, Parameter};
 
-/// Reason why a training cannot start from a network.
+/// Reason why a training run cannot start from a network.
 #[derive(Debug, thiserror::Error)]
 pub enum BeginError {
     /// The file is not an ONNX file.
@@ -43,7 +43,7 @@ pub enum BeginError {
     },
 }
 
-/// A trained network from which a training starts.
+/// A trained network from which a training run starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Begun {
     /// Parameters, in the order of the untrained ones.
@@ -55,7 +55,7 @@ pub struct Begun {
 /// Reads the parameters of a network that this crate wrote.
 ///
 /// The weights in the file are standardised. The length of every channel becomes its gain, and the weights get the length that they have
-/// at the beginning of a training. The resulting network gives the same output as the file, except for rounding.
+/// at the beginning of a training run. The resulting network gives the same output as the file, except for rounding.
 ///
 /// * `all`: the untrained parameters of the network. They are kept for channels that are 0 in the file.
 /// * `may_lack`: prefix of the names of layers that the file may lack; these layers stay untrained.

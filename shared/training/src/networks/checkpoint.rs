@@ -1,4 +1,4 @@
-//! Files of a training: a header with a checksum, then the content.
+//! Files of a training run: a header with a checksum, then the content.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -12,7 +12,7 @@ use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
 use formats::checksum::{Envelope, EnvelopeError};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// Kind of a file with the state of a training.
+/// Kind of a file with the state of a training run.
 pub(crate) const CHECKPOINT: [u8; 8] = *b"PLXTRAIN";
 /// Largest size of a payload, in bytes.
 const MAX_BYTES: usize = 16 << 30;

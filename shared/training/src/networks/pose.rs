@@ -4,7 +4,7 @@
 //!   teacher's results.
 //! * [`varied`], [`plain`]: the inputs made from a person, and the outputs that the network should give.
 //! * [`PoseTask`]: the training.
-//! * [`begun`]: the parameters of a previously trained network, from which a training starts.
+//! * [`begun`]: the parameters of a previously trained network, from which a training run starts.
 //! * [`file()`]: a trained network as an ONNX file; [`card()`] says how to use it.
 //! * [`Score`]: measures of the network's quality.
 //!

@@ -1,4 +1,4 @@
-//! Settings common to all trainings.
+//! Settings common to all training runs.
 
 use serde::{Deserialize, Serialize};
 

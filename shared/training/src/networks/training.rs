@@ -1,4 +1,4 @@
-//! A training: steps over samples, regular evaluations on held-out samples, and a state that can be saved.
+//! A training run: steps over samples, regular evaluations on held-out samples, and a state that can be saved.
 
 use core::fmt::Debug;
 
@@ -34,7 +34,7 @@ pub struct Costed<C> {
     pub gradients: Vec<Vec<f32>>,
 }
 
-/// The next pass of a training.
+/// The next pass of a training run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
     /// Number of steps.
@@ -43,12 +43,12 @@ pub struct Plan {
     pub is_judged: bool,
 }
 
-/// Values that a training reports and saves.
+/// Values that a training run reports and saves.
 pub trait Kept: Copy + Debug + PartialEq + Serialize + DeserializeOwned {}
 
 impl<T: Copy + Debug + PartialEq + Serialize + DeserializeOwned> Kept for T {}
 
-/// Samples, truth, cost and steps of a training: everything that differs between trainings.
+/// Samples, truth, cost and steps of a training run: everything that differs between training tasks.
 ///
 /// All data of a step depend only on the number of the step.
 pub trait Task: Sync {
@@ -108,7 +108,7 @@ pub trait Task: Sync {
     }
 }
 
-/// The results of one pass of a training.
+/// The results of one pass of a training run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pass<C, S> {
     /// Number of finished steps after the pass.
@@ -138,13 +138,13 @@ struct State<C, S> {
     best: Option<Best>,
 }
 
-/// Reason why a training cannot start or resume.
+/// Reason why a training run cannot start or resume.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
     /// The bytes are not a checkpoint, or were changed.
     #[error("the checkpoint cannot be used")]
     Checkpoint(#[from] StoreError),
-    /// The checkpoint belongs to another training.
+    /// The checkpoint belongs to another training run.
     #[error(
         "the checkpoint is of a training with other {learned_from} or settings, or from another network"
     )]
@@ -157,7 +157,7 @@ pub enum TrainError {
     Precision,
 }
 
-/// A training in progress.
+/// A training run in progress.
 #[derive(Debug)]
 pub struct Trainer<T: Task> {
     task: T,
@@ -166,7 +166,7 @@ pub struct Trainer<T: Task> {
 }
 
 impl<T: Task> Trainer<T> {
-    /// Prepares a training, from the start or from a checkpoint.
+    /// Prepares a training run, from the start or from a checkpoint.
     ///
     /// * `checkpoint`: bytes of [`Self::checkpoint`].
     ///

@@ -1,4 +1,4 @@
-//! The state of a training, from which the training continues exactly as if it had not been interrupted.
+//! The state of a training run, from which the training continues exactly as if it had not been interrupted.
 
 mod bytes;
 
@@ -13,7 +13,7 @@ use crate::watch::Watch;
 
 pub use bytes::CheckpointBytesError;
 
-/// The state of a training between two steps.
+/// The state of a training run between two steps.
 ///
 /// Examples are stored by their origin, with a hundred bytes each. Their features are recomputed from the
 /// images.
@@ -28,10 +28,10 @@ pub struct Checkpoint {
     examples: Vec<(Origin, f64)>,
 }
 
-/// Reason why a training cannot be resumed from a checkpoint.
+/// Reason why a training run cannot be resumed from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// The checkpoint belongs to another training.
+    /// The checkpoint belongs to another training run.
     #[error(
         "the checkpoint is of another training: people, images without people or settings have changed"
     )]

@@ -1,4 +1,4 @@
-//! Tests of complete trainings on drawn figures.
+//! Tests of complete training runs on drawn figures.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 

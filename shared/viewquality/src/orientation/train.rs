@@ -50,7 +50,7 @@ impl Default for Settings {
     }
 }
 
-/// Progress of a training.
+/// Progress of a training run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pass {
     /// Number of the finished pass, from 1.

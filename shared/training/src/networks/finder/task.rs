@@ -71,7 +71,7 @@ pub struct FinderTask<'a> {
 }
 
 impl<'a> FinderTask<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
     /// * `learnt`, `kept`: training pictures, and held-out pictures for the evaluation.
     /// * `from`: the network read by [`begun`](super::begun), used instead of random parameters.

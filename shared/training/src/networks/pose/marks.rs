@@ -116,7 +116,7 @@ impl Marks {
     ///
     /// If mark and teacher agree, the target is their mean. If they differ and the teacher is certain, both positions are targets. Without
     /// a mark, the target is the teacher's position, weighted by its peak. An extra keypoint without a mark is taken from the teacher if
-    /// the teacher is certain of it and finds the joint near it at its mark.
+    /// the teacher is certain of it and finds the nearby joint at its mark.
     pub fn targets(&self) -> [Target; N_KEYPOINTS] {
         core::array::from_fn(|joint| {
             let marked = self.marked[joint];

@@ -3,7 +3,7 @@
 //! The input is a picture of one person. There are three outputs: a map of log-odds for every keypoint, the evidence for the
 //! direction in which the trunk faces, and the expected error of every keypoint.
 //!
-//! The maps of the [extra keypoints](EXTRAS) have a small head of their own over the features of the joints, so that this head can be
+//! The maps of the [extra keypoints](EXTRAS) have a small head of their own over the features of the joints. This head can be
 //! trained alone.
 
 use skeleton::PARSE14;
@@ -140,7 +140,7 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     all
 }
 
-/// Reads the parameters of a network that [`file()`](super::file()) wrote, from which a training starts.
+/// Reads the parameters of a network that [`file()`](super::file()) wrote, from which a training run starts.
 ///
 /// If the file lacks the layers of the [extra keypoints](EXTRAS), these layers stay untrained.
 ///

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::network::{MULTIPLE, Shape};
 use crate::networks::settings::{Precision, SettingsError, check, count, from_zero};
 
-/// Settings of a training.
+/// Settings of a training run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {

@@ -126,7 +126,7 @@ pub struct PoseTask<'a> {
 }
 
 impl<'a> PoseTask<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
     /// * `learnt`, `kept`: training people, and held-out people for the evaluation and the training of the expected error.
     /// * `from`: the network read by [`begun`](super::begun), used instead of random parameters.

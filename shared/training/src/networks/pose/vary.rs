@@ -36,7 +36,7 @@ pub struct NetworkSample {
     pub places: [[f32; 2]; N_KEYPOINTS],
 }
 
-/// How a picture is mapped to the input: rotated, moved, scaled, and possibly mirrored.
+/// Mapping of a picture to the input: it is rotated, moved, scaled, and possibly mirrored.
 #[derive(Debug, Clone, Copy)]
 struct View {
     /// Cosine and sine of the angle by which the picture is rotated.

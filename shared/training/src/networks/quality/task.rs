@@ -27,7 +27,7 @@ pub struct Validated {
     pub area: f64,
 }
 
-/// Reason why samples or weights do not match a training.
+/// Reason why samples or weights do not match a training run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TaskError {
     /// There are no samples for training, or for validation.
@@ -71,7 +71,7 @@ pub struct QualityTask<'a> {
 }
 
 impl<'a> QualityTask<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
     /// * `weights`: initial parameters by name; all others are random.
     ///

@@ -5,7 +5,7 @@ use super::record::{At, Back, Record, by_sample};
 use crate::networks::lesson::Statistics;
 use crate::networks::parameters::EPSILON_OF_BATCH;
 
-/// How the maps of a batch are normalised.
+/// Values for normalising the maps of a batch.
 struct Normalisation {
     n: usize,
     /// Number of cells in a channel.

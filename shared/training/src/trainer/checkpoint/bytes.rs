@@ -60,7 +60,7 @@ impl Checkpoint {
     }
 
     /// Reads the checkpoint and the stamp from the bytes of a file. [`Trainer::resume`](crate::Trainer::resume) later checks whether
-    /// they match a training.
+    /// they match a training run.
     ///
     /// # Errors
     ///
