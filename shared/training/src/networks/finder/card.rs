@@ -33,15 +33,15 @@ pub fn card(shape: &Shape, about: &About) -> String {
         ..
     } = about.score;
     let before = if about.goes_on {
-        " after those of another network that it began with"
+        " after those of the network from which it started"
     } else {
         ""
     };
     let (recall, fill, side) = (100.0 * recall, FILL as u8, shape.side);
     format!(
         "\
-# A network of `parallax-lab train finder`: {learnt} pictures, {samples} samples{before}. In {kept} pictures that were kept apart it finds
-# {recall:.1} % of {people} people, and {false_boxes:.2} boxes a picture that are of nobody.
+# A network of `parallax-lab train finder`: {learnt} pictures, {samples} samples{before}. In {kept} held-out pictures, it finds
+# {recall:.1} % of {people} people, and {false_boxes:.2} boxes per picture without a person.
 format = \"parallax-detector\"
 version = 1
 name = \"Parallax, boxes of people, {side}x{side}\"

@@ -30,7 +30,7 @@ impl core::fmt::Display for Score {
     fn fmt(&self, to: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(
             to,
-            "{} pictures kept apart: {:.1} % of {} people found, {:.2} false boxes a picture, none in {:.1} % of {} pictures without people",
+            "{} held-out pictures: {:.1} % of {} people found, {:.2} false boxes per picture, no box in {:.1} % of {} pictures without people",
             self.pictures,
             100.0 * self.recall,
             self.people,

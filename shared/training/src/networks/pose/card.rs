@@ -37,9 +37,9 @@ pub fn card(shape: &Shape, about: &About) -> String {
     let Shape { width, height, .. } = shape;
     let before = match (about.goes_on, about.extras_alone) {
         (true, true) => {
-            ", for the extra keypoints alone; all else is that of the network that it began with"
+            ", for the extra keypoints alone; all other parts are those of the network from which it started"
         }
-        (true, false) => ", after those of another network that it began with",
+        (true, false) => ", after those of the network from which it started",
         (false, _) => "",
     };
     let names: Vec<String> = names().map(|name| format!("{name:?}")).collect();
@@ -47,10 +47,10 @@ pub fn card(shape: &Shape, about: &About) -> String {
     let fill = FILL as u8;
     format!(
         "\
-# A network of `parallax-lab train network`: {learnt} people, {samples} samples{before}. Of {judged} of {kept} people who were kept apart it finds
-# {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both, and tells {front:.1} % of the directions from their
-# opposites; joints that are off by more than half a head are told from others with an area under the curve of {area:.3};
-# {extras:.1} % of the extra keypoints lie within a fifth of the trunk.
+# A network of `parallax-lab train network`: {learnt} people, {samples} samples{before}. On {judged} of {kept} held-out people, it finds
+# {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both ends. It distinguishes {front:.1} % of the directions from
+# their opposites. Joints with an error of more than half a head are recognised with an area under the curve of {area:.3}.
+# {extras:.1} % of the extra keypoints are within a fifth of the trunk.
 format = \"parallax-keypoint-network\"
 version = 1
 name = \"Parallax, LSP-14, nose and feet as seen, {height}x{width}\"
