@@ -393,7 +393,11 @@ fn an_unusable_motion_recording_is_refused_with_the_right_exit_code() {
         (&["--frames", "6"][..], 2, "ends after 5"),
         (&["--live"], 2, "cannot be used with"),
         (&["--actions", "boxing"], 2, "cannot be used with"),
-        (&["--motion-frames", "2-9"], 2, "not among its frames 1-5"),
+        (
+            &["--motion-frames", "2-9"],
+            2,
+            "not among the file's frames 1-5",
+        ),
         (&["--markers", "cmu"], 4, "no marker"),
         (&["--markers", "absent.toml"], 4, "absent.toml"),
     ] {

@@ -1,4 +1,4 @@
-//! A build without the feature `gpu`: there is no device.
+//! Replacement for a build without the feature `gpu`, which has no device.
 
 use std::sync::Arc;
 
@@ -7,15 +7,15 @@ use kernels::Rgb8View;
 
 use crate::{Adapter, Choice, DeviceLost, Found, OpenError, Unsuitable, Wanted};
 
-/// A GPU; there is none in this build.
+/// A GPU; this build has none.
 #[derive(Debug)]
 pub enum Device {}
 
-/// The search of one view on a GPU; there is none in this build.
+/// The search of one view on a GPU; this build has none.
 #[derive(Debug)]
 pub enum View {}
 
-/// The adapters of this machine: none that this build could find.
+/// Lists the adapters of this machine: none in this build.
 pub fn adapters() -> Vec<Adapter> {
     Vec::new()
 }
@@ -35,7 +35,7 @@ impl Device {
         match *self {}
     }
 
-    /// Gives the device up.
+    /// Gives up the device.
     pub fn destroy(&self) {
         match *self {}
     }
@@ -46,7 +46,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// Never: there is no device.
+    /// None: there is no device to call this with.
     pub fn new(device: &Arc<Device>, _: Arc<Model>, _: Arc<Layout>) -> Result<Self, Unsuitable> {
         match **device {}
     }
@@ -55,7 +55,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// Never: there is no device.
+    /// None: there is no device to call this with.
     pub fn search(
         &self,
         _image: Rgb8View<'_>,

@@ -1,39 +1,39 @@
-//! Graphics cards, and programs that play one.
+//! Graphics cards, and programs that emulate one.
 
 use core::fmt;
 
-/// A graphics card, or a program that plays one.
+/// A graphics card, or a program that emulates one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Adapter {
-    /// Its name, as its driver says it.
+    /// Name of the adapter, as reported by its driver.
     pub name: String,
     /// The kind of device.
     pub kind: Kind,
-    /// Name and version of its driver.
+    /// Name and version of the driver.
     pub driver: String,
 }
 
 /// The kind of an adapter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// A program that computes on the processor: slower than the steps that are made for it.
+    /// A program that computes on the processor, slower than the code that is written for the processor.
     Software,
-    /// None of the others.
+    /// A device of another kind.
     Other,
     /// A share of a card, in a virtual machine.
     Virtual,
     /// Part of the processor.
     Integrated,
-    /// A card.
+    /// A graphics card.
     Discrete,
 }
 
-/// Which adapters may be opened.
+/// Adapters that may be opened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
     /// The best one that is not software.
     Hardware,
-    /// The best one, software too: for tests.
+    /// The best one, including software: for tests.
     Any,
 }
 

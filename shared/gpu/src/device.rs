@@ -1,4 +1,4 @@
-//! A GPU that was opened: its memory, its queue, and whether it still answers.
+//! An open GPU: its memory, its queue, and whether it still responds.
 
 use core::time::Duration;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,12 +10,12 @@ use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, MapMode, PollType};
 use crate::open::{self, Opened};
 use crate::{Adapter, Choice, DeviceLost, Kind, OpenError};
 
-/// The longest time that a card may take for a frame.
+/// Longest time that a card may take for a frame.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The same of software.
+/// Longest time that a software adapter may take for a frame.
 const PATIENCE_WITH_SOFTWARE: Duration = Duration::from_mins(2);
 
-/// A GPU that was opened. Several views of a process share one.
+/// An open GPU. Several views of a process share one.
 #[derive(Debug)]
 pub struct Device {
     raw: wgpu::Device,
@@ -26,11 +26,11 @@ pub struct Device {
     max_binding: u64,
     patience: Duration,
     is_lost: Arc<AtomicBool>,
-    /// The first complaint of the driver.
+    /// The first error reported by the driver.
     complaint: Arc<Mutex<Option<String>>>,
 }
 
-/// Some bytes of a buffer.
+/// A range of bytes in a buffer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece<'a> {
     pub(crate) buffer: &'a Buffer,
@@ -41,7 +41,7 @@ pub(crate) struct Piece<'a> {
 }
 
 impl<'a> Piece<'a> {
-    /// The whole of a buffer.
+    /// All bytes of a buffer.
     pub(crate) fn whole(buffer: &'a Buffer) -> Self {
         Self {
             buffer,
@@ -52,7 +52,7 @@ impl<'a> Piece<'a> {
 }
 
 impl Device {
-    /// Opens the best adapter: a card before a part of the processor before anything else.
+    /// Opens the best adapter. A graphics card comes first, then a part of the processor, then other kinds.
     ///
     /// # Errors
     ///
@@ -93,7 +93,7 @@ impl Device {
         })
     }
 
-    /// The same, using no more bytes at once than this: what a smaller device would have.
+    /// Returns the same device with a lower limit for the bytes bound at once, to emulate a smaller device.
     #[must_use]
     pub fn with_max_binding(self, max_binding: u64) -> Self {
         Self {
@@ -102,7 +102,8 @@ impl Device {
         }
     }
 
-    /// The same, giving kernels to the driver as text, checked and with bounds of every access: as one that takes no SPIR-V.
+    /// Returns the same device, but passes kernels to the driver as text, with checks and bounds for every access. This emulates a device
+    /// that does not accept SPIR-V.
     #[must_use]
     pub fn without_spirv(self) -> Self {
         Self {
@@ -116,7 +117,7 @@ impl Device {
         &self.adapter
     }
 
-    /// Gives the device up: every search from now on finds it lost.
+    /// Gives up the device: every later search reports that it is lost.
     pub fn destroy(&self) {
         self.is_lost.store(true, Ordering::Relaxed);
         self.raw.destroy();
@@ -134,17 +135,17 @@ impl Device {
         &self.limits
     }
 
-    /// Returns true if it takes kernels in SPIR-V, whose arithmetic can be decorated.
+    /// Returns true if the device accepts kernels in SPIR-V, whose arithmetic can be decorated.
     pub(crate) fn takes_spirv(&self) -> bool {
         self.takes_spirv
     }
 
-    /// Most bytes that a kernel sees of a buffer.
+    /// Largest number of bytes of a buffer that a kernel can access.
     pub(crate) fn max_binding(&self) -> u64 {
         self.max_binding
     }
 
-    /// Fails if the device no longer answers.
+    /// Fails if the device no longer responds.
     pub(crate) fn check(&self) -> Result<(), DeviceLost> {
         if self.is_lost.load(Ordering::Relaxed) {
             return Err(DeviceLost);
@@ -152,13 +153,13 @@ impl Device {
         Ok(())
     }
 
-    /// The first thing that the driver did not take, if any.
+    /// The first error reported by the driver, if any.
     pub(crate) fn complaint(&self) -> Option<String> {
         let complaint = self.complaint.lock();
         complaint.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// A buffer with contents that stay.
+    /// Makes a buffer with constant contents.
     pub(crate) fn table<T: bytemuck::Pod>(&self, contents: &[T]) -> Buffer {
         self.raw.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: None,
@@ -167,7 +168,7 @@ impl Device {
         })
     }
 
-    /// A buffer that is written from here or by kernels, and can be read.
+    /// Makes a buffer that the CPU or kernels write, and that can be read.
     pub(crate) fn space(&self, n_bytes: u64) -> Buffer {
         self.raw.create_buffer(&wgpu::BufferDescriptor {
             label: None,
@@ -177,9 +178,9 @@ impl Device {
         })
     }
 
-    /// Runs what was recorded, and reads some bytes afterwards, one piece after the other.
+    /// Runs the recorded commands, then reads ranges of bytes, one after the other.
     ///
-    /// * `staging`: memory that both sides see; grown where it is too small.
+    /// * `staging`: memory that the CPU and the device can access; enlarged if necessary.
     pub(crate) fn read(
         &self,
         mut recorded: CommandEncoder,

@@ -4,10 +4,10 @@ use wgpu::{BindGroup, Buffer, ComputePass, ComputePipeline};
 
 use crate::device::Device;
 
-/// Workgroups along the first dimension, where there are more than a dimension takes; the kernels know the number.
+/// Number of workgroups in a row if the first dimension alone cannot hold all of them. The kernels contain the same number.
 pub(crate) const ROW: u32 = 32768;
 
-/// A kernel, its buffers, and how often it runs.
+/// A kernel, its buffers, and its number of workgroups.
 #[derive(Debug)]
 pub(crate) struct Dispatch {
     pipeline: ComputePipeline,
@@ -16,9 +16,9 @@ pub(crate) struct Dispatch {
 }
 
 impl Dispatch {
-    /// Binds buffers to a kernel, in the order of its bindings.
+    /// Binds buffers to a kernel, in the order of the kernel's bindings.
     ///
-    /// * `groups`: number of workgroups; more in the first dimension than it takes lie in two, if the second one is 1.
+    /// * `groups`: number of workgroups in both dimensions. If the first is too large and the second is 1, the groups are split into rows.
     pub(crate) fn new(
         device: &Device,
         pipeline: &ComputePipeline,
@@ -45,12 +45,12 @@ impl Dispatch {
         }
     }
 
-    /// Records it.
+    /// Records the kernel.
     pub(crate) fn record(&self, pass: &mut ComputePass<'_>) {
         self.record_some(pass, self.groups[0]);
     }
 
-    /// Records its first `n` workgroups.
+    /// Records the first `n` workgroups of the kernel.
     pub(crate) fn record_some(&self, pass: &mut ComputePass<'_>, n: u32) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.buffers, &[]);

@@ -1,58 +1,58 @@
-//! Why there is no GPU, or no longer.
+//! Reasons why a GPU is missing or was lost.
 
-/// Why no device could be opened.
+/// Reason why no device could be opened.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
     /// The feature `gpu` is off.
     #[error("this build has no GPU support: build it with --features gpu")]
     NotBuilt,
-    /// There is no Vulkan, or it has no adapter.
+    /// Vulkan is missing or has no adapter.
     #[error("no Vulkan adapter was found")]
     NoAdapter,
     /// All adapters are programs that compute on the processor.
     #[error("the only Vulkan adapter is software: {name}")]
     OnlySoftware {
-        /// Its name.
+        /// Name of the best such adapter.
         name: String,
     },
     /// The adapter cannot be used.
     #[error("{name} cannot be used: {why}")]
     Refused {
-        /// Its name.
+        /// Name of the adapter.
         name: String,
-        /// The reason: something that it lacks, or the words of its driver.
+        /// The reason: a missing property, or the message of the driver.
         why: String,
     },
 }
 
-/// Why a device cannot search a view.
+/// Reason why a device cannot search a view.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Unsuitable {
-    /// Something the kernels are not written for.
+    /// The model has a property that the kernels do not support.
     #[error("the model has {what}, which the GPU does not support")]
     Model {
-        /// The property that is in the way.
+        /// The unsupported property.
         what: &'static str,
     },
     /// The device is too small.
-    #[error("{what} needs {needed}, the GPU has {has}")]
+    #[error("the GPU has a limit of {has} {what}, but {needed} are needed")]
     TooSmall {
-        /// The thing that needs it.
+        /// Unit of both numbers, and its use.
         what: &'static str,
-        /// The number needed, in the unit of `what`.
+        /// The number needed.
         needed: u64,
-        /// The number that the device has.
+        /// The limit of the device.
         has: u64,
     },
-    /// The driver does not take the kernels.
+    /// The driver does not accept the kernels.
     #[error("the driver refuses the kernels: {why}")]
     Refused {
-        /// The words of the driver.
+        /// The message of the driver.
         why: String,
     },
 }
 
-/// The device no longer answers, or not in time: it gives no further results.
+/// The device no longer responds, or did not respond in time. It gives no further results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the GPU was lost")]
 pub struct DeviceLost;

@@ -1,8 +1,8 @@
-//! Loops in the text of a kernel: WGSL has no way to ask for unrolling.
+//! Loop unrolling in the text of a kernel, for which WGSL has no syntax.
 
-/// Expands every `@unroll NAME FIRST END STEP { body }` to the bodies of its values, with `$NAME` replaced.
+/// Expands every `@unroll NAME FIRST END STEP { body }` to one body for each value, with `$NAME` replaced.
 ///
-/// The texts are the crate's own: one that is malformed is left as it is, and refused by the parser of WGSL.
+/// All texts are part of this crate. A malformed loop is not changed, and the WGSL parser refuses it.
 pub(crate) fn expand(text: &str) -> String {
     let mut out = String::with_capacity(4 * text.len());
     let mut rest = text;
@@ -20,7 +20,7 @@ pub(crate) fn expand(text: &str) -> String {
     out
 }
 
-/// A loop and the text around it.
+/// A loop and the text before and after it.
 struct Loop<'a> {
     begin: usize,
     name: &'a str,

@@ -1,4 +1,4 @@
-//! Some levels of the pyramid: their responses, messages, roots and traces. As many as the device can see at once.
+//! A group of pyramid levels, as many as the device can access at once: their responses, messages, roots and traces.
 
 use std::ops::Range;
 
@@ -11,17 +11,17 @@ use crate::dispatch::{Dispatch, ROW};
 use crate::programs::{Kernel, Programs};
 use crate::tree::{PANEL, Tree};
 
-/// Cells of a workgroup of `responses`, `combine`, `roots`; side of a tile of `transform`.
+/// Cells in a workgroup of `responses`, `combine` and `roots`; side of a tile of `transform`.
 const RESPONSES: usize = 64;
 const COMBINE: usize = 512;
 const ROOTS: usize = 128;
 const TILE: usize = 32;
-/// Roots that are traced at once.
+/// Number of roots that are traced at once.
 pub(crate) const BATCH: usize = 64;
-/// Numbers of a range: maximum, inverted minimum, maximum of the own score.
+/// Number of values in a range: maximum, inverted minimum, maximum of the own score.
 const RANGE: usize = 3;
 
-/// A level; see the kernels.
+/// A level, in the layout that the kernels expect.
 #[derive(Debug, Clone, Copy, bytemuck_derive::Pod, bytemuck_derive::Zeroable)]
 #[repr(C)]
 struct Level {
@@ -35,15 +35,15 @@ struct Level {
     unused: u32,
 }
 
-/// Some levels of a layout on the device.
+/// A group of levels on the device.
 #[derive(Debug)]
 pub(crate) struct Group {
-    /// The levels of the layout.
+    /// Indices of the levels in the layout.
     pub(crate) levels: Range<usize>,
-    /// First cell of every level, and the end.
+    /// First cell of every level, followed by the number of cells.
     pub(crate) cells: Vec<usize>,
     pub(crate) memory: Memory,
-    /// Features to responses, then messages and roots.
+    /// Kernel from features to responses; the kernels for messages and roots follow.
     pub(crate) responses: Dispatch,
     pub(crate) messages: Vec<Dispatch>,
     pub(crate) trace: Dispatch,
@@ -57,21 +57,21 @@ pub(crate) struct Memory {
     level_of_cell: Buffer,
     /// Responses, `[level][plane][row][col]`.
     pub(crate) maps: Buffer,
-    /// Transforms and scores, the same.
+    /// Transforms, and after them scores, in the same order.
     moved: Buffer,
     scores: Buffer,
-    /// `[level][plane][range]`.
+    /// Ranges, `[level][plane][range]`.
     pub(crate) ranges: Buffer,
-    /// `[cell][score, type]`; of the peaks only, of the others no type.
+    /// Roots, `[cell][score, type]`. In `peaks`, cells that are not peaks have no type.
     roots: Buffer,
     pub(crate) peaks: Buffer,
-    /// Cell and type of the roots to trace.
+    /// Cell and type of each root to trace.
     pub(crate) wanted: Buffer,
-    /// `[root][part][x, y, type]`.
+    /// Traced trees, `[root][part][x, y, type]`.
     pub(crate) poses: Buffer,
 }
 
-/// The buffers of a model that all groups share.
+/// The buffers of a model, shared by all groups.
 #[derive(Debug)]
 pub(crate) struct Shared {
     weights: Buffer,
@@ -99,7 +99,7 @@ impl Shared {
     }
 }
 
-/// Splits the levels so that the maps of no group are larger than the device can see.
+/// Splits the levels into groups whose maps the device can access.
 pub(crate) fn split(device: &Device, layout: &Layout) -> Result<Vec<Range<usize>>, Unsuitable> {
     let bytes_of_cell = (layout.n_filters * size_of::<f32>()) as u64;
     let most = device.max_binding().min(u64::from(ROW) * RESPONSES as u64 * bytes_of_cell);
@@ -108,7 +108,7 @@ pub(crate) fn split(device: &Device, layout: &Layout) -> Result<Vec<Range<usize>
         let needed = (size.rows * size.cols) as u64 * bytes_of_cell;
         if needed > most {
             return Err(Unsuitable::TooSmall {
-                what: "bytes of the responses of a level",
+                what: "bytes for the responses of a level",
                 needed,
                 has: most,
             });
@@ -123,7 +123,7 @@ pub(crate) fn split(device: &Device, layout: &Layout) -> Result<Vec<Range<usize>
     Ok(groups)
 }
 
-/// Everything that is needed to make a group.
+/// Parameters of a new group.
 pub(crate) struct Parts<'a> {
     pub(crate) device: &'a Device,
     pub(crate) programs: &'a Programs,
@@ -204,7 +204,7 @@ impl Parts<'_> {
         Dispatch::new(self.device, self.programs.get(kernel), buffers, groups)
     }
 
-    /// The kernel from features to responses.
+    /// Makes the kernel from features to responses.
     fn responses(&self, memory: &Memory, n_cells: usize) -> Dispatch {
         let Memory {
             levels,
@@ -224,7 +224,7 @@ impl Parts<'_> {
         self.bind(Kernel::Responses, &buffers, groups)
     }
 
-    /// The kernels of the messages, from the leaves to the root, and of its peaks.
+    /// Makes the kernels for the messages, from the leaves to the root, and for the peaks of the root.
     fn messages(&self, memory: &Memory, tables: &Tables) -> Vec<Dispatch> {
         let Memory {
             levels,
@@ -272,7 +272,7 @@ impl Parts<'_> {
         all
     }
 
-    /// The kernel that follows trees from their roots.
+    /// Makes the kernel that follows trees from their roots.
     fn trace(&self, memory: &Memory) -> Dispatch {
         let Memory {
             levels,
@@ -337,7 +337,7 @@ impl Group {
     }
 }
 
-/// The number whose order-preserving integer this is; see `key` of the kernels.
+/// Converts an order-preserving integer back to its number; see `key` in the kernels.
 pub(crate) fn number(key: u32) -> f32 {
     f32::from_bits(if key >> 31 == 1 {
         key & 0x7fff_ffff

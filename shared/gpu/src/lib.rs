@@ -1,8 +1,8 @@
 //! The paper's single-view search on a GPU: from the image to distinct poses, bounds and evidence.
 //!
-//! [`Device::open`] takes a GPU through Vulkan; a [`View`] searches the frames of one view on it. The CPU ([`fmp::Extractor`] and
-//! [`fmp::Solver`]) stays the reference: features and, of equal responses, poses, scores and bounds have its bits; responses are
-//! plain sums of fused products, as those of [`fmp::Extractor::direct`]. Without the feature `gpu` there is never a device.
+//! [`Device::open`] opens a GPU through Vulkan. A [`View`] searches the frames of one view on the GPU. The CPU ([`fmp::Extractor`] and
+//! [`fmp::Solver`]) is the reference. The features are the same bit by bit. For equal responses, so are the poses, scores and bounds.
+//! Responses are plain sums of fused products, as in [`fmp::Extractor::direct`]. Without the feature `gpu` there is never a device.
 #![deny(unsafe_code)]
 
 mod adapter;
@@ -46,7 +46,7 @@ pub use open::adapters;
 #[cfg(feature = "gpu")]
 pub use view::View;
 
-/// Says if this build can use a GPU.
+/// True if this build can use a GPU.
 pub const IS_BUILT: bool = cfg!(feature = "gpu");
 
 /// The result of a search.
@@ -54,15 +54,15 @@ pub const IS_BUILT: bool = cfg!(feature = "gpu");
 pub struct Found {
     /// Distinct poses, best first.
     pub candidates: Vec<fmp::Pose>,
-    /// Upper bounds of the scores on every level.
+    /// Upper bounds of the scores, for every level.
     pub bounds: fmp::Bounds,
 }
 
-/// Which poses are wanted.
+/// Limits for the poses of a result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// Largest number of poses.
     pub n: usize,
-    /// Smallest mean distance between the part centres of two poses, box sides; see [`fmp::Solver::distinct`].
+    /// Smallest mean distance between the part centres of two poses, in box sides; see [`fmp::Solver::distinct`].
     pub min_separation: f64,
 }

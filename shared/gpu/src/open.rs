@@ -1,4 +1,4 @@
-//! The adapters of this machine, and how one is opened.
+//! Lists and opens the adapters of this machine.
 
 use core::task::{Context, Poll, Waker};
 
@@ -6,7 +6,7 @@ use wgpu::{Backends, DeviceType, Features, Limits};
 
 use crate::{Adapter, Choice, Kind, OpenError};
 
-/// The features that are used where they are there.
+/// Optional features, used if the adapter has them.
 const WANTED: Features = Features::SHADER_F64.union(Features::PASSTHROUGH_SHADERS);
 
 /// An opened adapter.
@@ -58,7 +58,7 @@ pub(crate) fn open(choice: Choice) -> Result<Opened, OpenError> {
     })
 }
 
-/// The adapters that Vulkan knows, best first, each as often as Vulkan says it.
+/// All adapters reported by Vulkan, best first, including duplicates.
 fn found() -> Vec<wgpu::Adapter> {
     let mut wanted = wgpu::InstanceDescriptor::new_without_display_handle();
     wanted.backends = Backends::VULKAN;
@@ -87,7 +87,7 @@ fn kind(of: DeviceType) -> Kind {
     }
 }
 
-/// Waits for what `wgpu` has ready at once, though it gives a future.
+/// Waits for a future of `wgpu` that is ready at once.
 fn wait<F: Future>(future: F) -> F::Output {
     let mut future = std::pin::pin!(future);
     let mut context = Context::from_waker(Waker::noop());

@@ -8,16 +8,16 @@ use crate::dispatch::Dispatch;
 use crate::programs::{Kernel, Programs};
 use crate::{Unsuitable, suits};
 
-/// Pixels or cells of a workgroup.
+/// Number of pixels or cells in a workgroup.
 const BLOCK: usize = 128;
-/// Cells of a workgroup of the histograms.
+/// Number of cells in a workgroup of the histograms.
 const HISTOGRAM_BLOCK: usize = 42;
-/// Samples that a shrunken pixel is made of, along an axis, at most.
+/// Largest number of samples along an axis that make up a shrunken pixel.
 const TAPS: usize = 4;
-/// Orientations of a histogram.
+/// Number of orientations in a histogram.
 const ORIENTATIONS: u64 = 18;
 
-/// The picture of a level; see the kernels.
+/// The picture of a level, in the layout that the kernels expect.
 #[derive(Debug, Clone, Copy, Default, bytemuck_derive::Pod, bytemuck_derive::Zeroable)]
 #[repr(C)]
 struct Picture {
@@ -45,7 +45,7 @@ struct Tables {
     pictures: Vec<Picture>,
     /// First sample of every shrunken row or column.
     first: Vec<u32>,
-    /// [`TAPS`] of every shrunken row or column.
+    /// [`TAPS`] weights for every shrunken row or column.
     weights: Vec<f64>,
     /// Blocks of pixels of the pictures of an octave.
     octaves: Vec<Vec<[u32; 2]>>,
@@ -57,17 +57,17 @@ struct Tables {
     n_features: usize,
 }
 
-/// From an image to the features of all levels.
+/// Kernels and buffers from an image to the features of all levels.
 #[derive(Debug)]
 pub(crate) struct Features {
     pub(crate) image: Buffer,
-    /// `[level][row][col][channel]`.
+    /// Features, `[level][row][col][channel]`.
     pub(crate) values: Buffer,
     pub(crate) dispatches: Vec<Dispatch>,
 }
 
 impl Features {
-    /// Prepares the kernels for images of a size.
+    /// Prepares the kernels for images of one size.
     pub(crate) fn new(
         device: &Device,
         programs: &Programs,
@@ -76,9 +76,9 @@ impl Features {
     ) -> Result<Self, Unsuitable> {
         let tables = Tables::new(model, layout);
         let image_bytes = tables.n_pixels as u64 * 3 * size_of::<f64>() as u64;
-        suits::fits(device, "bytes of the shrunken pictures", image_bytes)?;
+        suits::fits(device, "bytes for the shrunken pictures", image_bytes)?;
         let feature_bytes = (tables.n_features * fmp::N_CHANNELS * size_of::<f32>()) as u64;
-        suits::fits(device, "bytes of the features", feature_bytes)?;
+        suits::fits(device, "bytes for the features", feature_bytes)?;
         let [width, height] = layout.image_size;
         let image = device.space(3 * (width * height) as u64);
         let values = device.space(feature_bytes);
@@ -139,8 +139,8 @@ impl Tables {
         tables
     }
 
-    /// Adds the samples that every shrunken pixel covers along an axis, as `kernels::resize_part` weighs them; returns where they
-    /// begin, and how many of each count.
+    /// Adds the samples that every shrunken pixel covers along an axis, with the weights of `kernels::resize_part`. Returns the index of
+    /// the first entry, and the number of samples per pixel.
     fn cover(&mut self, from: usize, to: usize) -> (u32, u32) {
         let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
         let n = (inverse.ceil() as usize + 1).min(from);
@@ -172,7 +172,7 @@ impl Tables {
         (at, n as u32)
     }
 
-    /// The kernels from the image to the shrunken pictures, and those.
+    /// Makes the kernels from the image to the shrunken pictures.
     fn shrinking(
         &self,
         device: &Device,
@@ -202,7 +202,7 @@ impl Tables {
         )
     }
 
-    /// The kernels from the shrunken pictures to the features.
+    /// Makes the kernels from the shrunken pictures to the features.
     fn describing(
         &self,
         device: &Device,
@@ -245,7 +245,7 @@ impl Tables {
     }
 }
 
-/// The shares of a pixel between four cells in the four corners of the block, `[row][col][corner]`.
+/// Weights that divide a pixel between four cells, for the four corners of the block, `[row][col][corner]`.
 fn shares() -> Vec<f32> {
     let share = |pixel: usize| {
         let at = ((2 + pixel) as f64 + 0.5) / 4.0 - 0.5;

@@ -6,7 +6,7 @@ use crate::device::Device;
 use crate::expand::expand;
 use crate::{Unsuitable, spirv};
 
-/// A kernel.
+/// Names of the kernels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kernel {
     Shrink,
@@ -23,7 +23,7 @@ pub(crate) enum Kernel {
     Trace,
 }
 
-/// How a kernel is called in its text, and its buffers.
+/// Name of a kernel in its text, and its buffers.
 struct Entry {
     name: &'static str,
     n_buffers: usize,
@@ -38,7 +38,7 @@ const fn entry(name: &'static str, n_buffers: usize, written: &'static [usize]) 
     }
 }
 
-/// Every text and its kernels, in the order of [`Kernel`].
+/// Every source text and its kernels, in the order of [`Kernel`].
 const SOURCES: [(&str, &[Entry]); 3] = [
     (
         include_str!("shaders/features.wgsl"),
@@ -67,21 +67,21 @@ const SOURCES: [(&str, &[Entry]); 3] = [
     ),
 ];
 
-/// Most buffers that a kernel binds.
+/// Largest number of buffers that a kernel binds.
 pub(crate) const MAX_BUFFERS: u32 = 11;
 
-/// Numbers that the texts are made for.
+/// Numbers that are inserted into the texts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sizes {
-    /// Side of a filter, cells.
+    /// Side of a filter, in cells.
     pub(crate) side: usize,
     /// Number of parts.
     pub(crate) parts: usize,
-    /// Number of types of every part.
+    /// Number of types of each part.
     pub(crate) types: usize,
-    /// Longest offset in the tables of costs, cells.
+    /// Longest offset in the tables of costs, in cells.
     pub(crate) reach: usize,
-    /// Parts that are traced together.
+    /// Number of parts that are traced together.
     pub(crate) slots: usize,
 }
 
@@ -110,7 +110,7 @@ impl Programs {
     }
 }
 
-/// The text with its numbers.
+/// Inserts the numbers into a text.
 fn filled(text: &str, sizes: Sizes) -> String {
     let numbers = [
         ("@SIDE@", sizes.side),
@@ -125,7 +125,7 @@ fn filled(text: &str, sizes: Sizes) -> String {
     })
 }
 
-/// Compiles a text: with its arithmetic decorated where the device takes that.
+/// Compiles a text; its arithmetic is decorated if the device accepts SPIR-V.
 #[expect(unsafe_code, reason = "wgpu hands SPIR-V to the driver as it is")]
 fn module(device: &Device, text: &str, kernels: &[Entry]) -> Result<ShaderModule, Unsuitable> {
     if !device.takes_spirv() {
@@ -146,8 +146,8 @@ fn module(device: &Device, text: &str, kernels: &[Entry]) -> Result<ShaderModule
         entry_points: entry_points.collect::<Vec<_>>().into(),
         ..Default::default()
     };
-    // SAFETY: the module was translated and validated by naga from a text of this crate, whose kernels stay within their buffers;
-    // decorations of results change no access to memory.
+    // SAFETY: naga translated and validated the module from a text of this crate, whose kernels stay within their buffers.
+    // Decorations of results change no access to memory.
     Ok(unsafe { device.raw().create_shader_module_passthrough(module) })
 }
 

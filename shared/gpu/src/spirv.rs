@@ -1,23 +1,23 @@
-//! From WGSL to SPIR-V in which no sum and product become one fused operation.
+//! Translation of WGSL to SPIR-V in which no sum and product are fused into one operation.
 
 use naga::back::spv;
 use naga::proc::BoundsCheckPolicies;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-/// First word of the instructions; the header lies before.
+/// Index of the first word of the instructions, after the header.
 const BEGIN: usize = 5;
 /// Instructions that declare types and constants: decorations come before them.
 const TYPES: std::ops::RangeInclusive<u32> = 19..=39;
-/// Sum, difference and product of numbers, and of a vector and a number.
+/// Opcodes of sum, difference and product of numbers, and of the product of a vector and a number.
 const ARITHMETIC: [u32; 4] = [129, 131, 133, 142];
-/// `OpDecorate`, of three words, and `NoContraction`.
+/// `OpDecorate`, with its length of three words, and `NoContraction`.
 const NO_CONTRACTION: [u32; 2] = [0x3_0047, 42];
 
 /// Translates a kernel and decorates every sum, difference and product.
 ///
 /// # Errors
 ///
-/// The text is no WGSL.
+/// The text is not valid WGSL.
 pub(crate) fn from_wgsl(text: &str) -> Result<Vec<u32>, String> {
     let module = naga::front::wgsl::parse_str(text).map_err(|error| error.emit_to_string(text))?;
     let info = Validator::new(ValidationFlags::all(), Capabilities::FLOAT64)

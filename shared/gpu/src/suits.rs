@@ -1,4 +1,4 @@
-//! The models and devices that the kernels are written for: all others are the CPU's.
+//! Checks whether the kernels support a model and a device. The CPU searches all others.
 
 use fmp::{Edge, Layout, Model, Spring, Springs};
 
@@ -6,18 +6,18 @@ use crate::Unsuitable;
 use crate::device::Device;
 use crate::programs::MAX_BUFFERS;
 
-/// Types that fit the packing of a root.
+/// Largest number of types that fits the packing of a root.
 const MAX_TYPES: usize = 8;
-/// Side of a cell, pixels.
+/// Side of a cell, in pixels.
 const CELL_PX: usize = 4;
-/// Bytes of shared memory of the largest kernel.
+/// Shared memory of the largest kernel, in bytes.
 const SHARED: u32 = 16 * 1024;
 
-/// The shape that all parts of a model have.
+/// The shape shared by all parts of a model.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shape {
     pub(crate) n_types: usize,
-    /// Side of every filter, cells.
+    /// Side of every filter, in cells.
     pub(crate) side: usize,
 }
 
@@ -25,23 +25,23 @@ fn without(what: &'static str) -> Unsuitable {
     Unsuitable::Model { what }
 }
 
-/// The shape of a model, if all of its parts have one.
+/// Returns the shape of a model if all its parts have the same one.
 pub(crate) fn shape(model: &Model) -> Result<Shape, Unsuitable> {
     let spec = model.spec();
     let n_types = model.n_types(0);
     let [side, cols] = model.max_filter();
     if (0..model.n_parts()).any(|part| model.n_types(part) != n_types) {
-        return Err(without("parts of unequal numbers of types"));
+        return Err(without("parts with different numbers of types"));
     }
     if n_types > MAX_TYPES {
-        return Err(without("more than 8 types of a part"));
+        return Err(without("parts with more than 8 types"));
     }
     let numbered = spec.parts.iter().flat_map(|part| &part.filter_of_type);
     if !numbered.copied().eq(0..model.n_filters()) {
         return Err(without("filters that are not numbered part by part"));
     }
     if spec.filters.iter().any(|filter| [filter.rows, filter.cols] != [side; 2]) || side != cols {
-        return Err(without("filters of unequal size"));
+        return Err(without("filters of different sizes"));
     }
     if spec.cell_px != CELL_PX {
         return Err(without("cells of another size than 4 pixels"));
@@ -54,7 +54,7 @@ pub(crate) fn shape(model: &Model) -> Result<Shape, Unsuitable> {
 pub(crate) struct Child<'a> {
     pub(crate) part: usize,
     pub(crate) edge: &'a Edge,
-    /// By type.
+    /// Springs by type.
     pub(crate) springs: &'a [Spring],
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn children(model: &Model) -> Result<Vec<Child<'_>>, Unsuitable> {
     edges.collect()
 }
 
-/// Checks what does not depend on the model; returns how many parts the device can trace together.
+/// Checks the requirements that do not depend on the model. Returns how many parts the device can trace together.
 pub(crate) fn device(device: &Device, n_types: usize) -> Result<usize, Unsuitable> {
     let limits = device.limits();
     let enough = |what, needed: u32, has: u32| {
@@ -84,12 +84,12 @@ pub(crate) fn device(device: &Device, n_types: usize) -> Result<usize, Unsuitabl
         Err(Unsuitable::TooSmall { what, needed, has })
     };
     enough(
-        "buffers of a kernel",
+        "buffers per kernel",
         MAX_BUFFERS,
         limits.max_storage_buffers_per_shader_stage,
     )?;
     enough(
-        "bytes that a workgroup shares",
+        "bytes of shared memory per workgroup",
         SHARED,
         limits.max_compute_workgroup_storage_size,
     )?;
@@ -97,7 +97,7 @@ pub(crate) fn device(device: &Device, n_types: usize) -> Result<usize, Unsuitabl
         .max_compute_invocations_per_workgroup
         .min(limits.max_compute_workgroup_size_x);
     let needed = 32 * n_types as u32;
-    enough("threads of a workgroup", needed.max(128), threads)?;
+    enough("threads per workgroup", needed.max(128), threads)?;
     Ok(match threads / needed {
         1 => 1,
         2 | 3 => 2,
@@ -105,7 +105,7 @@ pub(crate) fn device(device: &Device, n_types: usize) -> Result<usize, Unsuitabl
     })
 }
 
-/// Checks that a buffer can be seen by a kernel as a whole.
+/// Checks that a kernel can access the whole of a buffer.
 pub(crate) fn fits(device: &Device, what: &'static str, n_bytes: u64) -> Result<(), Unsuitable> {
     let has = device.max_binding();
     if n_bytes <= has {

@@ -5,44 +5,44 @@ use fmp::{Layout, Model, N_CHANNELS};
 use crate::Unsuitable;
 use crate::suits::{self, Child};
 
-/// Filters that a workgroup of `responses` computes.
+/// Number of filters that a workgroup of `responses` computes.
 pub(crate) const PANEL: usize = 160;
-/// In place of minus infinity.
+/// Used instead of minus infinity.
 const NEVER: f32 = -1.0e30;
-/// Parts that are traced together at most.
+/// Largest number of parts that are traced together.
 const GROUP: usize = 4;
 
-/// The parts whose subtrees are equally high: their messages are computed together.
+/// Parts whose subtrees have equal height: their messages are computed together.
 #[derive(Debug)]
 pub(crate) struct Step {
-    /// Part, number of children, first child in [`Tree::children`].
+    /// For each part: its index, its number of children, and its first child in [`Tree::children`].
     pub(crate) jobs: Vec<[u32; 4]>,
-    /// Planes to transform.
+    /// Indices of the planes to transform.
     pub(crate) planes: Vec<u32>,
 }
 
-/// Tables of a model for layouts of a size.
+/// Tables of a model for layouts of one size.
 #[derive(Debug)]
 pub(crate) struct Tree {
     pub(crate) n_parts: usize,
     pub(crate) n_types: usize,
-    /// Side of every filter, cells.
+    /// Side of every filter, in cells.
     pub(crate) side: usize,
-    /// Longest offset in the tables of costs.
+    /// Longest offset in the tables of costs, in cells.
     pub(crate) reach: usize,
-    /// `[panel][tap][channel / 4][filter of the panel][channel % 4]`.
+    /// Filter weights, `[panel][tap][channel / 4][filter of the panel][channel % 4]`.
     pub(crate) weights: Vec<f32>,
-    /// `[part][type of the parent][type]`.
+    /// Biases, `[part][type of the parent][type]`.
     pub(crate) bias: Vec<f32>,
     /// Stiffness and best offset of every plane, first vertical, then horizontal.
     pub(crate) springs: Vec<[f32; 4]>,
-    /// `[plane][vertical, horizontal][offset + reach]`.
+    /// Costs, `[plane][vertical, horizontal][offset + reach]`.
     pub(crate) costs: Vec<f32>,
     pub(crate) parents: Vec<u32>,
     pub(crate) children: Vec<u32>,
-    /// From the leaves to the root.
+    /// Steps of the messages, from the leaves to the root.
     pub(crate) steps: Vec<Step>,
-    /// Parts of equal depth, from the root to the leaves; 0 stands for none.
+    /// Parts of equal depth, from the root to the leaves; 0 is an empty slot.
     pub(crate) groups: Vec<[u32; GROUP]>,
     pub(crate) root_bias: f32,
 }
@@ -79,7 +79,7 @@ impl Tree {
         Ok(tree)
     }
 
-    /// Writes bias, springs and costs of a part.
+    /// Writes the biases, springs and costs of a part.
     fn tie(&mut self, child: &Child<'_>) {
         let Child {
             part,
@@ -108,7 +108,7 @@ impl Tree {
         }
     }
 
-    /// Finds the steps of the messages and the groups of the traces.
+    /// Determines the steps of the messages and the groups of the traces.
     fn order(&mut self, slots: usize) {
         let (n_parts, n_types) = (self.n_parts, self.n_types);
         let (mut height, mut depth) = (vec![0; n_parts], vec![0; n_parts]);
@@ -138,14 +138,15 @@ impl Tree {
                 self.groups.push(group);
             }
         }
-        // No buffer may be empty.
+        // A buffer must not be empty.
         if self.groups.is_empty() {
             self.groups.push([0; GROUP]);
         }
         self.children.push(0);
     }
 
-    /// Part, number of children, and where they lie: in descending order, as `fmp::Solver` adds their messages.
+    /// Returns the part, its number of children, and the index of the first child. The children are in descending order, in which
+    /// `fmp::Solver` adds their messages.
     fn job(&mut self, part: usize) -> [u32; 4] {
         let first = self.children.len();
         let children = (1..self.n_parts).rev();

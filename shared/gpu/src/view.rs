@@ -1,4 +1,4 @@
-//! The search of one view.
+//! The search of one view on a GPU.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -14,9 +14,9 @@ use crate::programs::{Programs, Sizes};
 use crate::tree::Tree;
 use crate::{DeviceLost, Found, Unsuitable, Wanted, suits};
 
-/// The search of the frames of one view, all of one size, on a GPU.
+/// Searches the frames of one view, which have one size, on a GPU.
 ///
-/// Searches one frame at a time; callers wait for each other.
+/// One frame is searched at a time; other callers wait.
 #[derive(Debug)]
 pub struct View {
     device: Arc<Device>,
@@ -26,37 +26,37 @@ pub struct View {
     tree: Tree,
     features: Features,
     groups: Vec<Group>,
-    /// Memory that both sides see.
+    /// Memory that the CPU and the device can access.
     staging: Mutex<Option<Buffer>>,
 }
 
-/// A root and where the device keeps it.
+/// A root and its location on the device.
 #[derive(Debug, Clone, Copy)]
 struct Peak {
     root: Root,
     group: usize,
-    /// Cell of the group.
+    /// Index of the cell in the group.
     cell: usize,
 }
 
-/// A level on the device.
+/// The location of a level on the device.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     level: usize,
     group: usize,
-    /// First cell of the group.
+    /// Index of the level's first cell in the group.
     cell0: usize,
 }
 
-/// The type of a root that is no peak.
+/// The type of a root that is not a peak.
 const NO_PEAK: u32 = 255;
 
 impl View {
-    /// Compiles the kernels for a model and a size of images: seconds.
+    /// Compiles the kernels for a model and a size of images, which takes seconds.
     ///
     /// # Errors
     ///
-    /// [`Unsuitable`]: the CPU has to do it.
+    /// [`Unsuitable`]: the device cannot be used, and the CPU has to do the search.
     pub fn new(
         device: &Arc<Device>,
         model: Arc<Model>,
@@ -105,16 +105,16 @@ impl View {
 
     /// Searches an image.
     ///
-    /// * `levels`: the levels of the evidence that these candidates need.
-    /// * `evidence`: [`Layout::n_responses`] values; those of the levels are written, the others keep what they have.
+    /// * `levels`: returns the levels whose evidence the given candidates need.
+    /// * `evidence`: [`Layout::n_responses`] values. Only those of the returned levels are written.
     ///
     /// # Errors
     ///
-    /// [`DeviceLost`]; `evidence` may be written in part.
+    /// [`DeviceLost`]; `evidence` may then be partly written.
     ///
     /// # Panics
     ///
-    /// If the image or `evidence` has another size than the layout.
+    /// If the size of the image or of `evidence` does not match the layout.
     pub fn search(
         &self,
         image: Rgb8View<'_>,
@@ -132,7 +132,7 @@ impl View {
         Ok(found)
     }
 
-    /// Solves given responses: for comparisons with the CPU.
+    /// Finds the poses for given responses, for comparisons with the CPU.
     ///
     /// * `responses`: [`Layout::n_responses`] values.
     ///
@@ -151,7 +151,7 @@ impl View {
         self.solved(std::iter::empty(), wanted, &mut staging)
     }
 
-    /// The features of all levels, `[level][row][col][channel]`: for comparisons with the CPU.
+    /// Returns the features of all levels, `[level][row][col][channel]`, for comparisons with the CPU.
     ///
     /// # Errors
     ///
@@ -159,7 +159,7 @@ impl View {
     ///
     /// # Panics
     ///
-    /// If the image has another size than the layout.
+    /// If the size of the image does not match the layout.
     pub fn features(&self, image: Rgb8View<'_>) -> Result<Vec<f32>, DeviceLost> {
         let mut staging = self.staging.lock().unwrap_or_else(PoisonError::into_inner);
         self.upload(image)?;
@@ -196,7 +196,7 @@ impl View {
         Ok(())
     }
 
-    /// Runs kernels, then the messages, and finds the poses.
+    /// Runs the given kernels, then the messages, and finds the poses.
     fn solved<'a>(
         &'a self,
         before: impl Iterator<Item = &'a Dispatch>,
@@ -270,7 +270,7 @@ impl View {
         let mut kept: Vec<Pose> = Vec::new();
         let best_first = |a: &Peak, b: &Peak| a.root.best_first(&b.root);
         while kept.len() < wanted.n && !peaks.is_empty() {
-            // There are thousands of peaks, and the first few are nearly always enough.
+            // There are thousands of peaks, but the first few are nearly always enough.
             if peaks.len() > BATCH {
                 peaks.select_nth_unstable_by(BATCH, best_first);
             }
@@ -287,7 +287,7 @@ impl View {
         Ok(kept)
     }
 
-    /// The trees of some roots, at most [`BATCH`].
+    /// Follows the trees of at most [`BATCH`] roots.
     fn trace(&self, peaks: &[Peak], staging: &mut Option<Buffer>) -> Result<Vec<Pose>, DeviceLost> {
         let mut encoder = self.encoder()?;
         let mut pieces = Vec::new();

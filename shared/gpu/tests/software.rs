@@ -1,4 +1,4 @@
-//! The kernels against the CPU, on any Vulkan adapter, software too; skipped where there is none.
+//! Compares the kernels with the CPU, on any Vulkan adapter including software. The tests are skipped if there is no adapter.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
@@ -19,7 +19,7 @@ const WANTED: Wanted = Wanted {
     min_separation: 1.0,
 };
 
-/// The device of all tests but those that lose it.
+/// The device shared by all tests, except those that lose it.
 fn device() -> Option<Arc<Device>> {
     static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
     DEVICE.get_or_init(|| opened().map(Arc::new)).clone()
@@ -35,7 +35,7 @@ fn opened() -> Option<Device> {
     }
 }
 
-/// A random tree: parts, types of each, side of the filters.
+/// A random tree with the given number of parts, types of each part, and side of the filters.
 fn spec(rng: &mut Rng, [n_parts, n_types, side]: [usize; 3]) -> ModelSpec {
     let filter = |rng: &mut Rng| Filter {
         rows: side,
@@ -86,7 +86,7 @@ fn edge(rng: &mut Rng, parent: usize, n_types: usize) -> Edge {
     }
 }
 
-/// A model, its layout of small images, and an image: noise over a slope.
+/// A model, its layout for small images, and an image: noise over a gradient.
 struct Case {
     model: Arc<Model>,
     layout: Arc<Layout>,
@@ -123,7 +123,7 @@ impl Case {
         (0..self.layout.levels.len() as u16).collect()
     }
 
-    /// The answer of the CPU.
+    /// The result of the CPU.
     fn solved(&self, responses: &[f32]) -> Found {
         let levels = self.levels();
         let evidence = Responses::new(&self.layout, responses, &levels);
@@ -157,7 +157,7 @@ fn of_equal_responses_poses_scores_and_bounds_have_the_bits_of_the_cpu() {
         let case = Case::new(&mut rng, shape);
         let view = case.view(&device).unwrap();
         for n_values in [9, 1 << 20] {
-            // Of few values, so that there are ties, or of many.
+            // Few different values, so that there are ties, or many.
             let value = |_| rng.u32(0..n_values) as f32 / n_values as f32 * 2.0 - 1.0;
             let responses: Vec<f32> = (0..case.layout.n_responses()).map(value).collect();
             let expected = case.solved(&responses);
@@ -185,7 +185,7 @@ fn a_search_gives_evidence_and_the_poses_that_are_in_it() {
     Extractor::direct(Arc::clone(&case.model)).responses(case.image(), &case.layout, &mut expected);
     for level in 0..case.layout.levels.len() {
         for (filter_idx, filter) in case.model.spec().filters.iter().enumerate() {
-            // No feature is larger than 1; one rounding a product and sum, on both sides.
+            // No feature is larger than 1. Each product and sum is rounded once, on both sides.
             let weights: f64 = filter.weights.iter().map(|weight| weight.abs()).sum();
             let bound = 2.0 * filter.weights.len() as f64 * f64::from(f32::EPSILON) * weights;
             for at in case.layout.map_range(level, filter_idx) {
@@ -306,7 +306,7 @@ fn models_of_another_kind_are_the_cpus() {
         let filter = &mut spec.filters[3];
         (filter.rows, filter.cols) = (1, 4);
     });
-    assert!(unequal.contains("filters of unequal size"), "{unequal}");
+    assert!(unequal.contains("filters of different sizes"), "{unequal}");
     let shared = refusal(&|spec| spec.parts[0].filter_of_type = vec![1, 0]);
     assert!(shared.contains("not numbered part by part"), "{shared}");
 }

@@ -1,4 +1,4 @@
-//! The engine of this house: convolutions by `kernels`, what follows them by `rten`.
+//! Parallax's own engine: convolutions by `kernels`, the later layers by `rten`.
 
 use kernels::Isa;
 
@@ -10,17 +10,17 @@ use crate::rest::rest;
 use crate::rten_engine::Rten;
 use crate::source::Source;
 
-/// A network in two parts.
+/// A network in two parts: its front and the rest.
 #[derive(Debug)]
 pub(crate) struct Parts {
     input: String,
     plan: Plan,
-    /// Names of what the first part gives.
+    /// Names of the outputs of the first part.
     exits: Vec<String>,
     rest: Option<Rten>,
 }
 
-/// A network in two parts, and as a whole for inputs of another shape.
+/// A network in two parts, and as a whole for inputs of other shapes.
 #[derive(Debug)]
 pub(crate) struct Direct {
     pub(crate) parts: Parts,
@@ -28,7 +28,7 @@ pub(crate) struct Direct {
 }
 
 impl Parts {
-    /// Takes the convolutions of a network over.
+    /// Splits a network into the convolutions run by Parallax and the rest.
     pub(crate) fn find(file: &[u8]) -> Result<Self, NoFront> {
         let isa = Isa::best();
         if isa.is_portable() {

@@ -1,24 +1,24 @@
-//! The interface of a library that runs networks.
+//! The interface to a library that runs networks.
 
 use core::fmt;
 
-/// The interface of a network, as declared in its file.
+/// Inputs, outputs and metadata of a network, as declared in its file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Description {
-    /// Names and values of its `metadata_props`.
+    /// Names and values of the file's `metadata_props`.
     pub metadata: Vec<(String, String)>,
-    /// Its inputs.
+    /// Inputs of the network.
     pub inputs: Vec<Port>,
-    /// Its outputs.
+    /// Outputs of the network.
     pub outputs: Vec<Port>,
 }
 
-/// An input or an output.
+/// An input or an output of a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Port {
-    /// Its name.
+    /// Name of the input or output.
     pub name: String,
-    /// Its sides; empty if the file does not declare them.
+    /// Sides of the tensor; empty if the file does not declare them.
     pub sides: Vec<Side>,
 }
 
@@ -27,7 +27,7 @@ pub struct Port {
 pub enum Side {
     /// A fixed size.
     Fixed(usize),
-    /// Any size; the name of the dimension.
+    /// Any size, with the name of the dimension.
     Named(String),
 }
 
@@ -51,7 +51,7 @@ impl fmt::Display for Side {
     }
 }
 
-/// The sides of a tensor as text, for example `[n, 3, 256, 192]`.
+/// Formats the sides of a tensor as text, for example `[n, 3, 256, 192]`.
 pub fn written(sides: &[Side]) -> String {
     let words: Vec<String> = sides.iter().map(ToString::to_string).collect();
     format!("[{}]", words.join(", "))
@@ -60,11 +60,11 @@ pub fn written(sides: &[Side]) -> String {
 /// An input tensor.
 #[derive(Debug, Clone, Copy)]
 pub struct Input<'a> {
-    /// Its name.
+    /// Name of the input.
     pub name: &'a str,
-    /// Its sides.
+    /// Sizes of the tensor's axes.
     pub shape: &'a [usize],
-    /// Its values, the last axis fastest.
+    /// Values of the tensor, with the last axis fastest.
     pub values: Values<'a>,
 }
 
@@ -73,7 +73,7 @@ pub struct Input<'a> {
 pub enum Values<'a> {
     /// Single precision.
     F32(&'a [f32]),
-    /// Whole numbers of 32 bits.
+    /// 32-bit integers.
     I32(&'a [i32]),
     /// Bytes.
     U8(&'a [u8]),
@@ -82,27 +82,27 @@ pub enum Values<'a> {
 /// An output tensor.
 #[derive(Debug, Clone, Copy)]
 pub struct Output<'a> {
-    /// Its place in the list of outputs that were asked for.
+    /// Index in the list of requested outputs.
     pub index: usize,
-    /// Its sides.
+    /// Sizes of the tensor's axes.
     pub shape: &'a [usize],
-    /// Its values, the last axis fastest; `None` if they are not of single precision.
+    /// Values of the tensor, with the last axis fastest; `None` if they are not single precision.
     pub values: Option<&'a [f32]>,
 }
 
-/// An error of a library.
+/// An error from a library.
 pub(crate) type EngineError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why a network could not be loaded.
+/// Reason why a network could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// The library cannot read it: not an ONNX file, truncated, or with unsupported operations.
+    /// The library cannot read the file: it is not an ONNX file, is truncated, or has unsupported operations.
     #[error("the file is not a network that can be run")]
     File(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// The library that should run it cannot be used.
+    /// ONNX Runtime cannot be used.
     #[error("ONNX Runtime cannot be used")]
     Library(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// ONNX Runtime cannot run it on a GPU.
+    /// ONNX Runtime cannot run the network on a GPU.
     #[error("ONNX Runtime cannot use CUDA")]
     Cuda(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
@@ -112,9 +112,9 @@ pub enum LoadError {
 #[error("the network cannot be run")]
 pub struct RunError(#[source] pub(crate) EngineError);
 
-/// A network that is loaded by a library.
+/// A network loaded by a library.
 pub(crate) trait Engine: fmt::Debug + Send + Sync {
-    /// Runs it on one thread of the processor, and hands over the outputs with these names.
+    /// Runs the network on one thread of the processor, and passes on the outputs with these names.
     fn run(
         &self,
         inputs: &[Input<'_>],

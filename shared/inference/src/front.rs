@@ -1,6 +1,6 @@
-//! The front of a network, from its input on: convolutions, sums and what lies between them, found in its file.
+//! The front of a network: convolutions, sums and the operations between them, found in the file from the input on.
 //!
-//! The rest, and every network with a convolution that is not known here, is for another library.
+//! Another library runs the rest. It also runs every network with an unsupported convolution.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,21 +9,21 @@ use rten_onnx::onnx::NodeProto;
 
 use crate::source::{Source, int, ints, op, text};
 
-/// Most values of a stack of channels, filled up and padded.
+/// Largest number of values in a stack of channels, including padding.
 const MOST_VALUES: usize = 1 << 26;
 /// Widest padding.
 const MOST_PADDING: usize = 8;
 /// Largest side of a kernel.
 const MOST_TAPS: usize = 2 * MOST_PADDING + 1;
 
-/// Why a network has no front.
+/// Reason why a network has no front.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum NoFront {
-    #[error("the machine has neither AVX2 nor AVX-512")]
+    #[error("the processor has neither AVX2 nor AVX-512")]
     Machine,
-    #[error("it does not take one picture of a fixed size")]
+    #[error("the network's input is not one picture of a fixed size")]
     Input,
-    #[error("it has no convolution")]
+    #[error("the network has no convolution")]
     Nothing,
     #[error("node {name:?} ({op}): {what}")]
     Node {
@@ -38,28 +38,28 @@ pub(crate) enum NoFront {
 /// A value of the front.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Value {
-    /// A stack of channels: the number of the operation that gives it; 0 is the input.
+    /// Index of the operation that produces the stack of channels; 0 is the input.
     pub(crate) stack: usize,
-    /// Negative values count as zero.
+    /// True if negative values are replaced with zero.
     pub(crate) is_relu: bool,
-    /// Pixels that each pixel is repeated over, down and across.
+    /// Factor by which each pixel is repeated, down and across.
     repeat: usize,
 }
 
-/// An operation; it gives a stack of channels.
+/// An operation that produces a stack of channels.
 #[derive(Debug)]
 pub(crate) enum Operation {
-    /// The input.
+    /// The input of the network.
     Input,
-    /// Part of a later one.
+    /// An operation that was merged into a later one.
     Nothing,
-    /// A convolution, and what is added to it.
+    /// A convolution, with an optional value that is added to its result.
     Conv {
         conv: Conv,
         input: Value,
         residual: Option<Value>,
     },
-    /// A sum; the second one's pixels are repeated.
+    /// A sum. The pixels of the second value are repeated.
     Sum { of: [Value; 2], repeat: usize },
 }
 
@@ -75,32 +75,32 @@ impl Operation {
     }
 }
 
-/// A value that is needed behind the front, by its name.
+/// A named value that is needed behind the front.
 #[derive(Debug)]
 pub(crate) struct Exit {
     pub(crate) name: String,
     pub(crate) value: Value,
 }
 
-/// The operations of a front, and what they lead to.
+/// The operations of a front, and their results.
 #[derive(Debug)]
 pub(crate) struct Front {
     pub(crate) operations: Vec<Operation>,
-    /// Channels, rows and columns of what the operations give.
+    /// Channels, rows and columns of the result of each operation.
     pub(crate) sides: Vec<[usize; 3]>,
     pub(crate) exits: Vec<Exit>,
-    /// Nodes behind the front.
+    /// Indices of the nodes behind the front.
     pub(crate) behind: HashSet<usize>,
-    /// Most rows or columns that are padded.
+    /// Largest padding of any convolution, in rows or columns.
     pub(crate) border: usize,
 }
 
-/// While a front is being found.
+/// State while a front is being found.
 struct Finding<'a> {
     source: &'a Source,
     front: Front,
     values: HashMap<&'a str, Value>,
-    /// Why nodes are not part of the front.
+    /// Reasons why nodes are not part of the front.
     refused: HashMap<usize, &'static str>,
 }
 
@@ -148,7 +148,7 @@ impl Front {
         }
     }
 
-    /// Adds where the convolution writes, where nothing else needs what it gives.
+    /// Merges a sum into a convolution that is its input, if no other operation uses that convolution's result.
     fn fuse(&mut self) {
         let mut uses = vec![0_usize; self.operations.len()];
         let taken = self.operations.iter().flat_map(Operation::takes);
@@ -176,7 +176,8 @@ impl Front {
 }
 
 impl<'a> Finding<'a> {
-    /// The value that a node gives, `None` if nothing of the front leads to it, or why it is not part of the front.
+    /// Returns the value that a node produces, or `None` if its input does not come from the front. Fails if the node is not part of the
+    /// front.
     fn read(&mut self, node: &'a NodeProto) -> Result<Option<Value>, &'static str> {
         let taken = |at: usize| node.input.get(at).map_or("", String::as_str);
         let Some(&first) = self.values.get(taken(0)) else {
@@ -184,7 +185,7 @@ impl<'a> Finding<'a> {
         };
         let is_standard = node.domain.as_deref().is_none_or(str::is_empty);
         match op(node) {
-            _ if !is_standard || node.output.len() != 1 => Err("the operation is not known"),
+            _ if !is_standard || node.output.len() != 1 => Err("this operation is not supported"),
             "Conv" if first.repeat == 1 => self.conv(node, first).map(Some),
             "Relu" if first.stack > 0 && first.repeat == 1 => Ok(Some(Value {
                 is_relu: true,
@@ -196,9 +197,9 @@ impl<'a> Finding<'a> {
             }
             "Add" => match self.values.get(taken(1)) {
                 Some(&second) => self.sum([first, second]).map(Some),
-                None => Err("its second input is not known"),
+                None => Err("its second input is not supported"),
             },
-            _ => Err("the operation is not known"),
+            _ => Err("this operation is not supported"),
         }
     }
 
@@ -220,7 +221,7 @@ impl<'a> Finding<'a> {
         let weights = self.source.constant(name);
         let weights = weights.ok_or("its weights are not constants of single or half precision")?;
         let &[outputs, inputs, down, across] = &weights.shape[..] else {
-            return Err("it is not over rows and columns");
+            return Err("the convolution is not two-dimensional");
         };
         let bias = match node.input.get(2).filter(|name| !name.is_empty()) {
             Some(name) => self.source.constant(name).map(|bias| bias.values),
@@ -231,15 +232,15 @@ impl<'a> Finding<'a> {
         });
         let is_dilated = ints(node, "dilations").is_some_and(|all| all.iter().any(|n| *n != 1));
         if int(node, "group").unwrap_or(1) != 1 {
-            return Err("it is in groups");
+            return Err("convolutions in groups are not supported");
         }
         if text(node, "auto_pad", "NOTSET") != "NOTSET" || is_dilated || !kernel {
-            return Err("its padding, dilation or kernel is not known");
+            return Err("its padding mode, dilation or kernel is not supported");
         }
         let stride = sides(ints(node, "strides").unwrap_or(&[1, 1]));
         let pads = sides(ints(node, "pads").unwrap_or(&[0; 4]));
         let (Some(stride), Some([top, left, bottom, right])) = (stride, pads) else {
-            return Err("its strides or paddings are not known");
+            return Err("its strides or padding are not supported");
         };
         let most = top.max(left).max(bottom).max(right);
         let [channels, rows, cols] = self.front.sides[input.stack];
@@ -249,7 +250,7 @@ impl<'a> Finding<'a> {
             return Err("its padding or kernel is too large");
         }
         if channels != inputs || reach[0] < down || reach[1] < across {
-            return Err("its shape does not fit its input");
+            return Err("its shape does not match its input");
         }
         let size = ConvSize {
             inputs,
@@ -270,7 +271,7 @@ impl<'a> Finding<'a> {
         };
         let conv = conv
             .and_then(|conv| conv.map_or_else(|| Conv::new(size, weights, &bias, is_picture), Ok));
-        let conv = conv.map_err(|_error| "its weights do not fit its shape")?;
+        let conv = conv.map_err(|_error| "its weights do not match its shape")?;
         self.front.border = self.front.border.max(most);
         let operation = Operation::Conv {
             conv,
@@ -280,7 +281,7 @@ impl<'a> Finding<'a> {
         self.give(operation, [outputs, out[0], out[1]])
     }
 
-    /// The number of times that a `Resize` repeats pixels, down and across.
+    /// Number of times that a `Resize` repeats pixels, down and across.
     fn repeat(&self, node: &NodeProto, scales: &str) -> Result<usize, &'static str> {
         let place = text(node, "coordinate_transformation_mode", "half_pixel");
         let nearest = text(node, "nearest_mode", "round_prefer_floor");
@@ -291,7 +292,7 @@ impl<'a> Finding<'a> {
         let scales = self.source.constant(scales);
         let scales = scales.ok_or("its scales are not constants")?.values;
         let [1.0, 1.0, down, across] = scales[..] else {
-            return Err("its scales are not those of rows and columns");
+            return Err("it scales more than rows and columns");
         };
         let is_whole = down == across && down.fract() == 0.0 && (1.0..=64.0).contains(&down);
         let has_sizes = node.input.get(3).is_some_and(|name| !name.is_empty());
@@ -300,7 +301,7 @@ impl<'a> Finding<'a> {
         if is_whole && is_nearest && !has_sizes && !has_axes {
             Ok(down as usize)
         } else {
-            Err("it does not repeat pixels")
+            Err("only repeating pixels is supported")
         }
     }
 
@@ -314,12 +315,12 @@ impl<'a> Finding<'a> {
         let [sides, [channels, rows, cols]] = of.map(|value| self.front.sides[value.stack]);
         let fits = of[0].repeat == 1 && sides == [channels, rows * repeat, cols * repeat];
         if of[0].stack == 0 || of[1].stack == 0 || !fits {
-            return Err("it does not add stacks of the same shape");
+            return Err("its inputs differ in shape");
         }
         self.give(Operation::Sum { of, repeat }, sides)
     }
 
-    /// Follows what the outputs need back to the front.
+    /// Traces the outputs back to the values of the front.
     fn look_behind(&mut self) -> Result<(), NoFront> {
         let nodes = &self.source.graph.node;
         let mut makers: HashMap<&str, usize> = HashMap::new();
@@ -354,15 +355,15 @@ impl<'a> Finding<'a> {
         Ok(())
     }
 
-    /// Names the node, or the one before it that is not known.
+    /// Returns an error that names the node, or the first unsupported node before it.
     fn refused(&self, at: usize, node: &NodeProto) -> NoFront {
         let first = self.refused.iter().filter(|(refused, _)| **refused <= at);
         let first = first.min_by_key(|(refused, _)| **refused);
         let nodes = &self.source.graph.node;
-        let (node, what) = first
-            .map_or((node, "it does not follow from the input"), |(at, what)| {
-                (&nodes[*at], *what)
-            });
+        let (node, what) = first.map_or(
+            (node, "it is not connected to the network's input"),
+            |(at, what)| (&nodes[*at], *what),
+        );
         NoFront::Node {
             name: node.output.first().cloned().unwrap_or_default(),
             op: op(node).to_owned(),
@@ -381,14 +382,14 @@ fn is_large(size: ConvSize, [rows, cols]: [usize; 2]) -> bool {
     size.inputs.min(size.outputs) >= FEWEST_CHANNELS && rows * cols >= FEWEST_OUTPUTS
 }
 
-/// Returns true if memory is enough for a stack of channels.
+/// Returns true if a stack of channels is within the limit of memory.
 fn fits([channels, rows, cols]: [usize; 3]) -> bool {
     let padded = [channels.div_ceil(16), rows, cols].map(|side| side.saturating_add(16));
     let n = padded.into_iter().fold(1_usize, usize::saturating_mul);
     n <= MOST_VALUES / 16 && ![channels, rows, cols].contains(&0)
 }
 
-/// Whole numbers that are not negative, as many as wanted.
+/// Returns exactly `N` non-negative integers.
 fn sides<const N: usize>(values: &[i64]) -> Option<[usize; N]> {
     let values = values.iter().map(|value| usize::try_from(*value));
     let values: Vec<usize> = values.collect::<Result<_, _>>().ok()?;

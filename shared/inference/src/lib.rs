@@ -1,7 +1,8 @@
-//! Networks from ONNX files, run by Parallax itself with the `rten` library, which are built in, or by ONNX Runtime, which the user provides.
+//! Networks from ONNX files, run by Parallax itself with the `rten` library, which are built in, or by ONNX Runtime, which the user
+//! provides.
 //!
-//! A [`Session`] is a network that is loaded: what it takes and gives ([`Description`]), and how it is run
-//! ([`Session::run`]), on one thread. What its numbers mean is for others to say.
+//! A [`Session`] is a loaded network. It has a description of its inputs and outputs ([`Description`]) and runs on one thread
+//! ([`Session::run`]). This crate does not interpret the values.
 #![forbid(unsafe_code)]
 
 mod direct;

@@ -1,7 +1,7 @@
 //! Checks that the messages in a file are nested as in an ONNX file.
 //!
-//! The library that reads the file trusts its lengths: it loops for ever on one that points
-//! backwards, and allocates any size. So they are checked first. Field numbers are those of the
+//! The library that reads the file trusts its lengths: on a length that points
+//! backwards it loops for ever, and it allocates any size. Lengths are therefore checked first. Field numbers are those of the
 //! published `onnx.proto`.
 
 /// Largest nesting depth.
@@ -19,7 +19,7 @@ pub(crate) enum Kind {
     Type,
     TensorType,
     Shape,
-    /// A message without nested messages: an operator set, an entry, a dimension.
+    /// A message without nested messages: an operator set, an entry or a dimension.
     Flat,
 }
 
@@ -41,7 +41,7 @@ impl Kind {
     }
 }
 
-/// The byte at which the nesting is wrong, from 0.
+/// Position of the first byte at which the nesting is wrong, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the file is truncated or not an ONNX file: unexpected byte {at}")]
 pub(crate) struct MalformedFile {
@@ -53,7 +53,7 @@ pub(crate) fn check(file: &[u8]) -> Result<(), MalformedFile> {
     walk(Kind::Model, file, 0, 0)
 }
 
-/// Checks one message, which begins at byte `base` of the file.
+/// Checks one message that begins at byte `base` of the file.
 fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), MalformedFile> {
     let malformed = |at: usize| MalformedFile { at: base + at };
     let mut at = 0;
@@ -84,7 +84,7 @@ fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), Malfo
     Ok(())
 }
 
-/// Reads a number of seven bits per byte, lowest first; `None` if it does not end.
+/// Reads a number with seven bits per byte, lowest bits first; `None` if the bytes end before the number does.
 pub(crate) fn varint(bytes: &[u8], at: &mut usize) -> Option<u64> {
     let mut value = 0;
     for shift in (0..64).step_by(7) {

@@ -1,6 +1,6 @@
-//! Writer of ONNX files: a network as data, and its bytes.
+//! Writer of ONNX files: converts a network to the bytes of a file.
 //!
-//! Numbers of fields are those of `onnx.proto` of the published schema, intermediate representation 8.
+//! Field numbers are those of the published schema `onnx.proto`, intermediate representation 8.
 
 mod half;
 mod message;
@@ -18,16 +18,16 @@ const FLOAT16: i64 = 10;
 pub enum Side {
     /// A known length.
     Fixed(usize),
-    /// Any length, under a name.
+    /// Any length, with a name.
     Named(&'static str),
 }
 
 /// The value of an attribute of a node.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Attribute {
-    /// A whole number.
+    /// An integer.
     Int(i64),
-    /// Several of them.
+    /// Several integers.
     Ints(Vec<i64>),
 }
 
@@ -36,37 +36,37 @@ pub enum Attribute {
 pub struct Node {
     /// The operator, as ONNX calls it.
     pub op: String,
-    /// Names of the values that it takes.
+    /// Names of the input values.
     pub inputs: Vec<String>,
-    /// Name of the value that it gives, and of the node.
+    /// Name of the output value, and of the node.
     pub output: String,
-    /// Names and values.
+    /// Names and values of the attributes.
     pub attributes: Vec<(&'static str, Attribute)>,
 }
 
-/// The numbers of a constant, row major.
+/// The numbers of a constant, in row-major order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
     /// Single precision.
     F32(Vec<f32>),
-    /// Half precision: the bits.
+    /// Half precision, as bits.
     F16(Vec<u16>),
-    /// Whole numbers: shapes, indices.
+    /// Integers, for shapes and indices.
     I64(Vec<i64>),
 }
 
-/// A constant: weights, or what nodes take as a list.
+/// A constant: weights, or a list of integers for nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constant {
-    /// The name by which nodes take it.
+    /// Name by which nodes refer to the constant.
     pub name: String,
-    /// Its shape.
+    /// Shape of the constant.
     pub shape: Vec<usize>,
-    /// As many as the shape asks for.
+    /// Values; their number follows from the shape.
     pub values: Values,
 }
 
-/// A network, put together node by node.
+/// A network that is built node by node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     /// Name of the graph.
@@ -75,13 +75,13 @@ pub struct Network {
     pub operator_set: u32,
     /// Name and version of the program that writes the file.
     pub producer: Option<(String, String)>,
-    /// Names and shapes; single precision.
+    /// Names and shapes of the inputs, in single precision.
     pub inputs: Vec<(String, Vec<Side>)>,
-    /// Names and shapes; single precision.
+    /// Names and shapes of the outputs, in single precision.
     pub outputs: Vec<(String, Vec<Side>)>,
-    /// In an order in which they can be computed.
+    /// Nodes, in an order in which they can be computed.
     pub nodes: Vec<Node>,
-    /// Constants.
+    /// Constants of the network.
     pub constants: Vec<Constant>,
     /// Keys and values of `metadata_props`.
     pub metadata: Vec<(String, String)>,
@@ -103,11 +103,11 @@ impl Default for Network {
 }
 
 impl Network {
-    /// Adds constant numbers of single precision.
+    /// Adds a constant in single precision.
     ///
     /// # Panics
     ///
-    /// Unless there are as many values as the shape asks for.
+    /// If the number of values does not match the shape.
     pub fn floats(&mut self, name: &str, shape: &[usize], values: Vec<f32>) {
         let n: usize = shape.iter().product();
         assert_eq!(values.len(), n, "{name}: as many as the shape asks for");
@@ -118,11 +118,11 @@ impl Network {
         });
     }
 
-    /// Adds constant numbers that are stored in half precision, and become single precision when the file is loaded.
+    /// Adds a constant that is stored in half precision and converted to single precision when the file is loaded.
     ///
     /// # Panics
     ///
-    /// Unless there are as many values as the shape asks for.
+    /// If the number of values does not match the shape.
     pub fn halves(&mut self, name: &str, shape: &[usize], values: &[f32]) {
         let n: usize = shape.iter().product();
         assert_eq!(values.len(), n, "{name}: as many as the shape asks for");
@@ -140,7 +140,7 @@ impl Network {
         );
     }
 
-    /// Adds a list of constant whole numbers.
+    /// Adds a list of constant integers.
     pub fn ints(&mut self, name: &str, values: Vec<i64>) {
         self.constants.push(Constant {
             name: name.to_owned(),
@@ -149,7 +149,7 @@ impl Network {
         });
     }
 
-    /// Adds an operation that gives one value.
+    /// Adds an operation with one output.
     pub fn node(
         &mut self,
         op: &str,

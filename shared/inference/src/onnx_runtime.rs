@@ -12,10 +12,10 @@ use crate::Values;
 use crate::engine::{Description, Engine, EngineError, Input, LoadError, Output, Port, Side};
 use crate::provider::{Place, Provider};
 
-/// The library of this process: only one can be loaded, and it stays loaded.
+/// The library loaded by this process. Only one can be loaded, and it stays loaded.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
 
-/// The loaded library, and what it runs networks on.
+/// The loaded library, and the device on which it runs networks.
 #[derive(Debug)]
 pub struct OnnxRuntime {
     environment: Environment,
@@ -25,11 +25,11 @@ pub struct OnnxRuntime {
 impl OnnxRuntime {
     /// Loads the library, once in a process. It runs networks on one thread of the processor.
     ///
-    /// * `library`: its file, for example `/usr/lib/libonnxruntime.so`; ONNX Runtime 1.17 or newer.
+    /// * `library`: path of the library file, for example `/usr/lib/libonnxruntime.so`; ONNX Runtime 1.17 or newer.
     ///
     /// # Errors
     ///
-    /// [`LoadError::Library`] if it cannot be loaded or is too old, or if another one has been loaded before.
+    /// [`LoadError::Library`] if the file cannot be loaded or is too old, or if another library has been loaded before.
     pub fn load(library: &Path) -> Result<Self, LoadError> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         let environment = match &*loaded {
@@ -51,13 +51,13 @@ impl OnnxRuntime {
         })
     }
 
-    /// Runs networks elsewhere than on the processor.
+    /// Selects the device on which networks run.
     #[must_use]
     pub fn on(self, provider: Provider) -> Self {
         Self { provider, ..self }
     }
 
-    /// Loads a network; says also where it runs.
+    /// Loads a network, and returns the device on which it runs.
     pub(crate) fn load_network(
         &self,
         file: &[u8],
@@ -136,7 +136,7 @@ fn sides(of: &ValueType) -> Vec<Side> {
     shape.iter().zip(dimension_symbols.iter()).map(side).collect()
 }
 
-/// A network loaded by the library; it runs for one caller at a time.
+/// A network loaded by the library. It runs for one caller at a time.
 #[derive(Debug)]
 pub(crate) struct Loaded(Mutex<Session>);
 

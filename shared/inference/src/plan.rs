@@ -1,4 +1,4 @@
-//! The operations of a front in the memory that they need, which is the same from picture to picture.
+//! The operations of a front with their memory, which is reused from picture to picture.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -6,19 +6,19 @@ use kernels::{Blocked, BlockedShape, Conv, Isa, Outputs, Scratch, add_repeated};
 
 use crate::front::{Front, Operation, Value};
 
-/// Steps, and which places of the memory they read and write.
+/// Steps of a run, and the memory blocks that they read and write.
 #[derive(Debug)]
 pub(crate) struct Plan {
     isa: Isa,
     steps: Vec<Step>,
-    /// The input first.
+    /// Shapes of the memory blocks; the first is the input.
     places: Vec<BlockedShape>,
     exits: Vec<Exit>,
-    /// Memory of earlier runs; several threads may run at once.
+    /// Memory of earlier runs. Several threads may run at the same time.
     spare: Mutex<Vec<Memory>>,
 }
 
-/// A value that is handed over, in the order of those of the front.
+/// An output of the front, in the order of `Front::exits`.
 #[derive(Debug)]
 struct Exit {
     place: usize,
@@ -28,7 +28,7 @@ struct Exit {
 #[derive(Debug)]
 struct Step {
     work: Work,
-    /// Places of the values as they are, and with zeros in place of negative ones.
+    /// Blocks for the values without change, and with zeros instead of negative values.
     outputs: [Option<usize>; 2],
 }
 
@@ -48,19 +48,19 @@ enum Work {
 /// The memory of a run.
 #[derive(Debug)]
 struct Memory {
-    /// `None` while it is written.
+    /// Memory blocks; `None` while a block is written.
     places: Vec<Option<Blocked>>,
     exits: Vec<Vec<f32>>,
     scratch: Scratch,
 }
 
-/// While places are given out.
+/// State while memory blocks are assigned.
 struct Places {
     shapes: Vec<BlockedShape>,
     free: Vec<usize>,
-    /// Places of each stack, as it is and with zeros in place of negative values.
+    /// Blocks of each stack: without change, and with zeros instead of negative values.
     of_stacks: Vec<[Option<usize>; 2]>,
-    /// Steps that still read each of these.
+    /// Number of steps that have yet to read each of these blocks.
     readers: Vec<[usize; 2]>,
 }
 
@@ -80,7 +80,7 @@ impl Places {
         self.of_stacks[value.stack][usize::from(value.is_relu)].unwrap_or_default()
     }
 
-    /// One reader less.
+    /// Counts down the readers of a value, and frees its block after the last one.
     fn leave(&mut self, value: Value) {
         let readers = &mut self.readers[value.stack][usize::from(value.is_relu)];
         *readers -= 1;
@@ -155,7 +155,7 @@ impl Plan {
         self.places[0].sides()
     }
 
-    /// Runs on a picture, channel by channel and row by row, and hands over the shapes and values of the exits.
+    /// Runs the front on a picture, given channel by channel and row by row, and passes on the shapes and values of the exits.
     pub(crate) fn run<T>(
         &self,
         picture: &[f32],

@@ -1,33 +1,33 @@
-//! Where ONNX Runtime runs networks.
+//! The device on which ONNX Runtime runs networks.
 
 use core::fmt;
 
-/// Where ONNX Runtime runs networks.
+/// Requested device for ONNX Runtime.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Provider {
     /// On one thread of the processor.
     Processor,
-    /// On the first GPU of NVIDIA's, which the library must have been built for: else no network can be loaded.
+    /// On the first NVIDIA GPU. The library must have been built for it, otherwise no network can be loaded.
     Cuda,
-    /// The same, or on the processor where CUDA cannot start.
+    /// On the first NVIDIA GPU, or on the processor if CUDA cannot start.
     CudaIfItStarts,
 }
 
 impl Provider {
-    /// Returns true if CUDA is tried.
+    /// Returns true if CUDA is requested.
     pub fn is_cuda(self) -> bool {
         self != Self::Processor
     }
 }
 
-/// Where ONNX Runtime runs a network.
+/// Device on which ONNX Runtime actually runs a network.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// On one thread of the processor, as requested.
     Processor,
-    /// On the first GPU of NVIDIA's.
+    /// On the first NVIDIA GPU.
     Cuda,
-    /// On the processor, since CUDA cannot start; the reason.
+    /// On the processor because CUDA cannot start, with the reason.
     ProcessorForCuda(String),
 }
 

@@ -1,4 +1,4 @@
-//! The file of what lies behind the front of a network.
+//! Writes a file with the part of a network behind the front.
 
 use std::collections::HashSet;
 
@@ -8,26 +8,27 @@ use crate::front::Front;
 use crate::nesting::varint;
 use crate::source::Source;
 
-/// Numbers of fields of a file, and of its graph.
+/// Field numbers in a file and in its graph.
 const GRAPH: u64 = 7;
 const NODE: u64 = 1;
 const CONSTANT: u64 = 5;
 const INPUT: u64 = 11;
 const VALUE_INFO: u64 = 13;
-/// Single precision.
+/// Element type of single precision.
 const FLOAT: i64 = 1;
 
 /// A field of a message.
 struct Field<'a> {
     number: u64,
-    /// With its number and length.
+    /// The whole field, including its number and length.
     whole: &'a [u8],
     content: &'a [u8],
 }
 
-/// The file without the front: what the front gives becomes inputs, beside the network's own. `None` if nothing lies behind it.
+/// Returns the file without the front: the outputs of the front become inputs, beside the network's own inputs. `None` if there is
+/// nothing behind the front.
 ///
-/// * `file`: nested as in an ONNX file.
+/// * `file`: bytes of a file whose nesting has been checked.
 pub(crate) fn rest(file: &[u8], source: &Source, front: &Front) -> Option<Vec<u8>> {
     if front.behind.is_empty() {
         return None;
@@ -62,7 +63,7 @@ fn graph(bytes: &[u8], source: &Source, front: &Front) -> Option<Vec<u8>> {
                 let constant = source.graph.initializer.get(n_constants - 1)?;
                 taken.contains(constant.name.as_deref()?)
             }
-            // They may describe values that are gone.
+            // The descriptions may refer to removed values.
             VALUE_INFO => false,
             _ => true,
         };

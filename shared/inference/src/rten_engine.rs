@@ -1,4 +1,4 @@
-//! The `rten` library, which is built in.
+//! The built-in library `rten`.
 
 use std::sync::Arc;
 

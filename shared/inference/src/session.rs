@@ -1,4 +1,4 @@
-//! A network that is loaded.
+//! A loaded network.
 
 use core::fmt;
 
@@ -10,7 +10,7 @@ use crate::provider::Place;
 use crate::rten_engine::Rten;
 use crate::{Description, Input, LoadError, Output, RunError, nesting, sizes};
 
-/// A network that is loaded by a library.
+/// A network loaded by a library.
 #[derive(Debug)]
 pub struct Session {
     engine: Box<dyn Engine>,
@@ -22,9 +22,9 @@ pub struct Session {
 /// A library that runs networks.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RunBy {
-    /// Convolutions by Parallax itself, what follows them by `rten`.
+    /// Convolutions by Parallax itself, later layers by `rten`.
     Parallax,
-    /// All of it by `rten`; why Parallax itself does not.
+    /// All layers by `rten`, with the reason why Parallax does not run the convolutions.
     Rten(String),
     /// ONNX Runtime.
     OnnxRuntime(Place),
@@ -66,7 +66,7 @@ impl Session {
         })
     }
 
-    /// As [`Self::parse`], but run by `rten` whatever it holds: for comparisons.
+    /// Loads a network that is run entirely by `rten`, for comparisons; otherwise as [`Self::parse`].
     ///
     /// # Errors
     ///
@@ -99,29 +99,29 @@ impl Session {
         })
     }
 
-    /// The library that runs it.
+    /// The library that runs the network.
     pub fn run_by(&self) -> &RunBy {
         &self.by
     }
 
-    /// Returns the description of its inputs and outputs.
+    /// Returns the description of the network's inputs and outputs.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// A fingerprint of the bytes of its file (FNV-1a, 32 bits).
+    /// A fingerprint of the bytes of the network's file (FNV-1a, 32 bits).
     pub fn fingerprint(&self) -> u32 {
         self.fingerprint
     }
 
-    /// Runs it on one thread.
+    /// Runs the network on one thread.
     ///
-    /// * `outputs`: the names of the wanted outputs.
-    /// * `take`: called once for each of them, in any order.
+    /// * `outputs`: names of the requested outputs.
+    /// * `take`: called once for each requested output, in any order.
     ///
     /// # Errors
     ///
-    /// [`RunError`], with what the library says.
+    /// [`RunError`], with the library's error.
     pub fn run(
         &self,
         inputs: &[Input<'_>],

@@ -1,4 +1,4 @@
-//! Checks the sizes that the nodes of a network state as constants: the library allocates whatever they say.
+//! Checks the sizes that the nodes of a network state as constants, because the library allocates any size.
 
 use std::collections::HashMap;
 
@@ -6,12 +6,12 @@ use rten_onnx::onnx::{AttributeProto, GraphProto, ModelProto, NodeProto, TensorP
 
 /// Largest side, padding, stride or repeat.
 const LARGEST_SIDE: i64 = 1 << 16;
-/// Most values of a tensor.
+/// Largest number of values in a tensor.
 const MOST_VALUES: i64 = 1 << 28;
-/// Deepest nesting of graphs in nodes.
+/// Deepest nesting of graphs inside nodes.
 const DEEPEST: usize = 8;
 
-/// Attributes that give sizes.
+/// Attributes that specify sizes.
 const ATTRIBUTES: [&str; 10] = [
     "pads",
     "kernel_shape",
@@ -24,7 +24,7 @@ const ATTRIBUTES: [&str; 10] = [
     "scales",
     "shape",
 ];
-/// Inputs that give sizes, by operator.
+/// Inputs that specify sizes, by operator.
 const INPUTS: [(&str, &[usize]); 9] = [
     ("Pad", &[1]),
     ("Resize", &[2, 3]),
@@ -37,7 +37,7 @@ const INPUTS: [(&str, &[usize]); 9] = [
     ("Range", &[0, 1]),
 ];
 
-/// A size that no network needs.
+/// A size above any that a network needs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("node {node:?} ({op}): {what} {value} exceeds the limit ({most})")]
 pub(crate) struct TooLarge {
@@ -48,7 +48,7 @@ pub(crate) struct TooLarge {
     most: i64,
 }
 
-/// Checks all nodes of a file; one that cannot be read is left to the library.
+/// Checks all nodes of a file. A file that cannot be read is left to the library.
 pub(crate) fn check(file: &[u8]) -> Result<(), TooLarge> {
     let graph = ModelProto::parse_buf(file).ok().and_then(|model| model.graph);
     graph.map_or(Ok(()), |graph| check_graph(&graph, DEEPEST))
@@ -119,7 +119,7 @@ fn check_values(node: &NodeProto, what: &str, values: &[i64]) -> Result<(), TooL
     Ok(())
 }
 
-/// The values of a short tensor, rounded up to whole numbers.
+/// The values of a short tensor, rounded up to integers.
 fn whole(tensor: &TensorProto) -> Vec<i64> {
     const FLOAT: i32 = 1;
     let raw = tensor.raw_data.as_ref().map(|raw_value| raw_value.borrow());

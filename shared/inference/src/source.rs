@@ -1,4 +1,4 @@
-//! A network as its file describes it: operations by the names of what they take, and constants.
+//! A network as described in its file: operations by the names of their inputs, and constants.
 
 use std::collections::HashMap;
 
@@ -6,19 +6,19 @@ use rten_onnx::onnx::{GraphProto, ModelProto, NodeProto, TensorProto};
 
 const FLOAT: i32 = 1;
 const FLOAT16: i32 = 10;
-/// Constants that are cast, one from another, at most.
+/// Largest number of casts between a constant and its use.
 const MOST_CASTS: usize = 4;
 
 /// The graph of a file.
 #[derive(Debug)]
 pub(crate) struct Source {
     pub(crate) graph: GraphProto,
-    /// The nodes that cast a constant, and the constants, by the names of what they give.
+    /// Input of each cast node by the name of its output.
     casts: HashMap<String, String>,
     constants: HashMap<String, usize>,
 }
 
-/// A constant of single precision.
+/// A constant in single precision.
 #[derive(Debug)]
 pub(crate) struct Constant {
     pub(crate) shape: Vec<usize>,
@@ -26,7 +26,7 @@ pub(crate) struct Constant {
 }
 
 impl Source {
-    /// `None` if the file cannot be read.
+    /// Reads a file; returns `None` if it cannot be read.
     pub(crate) fn read(file: &[u8]) -> Option<Self> {
         let graph = ModelProto::parse_buf(file).ok()?.graph?;
         let named = graph.initializer.iter().enumerate();
@@ -41,7 +41,7 @@ impl Source {
         })
     }
 
-    /// A constant of single or half precision.
+    /// A constant stored in single or half precision.
     pub(crate) fn constant(&self, name: &str) -> Option<Constant> {
         let mut name = name;
         for _ in 0..MOST_CASTS {
@@ -53,7 +53,7 @@ impl Source {
         None
     }
 
-    /// The name and the sides of the only input, channels, rows and columns of one picture; `None` if it is another.
+    /// Name of the only input, with the channels, rows and columns of one picture; `None` if the network has other inputs.
     pub(crate) fn input(&self) -> Option<(&str, [usize; 3])> {
         let mut inputs = self.graph.input.iter().filter(|input| {
             let name = input.name.as_deref().unwrap_or_default();
@@ -82,20 +82,20 @@ pub(crate) fn op(node: &NodeProto) -> &str {
     node.op_type.as_deref().unwrap_or_default()
 }
 
-/// Whole numbers of an attribute; `None` if the node does not have it.
+/// Integers of an attribute; `None` if the node does not have the attribute.
 pub(crate) fn ints<'a>(node: &'a NodeProto, name: &str) -> Option<&'a [i64]> {
     let mut all = node.attribute.iter();
     let found = all.find(|attribute| attribute.name.as_deref() == Some(name))?;
     Some(&found.ints)
 }
 
-/// A whole number of an attribute.
+/// Integer of an attribute.
 pub(crate) fn int(node: &NodeProto, name: &str) -> Option<i64> {
     let mut all = node.attribute.iter();
     all.find(|attribute| attribute.name.as_deref() == Some(name))?.i
 }
 
-/// A text of an attribute, or what holds without it.
+/// Text of an attribute, or `without` if the node does not have the attribute.
 pub(crate) fn text<'a>(node: &'a NodeProto, name: &str, without: &'a str) -> &'a str {
     let mut all = node.attribute.iter();
     let found = all.find(|attribute| attribute.name.as_deref() == Some(name));

@@ -1,4 +1,4 @@
-//! Networks run by Parallax itself against `rten`, and those that it leaves to it.
+//! Compares networks run by Parallax itself with `rten`, and tests which networks are left to `rten`.
 
 use crate::onnx::{Attribute, Network, Side};
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use crate::{Input, RunBy, RunError, Session, Values};
 
 const SHIPPED: &[u8] = include_bytes!("../../../configs/models/person.pose.onnx");
 
-/// Numbers that look drawn by chance.
+/// Pseudo-random numbers.
 fn noise(n: usize, seed: u32) -> Vec<f32> {
     let mut state = u64::from(seed) << 1 | 1;
     let next = |_| {
@@ -17,7 +17,7 @@ fn noise(n: usize, seed: u32) -> Vec<f32> {
     (0..n).map(next).collect()
 }
 
-/// All outputs for a picture of noise.
+/// All outputs for a picture of random noise.
 fn run(session: &Session, shape: &[usize], seed: u32) -> Result<Vec<Vec<f32>>, RunError> {
     let description = session.description();
     let picture = noise(shape.iter().product(), seed);
@@ -35,7 +35,7 @@ fn run(session: &Session, shape: &[usize], seed: u32) -> Result<Vec<Vec<f32>>, R
     Ok(outputs)
 }
 
-/// The largest difference in units of the largest value.
+/// The largest difference as a share of the largest value.
 fn difference(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len());
     let largest = |values: &mut dyn Iterator<Item = f32>| values.map(f32::abs).fold(0.0, f32::max);
@@ -46,7 +46,7 @@ fn assert_like_rten(file: &[u8], shape: &[usize], seed: u32) -> RunBy {
     let [own, rten] = [Session::parse, Session::parse_by_rten].map(|parse| {
         let session = parse(file.to_vec()).unwrap();
         let outputs = run(&session, shape, seed).unwrap();
-        // Memory that was used before gives the same.
+        // Reused memory gives the same result.
         assert_eq!(outputs, run(&session, shape, seed).unwrap());
         (session.run_by().clone(), outputs)
     });
@@ -116,7 +116,7 @@ impl Net {
     }
 }
 
-/// A residual block at half the size, added to the full one; both are also needed as they are, and a sigmoid follows.
+/// A residual block at half the size, added to the full-size one. Both are also used without the sum, and a sigmoid follows.
 fn residual(
     [inputs, narrow, wide]: [usize; 3],
     sides: [usize; 2],
@@ -175,7 +175,7 @@ fn what_is_not_known_goes_by_rten_and_is_named() {
     let error = reason(&net.file(&["c"]));
     assert_eq!(
         error,
-        "rten, since node \"b\" (Sigmoid): the operation is not known"
+        "rten, since node \"b\" (Sigmoid): this operation is not supported"
     );
 
     let mut net = Net::new([4, 6, 6]);
@@ -184,13 +184,16 @@ fn what_is_not_known_goes_by_rten_and_is_named() {
     let groups = vec![kernel, ("group", Attribute::Int(4))];
     net.net.node("Conv", &["picture", "w"], "a", groups);
     let error = reason(&net.file(&["a"]));
-    assert_eq!(error, "rten, since node \"a\" (Conv): it is in groups");
+    assert_eq!(
+        error,
+        "rten, since node \"a\" (Conv): convolutions in groups are not supported"
+    );
 
     let mut net = Net::new([4, 6, 6]);
     net.node("Relu", &["picture"], "a");
     assert_eq!(
         reason(&net.file(&["a"])),
-        "rten, since it has no convolution"
+        "rten, since the network has no convolution"
     );
 }
 
@@ -201,7 +204,7 @@ fn weights_that_do_not_fit_the_input_are_an_error() {
     let session = Session::parse(net.file(&["a"])).unwrap();
     let by = session.run_by().to_string();
     assert!(
-        by.ends_with("(Conv): its shape does not fit its input"),
+        by.ends_with("(Conv): its shape does not match its input"),
         "{by}"
     );
     run(&session, &[1, 4, 6, 6], 1).unwrap_err();
@@ -211,7 +214,7 @@ fn weights_that_do_not_fit_the_input_are_an_error() {
 fn a_file_that_is_cut_off_is_refused() {
     let file = residual([3, 4, 5], [4, 4], true);
     for n in (0..file.len()).step_by(97) {
-        // Never a panic; what happens to be whole may be read.
+        // Loading must never panic. A truncated file may still be readable.
         if let Ok(session) = Session::parse(file[..n].to_vec()) {
             assert_ne!(session.run_by(), &RunBy::Parallax);
         }

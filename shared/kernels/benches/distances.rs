@@ -1,4 +1,4 @@
-//! Time of the best ends of a bone: 125 places of a joint for each of 125 of another, as on a grid in space.
+//! Time to find the best ends of a bone: 125 positions of one joint for each of 125 positions of another, on a grid in space.
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;
@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use kernels::{Isa, LengthSpring, ScoredPoints};
 
-/// Places along one side of the grid.
+/// Number of positions along one side of the grid.
 const SIDE: usize = 5;
 
 fn main() {
@@ -38,7 +38,7 @@ fn main() {
     }
 }
 
-/// Least time of many runs, nanoseconds.
+/// Least time of many runs, in nanoseconds.
 fn fastest<T>(mut call: impl FnMut() -> T) -> f64 {
     let time = |_| {
         let begin = Instant::now();

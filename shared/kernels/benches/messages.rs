@@ -1,6 +1,6 @@
-//! Time of one max-sum message of a part with six types to a parent with six, with typical
-//! distances of trained springs: on the largest level of an image of 172 x 224 pixels, one octave
-//! below, and the same for 640 x 480.
+//! Time of one max-sum message between a part and its parent with six types each, for typical
+//! distances of trained springs. The grids are the largest level of an image of 172 x 224 pixels, one octave
+//! below, and the same for 640 x 480 pixels.
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;
@@ -26,14 +26,14 @@ fn main() {
     }
 }
 
-/// Candidates per nanosecond.
+/// Number of candidates evaluated per nanosecond.
 fn rate(call: impl FnOnce() -> usize) -> f64 {
     let begin = Instant::now();
     let n = black_box(call());
     n as f64 / begin.elapsed().as_nanos().max(1) as f64
 }
 
-/// Least time of many runs, microseconds.
+/// Least time of many runs, in microseconds.
 fn fastest(n: usize, mut call: impl FnMut()) -> f64 {
     let time = |_| {
         let begin = Instant::now();
@@ -60,7 +60,7 @@ fn rule() -> MessageRule {
     MessageRule::new(N_TYPES, springs(), choices.collect())
 }
 
-/// Made-up responses, spread as those of trained filters are.
+/// Synthetic responses with the spread of those of trained filters.
 fn maps(grid: Grid) -> Vec<Vec<f32>> {
     let mut noise = 1_u64;
     let mut next = || {
@@ -117,7 +117,7 @@ fn measure(isa: Isa, rule: &MessageRule, grid: Grid, peak: f64) {
     );
 }
 
-/// The same in double precision along lower envelopes.
+/// The same transforms in double precision, along lower envelopes.
 fn reference(maps: &[Vec<f32>], grid: Grid) {
     let springs = springs();
     let transformed = maps.iter().zip(&springs).map(|(map, (_, spring))| {

@@ -1,6 +1,6 @@
-//! Responses of 156 filters of 4x4, 5x5 and 6x6 cells on all levels of images of 172 x 224 and
-//! 640 x 480 pixels, one thread: milliseconds of its processor time, operations of the definition
-//! per second, their share of the multiply-add peak measured beside them, and how much longer plain
+//! Time of the responses of 156 filters of 4x4, 5x5 and 6x6 cells on all levels of images of 172 x 224 and
+//! 640 x 480 pixels, on one thread. Prints the processor time in milliseconds, and the operations of the definition
+//! per second with their share of the measured multiply-add peak. Also prints how much longer plain
 //! sums take.
 //!
 //! `cargo bench -p kernels --bench responses [repetitions]`
@@ -16,7 +16,7 @@ const N_FILTERS: usize = 156;
 fn main() {
     let repetitions = std::env::args().find_map(|arg| arg.parse().ok()).unwrap_or(20);
     for isa in Isa::available() {
-        // Without multiply-adds in hardware it takes minutes.
+        // Without multiply-adds in hardware, this takes minutes.
         if isa == Isa::available()[0] && Isa::available().len() > 1 {
             continue;
         }
@@ -28,13 +28,13 @@ fn main() {
     }
 }
 
-/// Seconds of processor time of this thread.
+/// Processor time of this thread, in seconds.
 fn cpu_time() -> f64 {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }
 
-/// Least processor time of many calls.
+/// Least processor time of many calls, in seconds.
 fn least(repetitions: usize, mut call: impl FnMut()) -> f64 {
     let once = |_| {
         let begin = cpu_time();
@@ -44,7 +44,7 @@ fn least(repetitions: usize, mut call: impl FnMut()) -> f64 {
     (0..repetitions).map(once).fold(f64::INFINITY, f64::min)
 }
 
-/// Sizes `[rows, cols]` of the response maps: ten levels an octave, cells of 4 pixels.
+/// Sizes `[rows, cols]` of the response maps for ten levels per octave and cells of 4 pixels.
 fn sizes([width, height]: [usize; 2], side: usize) -> Vec<[usize; 2]> {
     let shorter = width.min(height) as f64 / 20.0;
     let n = 1 + (10.0 * shorter.log2()).floor() as i32;
@@ -55,7 +55,7 @@ fn sizes([width, height]: [usize; 2], side: usize) -> Vec<[usize; 2]> {
     (0..n).map(size).collect()
 }
 
-/// Values in 0..1 that look random.
+/// Pseudo-random values in 0..1.
 fn noise(n: usize) -> Vec<f32> {
     let hash = |value: usize| (value as u32).wrapping_mul(2654435761).rotate_left(13);
     let value = |i| hash(i).wrapping_mul(2246822519) as f32 / u32::MAX as f32;

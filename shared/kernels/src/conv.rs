@@ -1,7 +1,7 @@
-//! Convolutions and sums of stacks of channels: what networks that find joints are made of.
+//! Convolutions and sums of stacks of channels, as used by the networks that find joints.
 //!
-//! Weights are packed once. The sum of an output begins with its bias, and adds block by block of the
-//! input's channels, tap by tap along rows, channel by channel, each product rounded once with its sum.
+//! Weights are packed once. The sum of an output begins with its bias. Products are added for one block of the
+//! input's channels after the other, tap by tap along rows, channel by channel. Each product is rounded once together with its sum.
 
 mod blocked;
 mod fast;
@@ -17,33 +17,33 @@ use crate::isa::Isa;
 use crate::simd::{ROW, Row, flat};
 use blocked::BLOCK;
 
-/// The sides of a convolution.
+/// The sizes of a convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConvSize {
-    /// Channels that it reads.
+    /// Number of input channels.
     pub inputs: usize,
-    /// Channels that it writes.
+    /// Number of output channels.
     pub outputs: usize,
     /// Rows and columns of the kernel.
     pub kernel: [usize; 2],
-    /// Rows and columns of the input from one output to the next.
+    /// Distance in rows and columns of the input between neighbouring outputs.
     pub stride: [usize; 2],
-    /// Rows of zeros above and columns of zeros to the left of the input.
+    /// Rows of zeros above the input, and columns of zeros to its left.
     pub pad: [usize; 2],
 }
 
-/// The numbers of weights do not fit the sides of the convolution.
+/// The numbers of weights and biases do not match the sizes of the convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "a convolution from {} to {} channels by {:?} has {weights} weights and {bias} biases",
     size.inputs, size.outputs, size.kernel
 )]
 pub struct ConvSizeError {
-    /// The sides.
+    /// The sizes of the convolution.
     pub size: ConvSize,
-    /// Weights that there are.
+    /// Number of weights found.
     pub weights: usize,
-    /// Biases that there are.
+    /// Number of biases found.
     pub bias: usize,
 }
 
@@ -51,22 +51,22 @@ pub struct ConvSizeError {
 #[derive(Debug, Clone)]
 pub struct Conv {
     size: ConvSize,
-    /// Channels in a block of the input.
+    /// Number of channels in a block of the input.
     width: usize,
     /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs. Empty in tiles.
     weights: Vec<Row>,
-    /// Filled up with zeros, as the outputs in the weights are: to pairs of blocks.
+    /// Biases, padded with zeros to pairs of blocks, as the outputs in the weights are.
     bias: Vec<Row>,
     /// In tiles: the convolution by 1 x 1 of each position. Otherwise empty.
     positions: Vec<Conv>,
 }
 
-/// Stacks that a convolution or a sum writes: its values as they are, with zeros in place of negative ones, or both.
+/// Stacks that a convolution or a sum writes: the plain values, the values with zeros instead of negative ones, or both.
 #[derive(Debug)]
 pub struct Outputs<'a> {
-    /// The values.
+    /// The plain values.
     pub raw: Option<&'a mut Blocked>,
-    /// The values, negative ones replaced with zero; those that are not numbers stay.
+    /// The values with zeros instead of negative ones; NaN is kept.
     pub relu: Option<&'a mut Blocked>,
 }
 
@@ -101,11 +101,11 @@ impl Conv {
     /// Packs weights.
     ///
     /// * `weights`: `outputs x inputs x kernel rows x kernel columns`.
-    /// * `packed`: for an input in one block of all channels, as [`BlockedShape::packed`].
+    /// * `packed`: true for an input in one block of all channels, as [`BlockedShape::packed`].
     ///
     /// # Errors
     ///
-    /// [`ConvSizeError`]; also for a kernel, a stride or channels of zero.
+    /// [`ConvSizeError`]; also if the kernel, a stride or a number of channels is zero.
     pub fn new(
         size: ConvSize,
         weights: &[f32],
@@ -178,17 +178,17 @@ impl Conv {
         Ok(Some(conv))
     }
 
-    /// Its sides.
+    /// The sizes of the convolution.
     pub fn size(&self) -> ConvSize {
         self.size
     }
 
-    /// Convolves, and adds `residual`.
+    /// Convolves `input`, and adds `residual`.
     ///
     /// # Panics
     ///
-    /// If the sides of the stacks do not fit: the channels, a border of the input below what the kernel reaches over, a
-    /// residual unlike the outputs, also in its border.
+    /// If the sizes of the stacks do not match. This includes wrong numbers of channels, a border of the input smaller than
+    /// the kernel needs, and a residual whose shape or border differs from the outputs.
     pub fn run(
         &self,
         isa: Isa,
@@ -204,7 +204,7 @@ impl Conv {
         }
     }
 
-    /// As [`Self::run`], in plain loops.
+    /// Does the same as [`Self::run`], in plain loops.
     ///
     /// # Panics
     ///

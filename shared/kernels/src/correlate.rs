@@ -1,4 +1,4 @@
-//! Responses of many filters on feature maps: the bulk of the arithmetic.
+//! Responses of many filters on feature maps: most of the arithmetic.
 
 mod points;
 mod reference;
@@ -17,39 +17,39 @@ use winograd::{Answer, Form, Pending};
 
 pub use reference::correlate_f64;
 
-/// Most filters in a panel.
+/// Largest number of filters in a panel.
 const N_LANES: usize = ROW;
-/// Pairs of points of the tiles that a map can be cut into, the smallest first.
+/// Numbers of pairs of points for the tiles into which a map can be cut, in ascending order.
 const FORMS: [usize; 2] = [3, 4];
-/// Sides of the filters that tiles are offered for, cells.
+/// Sides of the filters for which tiles are available, in cells.
 const TILED_SIDES: std::ops::RangeInclusive<usize> = 3..=6;
 
-/// A template over feature cells, as it is offered to [`FilterBank::new`].
+/// A template over feature cells, as passed to [`FilterBank::new`].
 #[derive(Debug, Clone, Copy)]
 pub struct Template<'a> {
-    /// Height, cells.
+    /// Height in cells.
     pub rows: usize,
-    /// Width, cells.
+    /// Width in cells.
     pub cols: usize,
-    /// `rows x cols x N_CHANNELS` weights, channel fastest, then column.
+    /// Weights, `rows x cols x N_CHANNELS`, channel fastest, then column.
     pub weights: &'a [f64],
 }
 
 /// A padded feature map, `rows x cols x N_CHANNELS`, channel fastest, then column.
 #[derive(Debug, Clone, Copy)]
 pub struct FeatureMap<'a> {
-    /// Height, cells.
+    /// Height in cells.
     pub rows: usize,
-    /// Width, cells.
+    /// Width in cells.
     pub cols: usize,
-    /// The features.
+    /// Features of all cells.
     pub cells: &'a [f32],
 }
 
 /// A feature map and the number of positions at which filters are evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct Level<'a> {
-    /// The features.
+    /// The feature map.
     pub map: FeatureMap<'a>,
     /// Size `[rows, cols]` of every response map.
     pub size: [usize; 2],
@@ -62,19 +62,19 @@ pub struct FilterBank {
     panels: Vec<Panel>,
 }
 
-/// Consecutive filters of equal size.
+/// Consecutive filters of the same size.
 #[derive(Debug, Clone)]
 struct Panel {
     filters: Range<usize>,
     /// Size `[rows, cols]` of a filter.
     filter: [usize; 2],
-    /// `rows x cols x N_CHANNELS`, a filter in each lane; zero where there is no filter.
+    /// Weights, `rows x cols x N_CHANNELS`, with one filter in each lane and zeros in unused lanes.
     direct: Vec<Row>,
-    /// The same transformed for each of [`FORMS`], `area x N_CHANNELS`; empty where not offered.
+    /// The same weights transformed for each of [`FORMS`], `area x N_CHANNELS`; empty if tiles are not available.
     tiles: [Vec<Row>; FORMS.len()],
 }
 
-/// Buffers of [`FilterBank::correlate`], used again from call to call.
+/// Buffers of [`FilterBank::correlate`], reused from call to call.
 #[derive(Debug, Default)]
 pub struct CorrelateWorkspace {
     pending: [Pending; FORMS.len()],
@@ -84,9 +84,9 @@ pub struct CorrelateWorkspace {
 /// The method by which the responses of a level are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Method {
-    /// By the definition.
+    /// The sums of the definition.
     Direct,
-    /// In tiles, by an index into [`FORMS`].
+    /// In tiles, with an index into [`FORMS`].
     Tiles(usize),
 }
 
@@ -100,7 +100,7 @@ impl FilterBank {
         Self::pack(isa, filters, true)
     }
 
-    /// As [`Self::new`], but all responses are computed by the definition: slower, for comparison.
+    /// Returns the same as [`Self::new`], but all responses are computed by the definition: slower, for comparison.
     ///
     /// # Panics
     ///
@@ -134,12 +134,12 @@ impl FilterBank {
         Self { isa, panels }
     }
 
-    /// Number of panels: the pieces that [`Self::correlate`] can be asked for apart.
+    /// Number of panels, which [`Self::correlate`] can compute separately.
     pub fn n_panels(&self) -> usize {
         self.panels.len()
     }
 
-    /// The filters of some panels.
+    /// Indices of the filters in some panels.
     ///
     /// # Panics
     ///
@@ -150,8 +150,8 @@ impl FilterBank {
         first..panels.last().map_or(0, |panel| panel.filters.end)
     }
 
-    /// Makes room for levels of up to `cols` placements across: [`Self::correlate`] allocates nothing
-    /// from then on.
+    /// Reserves memory for levels of up to `cols` placements across. Afterwards, [`Self::correlate`] does not
+    /// allocate.
     pub fn reserve(&self, cols: usize, workspace: &mut CorrelateWorkspace) {
         for panel in &self.panels {
             for (it, pending) in workspace.pending.iter_mut().enumerate() {
@@ -167,19 +167,19 @@ impl FilterBank {
     ///
     /// `out[l][f][y][x] = sum over rows r, columns c, channels k of map_l[y + r][x + c][k] w_f[r][c][k]`
     ///
-    /// to within `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`, the
-    /// maximum over the cells less than 10 away from those under the filter and `c` from
-    /// [`Self::error_factor`]: filters of 3 to 6 cells a side are evaluated on a tile of the map at
-    /// once (Winograd), others and those on very small maps by the definition. The method depends
-    /// on sizes only, and every response is summed in the same order whatever else is requested and
-    /// on every instruction set: the bits are always the same.
+    /// The error is at most `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`. The
+    /// maximum is over the cells less than 10 away from those under the filter, and `c` is
+    /// [`Self::error_factor`]. Filters of 3 to 6 cells a side are evaluated on a tile of the map at
+    /// once (Winograd). Other filters, and those on very small maps, are evaluated by the definition. The method depends
+    /// only on sizes. Every response is summed in the same order, whatever else is requested and
+    /// on every instruction set, so the bits are always the same.
     ///
     /// * `out`: `levels x filters x rows x cols`, without gaps; overwritten.
-    /// * Allocates nothing once `workspace` was used or has [room](Self::reserve).
+    /// * Does not allocate if `workspace` has been used before or has enough [memory](Self::reserve).
     ///
     /// # Panics
     ///
-    /// If a map is too small for its placements, or the lengths disagree.
+    /// If a map is too small for its placements, or the lengths do not match.
     #[expect(
         single_use_lifetimes,
         reason = "an argument of type `impl Trait` cannot do without a name"
@@ -220,12 +220,12 @@ impl FilterBank {
         });
     }
 
-    /// How far from exact a response of [`Self::correlate`] can be, as the factor in its bound.
+    /// Error bound of a response of [`Self::correlate`], as the factor in its formula.
     ///
-    /// With `u = 2^-24` and `N` roundings on the longest way from an input to a response, each of
-    /// the products that are added is off by a factor `(1 + u)^N - 1 <= N u / (1 - N u)` at most
+    /// Let `u = 2^-24`, and let `N` be the largest number of roundings between an input and a response. Each
+    /// added product is then off by a factor of at most `(1 + u)^N - 1 <= N u / (1 - N u)`
     /// (Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed., §3.1). The direct sum has
-    /// one rounding per product and one for the weight; in a tile the sums of absolute products are
+    /// one rounding per product and one for the weight. In a tile, the sums of absolute products are
     /// larger by a factor that follows from the matrices, once per axis.
     pub fn error_factor(&self, panel: usize, size: [usize; 2]) -> f64 {
         let filter = self.panels[panel].filter;
@@ -262,7 +262,7 @@ impl Panel {
         }
     }
 
-    /// The cheapest method by the number of products and the cost per tile.
+    /// Chooses the cheapest method from the number of products and the cost per tile.
     fn method(&self, size: [usize; 2]) -> Method {
         let mut best = (self.direct.len() * size[0] * size[1], Method::Direct);
         for (it, n_pairs) in FORMS.into_iter().enumerate() {
@@ -295,12 +295,12 @@ impl Panel {
     }
 }
 
-/// Cost of both transforms of a value, in products; an estimate, only used to choose a method.
+/// Estimated cost of both transforms of a value, in products; only used to choose a method.
 const TRANSFORMS: usize = 10;
 
 struct Correlate<'a, I> {
     panels: &'a [Panel],
-    /// Number of filters of all panels.
+    /// Number of filters in all panels.
     n_filters: usize,
     levels: I,
     out: &'a mut [f32],
@@ -338,7 +338,7 @@ impl<'a, I: Iterator<Item = Level<'a>> + Clone> Kernel for Correlate<'_, I> {
     }
 }
 
-/// All responses of a level, by the definition.
+/// Computes all responses of a level by the definition.
 #[inline(always)]
 fn direct<S: Simd>(
     simd: S,
@@ -371,12 +371,12 @@ fn direct<S: Simd>(
     }
 }
 
-/// Room for a row of cells, and some more since registers are read whole.
+/// Makes a buffer long enough for a row of cells, and for reading whole registers at its end.
 fn make_room(row: &mut Vec<Row>, cols: usize) {
     row.resize(row.len().max(cols + N_LANES), Row::ZERO);
 }
 
-/// Splits `total` cells into blocks of at most `largest`, as equal as they can be.
+/// Splits `total` cells into blocks of at most `largest`, as equal as possible.
 #[inline(always)]
 fn blocks(total: usize, largest: usize) -> impl Iterator<Item = Range<usize>> {
     let n = total.div_ceil(largest);

@@ -3,13 +3,13 @@
 use crate::isa::Isa;
 use crate::simd::{Kernel, Simd};
 
-/// A computation that is compiled once for every instruction set, and left to the compiler to
-/// vectorise.
+/// A computation that is compiled once for every instruction set and vectorised by the
+/// compiler.
 ///
-/// [`run`](Self::run) and everything it calls must be `#[inline(always)]`: a body takes on the
-/// instruction set of the function that it is inlined into.
+/// [`run`](Self::run) and everything it calls must be `#[inline(always)]`: a body uses the
+/// instruction set of the function into which it is inlined.
 pub trait Body {
-    /// Runs it.
+    /// Runs the computation.
     fn run(self);
 }
 

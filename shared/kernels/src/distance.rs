@@ -1,9 +1,9 @@
-//! Points at about a distance: the best of many for each of many, in double precision.
+//! Finds the best of many points at about a given distance from each of many others, in double precision.
 
 use crate::dispatch::{Body, dispatch};
 use crate::isa::Isa;
 
-/// Points with scores, coordinate by coordinate, so that several are tried at a time.
+/// Points with scores, stored by coordinate, so that several can be evaluated at a time.
 #[derive(Debug, Clone)]
 pub struct ScoredPoints {
     at: [Vec<f64>; 3],
@@ -11,28 +11,29 @@ pub struct ScoredPoints {
     n: usize,
 }
 
-/// A spring on a distance: it costs `weight * min(((distance - mean) / sd)^2 / 2, cap)`.
+/// A spring on a distance. Its cost is `weight * min(((distance - mean) / sd)^2 / 2, cap)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LengthSpring {
-    /// The distance that costs nothing.
+    /// Distance at which the cost is zero.
     pub mean: f64,
     /// Standard deviation, in the unit of the distance.
     pub sd: f64,
-    /// Weight.
+    /// Weight of the cost.
     pub weight: f64,
-    /// Most that the spring costs, before its weight.
+    /// Largest cost of the spring, before its weight.
     pub cap: f64,
 }
 
-/// Totals that are compared side by side.
+/// Number of totals that are compared in parallel.
 const LANES: usize = 8;
 
 impl ScoredPoints {
-    /// * `points`: at least one, with a score for each.
+    /// * `points`: at least one point.
+    /// * `scores`: one score for each point.
     ///
     /// # Panics
     ///
-    /// If there are no points, or not one score for each.
+    /// If there are no points, or the number of scores differs from the number of points.
     pub fn new(points: impl ExactSizeIterator<Item = [f64; 3]>, scores: &[f64]) -> Self {
         let n = points.len();
         assert!(n > 0 && n == scores.len(), "a score for each point");
@@ -51,10 +52,10 @@ impl ScoredPoints {
         Self { at, scores, n }
     }
 
-    /// For every point of `from` the best of these points, by its score less what the spring between the two costs, and that
-    /// total; the first of several. NaN is never the best.
+    /// Returns for every point of `from` the best of these points and its total: its score minus the cost of the spring between the
+    /// two. If several points are equally good, the first is returned. NaN is never the best.
     ///
-    /// The same bits as [`Self::best_reference`], on every instruction set.
+    /// The result has the same bits as [`Self::best_reference`] on every instruction set.
     pub fn best(
         &self,
         isa: Isa,
@@ -100,7 +101,7 @@ impl ScoredPoints {
     }
 }
 
-/// The score of a point less what the spring costs.
+/// The score of a point minus the cost of the spring.
 #[inline(always)]
 fn total(from: [f64; 3], [x, y, z]: [f64; 3], score: f64, spring: &LengthSpring) -> f64 {
     let by = [x - from[0], y - from[1], z - from[2]];
@@ -135,7 +136,7 @@ impl Body for Best<'_> {
         let mut most = [f64::NEG_INFINITY; LANES];
         let points = x.iter().zip(y).zip(z).zip(scores);
         for (totals, (((x, y), z), scores)) in all.iter_mut().zip(points) {
-            // Copies: behind references the compiler takes one place after the other, a tenth as fast.
+            // Copies the slices. Behind references, the compiler handles one position after the other, a tenth as fast.
             let (x, y, z, scores) = (*x, *y, *z, *scores);
             let here: [f64; LANES] = core::array::from_fn(|lane| {
                 total(from, [x[lane], y[lane], z[lane]], scores[lane], &spring)
@@ -148,7 +149,7 @@ impl Body for Best<'_> {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let most = most.into_iter().fold(f64::NEG_INFINITY, larger);
         let mut of_best = all.iter().enumerate().filter_map(|(chunk, totals)| {
-            // Counted, not searched: all at a time.
+            // Counts instead of searching, so that all totals are handled at a time.
             let n_best = totals.iter().filter(|total| **total == most).count();
             let lane = (n_best > 0).then(|| totals.iter().position(|total| *total == most))??;
             Some((chunk * LANES + lane, totals[lane]))
@@ -161,7 +162,7 @@ impl Body for Best<'_> {
 mod tests {
     use super::*;
 
-    /// Numbers that look random, from -1 to 1.
+    /// Pseudo-random numbers from -1 to 1.
     fn numbers(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         move || {
@@ -183,7 +184,7 @@ mod tests {
             let mut point = || [next(), next(), next()];
             let points: Vec<[f64; 3]> = (0..n).map(|_| point()).collect();
             let from: Vec<[f64; 3]> = (0..crate::sized(50, 3)).map(|_| point()).collect();
-            // Few different scores, so that several points are equally good.
+            // There are few different scores, so that several points are equally good.
             let scores: Vec<f64> = (0..n).map(|i| f64::from(i as u32 % 3)).collect();
             let one = ScoredPoints::new(points.iter().copied(), &scores);
             let wanted = one.best_reference(from.iter().copied(), &spring);

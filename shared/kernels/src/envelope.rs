@@ -1,7 +1,7 @@
 //! The distance transform in double precision, along the lower envelope of parabolas.
 //!
-//! Felzenszwalb & Huttenlocher, *Distance Transforms of Sampled Functions*, 2012, as the reference
-//! programs have it: everything in double but the breakpoints of the envelope, which are single.
+//! The method is that of Felzenszwalb & Huttenlocher, *Distance Transforms of Sampled Functions*, 2012, as in the reference
+//! programs. All values are double, except the breakpoints of the envelope, which are single.
 
 use crate::spring::{Axis, Spring};
 
@@ -10,9 +10,9 @@ use crate::spring::{Axis, Spring};
 pub struct Transformed {
     /// `max over v: plane[v] + spring(p, v)`, `rows x cols`.
     pub score: Vec<f64>,
-    /// Column of the child that attains it.
+    /// Column of the child with this score.
     pub x: Vec<usize>,
-    /// Row of the child that attains it.
+    /// Row of the child with this score.
     pub y: Vec<usize>,
 }
 
@@ -46,9 +46,9 @@ pub fn transform_f64(plane: &[f64], [rows, cols]: [usize; 2], spring: &Spring) -
     out
 }
 
-/// The best child on a line and its place, for every parent on it.
+/// For every parent on a line, the score and the position of the best child.
 fn line(scores: &[f64], axis: Axis) -> Vec<(f64, usize)> {
-    // Parabolas of the envelope from left to right, and where each begins to lead.
+    // Parabolas of the envelope from left to right, with the position from which each is the highest.
     let mut leaders: Vec<(usize, f32)> = Vec::with_capacity(scores.len());
     for q in 0..scores.len() {
         let mut begin = f32::NEG_INFINITY;
@@ -77,7 +77,7 @@ fn line(scores: &[f64], axis: Axis) -> Vec<(f64, usize)> {
     (0..scores.len()).map(best).collect()
 }
 
-/// Where the parabola of `q` overtakes that of `v < q`, rounded to single precision.
+/// Position where the parabola of `q` overtakes that of `v < q`, rounded to single precision.
 fn crossing(scores: &[f64], axis: Axis, v: usize, q: usize) -> f32 {
     let (from, to) = (v as f64, q as f64);
     let gain = (scores[q] - scores[v]) + axis.linear * (to - from)

@@ -1,4 +1,4 @@
-//! Gradient and its orientation at every pixel: the decision behind the features.
+//! Gradient and its orientation at every pixel, which determine the features.
 
 mod fast;
 
@@ -6,7 +6,7 @@ use crate::Planes;
 
 pub(crate) use fast::gradients;
 
-/// Number of signed orientations; the unsigned ones are half as many.
+/// Number of signed orientations; there are half as many unsigned ones.
 pub(crate) const N_ORIENTATIONS: usize = 18;
 
 /// Unit vectors of the first nine orientations, to the four decimals of the reference programs.
@@ -22,11 +22,11 @@ const DIRECTIONS: [[f64; 2]; 9] = [
     [-0.9397, 0.3420],
 ];
 
-/// Squared length, `(levels of grey)^2`, and orientation of the gradient at a pixel inside.
+/// Squared length, `(levels of grey)^2`, and orientation of the gradient at an inner pixel.
 ///
-/// The gradient is the central difference without the factor one half, taken in the colour plane
-/// where it is longest (first wins). Its orientation is that of the unit vector with the largest
-/// scalar product (first wins), 9 more if the product is negative.
+/// The gradient is the central difference without the factor of one half, taken in the colour plane
+/// where it is longest (the first of equal ones). Its orientation is that of the unit vector with the largest
+/// absolute scalar product (the first of equal ones), plus 9 if the product is negative.
 pub(crate) fn gradient(image: &Planes, y: usize, x: usize) -> (f64, usize) {
     let mut longest = (-1.0, [0.0; 2]);
     for plane in 0..3 {

@@ -16,22 +16,22 @@ use crate::{Isa, Planes};
 pub use fast::HogWorkspace;
 pub use reference::hog_f64;
 
-/// Channels of a cell.
+/// Number of channels of a cell.
 pub const N_CHANNELS: usize = 32;
 
 /// Number of orientations without their sign.
 const N_UNSIGNED: usize = N_ORIENTATIONS / 2;
 /// Upper limit of a normalised histogram entry.
 const CLIP: f64 = 0.2;
-/// Added to the energy of a block, so that flat blocks have a norm.
+/// Value added to the energy of a block, so that flat blocks have a norm.
 const FLAT: f64 = 0.0001;
 /// Weight of the texture channels, about `1 / sqrt(18)`.
 const TEXTURE: f64 = 0.2357;
 
-/// Where a channel's value goes when the picture is seen in a mirror (left and right exchanged).
+/// For each channel, the channel of its value when the picture is mirrored (left and right exchanged).
 ///
-/// An orientation of 20 k degrees becomes one of 180 - 20 k, and the blocks of 2 x 2 cells to the
-/// left of the cell, to which the texture channels belong, become those to its right. Its own
+/// An orientation of 20 k degrees becomes one of 180 - 20 k. The texture channels belong to blocks of 2 x 2 cells;
+/// blocks to the left of the cell become blocks to its right. The mapping is its own
 /// inverse.
 pub const MIRRORED_CHANNEL: [usize; N_CHANNELS] = {
     let mut to = [0; N_CHANNELS];
@@ -55,17 +55,17 @@ pub const MIRRORED_CHANNEL: [usize; N_CHANNELS] = {
     to
 };
 
-/// How the feature map of an image is laid out.
+/// The layout of an image's feature map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HogShape {
-    /// Side of a cell, pixels.
+    /// Side of a cell, in pixels.
     pub cell_px: usize,
-    /// Rows and columns of padding on every side of the map, cells.
+    /// Rows and columns of padding on every side of the map, in cells.
     pub pad: [usize; 2],
 }
 
 impl HogShape {
-    /// Cells `[rows, cols]` that the image is divided into: `round(side / cell_px)`.
+    /// Number of cells `[rows, cols]` into which the image is divided: `round(side / cell_px)`.
     fn cells(&self, width: usize, height: usize) -> [usize; 2] {
         [height, width].map(|side| (side as f64 / self.cell_px as f64).round() as usize)
     }
@@ -79,7 +79,7 @@ impl HogShape {
         ]
     }
 
-    /// Fills the padding of a map of `cells`, and returns the size of what is inside, if anything.
+    /// Fills the padding of a map of `cells`, and returns the size of the inner part, if there is one.
     fn pad_map(&self, cells: [usize; 2], map: &mut [[f32; N_CHANNELS]]) -> Option<[usize; 2]> {
         let [pad_rows, pad_cols] = self.pad;
         let [inner_rows, inner_cols] = cells.map(|cell| cell.saturating_sub(2));
@@ -100,9 +100,9 @@ impl HogShape {
 
 /// Writes the features of `image` with their padding.
 ///
-/// As [`hog_f64`]: the orientation of every gradient is decided in double precision, and everything
-/// after it is single precision, so the values differ by rounding only. A cell's votes are added up
-/// per block of pixels between four cell centres first, then over the cell's four blocks.
+/// As in [`hog_f64`], the orientation of every gradient is determined in double precision. All later steps
+/// are in single precision, so the values differ only by rounding. A cell's votes are first summed
+/// per block of pixels between four cell centres, then over the cell's four blocks.
 ///
 /// * `out`: `rows x cols x N_CHANNELS` of [`HogShape::map_size`]; overwritten.
 ///
@@ -137,10 +137,10 @@ pub fn hog(
     );
 }
 
-/// Where a pixel votes along one axis: the cell before it and the shares of that cell and the next.
+/// The vote of a pixel along one axis: the cell before the pixel, and the shares of that cell and the next.
 #[derive(Debug, Clone, Copy)]
 struct Vote {
-    /// Counted from 1: cell 0 is a ring outside of the image that is not used.
+    /// Number of the cell, from 1. Cell 0 is an unused ring outside the image.
     cell: usize,
     share: [f64; 2],
 }
@@ -185,7 +185,7 @@ mod tests {
         images_of(17.0)
     }
 
-    /// Half of them with samples that are not exact, as in a resized image.
+    /// Images of which half have inexact samples, as in a resized image.
     fn all_images() -> impl Strategy<Value = Planes> {
         prop_oneof![images(), images_of(17.0 / 1.1)]
     }
@@ -213,7 +213,7 @@ mod tests {
             }
         }
 
-        /// Two images after each other, so that nothing of the first may be left behind.
+        /// Computes two images one after the other, so that no data of the first may remain.
         #[test]
         fn every_instruction_set_gives_the_bits_of_the_reference(
             images in [all_images(), all_images()],
@@ -233,7 +233,7 @@ mod tests {
 
         #[test]
         fn a_mirrored_image_has_mirrored_features(cells in [3..9_usize, 3..9_usize], seed in any::<u64>()) {
-            // Samples of which no two gradients are alike, so that no orientation is a draw.
+            // The samples give gradients that all differ, so that no orientation is tied.
             let [width, height] = cells.map(|cell| 4 * cell);
             let mut state = seed | 1;
             let samples = std::iter::repeat_with(|| {

@@ -1,8 +1,8 @@
 //! A view of an 8-bit colour image.
 
-/// Interleaved 8-bit RGB, row major, without padding between rows.
+/// A view of interleaved 8-bit RGB, row major, without padding between rows.
 ///
-/// The pixels may lie in shared memory; nothing here copies them.
+/// The pixels may be in shared memory; the view does not copy them.
 #[derive(Debug, Clone, Copy)]
 pub struct Rgb8View<'a> {
     width: usize,
@@ -10,17 +10,17 @@ pub struct Rgb8View<'a> {
     data: &'a [u8],
 }
 
-/// The pixels do not fill the image.
+/// The number of bytes does not match the size of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("an RGB image of {width}x{height} pixels has {expected} bytes, got {got}")]
 pub struct ImageSizeError {
-    /// Width, pixels.
+    /// Width in pixels.
     pub width: usize,
-    /// Height, pixels.
+    /// Height in pixels.
     pub height: usize,
-    /// Bytes that the size asks for.
+    /// Number of bytes expected for the size.
     pub expected: usize,
-    /// Bytes offered.
+    /// Number of bytes given.
     pub got: usize,
 }
 
@@ -48,12 +48,12 @@ impl<'a> Rgb8View<'a> {
         }
     }
 
-    /// Width, pixels.
+    /// Width in pixels.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height, pixels.
+    /// Height in pixels.
     pub fn height(&self) -> usize {
         self.height
     }

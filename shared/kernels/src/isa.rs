@@ -1,26 +1,26 @@
 //! The instruction sets of the machine.
 
-/// An instruction set that this machine is known to have.
+/// An instruction set that this machine has.
 ///
-/// Every kernel gives the same bits on all of them; only the speed differs. A value can only be
-/// had from [`Self::best`] and [`Self::available`], so holding one proves that it was detected.
+/// Every kernel gives the same bits on all instruction sets; only the speed differs. Values only
+/// come from [`Self::best`] and [`Self::available`], so a value proves that the set was detected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Isa(pub(crate) Kind);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// The baseline of the target. Needs a fused multiply-add in hardware to be fast.
+    /// The baseline of the target. It is only fast with a fused multiply-add in hardware.
     Portable,
     /// AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// AVX-512 F, VL and what AVX2 means here.
+    /// AVX-512 F and VL, in addition to AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
 
 impl Isa {
-    /// The fastest one.
+    /// Returns the fastest instruction set.
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -38,12 +38,12 @@ impl Isa {
         Self(Kind::Portable)
     }
 
-    /// Returns true if it is the baseline of the target, which every machine has.
+    /// Returns true for the baseline of the target, which every machine has.
     pub fn is_portable(self) -> bool {
         self.0 == Kind::Portable
     }
 
-    /// Returns its name.
+    /// Returns the name of the instruction set.
     pub fn name(self) -> &'static str {
         match self.0 {
             Kind::Portable => "portable",
@@ -54,7 +54,7 @@ impl Isa {
         }
     }
 
-    /// All of them, slowest first; for tests and comparisons.
+    /// Returns all available instruction sets, slowest first, for tests and comparisons.
     pub fn available() -> Vec<Self> {
         let mut all = vec![Self(Kind::Portable)];
         #[cfg(target_arch = "x86_64")]

@@ -1,4 +1,4 @@
-//! Grids, images and the hot loops, each loop in two implementations: a readable reference and a
+//! Grids, images and the hot loops. Each loop has two implementations: a readable reference and a
 //! fast one.
 //!
 //! Both give the same bits on every instruction set.
@@ -26,7 +26,7 @@ mod planes;
 mod simd;
 mod spring;
 
-/// A size for a test: the second where an interpreter (Miri) takes a thousand times as long.
+/// A size for a test: the second value is used with an interpreter (Miri), which takes a thousand times as long.
 #[cfg(test)]
 const fn sized(usual: usize, interpreted: usize) -> usize {
     if cfg!(miri) { interpreted } else { usual }

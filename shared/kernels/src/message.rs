@@ -1,9 +1,9 @@
 //! Max-sum messages: the best score of a child's subtree for every position and type of the parent.
 //!
-//! A message is the generalised distance transform of Felzenszwalb & Huttenlocher 2012 under
-//! quadratic springs, the maximum over the child's types, and the sum into the parent's scores, row
-//! by row in one sweep. The transform evaluates every candidate in a window outside of which none
-//! can win, instead of following a lower envelope: cells are then independent, so lanes are cells.
+//! A message is computed in three steps: the generalised distance transform of Felzenszwalb & Huttenlocher 2012 for
+//! quadratic springs, the maximum over the child's types, and the sum into the parent's scores. All steps are done row
+//! by row in one sweep. The transform does not follow a lower envelope. It evaluates every candidate in a window that contains
+//! all possible winners. Cells are then independent, so each lane computes one cell.
 
 mod buffer;
 mod fast;
@@ -23,24 +23,24 @@ pub use own::OwnScores;
 pub use range::ScoreRange;
 pub use trace::TracedChild;
 
-/// Scores are kept in rows of a multiple of this many cells.
+/// Rows of scores are padded to a multiple of this number of cells.
 const ROW_ALIGN: usize = 16;
 
-/// Rows of a plane that are processed together.
+/// Number of rows of a plane that are processed together.
 const BLOCK: usize = 8;
 
-/// Rows of minus infinity between planes, so that a block may read beyond the grid.
+/// Number of rows of minus infinity between planes, so that a block may read beyond the grid.
 const MARGIN: usize = BLOCK - 1;
 
-/// The size of score planes, and how they lie in memory: `margin, plane, margin, plane, .., margin`.
+/// The size of score planes, and their layout in memory: `margin, plane, margin, plane, .., margin`.
 ///
-/// A plane has `rows` rows of a length that is rounded up, of which the first `cols` cells count.
-/// The other cells, and those of the margins, hold minus infinity.
+/// A plane has `rows` rows of a rounded-up length, of which the first `cols` cells count.
+/// The other cells and the margins contain minus infinity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
-    /// Height, cells.
+    /// Height in cells.
     pub rows: usize,
-    /// Width, cells.
+    /// Width in cells.
     pub cols: usize,
 }
 
@@ -50,7 +50,7 @@ impl Grid {
         self.cols.next_multiple_of(ROW_ALIGN)
     }
 
-    /// Length in memory of some planes, each with the margin before it.
+    /// Length in memory of `n_planes` planes, each with the margin before it.
     pub fn len(&self, n_planes: usize) -> usize {
         n_planes * (MARGIN + self.rows) * self.stride()
     }
@@ -65,12 +65,12 @@ impl Grid {
         self.rows == 0 || self.cols == 0
     }
 
-    /// Where a cell of a plane lies in memory.
+    /// Index in memory of a cell of a plane.
     pub fn at(&self, plane: usize, y: usize, x: usize) -> usize {
         (plane * (MARGIN + self.rows) + MARGIN + y) * self.stride() + x
     }
 
-    /// The rows of one of some planes.
+    /// The rows of one plane out of `planes`.
     pub fn plane<'a>(&self, planes: &'a [f32], plane: usize) -> &'a [f32] {
         &planes[self.at(plane, 0, 0)..][..self.rows * self.stride()]
     }
@@ -81,7 +81,7 @@ impl Grid {
 pub struct ChildScores<'a> {
     /// Size of the planes.
     pub grid: Grid,
-    /// One plane per type and the margin after the last one; no NaN.
+    /// One plane per type, and the margin after the last plane; must not contain NaN.
     pub planes: &'a [f32],
     /// Minimum and maximum score of every plane.
     pub ranges: &'a [ScoreRange],
@@ -91,9 +91,9 @@ pub struct ChildScores<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MessageRule {
     n_child_types: usize,
-    /// `(child type, spring)`.
+    /// Child type and spring of every transform.
     springs: Vec<(usize, Spring)>,
-    /// For every parent type the springs that it may use and their biases, by child type.
+    /// For every parent type, the allowed springs and their biases, by child type.
     choices: Vec<Vec<(usize, f32)>>,
 }
 
@@ -102,8 +102,8 @@ impl MessageRule {
     ///
     /// * `n_child_types`: number of the child's score planes.
     /// * `springs`: child type and spring of every transform.
-    /// * `choices`: for every parent type, index into `springs` and bias; earlier ones win ties. A
-    ///   parent type without choices, or with biases of minus infinity only, is impossible.
+    /// * `choices`: for every parent type, index into `springs` and bias; earlier choices win ties. A
+    ///   parent type without choices, or with only biases of minus infinity, is impossible.
     ///
     /// # Panics
     ///
@@ -130,14 +130,14 @@ impl MessageRule {
     /// Adds the child's message to every cell of the parent's score planes:
     ///
     /// `parent[l][p] += max over choices (k, s) of l: (max over v: child[k][v] + s(p, v)) + bias`,
-    /// where `s(p, v)` adds the vertical part of the spring first, then the horizontal one.
+    /// where `s(p, v)` first adds the vertical part of the spring, then the horizontal part.
     ///
-    /// * `parent`: one plane per parent type, without the margin after the last one; the minimum
-    ///   and maximum score of each are written to `ranges`.
+    /// * `parent`: one plane per parent type, without the margin after the last plane. The minimum
+    ///   and maximum score of each plane are written to `ranges`.
     ///
     /// # Panics
     ///
-    /// If the lengths disagree.
+    /// If the lengths do not match.
     pub fn add_message(
         &self,
         isa: Isa,

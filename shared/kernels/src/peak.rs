@@ -6,26 +6,26 @@ use crate::isa::{Isa, Kind};
 /// A loop that does nothing but one kind of arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Peak {
-    /// `sum = sum a + b` in single precision: the filters.
+    /// `sum = sum a + b` in single precision, as in the filters.
     MultiplyAdd,
-    /// `best = max(best, score + cost)` in single precision: the messages.
+    /// `best = max(best, score + cost)` in single precision, as in the messages.
     MaxPlus,
 }
 
-/// Values that share a weight, and weights that share a value: their product is the number of sums
-/// or maxima that are under way at once, and fits the registers of all instruction sets.
+/// Number of values that share a weight, followed by the number of weights that share a value. Their product is the number of sums
+/// or maxima that are computed at once; it fits the registers of all instruction sets.
 const ROWS: usize = 5;
 const WEIGHTS: usize = 2;
-/// Steps of a round; its values lie in the first cache.
+/// Number of steps in a round, whose values fit in the first-level cache.
 const STEPS: usize = 50;
 
 impl Peak {
     /// Runs the loop, and returns the number of single values that it computed.
     ///
-    /// Without a fused multiply-add in the instruction set the multiplication and the addition are
-    /// two operations, that are counted as one.
+    /// If the instruction set has no fused multiply-add, multiplication and addition are
+    /// two operations that are counted as one.
     ///
-    /// * `rounds`: a microsecond each, or less.
+    /// * `rounds`: number of rounds; each takes at most a microsecond.
     pub fn run(self, isa: Isa, rounds: usize) -> u64 {
         match isa.0 {
             Kind::Portable => self.run_on::<4, false>(isa, rounds),
@@ -72,7 +72,7 @@ struct MaxPlus<const LANES: usize, const FUSED: bool> {
 impl<const LANES: usize, const FUSED: bool> Body for MaxPlus<LANES, FUSED> {
     #[inline(always)]
     fn run(self) {
-        // As in the messages: the add units also compare, and the multiply units are free.
+        // As in the messages, the add units also compare, and the multiply units are free.
         let one = std::hint::black_box(1.0_f32);
         let larger = |best: f32, score: f32, cost: f32| {
             let score = if FUSED {
@@ -86,7 +86,7 @@ impl<const LANES: usize, const FUSED: bool> Body for MaxPlus<LANES, FUSED> {
     }
 }
 
-/// Folds rows of values into one row per weight and place of the row in a step.
+/// Folds rows of values into one row per weight and position of the row in a step.
 #[inline(always)]
 fn rounds<const LANES: usize>(n: usize, start: f32, fold: impl Fn(f32, f32, f32) -> f32) {
     let weights = std::hint::black_box([0.125_f32; WEIGHTS]);

@@ -1,7 +1,7 @@
-//! Colour images in double precision, and how they are made smaller.
+//! Colour images in double precision, and functions that reduce their size.
 //!
-//! The hard orientation decision of the features turns a difference in the last bit into another
-//! histogram bin, so both functions add their products in exactly the order of the reference
+//! The features assign each gradient to one orientation, so a difference in the last bit can change the
+//! histogram bin. Both functions therefore add their products in exactly the order of the reference
 //! programs: down the columns first, tap after tap, then along the rows.
 
 mod reduce;
@@ -24,12 +24,12 @@ pub struct Planes {
 }
 
 impl Planes {
-    /// Width, pixels.
+    /// Width in pixels.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height, pixels.
+    /// Height in pixels.
     pub fn height(&self) -> usize {
         self.height
     }
@@ -57,13 +57,13 @@ impl Planes {
         &mut self.data[(plane * self.height + y) * self.width..][..self.width]
     }
 
-    /// Makes room for an image of this size.
+    /// Reserves memory for an image of this size.
     pub fn reserve(&mut self, width: usize, height: usize) {
         let n = 3 * width * height;
         self.data.reserve_exact(n.saturating_sub(self.data.len()));
     }
 
-    /// Gives the image another size; samples are unspecified after it.
+    /// Changes the size of the image; the samples are unspecified afterwards.
     fn reshape(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
         self.data.resize(3 * width * height, 0.0);
@@ -84,19 +84,19 @@ impl Planes {
     }
 }
 
-/// Buffers of [`resize`] and [`reduce`], used again from image to image.
+/// Buffers of [`resize`] and [`reduce`], reused from image to image.
 #[derive(Debug, Default)]
 pub struct ShrinkWorkspace {
     down: resize::Taps,
     along: resize::Taps,
     /// A row after the vertical pass.
     line: Vec<f64>,
-    /// A row after both passes of [`resize`], colours together; the fourth has no meaning.
+    /// A row after both passes of [`resize`], with the colours of a pixel together; the fourth value is unused.
     pixels: Vec<[f64; 4]>,
 }
 
 impl ShrinkWorkspace {
-    /// Makes room for everything that can be made of an image of this size.
+    /// Reserves memory for everything that can be made from an image of this size.
     pub fn reserve(&mut self, width: usize, height: usize) {
         self.down.reserve(height);
         self.along.reserve(width);
@@ -107,20 +107,20 @@ impl ShrinkWorkspace {
     }
 }
 
-/// A rectangle of an image that is made smaller.
+/// A rectangle of an image at reduced size.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartOfResized {
-    /// Size `[width, height]` of the whole smaller image, pixels.
+    /// Size `[width, height]` of the whole reduced image, in pixels.
     pub size: [usize; 2],
-    /// Columns of it.
+    /// Columns of the rectangle.
     pub x: Range<usize>,
-    /// Rows of it.
+    /// Rows of the rectangle.
     pub y: Range<usize>,
 }
 
 /// Makes `out` the area average of `image` at `[width, height]` pixels.
 ///
-/// The reference programs' `resize`, and [`resize_by_taps`]: bit for bit.
+/// The result is the same, bit for bit, as that of the reference programs' `resize` and of [`resize_by_taps`].
 ///
 /// # Panics
 ///
@@ -140,8 +140,8 @@ pub fn resize(
     resize_part(isa, image, &whole, workspace, out);
 }
 
-/// Makes `out` a part of what [`resize`] would make of `image`: the same bits, in time that grows
-/// with the part.
+/// Makes `out` a part of the result of [`resize`] for `image`, with the same bits. The time is proportional
+/// to the size of the part.
 ///
 /// # Panics
 ///
@@ -179,14 +179,14 @@ fn check_resize(image: Rgb8View<'_>, [width, height]: [usize; 2]) {
     );
 }
 
-/// Side of the image that [`reduce`] makes of `side` samples: half, rounded away from zero.
+/// Length of a side of `side` samples after [`reduce`]: half, rounded away from zero.
 pub fn reduced(side: usize) -> usize {
     side.div_ceil(2)
 }
 
 /// Makes `out` the image at half size: five binomial taps, then every second sample.
 ///
-/// The reference programs' `reduce`, borders included, and [`reduce_by_taps`]: bit for bit.
+/// The result, including borders, is the same, bit for bit, as that of the reference programs' `reduce` and of [`reduce_by_taps`].
 ///
 /// # Panics
 ///
@@ -202,12 +202,12 @@ fn check_reduce(image: &Planes) {
     assert!(image.width.min(image.height) >= 5, "five taps");
 }
 
-/// Which taps an output sample of [`reduce`] has.
+/// The taps of an output sample of [`reduce`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Border {
     First,
     Inside,
-    /// The last but one, when the input ends one sample after it.
+    /// The last sample but one, if the input ends one sample after it.
     Folded,
     Last,
 }
@@ -233,7 +233,7 @@ fn inside(s: [f64; 5]) -> f64 {
     s[0] * 0.0625 + s[1] * 0.25 + s[2] * 0.375 + s[3] * 0.25 + s[4] * 0.0625
 }
 
-/// Taps (1, 4, 6, 5) / 16 on the four last samples, added from the last to the first.
+/// Taps (1, 4, 6, 5) / 16 on the last four samples, added from the last to the first.
 #[inline(always)]
 fn folded(a: f64, b: f64, c: f64, last: f64) -> f64 {
     last * 0.3125 + c * 0.375 + b * 0.25 + a * 0.0625
@@ -255,7 +255,7 @@ mod tests {
         bytes.take(n).collect()
     }
 
-    /// An image that was something else before.
+    /// An image that already has other contents.
     fn used() -> Planes {
         Planes::from_samples(3, 5, vec![f64::NAN; 45])
     }
@@ -269,7 +269,7 @@ mod tests {
             seed in any::<u64>(),
         ) {
             let [width, height] = size;
-            // Shares near 1 are those of the pyramid.
+            // The pyramid uses shares near 1.
             let smaller = |value: usize, share: f64| ((value as f64 * share.sqrt()).round() as usize).max(1);
             let to = [smaller(width, share[0]), smaller(height, share[1])];
             let bytes = noise(seed, misaligned + 3 * width * height);
@@ -348,7 +348,7 @@ mod tests {
         assert!(half.data().iter().all(|value| (value - 77.0).abs() < 1e-9));
     }
 
-    /// Rows so long that some samples are covered by less than a thousandth, others by a little more.
+    /// The rows are so long that some samples are covered by less than a thousandth, others by slightly more.
     #[test]
     fn shares_about_a_thousandth_are_treated_as_in_the_reference() {
         let all = [(1030, 1029), (2003, 2001), (2001, 1009)];

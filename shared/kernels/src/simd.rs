@@ -7,10 +7,10 @@ mod x86;
 use crate::isa::{Isa, Kind};
 use portable::Portable;
 
-/// Floats in a [`Row`].
+/// Number of floats in a [`Row`].
 pub(crate) const ROW: usize = 32;
 
-/// Thirty-two floats that begin at a cache line.
+/// Thirty-two floats, aligned to a cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(128))]
 pub(crate) struct Row(pub(crate) [f32; ROW]);
@@ -22,14 +22,14 @@ impl Row {
 /// The floats of all rows.
 #[inline(always)]
 pub(crate) fn flat(rows: &[Row]) -> &[f32] {
-    // SAFETY: a `Row` is its floats and nothing else, as its size says: 128 bytes, a multiple of its alignment.
+    // SAFETY: a `Row` consists only of its floats. Its size is 128 bytes, a multiple of its alignment.
     unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len() * ROW) }
 }
 
-/// As [`flat`].
+/// The floats of all rows, as a mutable slice.
 #[inline(always)]
 pub(crate) fn flat_mut(rows: &mut [Row]) -> &mut [f32] {
-    // SAFETY: as in `flat`; the rows are borrowed for as long as their floats.
+    // SAFETY: as in `flat`; the rows are borrowed as long as their floats.
     unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len() * ROW) }
 }
 
@@ -40,33 +40,33 @@ impl std::borrow::Borrow<[f32; ROW]> for Row {
     }
 }
 
-/// An instruction set: holding a value proves that the machine has it.
+/// An instruction set; a value proves that the machine has it.
 ///
-/// Lanes are independent, except in [`Self::transposed`], and each operation rounds once according
-/// to IEEE 754: the same calls give the same bits whatever the number of lanes.
+/// Lanes are independent, except in [`Self::transposed`]. Each operation rounds once according
+/// to IEEE 754, so the same calls give the same bits for any number of lanes.
 pub(crate) trait Simd: Copy {
-    /// A register.
+    /// Type of a register.
     type V: Copy;
-    /// `LANES` registers.
+    /// Type of `LANES` registers.
     type Square: AsRef<[Self::V]>;
-    /// Floats in a register; divides half a [`Row`].
+    /// Number of floats in a register; it divides half a [`Row`].
     const LANES: usize;
-    /// Pairs of sums that fit into the register file beside two weights and a cell.
+    /// Number of pairs of sums that fit into the register file together with two weights and a cell.
     const BLOCK: usize;
 
-    /// `value` in all lanes.
+    /// Returns `value` in all lanes.
     fn splat(self, value: f32) -> Self::V;
-    /// The first `LANES` values.
+    /// Loads the first `LANES` values.
     fn load(self, from: &[f32]) -> Self::V;
-    /// The `LANES` values from `at` on: as [`Self::load`], unchecked.
+    /// Loads the `LANES` values from index `at`, like [`Self::load`] but without a check.
     ///
     /// # Safety
     ///
     /// `at + LANES` is at most the slice's length.
     unsafe fn load_at(self, from: &[f32], at: usize) -> Self::V;
-    /// Writes the first `LANES` values of `to`.
+    /// Writes a register to the first `LANES` values of `to`.
     fn store(self, value: Self::V, to: &mut [f32]);
-    /// Writes all of `to` or its first `LANES` values, whichever is less.
+    /// Writes a register to all of `to`, or to its first `LANES` values if `to` is longer.
     fn store_partial(self, value: Self::V, to: &mut [f32]);
     /// `a * b + c`, rounded once.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
@@ -74,26 +74,26 @@ pub(crate) trait Simd: Copy {
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     /// `a - b`.
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a one + b`, where `one` holds ones: a sum, on the units that multiply where there are such.
+    /// Returns `a one + b`, where `one` contains ones: a sum that runs on the multiply units, if there are any.
     ///
-    /// Some processors compare on the units that add, and have others that multiply: sums that look
-    /// like products leave the former to the maxima, which doubles the candidates per cycle.
+    /// Some processors compare on the add units and have separate multiply units. Sums in the form of
+    /// products leave the add units to the maxima, which doubles the candidates per cycle.
     fn plus(self, a: Self::V, one: Self::V, b: Self::V) -> Self::V;
-    /// The larger one; `b` where they are equal.
+    /// Returns the larger value, or `b` if they are equal.
     fn max(self, a: Self::V, b: Self::V) -> Self::V;
-    /// The smaller one; `b` where they are equal.
+    /// Returns the smaller value, or `b` if they are equal.
     fn min(self, a: Self::V, b: Self::V) -> Self::V;
-    /// The first `n` lanes of `a`, the others of `b`.
+    /// Returns the first `n` lanes of `a` and the other lanes of `b`.
     fn first(self, n: usize, a: Self::V, b: Self::V) -> Self::V;
-    /// Register `i` holds value `lane + i` of each of the first `LANES` rows.
+    /// Transposes: register `i` contains value `lane + i` of each of the first `LANES` rows.
     fn transposed(self, rows: &[Row], lane: usize) -> Self::Square;
-    /// Runs a kernel in a function of its own, where no other values take registers from its loop.
+    /// Runs a kernel in a separate function, where no other values use registers of its loop.
     fn apart(self, kernel: impl Kernel);
 }
 
-/// A computation for the instructions of the machine.
+/// A computation that runs with the machine's instruction set.
 pub(crate) trait Kernel {
-    /// Runs it; must be `#[inline(always)]`, so that it is compiled for the set of `simd`.
+    /// Runs the computation. It must be `#[inline(always)]`, so that it is compiled for the set of `simd`.
     fn run<S: Simd>(self, simd: S);
 }
 
@@ -116,7 +116,7 @@ impl Isa {
 mod tests {
     use super::*;
 
-    /// Transposes a row of numbered floats, and stores every length.
+    /// Transposes a row of numbered floats, and stores partial registers of every length.
     struct Check;
 
     impl Kernel for Check {
@@ -152,7 +152,7 @@ mod tests {
         }
     }
 
-    /// One of each operation.
+    /// Runs every operation once.
     struct Arithmetic<'a>(&'a mut Vec<f32>);
 
     impl Kernel for Arithmetic<'_> {
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// Loads at every place of a row, and joins registers at every lane.
+    /// Loads at every position of a row, and combines registers at every lane.
     struct Places;
 
     impl Kernel for Places {

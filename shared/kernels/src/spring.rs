@@ -1,4 +1,4 @@
-//! The spring between a child and its parent, and the window in which the best child can lie.
+//! The spring between a child and its parent, and the window that contains the best child.
 
 use std::ops::Range;
 
@@ -8,9 +8,9 @@ use std::ops::Range;
 /// `-(w[0] d_x^2 + w[1] d_x + w[2] d_y^2 + w[3] d_y)` to the score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
-    /// `[d_x^2, d_x, d_y^2, d_y]`; the quadratic ones are positive.
+    /// Weights of `[d_x^2, d_x, d_y^2, d_y]`; those of the squares are positive.
     pub w: [f64; 4],
-    /// Offset `[x, y]` of the child at which `d` is zero, cells.
+    /// Offset `[x, y]` of the child at which `d` is zero, in cells.
     pub anchor: [i32; 2],
 }
 
@@ -22,19 +22,19 @@ pub(crate) struct Axis {
     pub(crate) anchor: i32,
 }
 
-/// Cells by which a window is wider than exact arithmetic asks for; with the excess in
-/// [`ScoreRange::spread`](crate::ScoreRange), rounding cannot make a candidate outside of it tie with the best inside.
+/// Number of cells by which a window is wider than in exact arithmetic. Together with the excess in
+/// [`ScoreRange::spread`](crate::ScoreRange), it keeps a candidate outside from tying with the best inside because of rounding.
 const SLACK: f64 = 1e-3;
 
-/// The window of the children that can be best for a parent, on one axis.
+/// The window of children that can be best for a parent, on one axis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reach {
     n: usize,
-    /// Best offset of the child from its parent, cells.
+    /// Best offset of the child from its parent, in cells.
     centre: f64,
-    /// Square of the distance at which the spring costs all that a score can gain, cells^2.
+    /// Square of the distance at which the cost of the spring equals the largest gain in score, in cells^2.
     square: f64,
-    /// First and last offset to try while the best offset lies on the grid.
+    /// First and last offset to try if the best position is on the grid.
     first: isize,
     last: isize,
 }
@@ -58,21 +58,21 @@ impl Spring {
 }
 
 impl Axis {
-    /// Returns the score that the spring adds when the child lies `offset` cells after its parent.
+    /// Returns the score that the spring adds if the child is `offset` cells after its parent.
     ///
-    /// Computed in double and rounded once, so that every caller adds the same number.
+    /// The score is computed in double and rounded once, so that every caller adds the same number.
     #[inline(always)]
     pub(crate) fn score(self, offset: isize) -> f32 {
         let d = f64::from(self.anchor) - offset as f64;
         -(self.quadratic * d * d + self.linear * d) as f32
     }
 
-    /// Where the best child of a parent can lie among `n` in a row.
+    /// Returns the window of the best child of a parent among `n` in a row.
     ///
-    /// * `spread`: largest difference between the scores of any two children. With the best place
-    ///   `c` of the spring and `v0` the nearest child to it, a child at `v` loses to `v0` if
-    ///   `quadratic ((v - c)^2 - (v0 - c)^2) > spread`; so all winners lie within
-    ///   `sqrt(spread / quadratic + (v0 - c)^2)` of `c`. Not finite: anywhere.
+    /// * `spread`: largest difference between the scores of any two children. Let `c` be the best position
+    ///   of the spring, and `v0` the nearest child to it. A child at `v` loses to `v0` if
+    ///   `quadratic ((v - c)^2 - (v0 - c)^2) > spread`. All winners are thus within
+    ///   `sqrt(spread / quadratic + (v0 - c)^2)` of `c`. If `spread` is not finite, they may be anywhere.
     pub(crate) fn reach(self, n: usize, spread: f32) -> Reach {
         let centre = f64::from(self.anchor) + self.linear / (2.0 * self.quadratic);
         let square = f64::from(spread) / self.quadratic;
@@ -105,20 +105,20 @@ impl Reach {
         first..((last + 1).clamp(0, n) as usize).max(first)
     }
 
-    /// The offsets at which one of the parents of a block can have its best child.
+    /// The offsets at which at least one parent of a block can have its best child.
     ///
-    /// Some of the others then have none there: an offset may lead beside the grid, but never
-    /// further than the block is long.
+    /// For other parents of the block, such an offset may be outside the grid, but never
+    /// by more than the length of the block.
     pub(crate) fn offsets(&self, block: Range<usize>) -> Range<isize> {
         let (p, last) = (block.start, block.end - 1);
-        // From one parent to the next neither end of the window moves back, nor by more than one
-        // cell: the ends seen from the parent fall.
+        // From one parent to the next, neither end of the window moves back, nor by more than one
+        // cell. The offsets of the ends from the parent therefore never increase.
         let first = self.window(last).start as isize - last as isize;
         let end = self.window(p).end as isize - p as isize;
         first..end.max(first)
     }
 
-    /// As above where the best place `centre` lies beside the grid.
+    /// The first and last child of the window if the best position `centre` is outside the grid.
     #[inline(never)]
     fn beside_the_grid(&self, centre: f64) -> (isize, isize) {
         let nearest = centre.clamp(0.0, self.n as f64 - 1.0);

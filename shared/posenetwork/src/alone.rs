@@ -1,19 +1,19 @@
-//! One person by the peaks of the maps: how well seen, where, and which way up.
+//! Measures of one person from the peaks of the joint maps: mean heat, position, and which way up the person is.
 
 use crate::maps::{JointMaps, MapSettings};
 use crate::network::Turn;
 use crate::outline::outline_of;
 
-/// Least heat of a joint that counts for the box around its person, 0 to 1.
+/// Least heat, 0 to 1, of a joint that counts for the box around the person.
 const FAINT: f64 = 0.02;
 
-/// Least heat of a joint that shows where the head points, 0 to 1.
+/// Least heat, 0 to 1, of a joint that counts for the direction of the head.
 const SURE: f64 = 0.2;
-/// Least number of joints of the legs, and least distance from them to the head, share of the longer side of the window.
+/// Least number of leg joints needed, and least distance from them to the head, as a share of the longer side of the window.
 const LEGS: usize = 3;
 const LONG: f64 = 0.12;
-/// Amount by which the head of an upright person may point elsewhere, radians: 70 degrees. The trunk of a person who bends
-/// until it is level over upright legs points 63 degrees away.
+/// Largest angle, in radians, between the head's direction and upright before the picture is rotated: 70 degrees. For a person who bends
+/// the trunk level over upright legs, this angle is 63 degrees.
 const MOST_LEAN: f64 = 7.0 / 18.0 * core::f64::consts::PI;
 
 impl JointMaps {
@@ -24,10 +24,10 @@ impl JointMaps {
         sum / self.peaks().len().max(1) as f64
     }
 
-    /// How the picture should be turned for the network to see this person upright: by where neck and head are, seen from the legs, whose
-    /// direction does not change with the trunk when a person bends down.
+    /// Returns how to rotate the picture so that the network sees this person upright. The direction is that from the legs to the neck and
+    /// head. It changes less than the direction of the trunk when a person bends down.
     ///
-    /// * `now`: how it was turned; it stays so up to 70 degrees.
+    /// * `now`: rotation used so far; it is kept if the direction differs by at most 70 degrees.
     pub fn turn(&self, now: Turn) -> Turn {
         let mean = |joints: core::ops::Range<usize>, least: usize| {
             let peaks = self.peaks().get(joints)?.iter().flatten();
@@ -49,7 +49,7 @@ impl JointMaps {
         now.towards(towards, MOST_LEAN)
     }
 
-    /// Evidence of all joints at their peaks, summed; a joint without a peak has the floor.
+    /// Sum of the evidence of all joints at their peaks. A joint without a peak counts with the floor.
     pub fn score(&self, settings: &MapSettings) -> f32 {
         let floor = self.floor();
         let peaks = self.peaks().iter();
@@ -58,7 +58,7 @@ impl JointMaps {
         evidence.sum()
     }
 
-    /// Box around the joints at their peaks ([`outline_of`]), pixels of the picture; `None` where none is seen.
+    /// Box around the joints at their peaks ([`outline_of`]), in pixels of the picture; `None` if no joint is seen.
     pub fn around(&self) -> Option<[f64; 4]> {
         let seen = self.peaks().iter().flatten();
         let seen = seen.filter(|peak| peak.score >= FAINT);
@@ -81,7 +81,7 @@ mod tests {
 
     use super::*;
 
-    /// Somebody who stands: ankle, knee, hip; hip, knee, ankle; wrist, elbow, shoulder; shoulder, elbow, wrist; neck, head.
+    /// A standing person. The order is ankle, knee, hip; hip, knee, ankle; wrist, elbow, shoulder; shoulder, elbow, wrist; neck, head.
     const STANDING: [[f64; 2]; 14] = [
         [-8.0, 90.0],
         [-8.0, 45.0],

@@ -1,23 +1,23 @@
-//! The parts of a person who is known, to be painted over so that a network sees who is behind.
+//! Bars over the body parts of a known person: they are painted over so that a network sees the person behind.
 
 use skeleton::PARSE14;
 
 use crate::cover::Bar;
 use crate::maps::JointMaps;
 
-/// Least heat of a joint at the end of a part that is painted over, 0 to 1.
+/// Least heat, 0 to 1, of a joint at the end of a part that is painted over.
 const SURE: f64 = 0.2;
-/// Half the width of a limb, share of the longer side of the box around the person.
+/// Half the width of a limb, as a share of the longer side of the box around the person.
 const HALF_WIDTH: f64 = 0.0375;
-/// Half the width of the head, which reaches from the neck to its top, likewise.
+/// Half the width of the head, as a share of the same side. The head reaches from the neck to the top of the head.
 const HALF_HEAD: f64 = 0.06;
-/// The edges and diagonals of the trunk: hips and shoulders by their places in [`PARSE14`].
+/// The edges and diagonals of the trunk. Hips and shoulders are given by their indices in [`PARSE14`].
 const TRUNK: [(usize, usize); 6] = [(2, 8), (3, 9), (8, 9), (2, 3), (2, 9), (3, 8)];
 /// The neck and the top of the head.
 const HEAD: (usize, usize) = (12, 13);
 
 impl JointMaps {
-    /// Adds the parts of the person, between joints that are seen.
+    /// Adds a bar for each part of the person whose two joints are seen.
     pub fn add_bars(&self, bars: &mut Vec<Bar>) {
         let Some([left, top, right, bottom]) = self.around() else {
             return;
@@ -38,7 +38,7 @@ impl JointMaps {
         }));
     }
 
-    /// The number of joints that are seen outside of bars.
+    /// Number of joints that are seen outside the given bars.
     pub fn n_outside(&self, bars: &[Bar]) -> usize {
         let seen = self.peaks().iter().flatten();
         seen.filter(|peak| peak.score >= SURE && !bars.iter().any(|bar| bar.holds(peak.at)))

@@ -1,6 +1,6 @@
-//! Values of a map between its cells.
+//! Interpolated values of a map between its cells.
 
-/// Four neighbouring cells along an axis, and how much each counts.
+/// Four neighbouring cells along an axis, and their weights.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tap {
     cells: [usize; 4],
@@ -9,7 +9,7 @@ pub(crate) struct Tap {
 }
 
 impl Tap {
-    /// Those about a place; beyond the `n` cells of the axis there are none.
+    /// Returns the four cells around a position, or no cells if the position is outside an axis of `n` cells.
     pub(crate) fn at(cell: f64, n: usize) -> Self {
         let is_inside = (-1.0..=n as f64).contains(&cell);
         if !is_inside {
@@ -19,7 +19,8 @@ impl Tap {
                 is_inside,
             };
         }
-        // The cell that it lies in or behind: `floor` of a number of at least -1, for processors without an instruction for it.
+        // The cell at or before the position. This computes `floor` of a number of at least -1 without needing a processor instruction for
+        // it.
         let lower = (cell + 1.0) as i64 - 1;
         let first = lower - 1;
         Self {
@@ -30,7 +31,7 @@ impl Tap {
     }
 }
 
-/// The value of a map between sixteen cells: along each of four rows, then across them.
+/// Interpolates a map between sixteen cells: first along each of four rows, then across the rows.
 pub(crate) fn between(map: &[f32], columns: usize, row: &Tap, column: &Tap) -> f32 {
     let [a, b, c, d] = row.cells.map(|cell| {
         let line = &map[cell * columns..(cell + 1) * columns];
@@ -41,7 +42,7 @@ pub(crate) fn between(map: &[f32], columns: usize, row: &Tap, column: &Tap) -> f
 }
 
 impl Tap {
-    /// The value of a line at the place.
+    /// Interpolates along one line.
     fn along(&self, line: &[f32]) -> f32 {
         let [a, b, c, d] = self.cells;
         let [w_a, w_b, w_c, w_d] = self.weights;
@@ -49,7 +50,7 @@ impl Tap {
     }
 }
 
-/// Weights of four neighbours for a place between the two in the middle (Catmull & Rom 1974).
+/// Weights of four neighbours for a position between the two middle ones (Catmull & Rom 1974).
 fn cubic(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [

@@ -1,4 +1,4 @@
-//! The maps of a view as a few Gaussians: joints with their uncertainty, in place of all cells.
+//! The maps of a view as a few Gaussians: joints with their uncertainty, instead of all cells.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -6,38 +6,38 @@ use crate::MapSettings;
 use crate::maps::N_JOINTS;
 use crate::person_maps::PersonMaps;
 
-/// Least heat of a Gaussian: what is left below it is ignored.
+/// Least heat for which another Gaussian is fitted; lower residuals are ignored.
 const LEAST_HEAT: f64 = 0.03;
-/// Least height of a Gaussian whose neighbours take its heat over.
+/// Least height of a Gaussian whose heat is taken over by its neighbours.
 const LEAST_HEIGHT: f64 = 0.002;
-/// How often the heights of all are fitted after one more.
+/// Number of times that all heights are fitted again after a Gaussian is added.
 const SWEEPS: usize = 6;
-/// Most Gaussians of a joint's map.
+/// Largest number of Gaussians for one joint's map.
 pub const MOST_OF_A_JOINT: usize = 8;
-/// Cells on each side of a maximum that its Gaussian is fitted to.
+/// Number of cells on each side of a maximum to which a Gaussian is fitted.
 const REACH: i64 = 2;
-/// Least share of the maximum in the cells that a Gaussian is fitted to.
+/// Least value of a cell to which a Gaussian is fitted, as a share of the maximum.
 const SHARE: f64 = 0.5;
-/// Least and largest standard deviation along any axis, cells.
+/// Least and largest standard deviation along any axis, in cells.
 const SIGMAS: [f64; 2] = [0.4, 12.0];
-/// A Gaussian ends where it has fallen to this: what [`MapSettings::of_heat`] counts as none.
+/// Value at which a Gaussian is cut off: [`MapSettings::of_heat`] counts it as zero.
 const NOTHING: f64 = 1e-5;
 
-/// A Gaussian of the heat of a joint's map.
+/// A Gaussian that describes part of the heat in a joint's map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bump {
-    /// The joint of `skeleton::PARSE14`.
+    /// Index of the joint in `skeleton::PARSE14`.
     pub joint: usize,
-    /// Where it is highest: column and row, cells of the maps.
+    /// Position of the maximum: column and row, in cells of the maps.
     pub at: [f32; 2],
-    /// The heat there, above 0 and at most 1.
+    /// Heat at the maximum, above 0 and at most 1.
     pub heat: f32,
-    /// The inverse of its covariance: across, both, down; per square cell.
+    /// Inverse of the covariance, per square cell: the xx, xy and yy entries.
     pub precision: [f32; 3],
 }
 
 impl Bump {
-    /// Returns true if [`bumps`] can give it: finite, positive definite, neither wider nor narrower than it makes them.
+    /// Returns true if [`bumps`] can produce this Gaussian: finite, positive definite, and within its limits of width.
     pub fn is_sound(&self) -> bool {
         let [xx, xy, yy] = self.precision.map(f64::from);
         let numbers = [self.at[0], self.at[1], self.heat];
@@ -54,14 +54,14 @@ impl Bump {
             && trace / 2.0 + spread <= 1.1 * high
     }
 
-    /// The heat at a cell.
+    /// Heat at a cell.
     fn heat_at(&self, [column, row]: [f64; 2]) -> f64 {
         let [xx, xy, yy] = self.precision.map(f64::from);
         let [x, y] = [column - f64::from(self.at[0]), row - f64::from(self.at[1])];
         f64::from(self.heat) * (-0.5 * (xx * x * x + 2.0 * xy * x * y + yy * y * y)).exp()
     }
 
-    /// The cells where it is anything: first column and the one after the last, first row and the one after the last.
+    /// Range of cells where the Gaussian is not cut off, for columns and for rows: the first and the one after the last.
     ///
     /// * `size`: number of columns and rows.
     fn extent(&self, size: [usize; 2]) -> [[usize; 2]; 2] {
@@ -81,13 +81,13 @@ impl Bump {
     }
 }
 
-/// Least and largest eigenvalue of a precision.
+/// Least and largest eigenvalue that a precision may have.
 fn precisions() -> [f64; 2] {
     let [narrow, wide] = SIGMAS;
     [1.0 / (wide * wide), 1.0 / (narrow * narrow)]
 }
 
-/// The maps of all joints as sums of Gaussians: the highest first, each fitted to what those before it leave.
+/// Describes the maps of all joints as sums of Gaussians. The highest is fitted first, each later one to the residual of those before it.
 pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
     let size = maps.grid().size;
     let floor = settings.floor();
@@ -115,9 +115,9 @@ pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
     found
 }
 
-/// Fills maps from Gaussians. Cells that no Gaussian reaches have the floor.
+/// Fills maps from Gaussians. Cells that no Gaussian reaches are set to the floor.
 ///
-/// * `bumps`: sound ones ([`Bump::is_sound`]).
+/// * `bumps`: Gaussians for which [`Bump::is_sound`] is true.
 /// * `size`: number of columns and rows of a map.
 /// * `values`: `[joint][row][column]`, overwritten.
 pub fn fill_from_bumps(
@@ -149,9 +149,9 @@ fn for_each_cell(bump: &Bump, size: [usize; 2], mut cell: impl FnMut(usize, f64)
     }
 }
 
-/// Makes the heights of the Gaussians of a map those of the least squares together, one after the other: neighbours share the heat between them.
+/// Fits the heights of all Gaussians of a map by least squares, one Gaussian after the other. Neighbours so share the heat between them.
 ///
-/// * `left`: what they leave of the map.
+/// * `left`: residual of the map.
 fn fit_heights(bumps: &mut [Bump], left: &mut [f64], size: [usize; 2]) {
     for _ in 0..SWEEPS {
         for bump in &mut *bumps {
@@ -170,7 +170,7 @@ fn fit_heights(bumps: &mut [Bump], left: &mut [f64], size: [usize; 2]) {
     }
 }
 
-/// The Gaussian of the highest cell of a map.
+/// Fits a Gaussian at the highest cell of a map.
 fn highest(joint: usize, heats: &[f64], [columns, rows]: [usize; 2]) -> Option<Bump> {
     let (cell, top) = heats.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     if *top < LEAST_HEAT {
@@ -183,7 +183,7 @@ fn highest(joint: usize, heats: &[f64], [columns, rows]: [usize; 2]) -> Option<B
         is_inside.then(|| heats[at[1] as usize * columns + at[0] as usize])
     };
     let fitted = fit(&around, *top);
-    // Where no Gaussian fits, one as narrow as a cell takes its maximum away.
+    // If no Gaussian can be fitted, one as wide as a cell removes the maximum.
     let (away, heat, precision) = fitted.unwrap_or(([0.0; 2], *top, [1.0, 0.0, 1.0]));
     Some(Bump {
         joint,
@@ -196,8 +196,8 @@ fn highest(joint: usize, heats: &[f64], [columns, rows]: [usize; 2]) -> Option<B
     })
 }
 
-/// Where a Gaussian lies from a maximum, its height and its precision: logarithms of the heats around it, fitted by a square function
-/// with the squares of the heats as weights, which is least squares of the heats to first order.
+/// Fits a Gaussian around a maximum; returns its offset from the maximum, its height and its precision. A quadratic is fitted to the
+/// logarithms of the heats, weighted by the squares of the heats. To first order, this is a least-squares fit of the heats.
 fn fit(around: &impl Fn(i64, i64) -> Option<f64>, top: f64) -> Option<([f64; 2], f64, [f64; 3])> {
     let mut left = Matrix6::<f64>::zeros();
     let mut right = Vector6::<f64>::zeros();
@@ -229,7 +229,7 @@ fn fit(around: &impl Fn(i64, i64) -> Option<f64>, top: f64) -> Option<([f64; 2],
     is_near.then_some((away, heat.min(1.0), precision))
 }
 
-/// The nearest precision whose eigenvalues are those of a Gaussian that is neither too narrow nor too wide.
+/// Returns the nearest precision whose eigenvalues are within the limits of width.
 fn bounded([xx, xy, yy]: [f64; 3]) -> Option<[f64; 3]> {
     if ![xx, xy, yy].iter().all(|value| value.is_finite()) {
         return None;

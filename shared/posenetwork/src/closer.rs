@@ -1,4 +1,4 @@
-//! Looking at people in boxes that may not fit: into several, and closer where a person is seen.
+//! Runs of the network on boxes that may not fit: on several boxes, then on a closer box around the person.
 
 use kernels::Rgb8View;
 
@@ -6,60 +6,61 @@ use crate::maps::{JointMaps, MapSettings};
 use crate::network::{LookError, PoseNetwork, Turn, Workspace};
 use crate::outline::overlap;
 
-/// Boxes that cover each other by more show the same to a network: another look shows nothing new.
+/// Largest overlap of two boxes for which a second run is worthwhile. Boxes with more overlap show the network the same.
 const FITS: f64 = 0.8;
-/// Amount by which the mean heat of the joints may be lower in a box that fits better, 0 to 1.
+/// Largest loss of mean joint heat, 0 to 1, that is accepted for a box that fits better.
 const FAINTER: f64 = 0.1;
-/// Most looks at one person beside the first.
+/// Largest number of further runs for one person after the first.
 const MOST_MORE: usize = 2;
 
-/// Network and settings with which the people of a picture are looked at.
+/// Network and settings for finding the joints of people in a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Looker<'a> {
     /// The network.
     pub network: &'a PoseNetwork,
-    /// How maps become evidence.
+    /// Settings that turn maps into evidence.
     pub settings: &'a MapSettings,
 }
 
-/// Memory that is used again from person to person.
+/// Memory that is reused from person to person.
 #[derive(Debug, Default)]
 pub struct LookMemory {
     workspace: Workspace,
-    /// Maps of a box that may turn out the better one.
+    /// Maps of a box that may fit better than the current one.
     other: JointMaps,
 }
 
-/// Result of a look at a box, beside the maps.
+/// Result of running the network on a box, apart from the maps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// The box: left, top, right, bottom, pixels of the picture.
+    /// The box: left, top, right, bottom, in pixels of the picture.
     pub outline: [f64; 4],
-    /// In which direction the trunk faces ([`Sight::front`](crate::Sight::front)).
+    /// Direction in which the trunk faces ([`Sight::front`](crate::Sight::front)).
     pub front: Option<[f32; 2]>,
-    /// Mean heat of the joints ([`JointMaps::heat`]): how well the person is seen, also compared with boxes of other sizes.
+    /// Mean heat of the joints ([`JointMaps::heat`]). It measures how well the person is seen, and can be compared between boxes of
+    /// different sizes.
     pub heat: f64,
     /// Evidence of the joints at their peaks ([`JointMaps::score`]).
     pub score: f32,
     /// The box around the joints ([`JointMaps::around`]).
     pub around: Option<[f64; 4]>,
-    /// How the picture was turned.
+    /// Rotation of the picture.
     pub turn: Turn,
 }
 
 impl LookMemory {
-    /// The memory of the network.
+    /// The network's working memory.
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.workspace
     }
 }
 
 impl Looker<'_> {
-    /// Looks into a box.
+    /// Runs the network on a box of the picture.
     ///
-    /// * `outline`: left, top, right, bottom, pixels of the picture.
-    /// * `maps`: of the joints, filled.
-    /// * Returns `None` for a box without an extent.
+    /// * `outline`: left, top, right, bottom, in pixels of the picture.
+    /// * `maps`: filled with the maps of the joints.
+    /// * Returns `None` if the box is empty.
     ///
     /// # Errors
     ///
@@ -88,9 +89,10 @@ impl Looker<'_> {
         Ok(Some(self.judge((outline, turn, sight.front()), maps)))
     }
 
-    /// Judges what was seen in a box whose maps are read.
+    /// Rates the result for a box whose maps have been read.
     ///
-    /// * `turn`: how the picture was turned; `front`: what the network says of the direction in which the trunk faces.
+    /// * `turn`: rotation of the picture.
+    /// * `front`: direction in which the trunk faces, according to the network.
     pub fn judge(
         &self,
         (outline, turn, front): ([f64; 4], Turn, Option<[f32; 2]>),
@@ -106,11 +108,11 @@ impl Looker<'_> {
         }
     }
 
-    /// Looks into the box around the joints that were seen in another one, and so on, as long as that is another box and shows the person
-    /// about as well or better: a box in which a person is small or at the edge is left for one that fits. One that cuts off the feet
-    /// stays: a network puts them at its edge.
+    /// Runs the network again on the box around the joints found in the previous box. This repeats as long as the box changes and shows the
+    /// person about as well or better. A box in which the person is small or at the edge is thus replaced by one that fits. A box that
+    /// cuts off the feet is kept, because the network places the feet at its edge.
     ///
-    /// * `seen`, `maps`: what was seen in the first box; the maps are replaced by better ones.
+    /// * `seen`, `maps`: result for the first box; the maps are replaced by better ones.
     ///
     /// # Errors
     ///
@@ -138,9 +140,9 @@ impl Looker<'_> {
         Ok(best)
     }
 
-    /// Looks at a person who is seen lying, or head down, once more, with the picture turned; what is seen better counts.
+    /// Runs the network once more on a rotated picture if the person is lying or upside down. The better of the two results is kept.
     ///
-    /// * `seen`, `maps`: what was seen in the box; the maps are replaced by better ones.
+    /// * `seen`, `maps`: result for the box; the maps are replaced by better ones.
     ///
     /// # Errors
     ///
@@ -164,11 +166,12 @@ impl Looker<'_> {
         Ok(turned)
     }
 
-    /// Looks into several boxes, and closer at the person who is seen best there.
+    /// Runs the network on several boxes, then closer on the person in the box with the best result.
     ///
-    /// * `outlines`: of the boxes; `turn`: how the picture is turned at first.
-    /// * `maps`: of the joints of that person, filled.
-    /// * Returns `None` if no box has an extent.
+    /// * `outlines`: the boxes.
+    /// * `turn`: rotation of the picture at first.
+    /// * `maps`: filled with the maps of that person's joints.
+    /// * Returns `None` if all boxes are empty.
     ///
     /// # Errors
     ///
@@ -191,7 +194,7 @@ impl Looker<'_> {
         best.map(|seen| self.look_closer((image, seen), memory, maps)).transpose()
     }
 
-    /// Looks into a box; the maps are `other` of the memory.
+    /// Runs the network on a box and writes the maps to `memory.other`.
     fn look_beside(
         &self,
         what: (Rgb8View<'_>, [f64; 4]),

@@ -1,18 +1,18 @@
-//! Painting over parts of a picture before a network looks at it.
+//! Painting over parts of a picture before the network runs on it.
 
 use keypoints::{Card, Layout, Window};
 
-/// A part of a person as a bar with round ends, pixels of the picture.
+/// A body part as a bar with round ends, in pixels of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
-    /// Where it begins and ends.
+    /// Both ends of the bar's axis.
     pub ends: [[f64; 2]; 2],
-    /// Half its width.
+    /// Half the width of the bar.
     pub radius: f64,
 }
 
 impl Bar {
-    /// Returns true if a point lies in it.
+    /// Returns true if a point is inside the bar.
     pub(crate) fn holds(&self, at: [f64; 2]) -> bool {
         let [from, to] = self.ends;
         let along = [to[0] - from[0], to[1] - from[1]];
@@ -28,7 +28,7 @@ impl Bar {
     }
 }
 
-/// Paints bars over the input of a network, in the colour that it has beyond the picture.
+/// Paints bars over the input of a network, in the colour that the input has outside the picture.
 ///
 /// * `values`: the input in the window.
 pub(crate) fn paint(bars: &[Bar], window: &Window, card: &Card, values: &mut [f32]) {

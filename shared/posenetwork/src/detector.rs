@@ -1,4 +1,4 @@
-//! A detector of people with its card: a picture in, boxes out.
+//! A people detector with its card: takes a picture, returns boxes.
 
 use inference::{Input, Session};
 use kernels::Rgb8View;
@@ -6,7 +6,7 @@ use keypoints::{Boxes, DetectorCard, Layout, PersonBox};
 
 use crate::network::{FitError, LookError, as_taken, input_of, only};
 
-/// A detector that fits its card.
+/// A people detector that matches its card.
 #[derive(Debug)]
 pub struct Detector {
     session: Session,
@@ -16,11 +16,11 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// Checks that a network fits its card, and runs it once on a grey picture.
+    /// Checks that a network matches its card, and runs it once on a grey picture.
     ///
     /// # Errors
     ///
-    /// [`FitError`], with the names and sides of both.
+    /// [`FitError`], with the names and dimensions on the card and in the network.
     pub fn new(session: Session, card: DetectorCard) -> Result<Self, FitError> {
         let description = session.description();
         let input = input_of(&card.input, &description.inputs)?;
@@ -40,7 +40,7 @@ impl Detector {
         Ok(detector)
     }
 
-    /// Its card.
+    /// The detector's card.
     pub fn card(&self) -> &DetectorCard {
         &self.card
     }
@@ -49,13 +49,13 @@ impl Detector {
         3 * self.card.input.width * self.card.input.height
     }
 
-    /// The people in a picture, the surest first; outlines in pixels of the picture.
+    /// Returns the people in a picture, the most certain first, with outlines in pixels of the picture.
     ///
-    /// * `values`: memory that is used again from picture to picture.
+    /// * `values`: memory that is reused from picture to picture.
     ///
     /// # Errors
     ///
-    /// [`LookError`]; also if the output holds a value that is not finite.
+    /// [`LookError`]; also if the output contains a value that is not finite.
     pub fn people(
         &self,
         image: Rgb8View<'_>,

@@ -1,13 +1,13 @@
-//! Joints that a network found, from the numbers of its output: joints made of keypoints, and how sure it is of them.
+//! Joints from the values of a network's output: weighted sums of keypoints, with scores.
 
 use keypoints::{Codec, Keypoint, Score};
 
 use crate::network::{Read, Sight};
 
-/// Standard deviation of the labels of `SimCC` along columns and rows, bins (mmpose's `RTMPose`, 192x256).
+/// Standard deviation of the `SimCC` training labels along columns and rows, in bins (mmpose's `RTMPose`, 192x256).
 const SIMCC_SIGMA: [f64; 2] = [4.9, 5.66];
 
-/// A keypoint with its score from 0 to 1; of distributions over columns and rows the likelihood of their highest bins.
+/// Returns a keypoint with a score from 0 to 1. For distributions over columns and rows, the score is the likelihood of their highest bins.
 pub(crate) fn scored(
     nth: usize,
     keypoint: Keypoint,
@@ -32,7 +32,7 @@ pub(crate) const NOWHERE: Keypoint = Keypoint {
     score: 0.0,
 };
 
-/// A weighted sum of keypoints; its score is the lowest of theirs. `None` where one of them was not found.
+/// Weighted sum of keypoints. Its score is the lowest score among them; `None` if one of them was not found.
 pub(crate) fn weighted(
     row: &[(usize, f64)],
     found: impl Fn(usize) -> Option<Keypoint>,
@@ -49,7 +49,7 @@ pub(crate) fn weighted(
     Some(sum)
 }
 
-/// The likelihood along an axis, as a share of what a label of the published width would give at its middle, at most 1.
+/// The likelihood along an axis relative to the peak of a label of the published width, at most 1.
 pub(crate) fn likelihood(values: &[f32], axis: usize, sight: &Sight<'_>) -> Vec<f64> {
     let nats = match sight.network().card().output {
         Codec::Simcc { nats, .. } => nats,

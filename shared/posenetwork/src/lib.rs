@@ -1,7 +1,7 @@
 //! Networks that find people in pictures, and their keypoints as the evidence of a view.
 //!
-//! [`PoseNetwork`] is a network with its card: a picture and a box around a person in, a [`Sight`] out. [`JointMaps`] are the
-//! logarithms of its maps for the 14 joints of the skeleton, [`PersonMaps`] the same where they lie in the picture.
+//! [`PoseNetwork`] is a network with its card: it takes a picture and a box around a person, and returns a [`Sight`]. [`JointMaps`] are the
+//! logarithms of its maps for the 14 joints of the skeleton. [`PersonMaps`] are the same maps with their position in the picture.
 #![forbid(unsafe_code)]
 
 mod alone;

@@ -1,4 +1,4 @@
-//! The maps of the skeleton's joints, as logarithms: the evidence that a network gives.
+//! The maps of the skeleton's joints, as logarithms: the evidence from a network.
 
 mod sides;
 
@@ -10,37 +10,37 @@ use crate::found::{likelihood, score_of, scored, weighted};
 use crate::network::{LookError, Read, Sight};
 use crate::person_maps::{MapGrid, PersonMaps};
 
-/// Number of joints, each with a map.
+/// Number of joints; each has a map.
 pub(crate) const N_JOINTS: usize = PARSE14.joints.len();
 
-/// How a map becomes evidence: `lambda * ln(max(h, 0) + eps)` with `h` the heat from 0 to 1.
+/// Conversion of a map to evidence: `lambda * ln(max(h, 0) + eps)`, where `h` is the heat from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapSettings {
-    /// Weight of the logarithm.
+    /// Factor of the logarithm.
     pub lambda: f64,
-    /// Heat of a place that the network says nothing of: the floor that keeps one view from ruling out what the others see.
+    /// Heat assumed where the network sees nothing. This floor keeps one view from ruling out what other views see.
     pub eps: f64,
-    /// Standard deviation of a position without a map, share of the height of the input.
+    /// Standard deviation of a keypoint without a map, as a share of the height of the input.
     pub point_sigma: f64,
 }
 
 impl MapSettings {
-    /// The evidence of a place that the network says nothing of.
+    /// The evidence where the network sees nothing.
     pub fn floor(&self) -> f32 {
         (self.lambda * self.eps.ln()) as f32
     }
 
-    /// The score of a person all of whose joints have a heat, and whose bones are of the usual lengths.
+    /// The score of a person whose joints all have this heat and whose bones have their usual lengths.
     pub fn score_of_heat(&self, heat: f64) -> f32 {
         (N_JOINTS as f64 * self.lambda * (heat + self.eps).ln()) as f32
     }
 
-    /// The heat, 0 to 1, that gives an amount of evidence.
+    /// The heat, 0 to 1, that corresponds to a value of evidence.
     pub fn heat(&self, evidence: f32) -> f64 {
         ((f64::from(evidence) / self.lambda).exp() - self.eps).clamp(0.0, 1.0)
     }
 
-    /// The evidence of a heat. One below a hundred-thousandth counts as none, which spares most cells the logarithm.
+    /// The evidence for a heat. A heat below a hundred-thousandth counts as zero, which saves the logarithm for most cells.
     ///
     /// * `floor`: [`Self::floor`].
     pub(crate) fn of_heat(&self, heat: f64, floor: f32) -> f32 {
@@ -64,56 +64,56 @@ impl Default for MapSettings {
 /// Maps of the joints in a window of a picture, on the grid of the network's own maps.
 #[derive(Debug, Clone, Default)]
 pub struct JointMaps {
-    /// `[joint][row][column]`, logarithms with their weight.
+    /// `[joint][row][column]`, weighted logarithms.
     values: Vec<f32>,
     rows: usize,
     columns: usize,
-    /// Interval at which rows and columns of the network's own maps are kept.
+    /// Interval between the kept rows and columns of the network's own maps.
     every: usize,
-    /// Pixels of the input between two cells, across and down; the first cell lies on the first pixel.
+    /// Pixels of the input between two cells, across and down; the first cell is at the first pixel.
     step: [f64; 2],
     floor: f32,
     window: Option<Window>,
-    /// Where each joint's map is highest, pixels of the picture, and its heat there from 0 to 1.
+    /// Peak of each joint's map, in pixels of the picture, with its heat from 0 to 1.
     peaks: Vec<Option<Keypoint>>,
-    /// All keypoints, pixels of the picture; scores as those of the peaks.
+    /// All keypoints, in pixels of the picture; their scores mean the same as those of the peaks.
     keypoints: Vec<Option<Keypoint>>,
-    /// The expected error of each joint as the network gives it, pixels of the picture; empty if it does not.
+    /// The expected error of each joint according to the network, in pixels of the picture; empty if the network does not give it.
     told: Vec<Option<f64>>,
-    /// The same of each keypoint.
+    /// The expected error of each keypoint.
     errors: Vec<f64>,
-    /// Standard deviation of a keypoint whose score is 1 on the maps themselves; `None` if it follows from the heat.
+    /// Standard deviation of a keypoint with score 1 on the maps themselves; `None` if it follows from the heat.
     sigma_px: Option<f64>,
 }
 
-/// Most cells of a map: larger ones are kept coarser.
+/// Largest number of cells of a map. Larger maps are kept at lower resolution.
 pub const MOST_CELLS: usize = 1 << 15;
 
-/// By how many cells two that are kept lie apart, so that at most [`MOST_CELLS`] are.
+/// Distance between two kept cells, such that at most [`MOST_CELLS`] are kept.
 fn coarseness([rows, columns]: [usize; 2]) -> usize {
     let area = |every: &usize| rows.div_ceil(*every) * columns.div_ceil(*every);
     let most = rows.max(columns).max(1);
     (1..=most).find(|every| area(every) <= MOST_CELLS).unwrap_or(most)
 }
 
-/// Cells between two columns or rows of a grid that is made for a codec without maps.
+/// Pixels between two columns or rows of a grid that is made for a codec without maps.
 const GRID_PX: f64 = 2.0;
-/// A box around keypoints is enlarged by it: the grid of a person that another program saw.
+/// Factor by which the box around another program's keypoints is enlarged for the grid.
 const BOX_MARGIN: f64 = 1.25;
-/// Most rows of such a grid.
+/// Largest number of rows of such a grid.
 const MOST_ROWS: usize = 64;
-/// Least standard deviation on such a grid, cells: a narrower one would be lost between two.
+/// Least standard deviation on such a grid, in cells. A narrower Gaussian could be lost between two cells.
 const LEAST_SIGMA: f64 = 1.0;
 
 /// The standard deviation along one axis of a normal distribution in the plane whose mean distance is 1: sqrt(2 / pi).
 const ALONG_AN_AXIS: f64 = 0.797_884_56;
 
 impl JointMaps {
-    /// Reads what a network sees.
+    /// Reads the output of a network.
     ///
     /// # Errors
     ///
-    /// [`LookError::Output`]; never, once the network has looked.
+    /// [`LookError::Output`]; never after the network has run successfully.
     pub fn read(&mut self, sight: &Sight<'_>, settings: &MapSettings) -> Result<(), LookError> {
         let keypoints = sight.keypoints()?;
         let rows = joint_rows(sight.network().names());
@@ -171,19 +171,19 @@ impl JointMaps {
         Ok(())
     }
 
-    /// Makes maps of the keypoints of a person that another program saw: around every joint a Gaussian as high as its score,
-    /// over the floor. Where nobody was found, everything is the floor, and no joint has a peak.
+    /// Makes maps from the keypoints of a person found by another program. Each joint becomes a Gaussian as high as its score, above
+    /// the floor. If no person was found, all cells are at the floor and no joint has a peak.
     ///
-    /// * `keypoints`: pixels of the picture; `None` for those that were not found, as for those with a score of 0.
-    /// * `ways`: how the joints follow from them: [`joint_ways`](keypoints::joint_ways) of their names. A joint has a peak where all
-    ///   keypoints of one of its ways were found; of several the first counts.
+    /// * `keypoints`: positions in pixels of the picture; `None`, or a score of 0, for keypoints that were not found.
+    /// * `ways`: how the joints follow from the keypoints: [`joint_ways`](keypoints::joint_ways) of their names. A joint has a peak if all
+    ///   keypoints of one of its ways were found; the first such way is used.
     /// * `settings`: its `point_sigma` is not used.
-    /// * `sigma`: standard deviation, share of the height of the enlarged box, as [`MapSettings::point_sigma`] is.
-    /// * Returns whether there is anybody.
+    /// * `sigma`: standard deviation, as a share of the height of the enlarged box, like [`MapSettings::point_sigma`].
+    /// * Returns true if a person was found.
     ///
     /// # Panics
     ///
-    /// If a row names a keypoint beyond the list.
+    /// If a row refers to a keypoint beyond the list.
     pub fn of_keypoints(
         &mut self,
         keypoints: &[Option<Keypoint>],
@@ -198,7 +198,7 @@ impl JointMaps {
         [self.columns, self.rows] = self.window.map_or([0, 0], |window| window.input());
         let n_values = N_JOINTS * self.rows * self.columns;
         self.values.clear();
-        // Once for the widest grid, so that no later frame allocates.
+        // Reserves memory for the largest grid, so that no later frame allocates.
         self.values.reserve(N_JOINTS * MOST_ROWS * (4 * MOST_ROWS + 1));
         self.values.resize(n_values, self.floor);
         self.peaks.clear();
@@ -234,7 +234,7 @@ impl JointMaps {
 
     /// Fills the map of one joint with a Gaussian.
     ///
-    /// * `at`, `sigma`: pixels of the input.
+    /// * `at`, `sigma`: in pixels of the input.
     fn fill_bump(
         &mut self,
         joint: usize,
@@ -301,11 +301,11 @@ impl JointMaps {
         }
     }
 
-    /// A keypoint as the network or the other program found it, and the standard deviation of its place along one axis, both pixels of
-    /// the picture: by the `sigma` of [`Self::of_keypoints`], as the network tells it, or by the score ([`expected_error`]). `None` for
-    /// one that was not found, and where nobody was looked at.
+    /// Returns a keypoint as found by the network or the other program, and the standard deviation of its position along one axis. Both are
+    /// in pixels of the picture. The standard deviation comes from the `sigma` of [`Self::of_keypoints`], from the network, or from the
+    /// score ([`expected_error`]). Returns `None` if the keypoint was not found or no picture has been read.
     ///
-    /// * `keypoint`: its number in the order of the card or of the file.
+    /// * `keypoint`: its index in the order of the card or of the file.
     pub fn keypoint(&self, keypoint: usize) -> Option<(Keypoint, f64)> {
         let found = self.keypoints.get(keypoint).copied().flatten()?;
         self.window?;
@@ -315,8 +315,8 @@ impl JointMaps {
         Some((found, self.sigma_px.or(told).unwrap_or_else(by_heat)))
     }
 
-    /// How far off a joint's peak may be: the standard deviation along one axis, pixels of the picture. As the network
-    /// gives it, else by the heat there ([`expected_error`]). `None` for a joint without a peak.
+    /// Expected error of a joint's peak: the standard deviation along one axis, in pixels of the picture. It comes from the network if the
+    /// network gives it, otherwise from the heat at the peak ([`expected_error`]). `None` for a joint without a peak.
     pub fn expected_px(&self, joint: usize) -> Option<f64> {
         let peak = self.peaks.get(joint).copied().flatten()?;
         let told = self.told.get(joint).copied().flatten();
@@ -325,8 +325,8 @@ impl JointMaps {
         Some(told.map_or_else(by_heat, |value| value * ALONG_AN_AXIS))
     }
 
-    /// Where the network sees each of the 14 joints, pixels of the picture; scores from 0 to 1. `None` for a joint that
-    /// does not follow from its keypoints.
+    /// Positions of the 14 joints according to the network, in pixels of the picture, with scores from 0 to 1. `None` for a joint that
+    /// cannot be derived from the keypoints.
     pub fn peaks(&self) -> &[Option<Keypoint>] {
         &self.peaks
     }
@@ -338,7 +338,7 @@ impl JointMaps {
 
     /// The highest maxima of a joint's map ([`PersonMaps::maxima`]).
     ///
-    /// * `n`: at most so many.
+    /// * `n`: largest number of maxima.
     pub fn maxima(&self, joint: usize, n: usize) -> Vec<([f64; 2], f32)> {
         self.evidence().map_or_else(Vec::new, |maps| maps.maxima(joint, n, |_| true))
     }
@@ -348,7 +348,7 @@ impl JointMaps {
         self.floor
     }
 
-    /// Moves everything in the picture, pixels.
+    /// Moves the maps and all keypoints by an offset in pixels of the picture.
     pub fn shift(&mut self, by: [f64; 2]) {
         self.window = self.window.map(|window| window.shifted(by));
         let keypoints = self.keypoints.iter_mut();
@@ -370,7 +370,7 @@ impl JointMaps {
         [left, top, right, bottom]
     }
 
-    /// The maps as they lie in the picture; `None` before the first picture.
+    /// The maps with their position in the picture; `None` before the first picture.
     pub fn evidence(&self) -> Option<PersonMaps<'_>> {
         let window = self.window.as_ref()?;
         let at = |cell: f64| window.in_picture(self.step.map(|step| cell * step));

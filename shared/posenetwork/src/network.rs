@@ -1,4 +1,4 @@
-//! A network with its card: a picture and a box in, keypoints and maps out.
+//! A network with its card: takes a picture and a box, returns keypoints and maps.
 
 mod errors;
 mod mirror;
@@ -21,7 +21,7 @@ use self::mirror::Mirror;
 use self::ports::outputs_of;
 use crate::cover::{Bar, paint};
 
-/// A network that fits its card.
+/// A network that matches its card.
 #[derive(Debug)]
 pub struct PoseNetwork {
     session: Session,
@@ -32,7 +32,7 @@ pub struct PoseNetwork {
     mirror: Option<Mirror>,
 }
 
-/// Memory that is used again from picture to picture.
+/// Memory that is reused from picture to picture.
 #[derive(Debug, Clone, Default)]
 pub struct Workspace {
     values: Vec<f32>,
@@ -41,21 +41,21 @@ pub struct Workspace {
     outputs: Vec<Tensor>,
     /// Outputs for the mirror image.
     mirrored: Vec<Tensor>,
-    /// Values of the input, while it is turned.
+    /// Buffer for the input values while they are rotated.
     turned: Vec<f32>,
     /// Bars that are painted over.
     covers: Vec<Bar>,
 }
 
 impl Workspace {
-    /// Paints over parts of the picture in what is looked at from now on: people who are known, so that the one behind them is seen.
+    /// Paints over parts of the picture in all later runs. This hides known people, so that the network sees the person behind them.
     pub fn cover(&mut self, bars: &[Bar]) {
         self.covers.clear();
         self.covers.extend_from_slice(bars);
     }
 }
 
-/// An output.
+/// One output of the network.
 #[derive(Debug, Clone, Default)]
 struct Tensor {
     shape: Vec<usize>,
@@ -84,23 +84,23 @@ pub struct Sight<'a> {
     outputs: &'a [Tensor],
 }
 
-/// The output of a network, read as its card says.
+/// The output of a network, decoded as its card says.
 #[derive(Debug, Clone, Copy)]
 pub enum Read<'a> {
-    /// Maps.
+    /// One map for each keypoint.
     Maps(HeatMaps<'a>),
     /// Distributions over columns and rows.
     SimCc(SimCc<'a>),
-    /// Positions.
+    /// Positions of the keypoints.
     List(List<'a>),
 }
 
 impl PoseNetwork {
-    /// Checks that a network fits its card, and runs it once on zeros.
+    /// Checks that a network matches its card, and runs it once on zeros.
     ///
     /// # Errors
     ///
-    /// [`FitError`], with the names and sides of both.
+    /// [`FitError`], with the names and dimensions on the card and in the network.
     pub fn new(session: Session, card: Card) -> Result<Self, FitError> {
         let description = session.description();
         let input = input_of(&card.input, &description.inputs)?;
@@ -123,8 +123,8 @@ impl PoseNetwork {
         Ok(network)
     }
 
-    /// Runs with the type of numbers of the card. One network is published with bytes and with whole numbers of 32 bits, by how it was
-    /// converted: where one type is refused and the other taken, that is it.
+    /// Runs the network with the number type of its card. If that type is refused, tries the other integer type and keeps it if it works.
+    /// Depending on how it was converted, the same network is published with bytes or with 32-bit integers.
     fn try_numbers(&mut self, workspace: &mut Workspace) -> Result<(), LookError> {
         let refused = match self.run(workspace) {
             Ok(()) => return Ok(()),
@@ -142,12 +142,12 @@ impl PoseNetwork {
         })
     }
 
-    /// The same network, which looks at the mirror image of every window as well: what it sees is the mean of both. That is better by
-    /// what two looks are better than one, and takes twice as long.
+    /// Returns the same network, which also runs on the mirror image of every window and averages both results. The result is
+    /// more accurate but takes twice as long.
     ///
     /// # Errors
     ///
-    /// [`FitError::Mirror`]: it gives positions, or a keypoint has no partner on the other side.
+    /// [`FitError::Mirror`]: the network returns positions, or a keypoint has no partner on the other side.
     pub fn mirrored(self) -> Result<Self, FitError> {
         let mirror = Mirror::new(&self.card, &self.names).map_err(FitError::Mirror)?;
         Ok(Self {
@@ -156,12 +156,12 @@ impl PoseNetwork {
         })
     }
 
-    /// Its card.
+    /// The network's card.
     pub fn card(&self) -> &Card {
         &self.card
     }
 
-    /// The names of its keypoints, in the order of its output.
+    /// The names of the keypoints, in the order of the network's output.
     pub fn names(&self) -> &[String] {
         &self.names
     }
@@ -171,12 +171,12 @@ impl PoseNetwork {
         &self.session
     }
 
-    /// Width and height of its input, pixels.
+    /// Width and height of the network's input, in pixels.
     pub fn size(&self) -> [usize; 2] {
         [self.card.input.width, self.card.input.height]
     }
 
-    /// Returns true if the network can look at turned pictures: it gives maps or distributions.
+    /// Returns true if the network can process rotated pictures: it returns maps or distributions.
     pub fn may_turn(&self) -> bool {
         !matches!(self.card.output, Codec::Keypoints { .. })
     }
@@ -186,14 +186,14 @@ impl PoseNetwork {
         3 * width * height
     }
 
-    /// Looks at the person in a box.
+    /// Finds the joints of the person in a box.
     ///
-    /// * `outline`: left, top, right, bottom, pixels of the picture.
-    /// * Returns `None` for a box without an extent.
+    /// * `outline`: left, top, right, bottom, in pixels of the picture.
+    /// * Returns `None` if the box is empty.
     ///
     /// # Errors
     ///
-    /// [`LookError`]; also if the output holds a value that is not finite.
+    /// [`LookError`]; also if the output contains a value that is not finite.
     pub fn look<'a>(
         &'a self,
         image: Rgb8View<'_>,
@@ -203,10 +203,10 @@ impl PoseNetwork {
         self.look_turned(image, (outline, Turn::Up), workspace)
     }
 
-    /// Looks at the person in a box whose head points somewhere. The maps are those of the picture, whatever was turned for the network;
-    /// one that [gives positions](Self::may_turn) sees the picture as it is.
+    /// Finds the joints of the person in a box, with the picture rotated by the direction of the head. The maps are rotated back to the
+    /// picture. A network that [returns positions](Self::may_turn) gets the picture without rotation.
     ///
-    /// * the others as for [`Self::look`].
+    /// * The other parameters are those of [`Self::look`].
     ///
     /// # Errors
     ///
@@ -256,7 +256,7 @@ impl PoseNetwork {
         self.sight(window, workspace).map(Some)
     }
 
-    /// Runs on the values of a workspace.
+    /// Runs the network on the input values of a workspace.
     fn run(&self, workspace: &mut Workspace) -> Result<(), LookError> {
         let [width, height] = self.size();
         let shape = match self.card.input.layout {
@@ -289,7 +289,7 @@ impl PoseNetwork {
         Ok(())
     }
 
-    /// Checks the outputs of a workspace.
+    /// Checks the outputs in a workspace.
     fn sight<'a>(
         &'a self,
         window: Window,
@@ -312,19 +312,19 @@ impl PoseNetwork {
 }
 
 impl<'a> Sight<'a> {
-    /// The network.
+    /// The network that produced this output.
     pub fn network(&self) -> &'a PoseNetwork {
         self.network
     }
 
-    /// Where the input lay in the picture.
+    /// The part of the picture that the input covers.
     pub fn window(&self) -> &Window {
         &self.window
     }
 
-    /// The window in which a cell of the maps lies at its number times their step, as [`HeatMaps::step`] has it. That is
-    /// [`Self::window`] where the first cell lies on the first pixel, and half a cell from there where every cell lies in the
-    /// middle of the pixels that it covers.
+    /// The window in which a cell's position is its index times the step of the maps, as in [`HeatMaps::step`]. It is
+    /// [`Self::window`] if the first cell is at the first pixel. It is moved by half a cell if every cell is at the
+    /// centre of the pixels that it covers.
     ///
     /// # Errors
     ///
@@ -346,11 +346,11 @@ impl<'a> Sight<'a> {
         Ok(self.window.shifted(by))
     }
 
-    /// The output, read as the card says.
+    /// Decodes the output as the card says.
     ///
     /// # Errors
     ///
-    /// [`LookError::Output`]; never, once the network has looked.
+    /// [`LookError::Output`]; never after the network has run successfully.
     pub fn read(&self) -> Result<Read<'a>, LookError> {
         let card = &self.network.card;
         let n = self.network.names.len();
@@ -380,15 +380,15 @@ impl<'a> Sight<'a> {
         })
     }
 
-    /// Returns the direction in which the trunk faces: towards the right of the picture, towards the camera; `None` if the
+    /// Returns the direction in which the trunk faces, as components towards the right of the picture and towards the camera. `None` if the
     /// network does not give it. See [`keypoints::Also::front`].
     pub fn front(&self) -> Option<[f32; 2]> {
         let at = self.also(self.network.card.also.front.as_deref())?;
         at.values.as_slice().try_into().ok()
     }
 
-    /// The expected error of every keypoint, pixels of the picture, in the order of the card's names; `None` if it does
-    /// not give them.
+    /// The expected error of every keypoint, in pixels of the picture, in the order of the card's names. `None` if the network does
+    /// not give it.
     pub fn errors(&self) -> Option<impl Iterator<Item = f64>> {
         let [_, height] = self.network.size();
         let height = height as f64 * self.window.step()[1];
@@ -399,11 +399,11 @@ impl<'a> Sight<'a> {
     fn also(&self, name: Option<&str>) -> Option<&'a Tensor> {
         let name = name?;
         let names = self.network.outputs.iter().zip(self.outputs);
-        // Behind those of the codec.
+        // These outputs follow those of the codec.
         names.rev().find(|output| output.0.as_str() == name).map(|name| name.1)
     }
 
-    /// Checks that the outputs beside the keypoints have the shape that the card says, and are finite.
+    /// Checks that the outputs other than the keypoints are finite and have the shape that the card says.
     fn check_also(&self) -> Result<(), LookError> {
         let also = &self.network.card.also;
         for (name, n) in [(&also.front, 2), (&also.error, self.network.names.len())] {
@@ -436,7 +436,7 @@ impl<'a> Sight<'a> {
         Ok(())
     }
 
-    /// The keypoints, in pixels of the picture, in the order of the card's names.
+    /// The keypoints, in pixels of the picture and in the order of the card's names.
     ///
     /// # Errors
     ///

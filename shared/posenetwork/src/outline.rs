@@ -1,12 +1,12 @@
 //! The box around a person whose joints are known.
 
-/// Amount by which hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+/// Margin for hands, feet and hair beyond the joints, on each side, as a share of the longer side.
 const BEYOND: f64 = 0.05;
 
-/// The box around the joints of a person, widened for what lies beyond them: left, top, right, bottom, in the unit of the
+/// The box around a person's joints, with a margin for hands, feet and hair: left, top, right, bottom, in the unit of the
 /// points.
 ///
-/// * Returns `None` without a point, or if they have no extent.
+/// * Returns `None` if there is no point or the points have no extent.
 pub fn outline_of(joints: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 4]> {
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
@@ -24,7 +24,7 @@ pub fn outline_of(joints: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 4]
     Some([low[0] - more, low[1] - more, high[0] + more, high[1] + more])
 }
 
-/// The share of two boxes that both cover: the intersection over the union, 0 to 1.
+/// The overlap of two boxes: intersection over union, 0 to 1.
 pub fn overlap(a: [f64; 4], b: [f64; 4]) -> f64 {
     let side = |axis: usize| (a[axis + 2].min(b[axis + 2]) - a[axis].max(b[axis])).max(0.0);
     let area =

@@ -1,18 +1,18 @@
-//! The maps of one person where they lie in a picture.
+//! The maps of one person with their position in a picture.
 
 use skeleton::PARSE14;
 
 use crate::between::{Tap, between};
 
-/// Evidence above the floor from which a cell may be a maximum.
+/// Least evidence above the floor for a cell to count as a maximum.
 const LEAST_ABOVE: f32 = 1e-3;
 
-/// Where the cells of maps lie in a picture.
+/// Position of the cells of maps in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapGrid {
-    /// Centre of the first cell, pixels of the picture.
+    /// Centre of the first cell, in pixels of the picture.
     pub first_px: [f64; 2],
-    /// Distance of neighbouring cells, across and down, pixels of the picture.
+    /// Distance between neighbouring cells, across and down, in pixels of the picture.
     pub cell_px: [f64; 2],
     /// Number of columns and rows.
     pub size: [usize; 2],
@@ -29,12 +29,12 @@ impl MapGrid {
         PARSE14.joints.len() * self.area()
     }
 
-    /// The cell at a point of the picture, with fractions.
+    /// Converts a point of the picture to cell coordinates, with fractions.
     pub fn cell(&self, point: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| (point[axis] - self.first_px[axis]) / self.cell_px[axis])
     }
 
-    /// The point of the picture at a cell, pixels.
+    /// Converts cell coordinates to a point of the picture, in pixels.
     ///
     /// * `cell`: column and row, with fractions.
     pub fn place(&self, cell: [f64; 2]) -> [f64; 2] {
@@ -42,7 +42,7 @@ impl MapGrid {
     }
 }
 
-/// The maps of one person, as logarithms ([`MapSettings`](crate::MapSettings)), in place.
+/// The maps of one person, as logarithms ([`MapSettings`](crate::MapSettings)), with their position in the picture.
 #[derive(Debug, Clone, Copy)]
 pub struct PersonMaps<'a> {
     grid: MapGrid,
@@ -51,14 +51,14 @@ pub struct PersonMaps<'a> {
 }
 
 impl<'a> PersonMaps<'a> {
-    /// Takes maps as they are.
+    /// Wraps the values of maps without changing them.
     ///
     /// * `values`: `[joint][row][column]`, joints of `skeleton::PARSE14`.
-    /// * `floor`: evidence of a place that the maps say nothing of.
+    /// * `floor`: evidence where the network sees nothing.
     ///
     /// # Panics
     ///
-    /// If the number of values is not that of the grid.
+    /// If the number of values does not match the grid.
     pub fn new(grid: MapGrid, values: &'a [f32], floor: f32) -> Self {
         assert_eq!(values.len(), grid.n_values(), "values of the maps");
         Self {
@@ -68,7 +68,7 @@ impl<'a> PersonMaps<'a> {
         }
     }
 
-    /// Where the cells lie.
+    /// Position of the cells in the picture.
     pub fn grid(&self) -> &MapGrid {
         &self.grid
     }
@@ -78,7 +78,7 @@ impl<'a> PersonMaps<'a> {
         self.values
     }
 
-    /// Evidence of a place that the maps say nothing of.
+    /// Evidence where the network sees nothing.
     pub fn floor(&self) -> f32 {
         self.floor
     }
@@ -89,8 +89,8 @@ impl<'a> PersonMaps<'a> {
         &self.values[joint * area..(joint + 1) * area]
     }
 
-    /// The evidence for a joint at a point of the picture, pixels: between sixteen cells (Catmull & Rom 1974), so that a maximum may lie
-    /// between two; the floor beyond the maps.
+    /// The evidence for a joint at a point of the picture, in pixels. It is interpolated between sixteen cells (Catmull & Rom 1974), so
+    /// that a maximum may be between two cells. Outside the maps, it is the floor.
     pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
         let [x, y] = self.grid.cell(point);
         let [columns, rows] = self.grid.size;
@@ -101,11 +101,11 @@ impl<'a> PersonMaps<'a> {
         between(self.map(joint), columns, &down, &across)
     }
 
-    /// The highest maxima of a joint's map: pixels of the picture, and the evidence of their cells; the best first. Each lies where the
-    /// parabolas through its cell and the neighbours are highest: the logarithm of a Gaussian is one.
+    /// The highest maxima of a joint's map, the best first: positions in pixels of the picture, and the evidence of their cells. Each
+    /// position is the vertex of parabolas through the cell and its neighbours, because the logarithm of a Gaussian is a parabola.
     ///
-    /// * `n`: at most so many.
-    /// * `is_wanted`: whether a place counts, pixels of the picture.
+    /// * `n`: largest number of maxima.
+    /// * `is_wanted`: returns true for positions that count, in pixels of the picture.
     pub fn maxima(
         &self,
         joint: usize,
@@ -117,7 +117,7 @@ impl<'a> PersonMaps<'a> {
         let least = self.floor + LEAST_ABOVE;
         let mut found: Vec<([f64; 2], f32)> = Vec::new();
         for (row, line) in map.chunks_exact(columns.max(1)).enumerate() {
-            // Most of a map is the floor.
+            // Most cells of a map are at the floor.
             let above = line.iter().enumerate().filter(|(_, here)| **here > least);
             for (column, here) in above {
                 let mut around = row.saturating_sub(1)..(row + 2).min(rows);
@@ -146,7 +146,7 @@ impl<'a> PersonMaps<'a> {
     }
 }
 
-/// Where the parabola through a maximum and its neighbours is highest, cells from the maximum; 0 at an edge.
+/// Vertex of the parabola through a maximum and its neighbours, in cells from the maximum; 0 at an edge.
 fn vertex(before: Option<f32>, here: f32, after: Option<f32>) -> f64 {
     let (Some(before), Some(after)) = (before, after) else {
         return 0.0;

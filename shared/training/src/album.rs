@@ -2,25 +2,25 @@
 
 use crate::datasets::Picture;
 
-/// Why an image cannot be read.
+/// Reason why an image cannot be read.
 pub type AlbumError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Images by number; requested repeatedly, from several threads.
+/// Access to images by number. The same image may be requested repeatedly and from several threads.
 pub trait Album: Sync {
-    /// The image of a person.
+    /// Returns the image of a person.
     ///
     /// # Errors
     ///
-    /// Whatever keeps it from being read.
+    /// If the image cannot be read.
     fn person(&self, person: usize) -> Result<Picture, AlbumError>;
 
     /// Number of background images, which show no people.
     fn n_backgrounds(&self) -> usize;
 
-    /// A background image.
+    /// Returns a background image.
     ///
     /// # Errors
     ///
-    /// Whatever keeps it from being read.
+    /// If the image cannot be read.
     fn background(&self, image: usize) -> Result<Picture, AlbumError>;
 }

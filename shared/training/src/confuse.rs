@@ -1,4 +1,4 @@
-//! Loss-augmented inference: wrong poses of a person that score as well as the right one.
+//! Loss-augmented inference: finds wrong poses of a person that score as well as the right one.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(crate) struct Confuser {
 
 /// The loss of a pose: the mean over its parts, each between 0 and the same maximum.
 ///
-/// Added to the solver's terms it gives loss-augmented inference.
+/// Together with the solver's terms, it gives loss-augmented inference.
 #[derive(Debug)]
 pub(crate) struct Loss<'a> {
     layout: &'a Layout,
@@ -27,9 +27,9 @@ pub(crate) struct Loss<'a> {
     weight: f64,
 }
 
-/// The loss of poses of a person.
+/// Returns the loss for the poses of one person.
 ///
-/// * `worst`: loss of a pose all of whose parts are wrong.
+/// * `worst`: loss of a pose with all parts wrong.
 pub(crate) fn loss<'a>(
     model: &Model,
     layout: &'a Layout,
@@ -45,13 +45,13 @@ pub(crate) fn loss<'a>(
 }
 
 impl Loss<'_> {
-    /// Loss of a part whose centre is `off` pixels from the marked one: 0 up to a quarter of the box's
-    /// side, 1 from three quarters on.
+    /// Loss of a part whose centre is `off` pixels from the marked centre. It is 0 up to a quarter of the box's
+    /// side, and 1 from three quarters on.
     fn of_part(&self, off: f64) -> f64 {
         self.weight * ((off / self.marked.side - 0.25) / 0.5).clamp(0.0, 1.0)
     }
 
-    /// Loss of a pose.
+    /// Loss of a whole pose.
     pub(crate) fn of_pose(&self, model: &Model, pose: &Pose) -> f64 {
         let centres = pose.centres(model, self.layout);
         let off = centres.iter().zip(&self.marked.parts);
@@ -89,9 +89,9 @@ impl Confuser {
         }
     }
 
-    /// The pose that maximises score plus loss; `None` if the image is too small for the model.
+    /// The pose with the largest sum of score and loss; `None` if the image is too small for the model.
     ///
-    /// * `worst`: loss of a pose all of whose parts are wrong.
+    /// * `worst`: loss of a pose with all parts wrong.
     pub(crate) fn worst(&self, picture: &Picture, marked: &Marked, worst: f64) -> Option<Pose> {
         let image = picture.view();
         let layout = Layout::new(&self.model, image.width(), image.height()).ok()?;

@@ -1,15 +1,15 @@
 //! Annotated people: reading, validation, rotation and mirroring, and the parts of a model from their joints.
 //!
-//! [`read`] takes the folder of a data set (PARSE, LSP, LSP-extended) or a file of JSON lines and returns
-//! [`People`]: the valid ones, and a [`Problem`] for each of the others, with file and row. A
+//! [`read`] takes the folder of a data set (PARSE, LSP, LSP-extended) or a file of JSON lines. It returns
+//! [`People`]: the valid people, and a [`Problem`] with file and row for each of the others. A
 //! [`Sample`] is a person with the pixels; a [`SkeletonTable`] converts joints to parts.
 //!
-//! Pixels: the centre of the top-left pixel is `(0, 0)`; the MATLAB files count from 1, which is undone
-//! when they are read.
+//! In pixel coordinates, the centre of the top-left pixel is `(0, 0)`. The MATLAB files count from 1, so their coordinates are
+//! converted when they are read.
 //!
 //! # The annotation file of Parallax
 //!
-//! One JSON object per line, one person each; empty lines are ignored:
+//! Each line is one JSON object and describes one person; empty lines are ignored:
 //!
 //! ```json
 //! {"image": "photos/7.jpg", "joints": [[31.5, 80.0], null, [40.0, 61.25]], "visible": [true, false, true], "name": "ann"}
@@ -18,11 +18,11 @@
 //! | key | meaning |
 //! |---|---|
 //! | `image` | path of the image, relative to the annotation file |
-//! | `joints` | `[x, y]` in pixels, or `null` where the joint is not known; the order is that of the skeleton table |
+//! | `joints` | `[x, y]` in pixels, or `null` if the joint is unknown; the order is that of the skeleton table |
 //! | `visible` | optional, one `true` or `false` per joint; without it, all known joints are visible |
-//! | `name` | optional, no two people of a file may have the same |
+//! | `name` | optional; must be unique in the file |
 //!
-//! Other keys are refused.
+//! Other keys are errors.
 
 mod person;
 pub mod sequences;

@@ -1,10 +1,10 @@
 //! The structural support vector machine, solved by dual coordinate descent over the working set of examples.
 //!
-//! Primal: `min_v 1/2 |v|^2 + sum_g C_g max(0, max_{j in g} (b_j - v . x_j))` with some coordinates of
-//! `v` not negative; an example `j` belongs to a group `g` (one person, or one place of a negative
-//! image), of which only the worst counts. Dual: `max_a sum_j a_j b_j - 1/2 |v(a)|^2` with `a_j >= 0`,
-//! `sum_{j in g} a_j <= C_g`, `v(a) = [sum_j a_j x_j]` with the negative among those coordinates set
-//! to 0. Source: Yang & Ramanan 2013, section 5, and what is known of their release's solver.
+//! Primal: `min_v 1/2 |v|^2 + sum_g C_g max(0, max_{j in g} (b_j - v . x_j))`, where some coordinates of
+//! `v` must not be negative. Each example `j` belongs to a group `g`: one person, or one position in a negative
+//! image. Only the worst example of a group counts. Dual: `max_a sum_j a_j b_j - 1/2 |v(a)|^2` with `a_j >= 0`,
+//! `sum_{j in g} a_j <= C_g`, and `v(a) = [sum_j a_j x_j]` with the negative among those coordinates set
+//! to 0. Source: Yang & Ramanan 2013, section 5, and what is known of the solver in their release.
 
 mod solve;
 #[cfg(test)]
@@ -22,7 +22,7 @@ pub use solve::{Effort, Gap};
 pub struct Constraint {
     /// The example.
     pub x: Sparse,
-    /// The required product with the solution.
+    /// Least product of the example with the solution.
     pub margin: f64,
 }
 
@@ -40,21 +40,21 @@ struct Entry<T> {
 struct Group<K> {
     key: K,
     cost: f64,
-    /// Sum of the shares of the members; at most the cost.
+    /// Sum of the shares of the group's members; at most the cost.
     total: f64,
     members: Vec<usize>,
 }
 
-/// The cost of a violated example, and its group.
+/// The group of an example, and the cost of violating its margin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost<K> {
-    /// The group: only its worst example counts.
+    /// Group of the example: only its worst example counts.
     pub group: K,
-    /// Cost of every unit by which the group's worst example misses its margin.
+    /// Cost per unit by which the group's worst example misses its margin.
     pub of_unit: f64,
 }
 
-/// The examples, and the solution so far.
+/// The working set of examples, and the solution so far.
 ///
 /// `K` identifies the groups, `T` is the caller's tag of an example.
 #[derive(Debug)]
@@ -71,9 +71,9 @@ pub struct Machine<K, T> {
 }
 
 impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
-    /// No examples yet; the solution is 0.
+    /// Makes a machine without examples, whose solution is 0.
     ///
-    /// * `non_negative`: coordinates that may not become negative.
+    /// * `non_negative`: coordinates that must not become negative.
     pub fn new(n_coordinates: usize, non_negative: Range<usize>) -> Self {
         Self {
             entries: Vec::new(),
@@ -86,9 +86,9 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         }
     }
 
-    /// Adds a constraint. The cost of a group is that of its first example.
+    /// Adds a constraint. The cost of a group is the cost of its first example.
     ///
-    /// * `share`: of the example in the solution; 0 for a new example, see
+    /// * `share`: share of the example in the solution; 0 for a new example, see
     ///   [`Self::entries`].
     pub fn add(&mut self, cost: Cost<K>, tag: T, demand: Constraint, share: f64) {
         let Cost { group, of_unit } = cost;
@@ -126,13 +126,13 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         self.entries.is_empty()
     }
 
-    /// Bytes that the examples hold.
+    /// Memory used by the examples, in bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Tags and shares of all examples, in the order in which they were added. Added again in this
-    /// order with these shares, they make the same machine.
+    /// Tags and shares of all examples, in the order in which they were added. Adding them again in this
+    /// order with these shares gives the same machine.
     pub fn entries(&self) -> impl Iterator<Item = (&T, f64)> {
         self.entries.iter().map(|entry| (&entry.tag, entry.share))
     }
@@ -146,15 +146,15 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         solution
     }
 
-    /// Keeps only the wanted examples; the others lose their share in the solution.
+    /// Keeps only the wanted examples. The others are removed, and their shares in the solution are dropped.
     pub fn retain(&mut self, wanted: impl Fn(&T) -> bool) {
         self.keep(&|entry| wanted(&entry.tag));
     }
 
-    /// Shrinks the working set: removes examples without a share that exceed their margin by `room`, and of
-    /// the others without a share those with the largest slack until at most `bytes` are used.
+    /// Shrinks the working set. Removes examples without a share that exceed their margin by `room`. Then removes
+    /// other examples without a share, those with the largest slack first, until at most `bytes` are used.
     ///
-    /// * `may_go`: whether an example with this tag may be removed.
+    /// * `may_go`: returns true if an example with this tag may be removed.
     pub fn forget(&mut self, room: f64, bytes: usize, may_go: impl Fn(&T) -> bool) {
         let mut idle: Vec<(f64, usize)> = (0..self.entries.len())
             .filter(|&i| self.entries[i].share == 0.0 && may_go(&self.entries[i].tag))
@@ -172,8 +172,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         self.keep(&|entry| !entry.share.is_nan());
     }
 
-    /// Removes entries; groups without any go too, and the others take the order of their first one,
-    /// so that the machine is the same as if nothing else had ever been in it.
+    /// Removes entries, and groups without entries. The remaining groups are ordered by their first entry,
+    /// so that the machine is the same as if the removed entries had never been added.
     fn keep(&mut self, wanted: &dyn Fn(&Entry<T>) -> bool) {
         let groups = std::mem::take(&mut self.groups);
         let entries = std::mem::take(&mut self.entries);

@@ -11,7 +11,7 @@ use crate::sparse::{Run, Sparse};
 /// The features of a pose: its score with the vector `v` is `features . v + fixed`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Example {
-    /// Features.
+    /// Features of the pose.
     pub features: Sparse,
     /// The part of the score due to the minimum stiffness, which is not trained.
     pub fixed: f64,
@@ -22,7 +22,7 @@ impl Example {
     ///
     /// # Panics
     ///
-    /// If the pose does not lie on the level.
+    /// If the pose is not on the level.
     pub(crate) fn of(shape: &Shape, at: &Coordinates, map: &FeatureMap<'_>, pose: &Pose) -> Self {
         let runs = pose.parts.iter().enumerate().map(|(part, placed)| {
             let corner = [placed.x, placed.y].map(usize::from);
@@ -35,11 +35,11 @@ impl Example {
         Self::with(shape, at, pose, None, runs.collect())
     }
 
-    /// As [`Self::of`], but the features are shared, not copied.
+    /// Returns the same as [`Self::of`], but refers to shared features instead of copying them.
     ///
     /// # Panics
     ///
-    /// If the pose does not lie on the pyramid.
+    /// If the pose is not on the pyramid.
     pub(crate) fn sharing(shape: &Shape, at: &Coordinates, pyramid: &Cells, pose: &Pose) -> Self {
         let row_len = shape.side * N_CHANNELS;
         let mut runs = Vec::with_capacity((shape.side + 3) * shape.n_parts());
@@ -99,12 +99,12 @@ impl Example {
 #[derive(Debug)]
 pub(crate) struct Cells {
     cells: Arc<[f32]>,
-    /// Where each level begins, and its columns.
+    /// First index and number of columns of each level.
     levels: Vec<(usize, usize)>,
 }
 
 impl Cells {
-    /// Computes all levels.
+    /// Computes the features of all levels.
     pub(crate) fn of(pyramid: &FeaturePyramid<'_>, n_levels: usize) -> Self {
         let mut cells = Vec::new();
         let mut levels = Vec::new();
@@ -119,7 +119,7 @@ impl Cells {
         }
     }
 
-    /// Bytes that they take.
+    /// Memory used by the features, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(&*self.cells)
     }
@@ -134,7 +134,7 @@ impl Cells {
 ///
 /// # Panics
 ///
-/// If the filter does not lie on the map.
+/// If the filter is not on the map.
 pub(crate) fn window(map: &FeatureMap<'_>, [x, y]: [usize; 2], side: usize) -> Vec<f32> {
     let row = |row: usize| {
         let first = ((y + row) * map.cols + x) * N_CHANNELS;

@@ -7,26 +7,26 @@ use crate::example::Example;
 use crate::shape::{Coordinates, Shape};
 use crate::sparse::Sparse;
 
-/// How the first filters are trained.
+/// Settings for training the initial filters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FilterSettings {
     /// Cost of a negative window that misses its margin.
     pub cost: f64,
-    /// Cost of a positive one, in costs of a negative one.
+    /// Cost of a positive window that misses its margin, in costs of a negative window.
     pub positive_weight: f64,
-    /// Stopping criterion of a machine.
+    /// Stopping criterion of each machine.
     pub effort: Effort,
-    /// Seed of the order of the steps.
+    /// Seed of the random order of steps.
     pub seed: u64,
 }
 
 /// Trains a filter for every type of every part, and combines them into an initial model.
 ///
-/// The biases of the machines become those of the types, all springs are as soft as they may be, and
-/// everything is divided by the number of parts, so that a person scores about 1.
+/// The biases of the machines become the biases of the types. All springs have the least stiffness. Filters
+/// and biases are divided by the number of parts, so that a person scores about 1.
 ///
-/// * `people`: every person, each part with its type.
-/// * `background`: windows without people, each a filter's features.
+/// * `people`: examples of all people, each part with its type.
+/// * `background`: features of windows without people, each of a filter's size.
 pub(crate) fn first_model(
     shape: &Shape,
     people: &[Example],
@@ -61,10 +61,10 @@ pub(crate) fn first_model(
     v
 }
 
-/// Feature of a machine's bias: it is regularised little.
+/// Value of the feature for a machine's bias. A large value means little regularisation.
 const BIAS: f64 = 10.0;
 
-/// Filter and bias of the windows whose features lie at `first` in the people's vectors.
+/// Trains one filter and its bias. The features of its windows begin at `first` in the people's vectors.
 fn one(
     at: &Coordinates,
     first: usize,

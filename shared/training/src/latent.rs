@@ -1,4 +1,4 @@
-//! The best pose of a person near the annotated parts (latent positive examples).
+//! Finds the best pose of a person near the annotated parts (latent positive examples).
 
 #[cfg(test)]
 mod tests;
@@ -9,17 +9,17 @@ use kernels::N_CHANNELS;
 /// An annotated person in an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
-    /// Centres of the parts, pixels; the centre of the top-left pixel is (0, 0).
+    /// Centres of the parts, in pixels; the centre of the top-left pixel is (0, 0).
     pub parts: Vec<[f64; 2]>,
-    /// Side of every part's box, pixels.
+    /// Side of every part's box, in pixels.
     pub side: f64,
     /// Required types of the parts; `None` if any type is allowed.
     pub types: Option<Vec<usize>>,
 }
 
 impl Marked {
-    /// The rectangle `[x1, y1, x2, y2]` in which the person is searched: that around all boxes, grown on
-    /// every side by half of its width and height together (Yang & Ramanan 2013).
+    /// The rectangle `[x1, y1, x2, y2]` in which the person is searched. It encloses all boxes and is enlarged on
+    /// every side by half the sum of its width and height (Yang & Ramanan 2013).
     pub fn surroundings(&self) -> [f64; 4] {
         let half = self.side / 2.0;
         let low = |axis: usize| {
@@ -50,12 +50,12 @@ struct Cell {
     overlap: f64,
 }
 
-/// The highest-scoring pose whose parts all overlap the marked ones.
+/// The highest-scoring pose whose parts all overlap the marked boxes.
 ///
-/// Exact over all levels: since few cells overlap enough, all pairs of them are compared. `None` if on no
-/// level every part can overlap, as for people smaller than the model.
+/// The result is exact over all levels: since few cells overlap enough, all pairs of cells are compared. Returns `None` if on no
+/// level all parts can overlap, as for people smaller than the model.
 ///
-/// * `overlap`: least intersection over union of every part's box with the marked one.
+/// * `overlap`: least intersection over union of every part's box with the marked box.
 pub(crate) fn best_near(
     model: &Model,
     pyramid: &FeaturePyramid<'_>,
@@ -83,7 +83,7 @@ pub(crate) fn best_near(
     best
 }
 
-/// The pose whose boxes overlap the marked ones best, regardless of its score.
+/// The pose whose boxes have the largest overlap with the marked boxes, regardless of its score.
 ///
 /// `None` as in [`best_near`].
 pub(crate) fn nearest(
@@ -127,7 +127,7 @@ fn placement(cell: &Cell, mixture: usize) -> Placement {
     }
 }
 
-/// The cells of a level at which each part overlaps its marked box; `None` if a part has none.
+/// The cells of a level at which each part overlaps its marked box; `None` if a part has no such cell.
 fn cells_near(
     model: &Model,
     layout: &Layout,
@@ -145,7 +145,7 @@ fn cells_near(
     }
     let cells_of = |centre: &[f64; 2]| {
         let mut found = Vec::new();
-        // Where a box of the level would have to begin to be concentric, cells.
+        // Position in cells at which a box of the level is concentric with the marked box.
         let begin = |axis: usize| {
             let pad = layout.pad[1 - axis] as f64;
             (centre[axis] - (size[axis] - 1.0) / 2.0) / it.scale + pad
@@ -182,14 +182,14 @@ struct Search<'a> {
     cells: Vec<Vec<Cell>>,
 }
 
-/// Scores of a part, `[cell][type]`, and which `[cell, type]` of each child they were reached with.
+/// Scores of a part, `[cell][type]`.
 type Scores = Vec<Vec<f64>>;
 
 impl Search<'_> {
     fn best(&self) -> Pose {
         let n_parts = self.model.n_parts();
         let mut scores: Vec<Scores> = (0..n_parts).map(|i| self.own(i)).collect();
-        // The best cell of a child's type for every cell of its parent: `[part][cell][type]`.
+        // The best cell for every cell of the parent and type of the child: `[part][cell][type]`.
         let mut choices: Vec<Vec<Vec<(f64, usize)>>> = vec![Vec::new(); n_parts];
         for part in (1..n_parts).rev() {
             let Some(edge) = &self.model.spec().parts[part].edge else {
@@ -230,7 +230,7 @@ impl Search<'_> {
         self.cells[part].iter().map(of_cell).collect()
     }
 
-    /// For every cell of the parent and type of the part: the best score, and the cell it needs.
+    /// Best score, and the cell that gives it, for every cell of the parent and type of the part.
     fn votes(&self, part: usize, scores: &Scores) -> Vec<Vec<(f64, usize)>> {
         let Some(edge) = &self.model.spec().parts[part].edge else {
             return Vec::new();

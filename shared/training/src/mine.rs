@@ -16,7 +16,7 @@ pub(crate) struct Miner {
 impl Miner {
     /// Prepares the search.
     ///
-    /// * `model`: with the levels per octave to search.
+    /// * `model`: the model, whose interval is the number of levels per octave to search.
     pub(crate) fn new(model: Model) -> Self {
         let model = Arc::new(model);
         Self {
@@ -26,7 +26,7 @@ impl Miner {
         }
     }
 
-    /// The poses of an image that score at least `threshold`, the `max` best ones; none if the image
+    /// The poses of an image that score at least `threshold`: at most the `max` best. The list is empty if the image
     /// is too small for the model.
     pub(crate) fn search(&self, picture: &Picture, threshold: f32, max: usize) -> Vec<Pose> {
         let image = picture.view();

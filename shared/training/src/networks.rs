@@ -2,12 +2,13 @@
 //!
 //! * [`Network`]: a network, defined once by the operations of [`Ops`]. [`initial`] plans its parameters, [`write()`] writes it as
 //!   an ONNX file.
-//! * [`Task`]: what is learned, from whom, and how. [`pose`], [`finder`] and [`quality`] are the three.
-//! * [`Trainer`]: runs the steps of a task, keeps the best network, and writes everything that it knows as a checkpoint, from which
-//!   a training goes on and ends with the same bits.
-//! * [`Backend`]: what computes. Rust is built in; `LibTorch` comes with the feature `libtorch`, for a processor with fast cores.
+//! * [`Task`]: the training data, the cost and the settings of a training run. [`pose`], [`finder`] and [`quality`] are the three tasks.
+//! * [`Trainer`]: runs the steps of a task and keeps the best network. It writes its state as a checkpoint. A training run that is resumed
+//!   from a checkpoint ends with the same bits.
+//! * [`Backend`]: the library that computes. Rust is built in; `LibTorch` comes with the feature `libtorch`, for a processor with fast
+//!   cores.
 //!
-//! Nothing here reads or writes files.
+//! This module does not read or write files.
 
 mod begun;
 mod checkpoint;

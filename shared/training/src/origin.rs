@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::shape::Shape;
 
-/// A pose as it is stored: level, and `(x, y, type)` of every part.
+/// A stored pose: level, and `(x, y, type)` of every part.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub(crate) struct Placed {
     level: u16,
@@ -13,7 +13,7 @@ pub(crate) struct Placed {
 }
 
 impl Placed {
-    /// Takes a pose without its score.
+    /// Converts a pose, without its score.
     pub(crate) fn of(pose: &Pose) -> Self {
         let part = |placement: &Placement| (placement.x, placement.y, placement.mixture);
         Self {
@@ -22,14 +22,14 @@ impl Placed {
         }
     }
 
-    /// Returns true if it has the parts and types of a shape.
+    /// Returns true if the pose has the parts and types of a shape.
     pub(crate) fn fits(&self, shape: &Shape) -> bool {
         let has_type =
             |(part, it): (usize, &(u16, u16, u8))| usize::from(it.2) < shape.n_types(part);
         self.parts.len() == shape.n_parts() && self.parts.iter().enumerate().all(has_type)
     }
 
-    /// The pose, with a score of 0.
+    /// Converts to a pose with a score of 0.
     pub(crate) fn pose(&self) -> Pose {
         let part = |&(x, y, mixture): &(u16, u16, u8)| Placement { x, y, mixture };
         Pose {
@@ -45,40 +45,40 @@ impl Placed {
 pub(crate) enum Origin {
     /// The right pose of a person.
     Right {
-        /// The person.
+        /// Number of the person.
         person: u32,
-        /// Its pose.
+        /// The right pose.
         pose: Placed,
     },
-    /// The difference of the right pose of a person and a wrong one.
+    /// The difference between the right pose of a person and a wrong pose.
     Mistake {
-        /// The person.
+        /// Number of the person.
         person: u32,
         /// The wrong pose.
         pose: Placed,
     },
-    /// A place of an image without people.
+    /// A pose found in an image without people.
     Background {
         /// Number of the image.
         image: u32,
-        /// Its pose.
+        /// The pose found there.
         pose: Placed,
     },
 }
 
-/// Examples of which only the worst counts.
+/// Group of examples in which only the worst counts.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Group {
-    /// A person.
+    /// The right pose of a person.
     Right(u32),
     /// The wrong poses of a person.
     Mistakes(u32),
-    /// Image, level, row and column of the root.
+    /// Image, level, row and column of the root in an image without people.
     Background(u32, u16, u16, u16),
 }
 
 impl Origin {
-    /// The pose that the example shows.
+    /// The pose of the example.
     pub(crate) fn pose(&self) -> &Placed {
         match self {
             Self::Right { pose, .. }
@@ -87,7 +87,7 @@ impl Origin {
         }
     }
 
-    /// The image that shows it: whether of a person, and its number.
+    /// The image of the example: true if it shows a person, and its number.
     pub(crate) fn source(&self) -> (bool, u32) {
         match self {
             Self::Right { person, .. } | Self::Mistake { person, .. } => (true, *person),
@@ -95,7 +95,7 @@ impl Origin {
         }
     }
 
-    /// The group of the example.
+    /// The group to which the example belongs.
     pub(crate) fn group(&self) -> Group {
         match self {
             Self::Right { person, .. } => Group::Right(*person),

@@ -1,4 +1,4 @@
-//! Sizes of the people and types of their parts, from the annotations alone, without images.
+//! The plan of a training run: sizes of the people and types of their parts, computed from the annotations without images.
 
 use crate::latent::Marked;
 use crate::scale::{box_sides, filter_side};
@@ -11,14 +11,14 @@ use crate::types::{Types, cluster};
 pub struct Tree {
     /// Names of the parts, root first.
     pub names: Vec<String>,
-    /// Parent of every part, smaller than the part; `None` for the root, which is part 0.
+    /// Parent of every part, with a smaller index than the part; `None` for the root, which is part 0.
     pub parents: Vec<Option<usize>>,
-    /// The part on the other side of the body.
+    /// For each part, the part on the other side of the body.
     pub mirror: Option<Vec<usize>>,
 }
 
 impl Tree {
-    /// The parents, and the mirror if either side is to be the mirror image of the other.
+    /// The parents, and the mirror if the model is to be symmetric.
     fn sides(&self, settings: &Settings) -> (&[Option<usize>], Option<&[usize]>) {
         let mirror = self.mirror.as_deref().filter(|_| settings.symmetric);
         (&self.parents, mirror)
@@ -36,34 +36,34 @@ pub struct Plan {
 /// A person of the training set.
 #[derive(Debug, Clone, PartialEq)]
 struct Planned {
-    /// Number in the album.
+    /// Number of the person in the album.
     person: usize,
     parts: Vec<[f64; 2]>,
     side: f64,
     types: Vec<usize>,
 }
 
-/// Why nothing can be trained.
+/// Reason why a training run is not possible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// No person is large enough.
     #[error(
-        "of {n_people} people, none is large enough for filters of {filter_px} pixels: take larger pictures, or smaller filters"
+        "of {n_people} people, none is large enough for filters of {filter_px} pixels: use larger pictures or smaller filters"
     )]
     NoPeople {
-        /// People there were.
+        /// Number of people in the album.
         n_people: usize,
-        /// Side of the filters at full resolution, pixels.
+        /// Side of the filters at full resolution, in pixels.
         filter_px: usize,
     },
     /// The parts of a person are incomplete.
     #[error("person {person} has {got} finite parts, expected {expected}")]
     Parts {
-        /// Number in the album, from 1.
+        /// Number of the person in the album, from 1.
         person: usize,
-        /// Parts that are finite numbers.
+        /// Number of parts with finite coordinates.
         got: usize,
-        /// Parts of the model.
+        /// Number of parts of the model.
         expected: usize,
     },
     /// The people are too small for the smallest filter.
@@ -71,17 +71,17 @@ pub enum PlanError {
         "the people are too small: 95 of 100 have heads of more than {side_px:.1} pixels, and the filters would have {cells} cells, expected at least 3; enlarge the pictures"
     )]
     Small {
-        /// Fifth percentile of the sides of the part boxes, pixels.
+        /// Fifth percentile of the sides of the part boxes, in pixels.
         side_px: f64,
-        /// Cells that fit.
+        /// Side of the largest filter that fits, in cells.
         cells: usize,
     },
 }
 
 impl Plan {
-    /// Judges the sizes of the people, drops those smaller than the filters, and clusters the parts.
+    /// Estimates the sizes of the people, drops those smaller than the filters, and clusters the parts.
     ///
-    /// * `people`: centres of the parts of every person of the album, pixels of the image.
+    /// * `people`: centres of the parts of every person in the album, in pixels of the image.
     ///
     /// # Errors
     ///
@@ -155,22 +155,22 @@ impl Plan {
         &self.shape
     }
 
-    /// Number of people who are trained on.
+    /// Number of people to train on.
     pub fn n_people(&self) -> usize {
         self.people.len()
     }
 
-    /// Number of people who were smaller than the filters.
+    /// Number of people dropped because they are smaller than the filters.
     pub fn n_small(&self) -> usize {
         self.n_small
     }
 
-    /// Number in the album of a person who is trained on.
+    /// Number in the album of a person to train on.
     pub fn person(&self, it: usize) -> usize {
         self.people[it].person
     }
 
-    /// Where a person's parts are, with the types of the clusters or without.
+    /// Positions of a person's parts, with or without the types of the clusters.
     pub fn marked(&self, it: usize, with_types: bool) -> Marked {
         let person = &self.people[it];
         Marked {
@@ -181,5 +181,5 @@ impl Plan {
     }
 }
 
-/// Smallest filters, cells a side.
+/// Least side of a filter, in cells.
 const LEAST_CELLS: usize = 3;

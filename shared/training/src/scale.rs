@@ -5,12 +5,12 @@ use statistics::Sorted;
 /// Sizes of the part boxes of all people, in pixels of their images.
 ///
 /// The length of every edge of the tree is divided by its typical length relative to the first edge (neck to
-/// head); the side of a person's boxes is the upper quartile of these. So the box has the size that the head
-/// would have, though the head may be tilted towards the camera. Source: Yang & Ramanan 2013, their release's
+/// head). The side of a person's boxes is the upper quartile of the results. The box thus has the size that the head
+/// would have even if the head is tilted towards the camera. Source: Yang & Ramanan 2013, their release's
 /// `pointtobox`.
 ///
-/// * `people`: centres of the parts of every person, pixels.
-/// * `parents`: of every part; `None` for the root.
+/// * `people`: centres of the parts of every person, in pixels.
+/// * `parents`: parent of every part; `None` for the root.
 pub(crate) fn box_sides(people: &[Vec<[f64; 2]>], parents: &[Option<usize>]) -> Vec<f64> {
     let edges: Vec<_> = parents
         .iter()
@@ -40,14 +40,14 @@ pub(crate) fn box_sides(people: &[Vec<[f64; 2]>], parents: &[Option<usize>]) -> 
     people.iter().map(side).collect()
 }
 
-/// The side of the filters, cells, and of the boxes that they come from, pixels: the fifth percentile of the
+/// The side of the filters in cells, and the side in pixels from which it was computed: the fifth percentile of the
 /// box sizes.
 pub(crate) fn filter_side(sides: &[f64], cell_px: usize) -> (usize, f64) {
     let side = quantile(sides.to_vec(), 0.05);
     ((side / cell_px as f64).floor() as usize, side)
 }
 
-/// The quantile at `share`, linear between neighbours; 0 of nothing.
+/// The quantile at `share`, interpolated linearly between neighbours; 0 for an empty list.
 pub(crate) fn quantile(values: Vec<f64>, share: f64) -> f64 {
     Sorted::new(values).interpolated(share).unwrap_or(0.0)
 }
@@ -56,7 +56,7 @@ pub(crate) fn quantile(values: Vec<f64>, share: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Head, neck, and an arm of two parts.
+    /// Parents of the head, the neck, and the two parts of an arm.
     const PARENTS: [Option<usize>; 4] = [None, Some(0), Some(1), Some(2)];
 
     fn person(scale: f64) -> Vec<[f64; 2]> {

@@ -1,29 +1,29 @@
-//! How a model is trained.
+//! Settings for training a model.
 
 use fmp::Model;
 use serde::{Deserialize, Serialize};
 
-/// Everything about a training that is not its data.
+/// All settings of a training run, except the data.
 ///
-/// The defaults are those of Yang & Ramanan 2013, as far as they are known, but for what keeps memory
-/// and time in bounds (`per_image`, `room`, `cache_mib`, `batch`, `passes`), and `symmetric`.
+/// The defaults are those of Yang & Ramanan 2013, where known. The exceptions are `symmetric` and the settings
+/// that limit memory and time (`per_image`, `room`, `cache_mib`, `batch`, `passes`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Settings {
-    /// Types of every part (6: Yang & Ramanan 2013).
+    /// Number of types of every part (6: Yang & Ramanan 2013).
     pub n_types: usize,
-    /// How the parts are clustered into types.
+    /// Offsets by which the parts are clustered into types.
     pub types_by: TypesBy,
-    /// True if the left side of the body is the mirror image of the right one: types, filters, springs and
+    /// True if the left side of the body is the mirror image of the right side, in types, filters, springs and
     /// biases. Only valid if the training set contains the mirror images.
     pub symmetric: bool,
-    /// Random starts of every clustering, of which the tightest is taken.
+    /// Number of random starts of every clustering; the tightest result is used.
     pub cluster_starts: usize,
-    /// Side of a feature cell, pixels of its level.
+    /// Side of a feature cell, in pixels of its level.
     pub cell_px: usize,
-    /// Largest side of the filters, cells; smaller where the people are small.
+    /// Largest side of the filters, in cells; the filters are smaller if the people are small.
     pub max_filter_cells: usize,
-    /// Levels per octave of the pyramid that the model is made for.
+    /// Levels per octave of the pyramid for which the model is trained.
     pub interval: usize,
     /// Levels per octave on which images without people are searched.
     pub mining_interval: usize,
@@ -31,31 +31,31 @@ pub struct Settings {
     pub cost: f64,
     /// Cost of a person who scores below 1, in costs of a negative.
     pub positive_weight: f64,
-    /// Cost of a wrong pose that scores as well as the right one of the same person, in costs of a
-    /// negative; 0 switches these examples off, as in Yang & Ramanan 2013.
+    /// Cost of a wrong pose that scores as well as the right pose of the same person, in costs of a
+    /// negative. 0 turns these examples off, as in Yang & Ramanan 2013.
     pub pose_weight: f64,
-    /// Margin that the right pose must keep from one all of whose parts are wrong.
+    /// Margin between the right pose and a pose with all parts wrong.
     pub pose_margin: f64,
-    /// Least intersection over union of a placed part's box with the marked one.
+    /// Least intersection over union of a placed part's box with the marked box.
     pub overlap: f64,
     /// Duality gap at which the machine stops, as a share of its objective.
     pub tolerance: f64,
-    /// Memory for examples and the features that they show, MiB; what the solution needs is kept even
-    /// if it takes more.
+    /// Memory for the examples and their features, in MiB. Examples that the solution needs are kept even
+    /// if they take more.
     pub cache_mib: usize,
-    /// Slack beyond the margin at which a negative is removed from the working set.
+    /// Slack beyond the margin from which a negative is removed from the working set.
     pub room: f64,
-    /// Most negatives that are added from one image at a time, best first.
+    /// Largest number of negatives that are added from one image at a time, best first.
     pub per_image: usize,
-    /// Background images that are searched between two solutions.
+    /// Number of background images that are searched between two solutions.
     pub batch: usize,
-    /// Rounds in which the types of the parts are those of the clusters.
+    /// Number of rounds in which the types of the parts are those of the clusters.
     pub fixed_rounds: usize,
-    /// Rounds after them, in which the model chooses the types.
+    /// Number of later rounds in which the model chooses the types.
     pub latent_rounds: usize,
-    /// Passes over all background images in a round.
+    /// Number of passes over all background images in a round.
     pub passes: usize,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -63,7 +63,7 @@ pub struct Settings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TypesBy {
-    /// The offset from the parent; of the root, that of its first child (Yang & Ramanan 2013).
+    /// The offset from the parent; for the root, the offset from its first child (Yang & Ramanan 2013).
     Parent,
     /// The offsets from the parent and from all children (the 2014 release).
     Neighbours,
@@ -102,13 +102,13 @@ impl Default for Settings {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{key} is {got}, expected {min} to {max}")]
 pub struct SettingsError {
-    /// Its key.
+    /// Key of the setting.
     pub key: &'static str,
-    /// Its value.
+    /// Value of the setting.
     pub got: f64,
-    /// Least value that is accepted.
+    /// Least accepted value.
     pub min: f64,
-    /// Greatest value that is accepted.
+    /// Greatest accepted value.
     pub max: f64,
 }
 
@@ -117,7 +117,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// [`SettingsError`], for the first that does not.
+    /// [`SettingsError`], for the first setting out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
         const LEAST: f64 = 1e-12;
         const MOST: f64 = 1e12;

@@ -2,11 +2,11 @@
 
 use fmp::{Edge, Filter, Model, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
 
-/// The smallest quadratic coefficient of a trained spring, score per cell^2: keeps every spring convex (Yang
+/// The smallest quadratic coefficient of a trained spring, in score per cell^2. It keeps every spring convex (Yang
 /// & Ramanan 2013).
 pub const MIN_STIFFNESS: f64 = 0.01;
 
-/// How weakly the root's bias is regularised: the square of this factor weights its part of the norm.
+/// Scale of the root's bias: its part of the norm is weighted with the square of this factor, so that it is regularised weakly.
 const ROOT_BIAS_SCALE: f64 = 0.01;
 
 /// The fixed properties of a model: tree, sizes, names, and rest positions of the springs.
@@ -16,25 +16,25 @@ pub struct Shape {
     pub name: String,
     /// Names of the parts, root first.
     pub part_names: Vec<String>,
-    /// Parent of every part, smaller than the part; `None` for the root.
+    /// Parent of every part, with a smaller index than the part; `None` for the root.
     pub parents: Vec<Option<usize>>,
-    /// The part on the other side of the body.
+    /// For each part, the part on the other side of the body.
     pub mirror: Option<Vec<usize>>,
-    /// Where each type of a part rests relative to its parent `[x, y]`, cells: `[part][type]`.
+    /// Rest position of each type of a part relative to its parent, `[x, y]` in cells: `[part][type]`.
     pub anchors: Vec<Vec<[i32; 2]>>,
-    /// Side of every filter, cells.
+    /// Side of every filter, in cells.
     pub side: usize,
-    /// Side of a cell, pixels of its level.
+    /// Side of a cell, in pixels of its level.
     pub cell_px: usize,
     /// Levels per octave of the pyramid that the model is used with.
     pub interval: usize,
 }
 
-/// The vector of a [`Shape`]: all filters, the quadratic and the linear coefficients of all springs,
-/// the biases of all pairs of types, the root's bias.
+/// Layout of the vector of a [`Shape`]: all filters, the quadratic and the linear coefficients of all springs,
+/// the biases of all pairs of types, and the root's bias.
 ///
-/// The trained vector is not the model's parameter `w` but `v = (w - w_0) r` with `w_0` the least
-/// stiffness and `r` the scale of the root's bias, so that the minimised norm is that of `v`.
+/// The trained vector is not the model's parameter `w` but `v = (w - w_0) r`, where `w_0` is the least
+/// stiffness and `r` the scale of the root's bias. The minimised norm is that of `v`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coordinates {
     first_type: Vec<usize>,
@@ -90,7 +90,7 @@ impl Shape {
     ///
     /// # Panics
     ///
-    /// If `v` has another length than the shape has coordinates.
+    /// If the length of `v` is not the number of coordinates of the shape.
     pub fn model(&self, v: &[f64], threshold: f64) -> Result<Model, ModelError> {
         let at = self.coordinates();
         assert_eq!(v.len(), at.len(), "the vector of this shape");
@@ -149,48 +149,48 @@ impl Coordinates {
         self.root + 1
     }
 
-    /// Returns true if the vector is empty; never, since the root has a bias.
+    /// Returns true if the vector is empty. It never is, since the root has a bias.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Numbers in a filter.
+    /// Number of values in a filter.
     pub fn filter_len(&self) -> usize {
         self.filter_len
     }
 
-    /// Number of types of all parts.
+    /// Total number of types of all parts.
     pub fn n_types(&self) -> usize {
         self.quadratic / self.filter_len
     }
 
-    /// Where the filter of a part's type begins.
+    /// First index of the filter for a type of a part.
     pub fn filter(&self, part: usize, mixture: usize) -> usize {
         (self.first_type[part] + mixture) * self.filter_len
     }
 
-    /// Where the two quadratic coefficients `[x, y]` of a spring begin.
+    /// First index of the two quadratic coefficients `[x, y]` of a spring.
     pub fn quadratic(&self, part: usize, mixture: usize) -> usize {
         self.quadratic + 2 * (self.first_type[part] + mixture)
     }
 
-    /// Where the two linear coefficients `[x, y]` of a spring begin.
+    /// First index of the two linear coefficients `[x, y]` of a spring.
     pub fn linear(&self, part: usize, mixture: usize) -> usize {
         self.linear + 2 * (self.first_type[part] + mixture)
     }
 
-    /// Where the bias of a pair of types lies.
+    /// Index of the bias of a pair of types.
     pub fn bias(&self, part: usize, parent_type: usize, mixture: usize) -> usize {
         let n_types = self.first_type[part + 1] - self.first_type[part];
         self.biases + self.first_bias[part] + parent_type * n_types + mixture
     }
 
-    /// Index of the root's bias, and its feature.
+    /// Index of the root's bias, and the value of its feature.
     pub fn root(&self) -> (usize, f32) {
         (self.root, (1.0 / ROOT_BIAS_SCALE) as f32)
     }
 
-    /// The coordinates that may not become negative: the quadratic coefficients above their least.
+    /// The coordinates that must not become negative: the quadratic coefficients above their least value.
     pub fn non_negative(&self) -> std::ops::Range<usize> {
         self.quadratic..self.linear
     }

@@ -1,24 +1,24 @@
-//! Sparse vectors made of runs.
+//! Sparse vectors made of runs of consecutive values.
 
 use std::sync::Arc;
 
-/// Consecutive coordinates that are not zero.
+/// Consecutive non-zero coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Span {
     start: u32,
     len: u32,
-    /// Start of the values in the vector's own or in the shared array.
+    /// Start of the values in the vector's own array or in the shared array.
     at: u32,
     shared: bool,
 }
 
 /// A sparse vector, as runs of values in ascending order, times 1 or -1.
 ///
-/// The values of a run are the vector's own, or lie in an array that many vectors share: the features of
-/// one image, of which every example shows other windows.
+/// The values of a run belong to the vector, or are in an array that many vectors share. The shared array holds the features of
+/// one image; each example refers to different windows of it.
 ///
-/// Vectors that meet (in [`Self::dot_sparse`], [`Self::minus`]) are made of the same kinds of runs: two
-/// runs begin at the same coordinate and have the same length, or share no coordinate.
+/// Two vectors in one operation ([`Self::dot_sparse`], [`Self::minus`]) must have the same kinds of runs. Any two
+/// runs either begin at the same coordinate and have the same length, or share no coordinate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sparse {
     spans: Box<[Span]>,
@@ -30,13 +30,13 @@ pub struct Sparse {
 /// The values of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Run {
-    /// A copy.
+    /// A copy of the values.
     Own(Vec<f32>),
     /// A range of the shared array.
     Shared {
-        /// The first.
+        /// First index of the range.
         at: usize,
-        /// How many.
+        /// Length of the range.
         len: usize,
     },
 }
@@ -51,11 +51,11 @@ impl Sparse {
         )
     }
 
-    /// Makes a vector of runs, some of which lie in `shared`.
+    /// Makes a vector of runs, some of which refer to `shared`.
     ///
     /// # Panics
     ///
-    /// If a run is to lie beyond the end of `shared`.
+    /// If a run would end beyond the end of `shared`.
     pub fn sharing(
         shared: Option<Arc<[f32]>>,
         runs: impl IntoIterator<Item = (usize, Run)>,
@@ -88,12 +88,12 @@ impl Sparse {
         }
     }
 
-    /// Bytes that the vector holds for itself alone.
+    /// Memory used by the vector, without the shared array, in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.spans) + size_of_val(&*self.own)
     }
 
-    /// The runs, each with where it begins, before the sign.
+    /// The runs with their first coordinates, before the sign is applied.
     fn runs(&self) -> impl Iterator<Item = (usize, &[f32])> {
         let shared = self.shared.as_deref().unwrap_or_default();
         self.spans.iter().map(move |span| {
@@ -103,7 +103,7 @@ impl Sparse {
         })
     }
 
-    /// Where every run begins and how long it is.
+    /// First coordinate and length of every run.
     pub fn spans(&self) -> impl Iterator<Item = (usize, usize)> {
         let spans = self.spans.iter();
         spans.map(|span| (span.start as usize, span.len as usize))
@@ -115,7 +115,7 @@ impl Sparse {
         found.map(|(_, run)| run.iter().map(|value| self.sign * value).collect())
     }
 
-    /// The square of its norm.
+    /// The squared norm.
     pub fn squared_norm(&self) -> f64 {
         self.runs().map(|(_, run)| sum_of_products(run, run)).sum()
     }
@@ -151,14 +151,14 @@ impl Sparse {
         }
     }
 
-    /// The vector with its sign changed.
+    /// The vector with opposite sign.
     #[must_use]
     pub fn negated(mut self) -> Self {
         self.sign = -self.sign;
         self
     }
 
-    /// This vector less another.
+    /// This vector minus another.
     #[must_use]
     pub fn minus(&self, other: &Self) -> Self {
         let signed =
@@ -182,7 +182,7 @@ impl Sparse {
     }
 }
 
-/// Sums in sixteen accumulators, so that the compiler can vectorise.
+/// Sums products in sixteen accumulators, so that the compiler can vectorise the loop.
 fn sum_of_products(a: &[f32], b: &[f32]) -> f64 {
     const STRANDS: usize = 16;
     let mut sums = [0.0_f32; STRANDS];
@@ -205,7 +205,7 @@ mod tests {
 
     const LEN: usize = 40;
 
-    /// Runs that begin at multiples of 4 and are 1 to 4 long, the same length at the same place.
+    /// Generates runs that begin at multiples of 4 and are 1 to 4 long. Runs at the same position have the same length.
     fn vector() -> impl Strategy<Value = Sparse> {
         let run = (any::<bool>(), prop::collection::vec(-9_i8..9, 4));
         (prop::collection::vec(run, LEN / 4), any::<bool>()).prop_map(|(runs, negated)| {

@@ -1,22 +1,22 @@
-//! Symmetrises the model: both sides of the body get mirrored parameters.
+//! Symmetrises the model, so that both sides of the body have mirrored parameters.
 
 use fmp::N_CHANNELS;
 use kernels::MIRRORED_CHANNEL;
 
 use crate::shape::{Coordinates, Shape};
 
-/// For every parameter its index in the mirror image, and its sign.
+/// For every parameter, its index in the mirror image and its sign.
 ///
-/// People are trained on with their mirror images, so the best model is its own mirror image; an
-/// approximate one is not, and its mean with its mirror image costs no more (the objective is convex).
+/// The training set contains the mirror image of each person, so the best model is its own mirror image. An
+/// approximate model is not symmetric. The mean with its mirror image costs no more, since the objective is convex.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Symmetry {
     mirrored: Vec<(u32, f64)>,
 }
 
 impl Symmetry {
-    /// Takes a shape whose types are mirrored as [`cluster`](crate::types::cluster) makes them;
-    /// returns `None` if they are not, or if it has no mirror.
+    /// Finds the symmetry of a shape whose types are mirrored as by [`cluster`](crate::types::cluster).
+    /// Returns `None` if the types are not mirrored or the shape has no mirror.
     pub(crate) fn of(shape: &Shape) -> Option<Self> {
         let mirror = shape.mirror.as_deref()?;
         let of = |part: usize, k: usize| {
@@ -90,7 +90,7 @@ fn springs(at: &Coordinates, mirrored: &mut [(u32, f64)], own: Typed, their: Typ
     }
 }
 
-/// The mirror image of a type of a part in the middle: they come in pairs, unless there is only one.
+/// The mirror image of a type of a part in the middle. These types come in pairs, unless there is only one.
 fn pair_of(k: usize, n_types: usize) -> usize {
     if n_types == 1 { k } else { k ^ 1 }
 }
@@ -108,7 +108,7 @@ mod tests {
     const COLS: usize = 9;
     const ROWS: usize = 8;
 
-    /// Head, trunk, and an arm on either side.
+    /// A shape with a head, a trunk, and an arm on each side.
     fn shape() -> Shape {
         Shape {
             name: "small".to_owned(),

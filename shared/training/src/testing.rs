@@ -5,7 +5,7 @@ use footage::Size;
 
 use crate::shape::Shape;
 
-/// Head, trunk and a leg, of two types each but the head.
+/// A shape with a head, a trunk and a leg. The head has one type, the others have two.
 pub(crate) fn shape() -> Shape {
     Shape {
         name: "small".to_owned(),
@@ -19,7 +19,7 @@ pub(crate) fn shape() -> Shape {
     }
 }
 
-/// A vector of the shape with numbers of the size that training gives.
+/// A random vector for the shape, with values of the same size as trained ones.
 pub(crate) fn vector(seed: u64) -> Vec<f64> {
     let at = shape().coordinates();
     let mut random = fastrand::Rng::with_seed(seed);

@@ -24,27 +24,27 @@ use crate::watch::{Event, Step, Watch};
 
 pub use checkpoint::{Checkpoint, CheckpointBytesError, CheckpointError};
 
-/// Why a training failed.
+/// Reason why a training run failed.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// It was stopped.
+    /// The training was stopped.
     #[error("stopped")]
     Stopped,
     /// An image of a person cannot be read.
-    #[error("the image of person {person}")]
+    #[error("cannot read the image of person {person}")]
     Person {
-        /// Number in the album, from 1.
+        /// Number of the person in the album, from 1.
         person: usize,
-        /// Why.
+        /// Error of the album.
         #[source]
         source: AlbumError,
     },
     /// A background image cannot be read.
-    #[error("image {image} of those without people")]
+    #[error("cannot read image {image} of the images without people")]
     Background {
-        /// Number in the album, from 1.
+        /// Number of the image in the album, from 1.
         image: usize,
-        /// Why.
+        /// Error of the album.
         #[source]
         source: AlbumError,
     },
@@ -54,19 +54,19 @@ pub enum TrainError {
     /// No person could be placed.
     #[error("none of {n_people} people could be placed on any level of the pyramid")]
     NobodyPlaced {
-        /// People there were.
+        /// Number of people to train on.
         n_people: usize,
     },
-    /// A pose does not lie on its image, which must have changed since the pose was found.
-    #[error("a pose does not lie on its image: an image has changed since the training began")]
+    /// A pose is not on its image, which must have changed since the pose was found.
+    #[error("a pose is outside its image: an image has changed since the training began")]
     Moved,
     /// The trained parameters are not a valid model.
     #[error("the result of the training is not a valid model")]
     Model(#[from] ModelError),
 }
 
-/// A training in progress. Deterministic: the same plan, images and settings give the same model, bit for
-/// bit, on any number of threads, and whether or not it was interrupted between steps.
+/// A training run in progress. It is deterministic: the same plan, images and settings give the same model, bit for
+/// bit, on any number of threads, and whether or not the training was interrupted between steps.
 pub struct Trainer<'a> {
     plan: &'a Plan,
     settings: &'a Settings,
@@ -76,9 +76,9 @@ pub struct Trainer<'a> {
     steps: Vec<Step>,
     next: usize,
     machine: Machine<Group, Origin>,
-    /// Features of the images without people that examples show.
+    /// Features of the images without people, kept while examples use them.
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
-    /// Where every person was placed last.
+    /// Last placement of every person.
     right: Vec<Option<Placed>>,
     /// The symmetry of the model, if it is symmetric.
     symmetry: Option<Symmetry>,
@@ -93,7 +93,7 @@ impl std::fmt::Debug for Trainer<'_> {
 }
 
 impl<'a> Trainer<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
     /// # Errors
     ///
@@ -125,17 +125,17 @@ impl<'a> Trainer<'a> {
         })
     }
 
-    /// All steps.
+    /// All steps of the training.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// Number of steps that are done.
+    /// Number of finished steps.
     pub fn n_done(&self) -> usize {
         self.next
     }
 
-    /// Does the next step; `false` if there was none left.
+    /// Runs the next step. Returns `false` if there are no more steps.
     ///
     /// # Errors
     ///
@@ -158,7 +158,7 @@ impl<'a> Trainer<'a> {
         Ok(true)
     }
 
-    /// The model as it is now.
+    /// The current model.
     ///
     /// # Errors
     ///
@@ -210,7 +210,7 @@ impl<'a> Trainer<'a> {
     /// Places all people again, and replaces their examples.
     fn place(&mut self, round: usize) -> Result<(), TrainError> {
         let placed = self.best_placements(round < self.settings.fixed_rounds)?;
-        // Most people keep their placement, or nearly so: their shares are a good start.
+        // Most people keep nearly the same placement, so their shares are a good start.
         let mut shares = vec![0.0; self.plan.n_people()];
         for (origin, share) in self.machine.entries() {
             if let Origin::Right { person, .. } = origin {
@@ -243,7 +243,7 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    /// Bytes that examples and features take.
+    /// Memory used by examples and features, in bytes.
     fn bytes(&self) -> usize {
         let cells = self.cells.lock().unwrap_or_else(PoisonError::into_inner);
         self.machine.bytes() + cells.values().map(|value| value.bytes()).sum::<usize>()
@@ -253,7 +253,7 @@ impl<'a> Trainer<'a> {
     fn forget(&mut self) {
         let features = self.bytes() - self.machine.bytes();
         let room = (self.settings.cache_mib << 20).saturating_sub(features);
-        // A right pose without a share may need one later, and would not be found again.
+        // A right pose without a share may be needed later, and would not be found again.
         let may_go = |origin: &Origin| !matches!(origin, Origin::Right { .. });
         self.machine.forget(self.settings.room, room, may_go);
         let image = |origin: &Origin| match origin {
@@ -274,7 +274,7 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    /// Adds examples, each with the next of the shares.
+    /// Adds examples with their shares in the solution.
     fn add(
         &mut self,
         origins: Vec<Origin>,
@@ -297,7 +297,7 @@ impl<'a> Trainer<'a> {
     }
 }
 
-/// Most passes of a solution.
+/// Largest number of passes for one solution.
 const MAX_PASSES: usize = 200;
 
 fn steps(settings: &Settings, n_backgrounds: usize) -> Vec<Step> {

@@ -4,26 +4,26 @@ use rayon::prelude::*;
 
 use crate::settings::{Settings, TypesBy};
 
-/// The type of every person's part, and the anchors of the types.
+/// The types of every person's parts, and the anchors of the types.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Types {
     /// Type of every part of every person: `[person][part]`.
     pub of_person: Vec<Vec<usize>>,
-    /// Mean offset of a type from its parent `[x, y]`, cells, rounded: `[part][type]`.
+    /// Mean offset of a type from its parent, `[x, y]` in whole cells: `[part][type]`.
     pub anchors: Vec<Vec<[i32; 2]>>,
 }
 
 /// Clusters every part of all people into types by k-means.
 ///
-/// With a mirror the types of a part are the mirrored ones of the part on the other side, number by
-/// number. Those of a part in the middle come in mirrored pairs, 0 and 1, 2 and 3...; if their number is
-/// odd, it has one less.
+/// If there is a mirror, type `k` of a part is the mirror image of type `k` of the part on the other
+/// side. The types of a part in the middle come in mirrored pairs: 0 and 1, 2 and 3, and so on. If the number of types is
+/// odd, such a part has one type less.
 ///
 /// There are fewer types if there are fewer different people.
 ///
 /// * `people`: centres of the parts of every person, in cells of the level at which the person has
 ///   the size of the model.
-/// * `mirror`: the part on the other side of the body, its own inverse and true to the tree.
+/// * `mirror`: the part on the other side of the body. The mirror must be its own inverse and keep the tree.
 pub(crate) fn cluster(
     people: &[Vec<[f64; 2]>],
     (parents, mirror): (&[Option<usize>], Option<&[usize]>),
@@ -75,7 +75,7 @@ struct Offsets {
 }
 
 impl Offsets {
-    /// The parts whose offsets define the types of `part`, its parent first.
+    /// Finds the parts whose offsets define the types of `part`, its parent first.
     fn new(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
         let children = (0..parents.len()).filter(|&i| parents[i] == Some(part));
         let mut neighbours: Vec<_> = parents[part].into_iter().collect();
@@ -91,7 +91,7 @@ impl Offsets {
         }
     }
 
-    /// The same of the other side of the body.
+    /// The corresponding offsets on the other side of the body.
     fn mirrored(&self, mirror: &[usize]) -> Self {
         Self {
             part: mirror[self.part],
@@ -100,7 +100,7 @@ impl Offsets {
         }
     }
 
-    /// Offsets from the neighbours, cells, one point a person: `x, y, x, y...`.
+    /// Offsets from the neighbours in cells, one point per person: `x, y, x, y...`.
     fn offsets(&self, people: &[Vec<[f64; 2]>]) -> Vec<Vec<f64>> {
         let of_person = |person: &Vec<[f64; 2]>| {
             let from = |&of: &usize| {
@@ -132,7 +132,7 @@ impl OfPart {
         Self { labels, centres }
     }
 
-    /// The types of the other side of the body: each person gets the one whose mirror image is nearest.
+    /// Derives the types of the part on the other side of the body. Each person gets the type whose mirror image is nearest.
     ///
     /// * `points`: the mirrored offsets of the other side.
     fn mirrored(&self, points: &[Vec<f64>]) -> Self {
@@ -143,7 +143,7 @@ impl OfPart {
         }
     }
 
-    /// The anchors of the types, `[x, y]` from the first neighbour, cells.
+    /// The anchors of the types: `[x, y]` from the first neighbour, in cells.
     fn anchors(&self) -> Vec<[i32; 2]> {
         let anchor = |centre: &Vec<f64>| match centre[..] {
             [x, y, ..] => [x, y].map(|value| value.round() as i32),
@@ -153,9 +153,9 @@ impl OfPart {
     }
 }
 
-/// Types of a part in the middle, in pairs: offsets to the left are clustered as their mirror images.
+/// Types of a part in the middle, in pairs. Offsets to the left are mirrored before clustering.
 ///
-/// * `both`: every person's offsets, and mirrored.
+/// * `both`: the offsets of every person, plain and mirrored.
 fn in_the_middle(
     [plain, mirrored]: [Vec<Vec<f64>>; 2],
     settings: &Settings,
@@ -175,7 +175,7 @@ fn in_the_middle(
     OfPart { labels, centres }
 }
 
-/// A mirrored point.
+/// Mirrors a point.
 fn in_mirror(point: &[f64]) -> Vec<f64> {
     let axes = point.iter().enumerate();
     axes.map(|(axis, it)| if axis % 2 == 0 { -it } else { *it }).collect()
@@ -193,13 +193,13 @@ fn middle(points: &mut dyn Iterator<Item = &Vec<f64>>) -> Vec<f64> {
     sum.into_iter().map(|sum| sum / n).collect()
 }
 
-/// The nearest of some points, and its squared distance; the first of several.
+/// Index of the nearest point and its squared distance; the first index if several are equally near.
 fn nearest(point: &[f64], to: &[Vec<f64>]) -> Option<(usize, f64)> {
     let distances = to.iter().map(|other| squared_distance(point, other));
     distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Lloyd's algorithm from several random starts; the labels of the tightest clusters.
+/// Lloyd's algorithm from several random starts. Returns the labels of the tightest clusters.
 ///
 /// Labels are numbered from 0 without gaps, larger clusters first.
 fn k_means(points: &[Vec<f64>], settings: &Settings, random: &mut fastrand::Rng) -> Vec<usize> {
@@ -267,7 +267,7 @@ fn by_size(mut labels: Vec<usize>, k: usize) -> Vec<usize> {
     labels
 }
 
-/// Most iterations of a start.
+/// Largest number of iterations from one start.
 const MAX_ROUNDS: usize = 1000;
 
 #[cfg(test)]

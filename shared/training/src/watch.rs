@@ -1,69 +1,69 @@
-//! Progress of a training.
+//! Progress of a training run.
 
 use crate::dual::Gap;
 
-/// A step; a training is a list of them.
+/// A step of a training run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
     /// Train a separate filter for every part and type.
     Filters,
     /// Find every person's best placement.
     Place {
-        /// From 0.
+        /// Number of the round, from 0.
         round: usize,
     },
-    /// Mine examples on some images, and solve on the whole working set.
+    /// Mine examples on some images, then solve on the whole working set.
     Learn {
-        /// From 0.
+        /// Number of the round, from 0.
         round: usize,
-        /// Pass over the images without people, from 0.
+        /// Number of the pass over the images without people, from 0.
         pass: usize,
-        /// Batch of the pass, from 0.
+        /// Number of the batch within the pass, from 0.
         batch: usize,
     },
-    /// Find every person's best placement under the final model, for the threshold.
+    /// Find every person's best placement under the final model, to set the threshold.
     Judge,
 }
 
-/// An event of a training.
+/// An event of a training run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
-    /// Progress within the step, images.
+    /// Progress within the step, in images.
     Images {
-        /// So far.
+        /// Number of images finished.
         done: usize,
-        /// In all.
+        /// Number of images in the step.
         of: usize,
     },
     /// People were placed.
     Placed {
-        /// How many.
+        /// Number of people placed.
         n: usize,
-        /// People who fit the model on no level.
+        /// Number of people who fit the model on no level.
         n_lost: usize,
-        /// Their mean score under the model so far.
+        /// Mean score of the people under the current model.
         mean_score: f64,
     },
     /// Examples were collected.
     Collected {
-        /// Negatives that score above -1.
+        /// Number of negatives that score above -1.
         backgrounds: usize,
-        /// Wrong poses.
+        /// Number of wrong poses.
         mistakes: usize,
-        /// Examples in memory.
+        /// Number of examples in memory.
         held: usize,
-        /// Bytes that they take.
+        /// Memory used by the examples, in bytes.
         bytes: usize,
     },
     /// The duality gap of the machine.
     Gap(Gap),
 }
 
-/// Receives the progress of a training; called from several threads.
+/// Receives the progress of a training run; its functions are called from several threads.
 pub trait Watch: Sync {
     /// Receives an event.
     fn tell(&self, event: Event);
 
-    /// Returns true to continue; called often.
+    /// Returns true if the training may continue; called often.
     fn go_on(&self) -> bool;
 }

@@ -1,4 +1,4 @@
-//! The network that finds people learns, and its file finds what the trained network found.
+//! Tests that the network that finds people can be trained, and that its file gives the same results as the trained network.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use training::networks::finder::{
 };
 use training::networks::{Backend, Plan, Task as _, Trainer};
 
-/// Pictures of bright upright boxes on noise; every fourth shows nobody.
+/// Pictures of bright upright boxes on noise; every fourth picture shows no people.
 fn pictures(n: usize, seed: u64) -> Vec<Picture> {
     let mut rng = fastrand::Rng::with_seed(seed);
     (0..n).map(|nth| picture(nth, &mut rng)).collect()
@@ -164,7 +164,7 @@ fn the_network_that_ships_is_cheap_and_its_card_is_one() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// The card's codec reads boxes that lie in the sample from what the network should give, whatever was varied.
+    /// For any variation, the card's codec decodes the true output to the boxes in the sample.
     #[test]
     fn what_should_be_found_is_decoded_as_the_boxes_that_were_shown(seed in any::<u64>()) {
         let settings = small();

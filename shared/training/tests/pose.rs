@@ -1,4 +1,4 @@
-//! The network learns, and what it learned can be kept, taken up again and written.
+//! Tests that the network can be trained, and that a training run can be saved, resumed and written.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use training::networks::pose::{
@@ -84,7 +84,7 @@ fn small() -> Settings {
     }
 }
 
-/// A training from the start, or from a checkpoint.
+/// A training run from the start, or from a checkpoint.
 fn trainer<'a>(
     settings: &'a Settings,
     people: [&'a [Person]; 2],
@@ -94,7 +94,7 @@ fn trainer<'a>(
     Trainer::new(task, Backend::BuiltIn, checkpoint).unwrap()
 }
 
-/// A pass of some steps that are not judged.
+/// A pass of some steps without evaluation.
 const fn steps(steps: usize) -> Plan {
     Plan {
         steps,
@@ -137,7 +137,7 @@ fn it_learns_and_a_training_that_was_interrupted_ends_with_the_same_bits() {
     assert!(whole == resumed, "everything that they know is the same");
 }
 
-/// Sums in another order: some steps end near each other, not with the same bits.
+/// `LibTorch` sums in another order, so that the results of some steps are close but not equal.
 #[cfg(feature = "libtorch")]
 #[test]
 fn both_backends_learn_the_same() {
@@ -149,7 +149,7 @@ fn both_backends_learn_the_same() {
     let [built_in, torch] = [Backend::BuiltIn, Backend::LibTorch].map(|backend| {
         let task = PoseTask::new(&settings, [&learnt, &kept], None).unwrap();
         let mut trainer = Trainer::new(task, backend, None).unwrap();
-        // Six steps of everything, four of the expected error alone.
+        // Six steps train everything, four train only the expected error.
         for _ in 0..10 {
             assert!(trainer.run(steps(1), &mut |_| true));
         }
@@ -304,7 +304,7 @@ fn a_file_that_is_not_such_a_network_is_refused_with_what_it_lacks() {
         refused(&settings.shape, &file[..n]);
     }
     refused(&settings.shape, b"no network");
-    // In the middle lie weights; all bits set are not a number.
+    // The middle of the file contains weights; with all bits set, a weight is NaN.
     let mut broken = file.clone();
     let middle = broken.len() / 2;
     broken[middle..middle + 64].fill(0xff);
@@ -324,7 +324,7 @@ fn numbers_that_only_another_backend_has_are_refused() {
     assert!(matches!(refused, Err(TrainError::Precision)));
 }
 
-/// Maps, direction and errors that a file finds in a picture.
+/// Maps, direction and errors that the network of a file gives for a picture.
 fn found_by(file: Vec<u8>, shape: &Shape, picture: &[f32]) -> Vec<Vec<f32>> {
     use training::networks::pose::{ERROR, FRONT, MAPS, PICTURE};
 
@@ -356,7 +356,7 @@ fn extra_keypoints_are_learned_alone_and_everything_else_keeps_its_bits() {
         extras_alone: true,
         ..small()
     };
-    // A network without the extra keypoints: their layers are called something else.
+    // Renames the layers of the extra keypoints, so that the network lacks them.
     let mut without = before.clone();
     for at in 0..without.len() - 6 {
         if &without[at..at + 6] == b"extra_" {

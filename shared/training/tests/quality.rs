@@ -1,4 +1,4 @@
-//! Trainings from samples to files, with synthetic errors.
+//! Tests of training runs from samples to files, with synthetic errors.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -12,7 +12,7 @@ use training::networks::quality::task::{QualityTask, TaskError};
 use training::networks::{Backend, Parameter, TrainError, Trainer};
 use viewquality::{Network, TileShape, n_evidence};
 
-/// Samples whose errors depend on the first number of the pose's evidence and on the brightness of the
+/// Samples whose errors depend on the first value of the pose's evidence and on the brightness of the
 /// picture.
 fn samples(kind: Kind, n: usize) -> Samples {
     let [height, width] = kind.tile().unwrap_or([8, 8]);
@@ -51,7 +51,7 @@ fn settings(network: Kind) -> Settings {
     }
 }
 
-/// A training from the start, or from a checkpoint.
+/// A training run from the start, or from a checkpoint.
 fn begun<'a>(
     settings: &'a Settings,
     samples: &'a Samples,
@@ -69,11 +69,11 @@ fn trained<'a>(settings: &'a Settings, samples: &'a Samples) -> Trainer<QualityT
     trainer
 }
 
-/// The file, run by another library, gives the predictions of the trainer.
+/// Checks that the file, run by another library, gives the trainer's predictions.
 fn check_file(network: Kind, n: usize, within: f32) {
     let (settings, samples) = (settings(network), samples(network, n));
     let trainer = if network == Kind::Vgg16 {
-        // Untrained: the initial weights are enough.
+        // No training is needed: the initial weights are enough.
         begun(&settings, &samples, None).unwrap()
     } else {
         trained(&settings, &samples)
@@ -132,7 +132,7 @@ fn the_evidence_network_learns_the_errors_in_the_evidence_only() {
     let [first, last] = [trainer.passes()[0], *trainer.passes().last().unwrap()];
     assert!(last.score.unwrap().loss < first.score.unwrap().loss);
     let judged = trainer.judge(trainer.task().validated());
-    // Half of the variance is in the evidence: a perfect reader of it has a rank correlation of about 0.7.
+    // The evidence explains half of the variance. A perfect predictor from the evidence has a rank correlation of about 0.7.
     let found = judged.mean_rank_correlation();
     assert!((0.55..0.85).contains(&found), "{found}");
 }

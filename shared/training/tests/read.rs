@@ -1,4 +1,4 @@
-//! Small data sets of every layout, valid and invalid.
+//! Tests with small data sets of every layout, valid and invalid.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -16,7 +16,7 @@ use training::datasets::{
 
 const N_JOINTS: usize = 3;
 
-/// Joint of a person, pixels from 0.
+/// Position of a joint of a person, in pixels from 0.
 fn joint(person: usize, joint: usize) -> [f64; 2] {
     [
         (5 * person + 2 * joint) as f64,
@@ -33,7 +33,7 @@ fn write_image(path: &Path) {
     image::RgbImage::new(40, 20).save(path).unwrap();
 }
 
-/// Values of an array of three sizes, the first fastest.
+/// An array of three sizes, with the first index fastest.
 fn array(sizes: [usize; 3], value: impl Fn([usize; 3]) -> f64) -> Mat {
     let mut values = Vec::new();
     for plane in 0..sizes[2] {
@@ -156,7 +156,7 @@ fn the_images_of_lsp_are_numbered_with_four_or_five_digits_or_listed() {
     fs::write(&list, "b.png\n").unwrap();
     let error = read(dir.path(), &ReadOptions::default()).unwrap_err();
     assert!(
-        error.to_string().ends_with("names 1 images for 2 people"),
+        error.to_string().ends_with("lists 1 images for 2 people"),
         "{error}"
     );
 }
@@ -189,7 +189,7 @@ fn ranges_and_lists_select_and_leave_out() {
     ));
 }
 
-/// A file of JSON lines with one of every fault.
+/// A file of JSON lines with one example of every fault.
 fn faulty() -> TempDir {
     let dir = tempfile::tempdir().unwrap();
     write_image(&dir.path().join("photos/a.png"));
@@ -226,12 +226,12 @@ fn every_fault_is_reported_with_file_and_row_and_counted() {
         "1.5 px outside is accepted by default"
     );
     let expected = [
-        "people.jsonl, line 3: the name \"ann\" is already that of line 1",
+        "people.jsonl, line 3: the name \"ann\" is already used in line 1",
         "people.jsonl, line 4: the same image and joints as line 1",
         "people.jsonl, line 5: 3 joints, expected 2",
-        "people.jsonl, line 6: joint 2 is not known",
-        "people.jsonl, line 7: all joints lie within 0.000 px of (7.0, 2.0)",
-        "people.jsonl, line 8: joint 2 at (50.0, 2.0) lies 10.5 px outside the image of 40x20, more than 2",
+        "people.jsonl, line 6: joint 2 is unknown",
+        "people.jsonl, line 7: all joints are within 0.000 px of (7.0, 2.0)",
+        "people.jsonl, line 8: joint 2 at (50.0, 2.0) is 10.5 px outside the image of 40x20, more than 2",
         "people.jsonl, line 9: the image cannot be used",
         "people.jsonl, line 10: the image cannot be used",
         "people.jsonl, line 11: the image cannot be used",
@@ -260,7 +260,7 @@ fn the_caller_chooses_fatal_faults_and_the_margin() {
     let error = fatal(&[FaultKind::Image, FaultKind::Count]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "4 of 12 people have a fault that was called fatal"
+        "4 of 12 people have a fault of a fatal kind"
     );
     let first = error.source().unwrap().to_string();
     assert!(first.ends_with("people.jsonl, line 5"), "{first}");
@@ -300,9 +300,9 @@ fn numbers_that_are_not_finite_are_faults() {
     fs::write(dir.path().join("labels.mat"), bytes).unwrap();
     let people = read(dir.path(), &ReadOptions::default()).unwrap();
     let expected = [
-        "labels.mat, person 2: joint 2 lies at (NaN, 9.5)",
-        "labels.mat, person 3: joint 3 lies at (14, inf)",
-        "labels.mat, person 4: joint 1 is not known",
+        "labels.mat, person 2: joint 2 is at (NaN, 9.5)",
+        "labels.mat, person 3: joint 3 is at (14, inf)",
+        "labels.mat, person 4: joint 1 is unknown",
     ];
     assert_eq!(messages(&people), expected);
     assert_eq!(people.people.len(), 1);
@@ -333,7 +333,7 @@ fn other_files_are_refused() {
     let bytes = file("points", &labels(1), false);
     assert_eq!(
         parse_labels(&bytes).unwrap_err().to_string(),
-        "it holds no array of real numbers called `ptsAll`"
+        "it contains no array of real numbers called `ptsAll`"
     );
     let bytes = file("joints", &array([4, 2, 2], |_| 0.5), false);
     assert_eq!(

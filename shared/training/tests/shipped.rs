@@ -1,4 +1,4 @@
-//! The network that ships, run by the library that the service uses.
+//! Test of the built-in network, run by the library that the service uses.
 
 use skeleton::N_PARTS;
 use viewquality::{Network, TileShape, Unit, n_evidence};

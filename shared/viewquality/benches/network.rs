@@ -1,4 +1,4 @@
-//! Time for one view's expected errors on one core: the tile of a person 400 pixels high from a
+//! Time on one core for the expected errors of one view: the tile of a person 400 pixels high from a
 //! 1280 x 720 frame, and a network of 13 depthwise-separable blocks, width 0.5, on 160 x 64 pixels,
 //! with random weights.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
@@ -14,7 +14,7 @@ use viewquality::{Network, Normalisation, Sampler, Tile, TileShape};
 const SIZE: [usize; 2] = [1280, 720];
 const N_PARTS: usize = 26;
 const REPEATS: usize = 300;
-/// Channels of the blocks of `MobileNet` (Howard et al. 2017, table 1) and their strides, at full width.
+/// Channels and strides of the blocks of `MobileNet` at full width (Howard et al. 2017, table 1).
 const BLOCKS: [(usize, i64); 13] = [
     (64, 1),
     (128, 2),
@@ -47,7 +47,7 @@ fn main() {
     println!("CPU ms, least of {REPEATS}: tile {sampled:.3}, network {run:.3}");
 }
 
-/// CPU time of the whole process, milliseconds, least of many repetitions.
+/// Least CPU time of the whole process over many repetitions, in milliseconds.
 fn fastest(mut act: impl FnMut()) -> f64 {
     let now = || {
         let time = clock_gettime(ClockId::ProcessCPUTime);
@@ -61,7 +61,7 @@ fn fastest(mut act: impl FnMut()) -> f64 {
     (0..REPEATS).map(once).fold(f64::INFINITY, f64::min)
 }
 
-/// The network, batch norms folded into the convolutions.
+/// The network, with batch normalisation merged into the convolutions.
 fn file() -> Vec<u8> {
     let mut net = inference::onnx::Network::default();
     let TileShape { height, width } = TileShape::SMALL;
@@ -102,7 +102,7 @@ struct Layers {
 }
 
 impl Layers {
-    /// A convolution with bias, and a rectifier.
+    /// A convolution with bias, followed by a rectifier.
     fn convolve(&mut self, channels: usize, side: usize, stride: i64, groups: usize) {
         let nth = self.net.nodes.len();
         let [weights, bias, raw, out] = ["w", "b", "c", "r"].map(|name| format!("{name}{nth}"));

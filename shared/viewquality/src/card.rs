@@ -12,13 +12,13 @@ pub mod key {
     pub const TILE: &str = "parallax.tile";
     /// Mean of red, green and blue, from 0 to 1, separated by white space or commas.
     pub const MEAN: &str = "parallax.mean";
-    /// Deviation of red, green and blue, above 0.
+    /// Standard deviation of red, green and blue, above 0.
     pub const STD: &str = "parallax.std";
     /// Version of the layout of the second input; absent if the network only takes the tile.
     pub const EVIDENCE: &str = "parallax.evidence";
     /// Unit of the output: `pixels`, `relative` or `log-relative`.
     pub const OUTPUT: &str = "parallax.output";
-    /// Which network this is, for people.
+    /// Name of the network for users.
     pub const IDENTITY: &str = "parallax.identity";
     /// Thresholds for switching parts off, one per part; see [`Card::tau`](super::Card::tau).
     pub const TAU: &str = "parallax.tau";
@@ -28,23 +28,23 @@ pub mod key {
 const VERSION: u32 = 1;
 /// Fraction of the tile's height that is the unit of the logarithm.
 const LOG_UNIT: f64 = 0.01;
-/// Largest side of a tile, pixels.
+/// Largest side of a tile, in pixels.
 pub(crate) const MAX_SIDE: usize = 1024;
 
-/// The unit of an output.
+/// The unit of a network's output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Unit {
-    /// Expected error `e`, pixels of the original image.
+    /// Expected error `e`, in pixels of the original image.
     #[default]
     Pixels,
-    /// `e / h`, with `h` the height of the tile in pixels of the original image.
+    /// `e / h`, where `h` is the height of the tile in pixels of the original image.
     Relative,
-    /// `ln(1 + e / (0.01 h))`.
+    /// `ln(1 + e / (0.01 h))`, with `e` and `h` as for [`Self::Relative`].
     LogRelative,
 }
 
 impl Unit {
-    /// The name in a file.
+    /// The name of the unit in a file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pixels => "pixels",
@@ -60,7 +60,7 @@ impl Unit {
 
     /// The training label for an error.
     ///
-    /// * `error`: distance from the truth, and `tile_height`: height that the tile shows, in the
+    /// * `error`, `tile_height`: distance from the truth, and height that the tile shows, in the
     ///   same unit.
     pub fn label(self, error: f64, tile_height: f64) -> f64 {
         match self {
@@ -73,7 +73,7 @@ impl Unit {
     /// The expected error for an output, in the unit of `tile_height`; the inverse of
     /// [`Self::label`]. Negative errors become 0.
     ///
-    /// * Returns `None` unless it is finite.
+    /// * Returns `None` if the error is not finite.
     pub fn error(self, output: f32, tile_height: f64) -> Option<f32> {
         let output = f64::from(output);
         let error = match self {
@@ -89,18 +89,18 @@ impl Unit {
 /// The description of a network besides its graph.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Card {
-    /// The tile; by default the size of the input.
+    /// Size of the tile; by default the size of the input.
     pub tile: Option<TileShape>,
     /// The normalisation of colours; by default that of `ImageNet`.
     pub colours: Normalisation,
-    /// The version of the [`evidence`](crate::evidence()) that it takes; by default none.
+    /// The version of the [`evidence`](crate::evidence()) that the network takes; by default none.
     pub evidence: Option<u32>,
-    /// The unit of its output; by default pixels.
+    /// The unit of the network's output; by default pixels.
     pub unit: Unit,
-    /// Which network it is, for people; may be empty.
+    /// Name of the network for users; may be empty.
     pub identity: String,
-    /// Errors above which a part is switched off: pixels of the original image if the unit is
-    /// pixels, else fractions of the tile's height (never logarithms). By default empty.
+    /// Errors above which a part is switched off; empty by default. If the unit is pixels, they are pixels of the
+    /// original image. Otherwise, they are fractions of the tile's height, never logarithms.
     pub tau: Vec<f32>,
 }
 
@@ -117,15 +117,15 @@ impl Default for Card {
     }
 }
 
-/// Why an entry was rejected.
+/// Reason why an entry was rejected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CardError {
     /// An entry cannot be read.
     #[error("`{key}` is `{got}`, expected {expected}")]
     Entry {
-        /// Its name.
+        /// Name of the entry.
         key: &'static str,
-        /// The first characters of its value.
+        /// The first characters of the entry's value.
         got: String,
         /// The accepted values.
         expected: String,
@@ -133,16 +133,16 @@ pub enum CardError {
     /// The name is unknown: it is misspelt, or belongs to a later version.
     #[error("`{key}` is not an entry of version {VERSION}")]
     Unknown {
-        /// The name, the first characters.
+        /// The first characters of the name.
         key: String,
     },
 }
 
 impl Card {
-    /// Reads entries; those whose names do not begin with `parallax.` are ignored.
+    /// Reads entries. Entries whose names do not begin with `parallax.` are ignored.
     ///
-    /// * `entries`: names and values of `metadata_props`; of duplicate names the last one counts.
-    /// * `n_parts`: number of parts of the model, for the number of thresholds.
+    /// * `entries`: names and values of `metadata_props`; if a name occurs several times, the last one counts.
+    /// * `n_parts`: number of parts of the model, used to check the number of thresholds.
     ///
     /// # Errors
     ///
@@ -180,7 +180,7 @@ impl Card {
         Ok(card)
     }
 
-    /// The entries for a file; [`Self::parse`] reads the same card from them.
+    /// The entries for a file, from which [`Self::parse`] reads the same card.
     pub fn entries(&self) -> BTreeMap<&'static str, String> {
         let join = |values: &[f32]| {
             let words: Vec<String> = values.iter().map(f32::to_string).collect();

@@ -1,4 +1,4 @@
-//! Properties of the single-view pose, as the numbers of a network's second input.
+//! Properties of the single-view pose, as values of a network's second input.
 
 use fmp::{Layout, LocalScore, Model, Pose, Springs};
 
@@ -10,18 +10,18 @@ pub const EVIDENCE_VERSION: u32 = 1;
 /// Largest number of types of a part in the layout.
 pub const N_TYPES: usize = 6;
 
-/// Numbers of every part, in this order; the types follow.
+/// Values of every part, in this order, followed by the types.
 ///
 /// * `response`, `contrast`, `margin`: see [`LocalScore`].
 /// * `spring`: score of the spring to the parent, at most 0 or slightly above; 0 for the root.
 /// * `pair_bias`: score of the pair of types of part and parent; 0 for the root.
-/// * `x`, `y`: position of the part's centre relative to the tile's centre, heights of the tile.
-/// * `from_mirror`: distance to the part on the other side of the body, box sides; 0 if it is its
+/// * `x`, `y`: position of the part's centre relative to the tile's centre, in heights of the tile.
+/// * `from_mirror`: distance to the part on the other side of the body, in box sides; 0 if the part is its
 ///   own mirror.
-/// * `from_second`: distance to the same part of the second candidate, box sides, at most [`FAR`],
-///   which is also the value without a second candidate.
-/// * `inside`: distance to the nearest border of the frame, box sides, from minus to plus [`FAR`];
-///   negative outside.
+/// * `from_second`: distance to the same part of the second candidate, in box sides, at most [`FAR`].
+///   Without a second candidate, it is [`FAR`].
+/// * `inside`: distance to the nearest border of the frame, in box sides, from minus to plus [`FAR`];
+///   negative outside the frame.
 /// * `type_1` to `type_6`: 1 for the part's type, else 0.
 pub const PART_NUMBERS: [&str; 10] = [
     "response",
@@ -36,13 +36,13 @@ pub const PART_NUMBERS: [&str; 10] = [
     "inside",
 ];
 
-/// Numbers of the pose as a whole; they come after those of the parts.
+/// Values of the pose as a whole, after those of the parts.
 ///
-/// * `score`: of the pose.
-/// * `lead`: the score minus that of the second candidate; at most [`FAR`], which is also the value
-///   without one.
+/// * `score`: score of the pose.
+/// * `lead`: the score minus the score of the second candidate, at most [`FAR`]. Without a second candidate, it is
+///   [`FAR`].
 /// * `candidates`: number of candidates, up to 8, divided by 8.
-/// * `log_box_side`: natural logarithm of the root's box side, pixels of the frame.
+/// * `log_box_side`: natural logarithm of the root's box side in pixels of the frame.
 /// * `tile_height`: the tile's height divided by the frame's.
 /// * `aspect`: width of the box of all parts divided by its height.
 /// * `responses`, `springs`: sums over the parts.
@@ -57,23 +57,23 @@ pub const POSE_NUMBERS: [&str; 8] = [
     "springs",
 ];
 
-/// Numbers are capped at this many box sides, or this score.
+/// Limit of values, in box sides or in units of the score.
 pub const FAR: f32 = 10.0;
 
-/// Replaces minus infinity for a pair of types that the model rules out.
+/// Used instead of minus infinity for a pair of types that the model rules out.
 const IMPOSSIBLE: f64 = -100.0;
 
 const PER_PART: usize = PART_NUMBERS.len() + N_TYPES;
 const MOST_CANDIDATES: usize = 8;
 
-/// Number of values for a model with this number of parts: 424 for 26.
+/// Number of values for a model with the given number of parts: 424 for 26.
 pub fn n_evidence(n_parts: usize) -> usize {
     n_parts * PER_PART + POSE_NUMBERS.len()
 }
 
 /// Name of the value at an index, for example `part 3 spring`; parts and types are counted from 1.
 ///
-/// * Returns `None` beyond [`n_evidence`].
+/// * Returns `None` if the index is not below [`n_evidence`].
 pub fn evidence_name(index: usize, n_parts: usize) -> Option<String> {
     let (part, number) = (index / PER_PART, index % PER_PART);
     if part < n_parts {
@@ -87,36 +87,36 @@ pub fn evidence_name(index: usize, n_parts: usize) -> Option<String> {
     Some((*name).to_owned())
 }
 
-/// Why the evidence could not be computed.
+/// Reason why the evidence could not be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum EvidenceError {
     /// There is no candidate.
     #[error("there is no pose")]
     NoPose,
-    /// A part has more types than the layout has room for.
-    #[error("part {part} has {got} types, the evidence has room for {N_TYPES}")]
+    /// A part has more types than the layout allows.
+    #[error("part {part} has {got} types, but the evidence allows at most {N_TYPES}")]
     Types {
-        /// 1-based part.
+        /// Number of the part, from 1.
         part: usize,
-        /// Its types.
+        /// Number of the part's types.
         got: usize,
     },
     /// The number of local scores differs from the number of parts of the pose.
     #[error("there are {got} local scores for {expected} parts")]
     Scores {
-        /// Scores given.
+        /// Number of scores given.
         got: usize,
-        /// Parts of the pose.
+        /// Number of parts of the pose.
         expected: usize,
     },
 }
 
-/// Writes the properties of the best candidate: [`n_evidence`] raw numbers, for every part
-/// [`PART_NUMBERS`] and the types, then [`POSE_NUMBERS`]. The network has to scale them.
+/// Writes the properties of the best candidate: [`n_evidence`] values without scaling. For every part, these are
+/// [`PART_NUMBERS`] and the types; [`POSE_NUMBERS`] follow. The network has to scale the values.
 ///
-/// * `candidates`: of the frame, best first; the first is the pose.
-/// * `scores`: of the pose; see [`fmp::local_scores`].
-/// * `tile`: of the pose.
+/// * `candidates`: candidates of the frame, best first; the first is the pose.
+/// * `scores`: local scores of the pose; see [`fmp::local_scores`].
+/// * `tile`: tile of the pose.
 /// * `out`: overwritten.
 ///
 /// # Errors
@@ -185,13 +185,13 @@ pub fn evidence(
     Ok(())
 }
 
-/// Height of a part's box, pixels.
+/// Height of a part's box, in pixels.
 fn box_side(model: &Model, layout: &Layout, pose: &Pose, part: usize) -> f64 {
     let [_, y1, _, y2] = pose.part_box(model, layout, part);
     y2 - y1 + 1.0
 }
 
-/// Scores of the spring to the parent and of the pair of types.
+/// Scores of the spring to the parent, and of the pair of types.
 fn edge(model: &Model, pose: &Pose, part: usize) -> [f32; 2] {
     let Some(edge) = &model.spec().parts[part].edge else {
         return [0.0, 0.0];

@@ -17,7 +17,7 @@ pub struct Forecaster {
 /// The input of a forecast: a frame and its single-view result.
 #[derive(Debug, Clone, Copy)]
 pub struct ForecastInput<'a> {
-    /// The frame.
+    /// Image of the frame.
     pub image: Rgb8View<'a>,
     /// The model of the person, and the pyramid of the frame.
     pub on: (&'a Model, &'a Layout),
@@ -35,20 +35,20 @@ pub struct ForecastInput<'a> {
 pub struct Forecast {
     /// The tile that the network used.
     pub tile: Tile,
-    /// Expected error of every part, pixels of the frame.
+    /// Expected error of every part, in pixels of the frame.
     pub sigma_px: Vec<f32>,
-    /// Errors above which parts are switched off according to the network's file, pixels of the
+    /// Errors above which parts are switched off according to the network's file, in pixels of the
     /// frame; may be empty.
     pub tau_px: Vec<f32>,
 }
 
-/// Why there is no prediction for a frame.
+/// Reason why there is no prediction for a frame.
 #[derive(Debug, thiserror::Error)]
 pub enum ForecastError {
-    /// There is no candidate, or the network was not made for such poses.
+    /// There is no candidate, or the network is not made for such poses.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
-    /// The pose has no size.
+    /// The box around the pose is empty or not finite.
     #[error("the box of the parts is empty or not finite")]
     NoTile,
     /// The network could not be run.
@@ -57,9 +57,9 @@ pub enum ForecastError {
     /// The network's output is not a valid number of pixels.
     #[error("the network's output for part {part} is {got}")]
     NotANumber {
-        /// 1-based part.
+        /// Number of the part, from 1.
         part: usize,
-        /// The output.
+        /// The network's output.
         got: f32,
     },
 }
@@ -88,7 +88,7 @@ impl Forecaster {
     ///
     /// # Panics
     ///
-    /// If the image has no pixels, or a candidate does not lie on the layout.
+    /// If the image has no pixels, or a candidate is not on the layout.
     pub fn run(&mut self, input: &ForecastInput<'_>) -> Result<Forecast, ForecastError> {
         let (model, layout) = input.on;
         let pose = input.candidates.first().ok_or(EvidenceError::NoPose)?;
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::{Card, Unit};
 
-    /// One part of 3 x 3 cells of 4 pixels.
+    /// A model of one part with 3 x 3 cells of 4 pixels.
     fn model() -> Model {
         Model::new(ModelSpec {
             name: "one".to_owned(),
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn relative_errors_scale_with_the_tile_at_every_frame_scale() {
-        // 12 pixels wide, so 16 high by the shape of the tile, plus a tenth.
+        // The box is 12 pixels wide. With the shape of the tile, the tile is 16 pixels high, plus a tenth.
         for frame_scale in [0.25, 1.0, 3.0] {
             let forecast = run(&mut constant(0.1, Unit::Relative, 0.2), frame_scale).unwrap();
             assert!((forecast.tile.height_px() - 17.6).abs() < 1e-9);

@@ -1,9 +1,9 @@
 //! Expected errors of the parts of a view: the paper's sigma (section 4.3).
 //!
-//! A [`Network`] predicts them from the person's [`Tile`] and, optionally, the [`evidence()`]; a
-//! [`Card`] is the description in its file. [`Forecaster`] runs all steps. [`Table`] holds
-//! predictions that were made elsewhere, and [`Predictor`] returns those of one view, frame by
-//! frame. [`Tau`] holds the thresholds above which a part is switched off.
+//! A [`Network`] predicts the errors from the person's [`Tile`] and, optionally, the [`evidence()`]. A
+//! [`Card`] is the description in the network's file. [`Forecaster`] runs all steps. [`Table`] contains
+//! predictions that were made elsewhere, and [`Predictor`] returns the predictions of one view, frame by
+//! frame. [`Tau`] contains the thresholds above which a part is switched off.
 #![forbid(unsafe_code)]
 
 mod card;

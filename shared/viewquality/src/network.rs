@@ -21,44 +21,44 @@ pub struct Network {
     n_parts: usize,
 }
 
-/// Why a file was rejected as a network.
+/// Reason why a file was rejected as a network.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
-    /// It cannot be loaded.
+    /// The file cannot be loaded.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// An entry of its card is invalid.
+    /// An entry of the network's card is invalid.
     #[error(transparent)]
     Card(#[from] CardError),
-    /// It has other inputs or outputs.
+    /// The network has other inputs or outputs than expected.
     #[error("the network has the {what} {got}, expected {expected}")]
     Names {
         /// `inputs` or `outputs`.
         what: &'static str,
-        /// Their names.
+        /// Names of the inputs or outputs.
         got: String,
         /// The accepted names.
         expected: &'static str,
     },
-    /// An input or the output has another shape.
+    /// An input or the output has an unexpected shape.
     #[error("`{name}` of the network is {got}, expected {expected}")]
     Shape {
-        /// Its name.
+        /// Name of the input or output.
         name: &'static str,
         /// The shape found.
         got: String,
         /// The expected shape.
         expected: String,
     },
-    /// The inputs and the card do not agree.
+    /// The network's inputs contradict its card.
     #[error("the network {takes} `evidence`, but its file {declares} its version")]
     EvidenceVersion {
-        /// `takes` or `does not take`, by whether it has the input.
+        /// `takes` or `does not take`, depending on the inputs.
         takes: &'static str,
-        /// `declares` or `does not declare`, by whether it has the entry.
+        /// `declares` or `does not declare`, depending on the entries.
         declares: &'static str,
     },
-    /// The library could not run it.
+    /// The library could not run the network.
     #[error(transparent)]
     Run(#[from] RunError),
 }
@@ -66,7 +66,7 @@ pub enum NetworkError {
 impl Network {
     /// Reads a network, and runs it once on zeros to check its output.
     ///
-    /// The file must come from a trusted source: a network may use any amount of memory and time.
+    /// The file must come from a trusted source, because a network may use any amount of memory and time.
     ///
     /// * `file`: the bytes of an ONNX file, as described in `NETWORK.md` of this crate.
     /// * `n_parts`: number of parts of the model.
@@ -124,40 +124,40 @@ impl Network {
         Ok(network)
     }
 
-    /// The description in its file.
+    /// The description in the network's file.
     pub fn card(&self) -> &Card {
         &self.card
     }
 
-    /// A fingerprint of the bytes of its file (FNV-1a, 32 bits).
+    /// A fingerprint of the bytes of the network's file (FNV-1a, 32 bits).
     pub fn fingerprint(&self) -> u32 {
         self.session.fingerprint()
     }
 
-    /// The shape of its tile; for a network without a tile, the shape that relative errors refer
-    /// to.
+    /// The shape of the network's tile. For a network without a tile, the shape to which relative errors
+    /// refer.
     pub fn tile_shape(&self) -> TileShape {
         self.shape
     }
 
-    /// Returns true if it takes the tile.
+    /// Returns true if the network takes the tile.
     pub fn takes_tile(&self) -> bool {
         self.takes_tile
     }
 
-    /// Returns true if it takes [`evidence`](crate::evidence()).
+    /// Returns true if the network takes [`evidence`](crate::evidence()).
     pub fn takes_evidence(&self) -> bool {
         self.takes_evidence
     }
 
-    /// Runs it on one thread; the output is in its own [unit](crate::Unit).
+    /// Runs the network on one thread. The output is in the network's own [unit](crate::Unit).
     ///
     /// * `tile`: [`TileShape::n_values`] values; ignored by a network without a tile.
-    /// * `evidence`: [`n_evidence`] numbers; ignored by a network without evidence.
+    /// * `evidence`: [`n_evidence`] values; ignored by a network without evidence.
     ///
     /// # Errors
     ///
-    /// [`NetworkError::Shape`] if a slice or the output has another length, [`NetworkError::Run`]
+    /// [`NetworkError::Shape`] if a slice or the output has an unexpected length, [`NetworkError::Run`]
     /// if the library fails.
     pub fn run(&self, tile: &[f32], evidence: &[f32]) -> Result<Vec<f32>, NetworkError> {
         let TileShape { height, width } = self.shape;
@@ -222,9 +222,9 @@ fn length(name: &'static str, values: &[f32], expected: usize) -> Result<(), Net
     Ok(())
 }
 
-/// Height and width of the tile: those of the card, else those of the input.
+/// Height and width of the tile, from the card or else from the input.
 ///
-/// * `sides`: of the input; empty if the file does not declare them.
+/// * `sides`: sides of the input; empty if the file does not declare them.
 fn tile_shape(sides: &[Side], card: &Card) -> Result<TileShape, NetworkError> {
     let expected = match card.tile {
         Some(TileShape { height, width }) => format!("[n, 3, {height}, {width}]"),

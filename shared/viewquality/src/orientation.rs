@@ -1,18 +1,18 @@
-//! In which direction a person faces, by the picture of one view.
+//! Estimates the direction in which a person faces, from the picture of one view.
 //!
-//! A part detector knows left and right of the picture only: whether the person is seen from the front or
-//! from behind must come from elsewhere. Here it comes from what surrounds the head: histograms of oriented
-//! gradients and colours of three patches, and a network of one hidden layer. Its two outputs are
-//! [`multiview::FrontEvidence`]; several views of one person add theirs up.
+//! A part detector only knows left and right of the picture. Whether the person is seen from the front or
+//! from behind must be determined separately. This module uses the surroundings of the head. Histograms of oriented
+//! gradients and colours of three patches are the input of a network with one hidden layer. Its two outputs are
+//! [`multiview::FrontEvidence`], which can be added over several views of one person.
 //!
-//! The method is our own; the paper has nothing in its place.
+//! The method is our own; the paper does not solve this problem.
 //!
-//! * [`Detector`]: the evidence for a pose of a frame.
-//! * [`Tile`]: what it looks at; [`Crop`]: how examples are varied in training.
-//! * [`Network`]: its numbers, and the file that holds them.
-//! * [`train`](train()): learns them from [`Sample`]s; [`Score`]: how often a network is right.
+//! * [`Detector`]: returns the evidence for a pose of a frame.
+//! * [`Tile`]: the detector's input; [`Crop`]: random variation of examples in training.
+//! * [`Network`]: the parameters of the detector, and their file.
+//! * [`train`](train()): trains them on [`Sample`]s; [`Score`]: how often a network is right.
 //!
-//! Inference adds and multiplies single-precision numbers in one order only: the same picture and pose give the
+//! Inference adds and multiplies single-precision numbers in a fixed order. The same picture and pose therefore give the
 //! same bits on every machine.
 
 mod detector;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::Table;
 
-/// The sequence of a table that belongs to a deployment, and the numbering of its frames.
+/// The sequence of a table that corresponds to a deployment, and the numbering of its frames.
 ///
 /// By default the frame numbers of the table are those of the deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,9 +13,9 @@ pub struct Selection {
     pub subject: String,
     /// Action in the table; empty if the table has no actions.
     pub action: String,
-    /// Frame of the table that belongs to frame 0 of the deployment.
+    /// Frame of the table that corresponds to frame 0 of the deployment.
     pub frame_offset: i64,
-    /// Frames of the table per frame of the deployment.
+    /// Number of table frames per frame of the deployment.
     pub frame_step: u32,
 }
 
@@ -31,7 +31,7 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// The table's frame for a frame of the deployment; `None` if it exceeds the range of numbers.
+    /// The table's frame for a frame of the deployment; `None` on overflow.
     pub fn table_frame(&self, frame: u64) -> Option<i64> {
         let steps = i64::try_from(frame).ok()?.checked_mul(i64::from(self.frame_step))?;
         self.frame_offset.checked_add(steps)
@@ -61,7 +61,7 @@ pub enum Predictor {
     Table {
         /// The numbering of frames in the table.
         selection: Selection,
-        /// By frame of the table; pixels, one per part.
+        /// Expected errors by frame of the table, in pixels, one per part.
         rows: BTreeMap<i64, Vec<f32>>,
     },
 }
@@ -71,7 +71,7 @@ impl Predictor {
     ///
     /// # Errors
     ///
-    /// [`NoPredictions`] if there are no rows, with the sequences that the table has.
+    /// [`NoPredictions`] if there are no such rows; the error lists the sequences of the table.
     pub fn from_table(
         table: &Table,
         selection: Selection,
@@ -91,8 +91,8 @@ impl Predictor {
         }
     }
 
-    /// Expected error of every part in a frame of the deployment, pixels; `None` if there is no
-    /// prediction, and every part counts as usable.
+    /// Expected error of every part in a frame of the deployment, in pixels. `None` if there is no
+    /// prediction; every part then counts as usable.
     pub fn sigma_px(&self, frame: u64) -> Option<&[f32]> {
         match self {
             Self::Table { selection, rows } => {

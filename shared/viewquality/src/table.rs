@@ -20,40 +20,40 @@ pub(crate) struct Name {
     pub(crate) view: String,
 }
 
-/// Why a text was rejected as a table.
+/// Reason why a text was rejected as a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// There are no rows.
+    /// The table has no rows.
     #[error("the table has no rows")]
     Empty,
     /// The header has an unknown or duplicate column.
     #[error("line {line}, column {column}: `{got}` is {problem}; expected {KNOWN}")]
     Header {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// Column, from 1.
+        /// Number of the column, from 1.
         column: usize,
-        /// The name.
+        /// Name of the column.
         got: String,
-        /// Fault of the value.
+        /// Fault of the name.
         problem: &'static str,
     },
     /// The header lacks a column.
     #[error("line {line}: the header has no column `{column}`; expected {KNOWN}")]
     MissingColumn {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// The column's name.
+        /// Name of the missing column.
         column: String,
     },
     /// The number of fields of a row differs from the number of columns.
     #[error("line {line}: {got} columns, expected {expected}")]
     Columns {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// Fields of the row.
+        /// Number of fields in the row.
         got: usize,
-        /// Columns of the table.
+        /// Number of columns of the table.
         expected: usize,
     },
     /// An expected error is not a valid number of pixels.
@@ -62,31 +62,31 @@ pub enum TableError {
          number of pixels from 0"
     )]
     Number {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// Column, from 1.
+        /// Number of the column, from 1.
         column: usize,
-        /// 1-based part.
+        /// Number of the part, from 1.
         part: usize,
-        /// The field.
+        /// Text of the field.
         got: String,
     },
     /// A frame is not a whole number.
     #[error("line {line}, column {column}: frame `{got}` is not a whole number")]
     Frame {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// Column, from 1.
+        /// Number of the column, from 1.
         column: usize,
-        /// The field.
+        /// Text of the field.
         got: String,
     },
     /// Two rows have the same frame of the same view.
-    #[error("line {line}: frame {frame} of {what} was given before")]
+    #[error("line {line}: frame {frame} of {what} occurs twice")]
     Duplicate {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// The frame.
+        /// Number of the frame.
         frame: i64,
         /// Subject, action and view.
         what: String,
@@ -100,13 +100,13 @@ const KNOWN: &str =
     "`subject`, `action`, `frame`, `view` (or `camera`) and `part_1`, `part_2`, ...";
 
 impl Table {
-    /// Reads a table of expected errors, pixels of the frame.
+    /// Reads a table of expected errors, in pixels of the frame.
     ///
-    /// Columns, separated by commas:
-    /// * with a header: `frame`, `view` (or `camera`), `part_1` to `part_n`, and, if the table
-    ///   holds several sequences, `subject` and `action`; in any order. Without the columns
-    ///   `subject` or `action` the name is empty.
-    /// * without a header, as in the authors' files: subject, action, frame, view, then the parts
+    /// Columns are separated by commas:
+    /// * With a header, the columns are `frame`, `view` (or `camera`) and `part_1` to `part_n`, in any order. If the table
+    ///   contains several sequences, it also has `subject` and `action`. Without these columns, the names are
+    ///   empty.
+    /// * Without a header, as in the authors' files, the columns are subject, action, frame, view, and the parts
     ///   in order.
     ///
     /// The first line is a header if one of its fields is `frame`.
@@ -152,7 +152,7 @@ impl Table {
         self.series.values().map(BTreeMap::len).sum()
     }
 
-    /// Expected errors of a frame of a view, pixels, one per part.
+    /// Expected errors of a frame of a view, in pixels, one per part.
     ///
     /// * `subject`, `action`: empty for tables without these columns.
     pub fn get(&self, subject: &str, action: &str, frame: i64, view: &str) -> Option<&[f32]> {
@@ -266,7 +266,7 @@ impl Columns {
             };
             let problem = match known {
                 "" => "not a column for this number of parts",
-                _ if columns.contains_key(known) => "there twice",
+                _ if columns.contains_key(known) => "given twice",
                 _ => {
                     columns.insert(known.to_owned(), column);
                     continue;
@@ -299,7 +299,7 @@ impl Columns {
     }
 }
 
-/// The 1-based part of a column `part_n`.
+/// Number of the part of a column `part_n`, from 1.
 fn part_of(name: &str) -> Option<usize> {
     let number = name.strip_prefix("part_")?;
     let part = number.parse().ok().filter(|&part| part > 0)?;
@@ -374,7 +374,7 @@ mod tests {
         let error = outcome("S,A,1.5,C,1,2\n");
         assert_eq!(error, "line 1, column 3: frame `1.5` is not a whole number");
         let error = outcome("S,A,1,C,1,2\n\nS,A,1,D,1,2\nS,A,1,C,3,4\n");
-        assert_eq!(error, "line 4: frame 1 of S A C was given before");
+        assert_eq!(error, "line 4: frame 1 of S A C occurs twice");
     }
 
     #[test]
@@ -396,7 +396,7 @@ mod tests {
         }
         assert_eq!(
             outcome("frame,view,camera\n"),
-            format!("line 1, column 3: `camera` is there twice; expected {KNOWN}")
+            format!("line 1, column 3: `camera` is given twice; expected {KNOWN}")
         );
     }
 

@@ -1,6 +1,6 @@
 //! Thresholds of the expected error above which a part is switched off.
 
-/// The authors' measurements on a training set, pixels of its images, one number per part.
+/// The authors' measurements on a training set, in pixels of its images, one value per part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainingErrors {
     /// Median error of the single-view pose.
@@ -10,7 +10,7 @@ pub struct TrainingErrors {
 }
 
 impl TrainingErrors {
-    /// HumanEva-I (640x480), from the constants of the authors' program.
+    /// Measurements on HumanEva-I (640x480), from the constants of the authors' program.
     pub const HUMANEVA: Self = Self {
         median_px: [
             9.783, 8.302, 8.008, 22.404, 13.370, 13.751, 15.090, 9.573, 10.866, 10.209, 21.458,
@@ -24,10 +24,10 @@ impl TrainingErrors {
         ],
     };
 
-    /// UMPM (644x486), from the constants of the authors' program.
+    /// Measurements on UMPM (644x486), from the constants of the authors' program.
     ///
-    /// The inaccuracy of part 16, 23.258, comes from a mistake in their data: that part was trained
-    /// with the errors of part 6. It is kept as published, so that their runs can be reproduced.
+    /// The inaccuracy of part 16, 23.258, is due to a mistake in their data: that part was trained
+    /// with the errors of part 6. The published value is kept, so that their runs can be reproduced.
     pub const UMPM: Self = Self {
         median_px: [
             4.713, 4.372, 6.777, 7.732, 9.641, 12.699, 16.146, 6.152, 6.082, 6.121, 5.931, 5.747,
@@ -42,29 +42,29 @@ impl TrainingErrors {
     };
 }
 
-/// Thresholds of the expected error, pixels, one per part: the tau of the paper's eq. 7.
+/// Thresholds of the expected error in pixels, one per part: tau in the paper's eq. 7.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tau {
     px: Vec<f32>,
 }
 
-/// Why a text was rejected as a list of thresholds.
+/// Reason why a text was rejected as a list of thresholds.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TauError {
     /// A field is not a valid number of pixels.
     #[error("line {line}: `{got}` is not a threshold in pixels, expected a finite number from 0")]
     Number {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
-        /// The field.
+        /// Text of the field.
         got: String,
     },
     /// The number of thresholds differs from the number of parts.
     #[error("there are {got} thresholds, expected {expected}: one per part")]
     Count {
-        /// Thresholds found.
+        /// Number of thresholds found.
         got: usize,
-        /// Parts of the model.
+        /// Number of parts of the model.
         expected: usize,
     },
 }
@@ -127,7 +127,7 @@ impl Tau {
         Ok(Self { px })
     }
 
-    /// The thresholds, pixels, one per part.
+    /// The thresholds in pixels, one per part.
     pub fn px(&self) -> &[f32] {
         &self.px
     }

@@ -4,16 +4,16 @@ use kernels::Rgb8View;
 
 /// Height shown by a tile, relative to the height of the person's box.
 ///
-/// The box already extends half a part beyond the outermost centres; the margin shows the network
+/// The box already extends half a part beyond the outermost centres. The margin shows the network
 /// the surroundings of the limb ends.
 const MARGIN: f64 = 1.1;
 
 /// The size of a tile in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileShape {
-    /// Height, pixels, at least 1.
+    /// Height in pixels, at least 1.
     pub height: usize,
-    /// Width, pixels, at least 1.
+    /// Width in pixels, at least 1.
     pub width: usize,
 }
 
@@ -23,25 +23,25 @@ impl TileShape {
         height: 160,
         width: 64,
     };
-    /// The tile of VGG-16; its five halvings leave 5 x 1.
+    /// The tile of VGG-16. Halving it five times leaves 5 x 1.
     pub const VGG16: Self = Self {
         height: 160,
         width: 48,
     };
 
-    /// Number of values of a tile: three channels.
+    /// Number of values of a tile, which has three channels.
     pub fn n_values(self) -> usize {
         3 * self.height * self.width
     }
 }
 
-/// The position of a tile in its frame: upright, not distorted, with the same scale in both
+/// The position of a tile in its frame. The tile is upright and not distorted, with the same scale in both
 /// directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tile {
     /// The size of the tile.
     pub shape: TileShape,
-    /// Its centre in the frame, `[x, y]`, pixels; the centre of the top-left pixel is (0, 0).
+    /// Centre of the tile in the frame, `[x, y]` in pixels; the centre of the top-left pixel is (0, 0).
     pub centre: [f64; 2],
     /// Pixels of the frame per pixel of the tile, above 0.
     pub scale: f64,
@@ -50,12 +50,12 @@ pub struct Tile {
 impl Tile {
     /// The smallest tile that shows a box and a margin of a tenth.
     ///
-    /// With the box `b` wide and `h` high it shows `1.1 max(h, b H / W)` pixels of the frame in height,
-    /// about the box's centre; `H x W` is the tile's shape.
+    /// For a box of width `b` and height `h`, the tile shows a height of `1.1 max(h, b H / W)` pixels of the frame
+    /// around the box's centre. `H x W` is the tile's shape.
     ///
-    /// * `bounds`: `[x1, y1, x2, y2]`, centres of the outermost pixels, as
-    ///   [`Pose::bounding_box`](fmp::Pose::bounding_box) of the single-view pose gives them.
-    /// * Returns `None` if the box is not finite, or empty.
+    /// * `bounds`: `[x1, y1, x2, y2]`, centres of the outermost pixels, as returned by
+    ///   [`Pose::bounding_box`](fmp::Pose::bounding_box) of the single-view pose.
+    /// * Returns `None` if the box is empty or not finite.
     pub fn around(bounds: [f64; 4], shape: TileShape) -> Option<Self> {
         let [x1, y1, x2, y2] = bounds;
         let [width, height] = [x2 - x1 + 1.0, y2 - y1 + 1.0];
@@ -70,18 +70,18 @@ impl Tile {
         })
     }
 
-    /// Height that the tile shows, pixels of the frame: the size of the person to which relative
-    /// errors refer.
+    /// Height that the tile shows, in pixels of the frame. Relative errors refer to this size of the
+    /// person.
     pub fn height_px(&self) -> f64 {
         self.shape.height as f64 * self.scale
     }
 
-    /// Width that the tile shows, pixels of the frame.
+    /// Width that the tile shows, in pixels of the frame.
     pub fn width_px(&self) -> f64 {
         self.shape.width as f64 * self.scale
     }
 
-    /// The rectangle that the tile shows, `[x1, y1, x2, y2]`, centres of the outermost pixels of
+    /// The rectangle that the tile shows, `[x1, y1, x2, y2]`: the centres of its outermost pixels of
     /// the frame.
     pub fn rectangle(&self) -> [f64; 4] {
         let [x, y] = self.centre;
@@ -102,19 +102,19 @@ impl Tile {
 pub struct Normalisation {
     /// Mean of red, green and blue, from 0 to 1.
     pub mean: [f32; 3],
-    /// Deviation of red, green and blue, above 0.
+    /// Standard deviation of red, green and blue, above 0.
     pub deviation: [f32; 3],
 }
 
 impl Normalisation {
-    /// For networks that were trained on `ImageNet`, such as torchvision's.
+    /// Normalisation for networks that were trained on `ImageNet`, such as torchvision's.
     pub const IMAGENET: Self = Self {
         mean: [0.485, 0.456, 0.406],
         deviation: [0.229, 0.224, 0.225],
     };
 }
 
-/// Resamples tiles; keeps its buffers between calls.
+/// Resamples tiles; its buffers are reused between calls.
 #[derive(Debug, Clone, Default)]
 pub struct Sampler {
     taps: Vec<Taps>,
@@ -125,7 +125,7 @@ pub struct Sampler {
 /// The pixels of a row or column of the frame whose weighted mean is a pixel of the tile.
 #[derive(Debug, Clone, Copy)]
 struct Taps {
-    /// The first of them; may lie outside of the frame, where the border is repeated.
+    /// Index of the first pixel. It may be outside the frame, where the border is repeated.
     first: i64,
     /// Index of the first weight, and the number of weights.
     begin: usize,
@@ -133,12 +133,12 @@ struct Taps {
 }
 
 impl Sampler {
-    /// Resamples a tile once from its frame, as `3 x height x width` normalised values.
+    /// Resamples a tile from its frame, as `3 x height x width` normalised values.
     ///
     /// Every pixel is a weighted mean, first over one direction, then over the other. The weight of
     /// a pixel of the frame falls linearly to 0 at `max(1, s)` pixels from the position of the
-    /// tile's pixel (`s` is the scale): bilinear interpolation where the tile is the finer grid, an
-    /// average without aliasing where it is the coarser. Beyond the frame its border is repeated.
+    /// tile's pixel, where `s` is the scale. This is bilinear interpolation if the tile is the finer grid, and an
+    /// average without aliasing if it is the coarser one. Outside the frame, its border is repeated.
     /// Sums are computed in f32 in ascending order, columns first, so that the same frame and tile
     /// give the same bits everywhere.
     ///
@@ -176,7 +176,7 @@ impl Sampler {
         }
     }
 
-    /// Computes the taps of one direction.
+    /// Computes the pixels and weights of one direction.
     fn add_taps(&mut self, centre: f64, scale: f64, n: usize) {
         let reach = scale.max(1.0);
         for i in 0..n {
@@ -207,7 +207,7 @@ impl Sampler {
         [first.unwrap_or(0), last.map_or(1, |value| value + 1)]
     }
 
-    /// The weighted mean of the frame's rows that belong to a row of the tile, into `band`.
+    /// Writes the weighted mean of the frame's rows for one row of the tile to `band`.
     fn mix_rows(&mut self, image: Rgb8View<'_>, row: usize, [left, right]: [usize; 2]) {
         let taps = self.taps[row];
         self.band.fill(0.0);
@@ -220,7 +220,7 @@ impl Sampler {
         }
     }
 
-    /// The weighted mean of the mixed row's pixels that belong to a column of the tile.
+    /// The weighted mean of the mixed row's pixels for one column of the tile.
     fn mix_columns(&self, taps: usize, image_width: usize, [left, _]: [usize; 2]) -> [f32; 3] {
         let taps = self.taps[taps];
         let mut mean = [0.0; 3];

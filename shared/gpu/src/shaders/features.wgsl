@@ -1,27 +1,27 @@
-// From the image to the features of every level: shrinking, halving, gradients, histograms, energies, features. Every operation is the
-// CPU's, in its order and precision; none may be contracted to a fused one.
+// From the image to the features of every level: shrinking, halving, gradients, histograms, energies, features. Every operation has the
+// order and precision of the CPU's. No two operations may be fused.
 struct Picture {
-    w: u32, h: u32, pixel0: u32, source: u32,        // size; its first pixel; the picture it is halved from
-    rows: u32, cols: u32, cell0: u32, feature0: u32, // cells without padding; the first of them; the first padded cell
+    w: u32, h: u32, pixel0: u32, source: u32,        // size; first pixel; picture from which it is halved
+    rows: u32, cols: u32, cell0: u32, feature0: u32, // cells without padding; first cell; first padded cell
     pad_rows: u32, pad_cols: u32, padded_rows: u32, padded_cols: u32,
     table_x: u32, table_y: u32, taps_x: u32, taps_y: u32, // shrinking: first entry of an axis, samples per pixel
 }
 @group(0) @binding(0) var<storage, read> pictures: array<Picture>;
 @group(0) @binding(1) var<storage, read> blocks: array<vec2<u32>>; // picture, first pixel or cell
 
-// A driver's square root may be some units off: a step of Newton in double makes it the nearest.
+// A driver's square root may be some units off. A Newton step in double rounds it to the nearest number.
 fn nearest_sqrt(x: f32) -> f32 {
     let y = f64(sqrt(x));
     if (y == 0.0lf) { return 0.0; }
     return f32(0.5lf * (y + f64(x) / y));
 }
 
-// More blocks than a dimension takes lie in two.
+// If one dimension cannot hold all blocks, they are split into rows.
 fn block_of(group: vec3<u32>) -> u32 { return group.x + group.y * 32768u; }
 
 @group(0) @binding(2) var<storage, read> s_image: array<u32>;    // bytes of the image
 @group(0) @binding(3) var<storage, read> s_first: array<u32>;    // first sample of a pixel along an axis
-@group(0) @binding(4) var<storage, read> s_weights: array<f64>;  // of 4 samples each
+@group(0) @binding(4) var<storage, read> s_weights: array<f64>;  // weights of 4 samples each
 @group(0) @binding(5) var<storage, read> s_width: u32;
 @group(0) @binding(6) var<storage, read_write> s_out: array<f64>; // [picture][channel][row][col]
 
@@ -151,7 +151,7 @@ fn gradient(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
 @group(0) @binding(4) var<storage, read> v_shares: array<f32>;   // [row 4][col 4][corner of the block of 4 cells]
 @group(0) @binding(5) var<storage, read_write> v_out: array<f32>; // [cell][orientation 18]
 
-// 42 cells, 3 threads each: 6 orientations a thread.
+// 42 cells with 3 threads each; 6 orientations per thread.
 @compute @workgroup_size(126)
 fn histograms(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) t: u32) {
     let at = block_of(group);

@@ -1,10 +1,10 @@
-// The tree: own scores and messages of the children, their transforms, the best root of every cell, and backtracking. Nothing here
-// but sums and comparisons in the order of `fmp::Solver`, so that scores and poses have its bits.
+// The tree: own scores and messages of the children, their transforms, the best root of every cell, and backtracking. There are only
+// sums and comparisons, in the order of `fmp::Solver`, so that scores and poses have the same bits.
 struct Level { rows: u32, cols: u32, area: u32, cell0: u32, feat0: u32, stride: u32, map0: u32, unused: u32 }
 const PLANES: u32 = @PLANES@u;   // parts x types
 const PARTS: u32 = @PARTS@u;
 const REACH: i32 = @REACH@;      // longest offset in the tables of costs
-const NOTHING: f32 = -4.0e30;    // in place of minus infinity, which WGSL lacks
+const NOTHING: f32 = -4.0e30;    // used instead of minus infinity, which WGSL lacks
 const LOWEST: f32 = -3.0e38;
 
 @group(0) @binding(0) var<storage, read> levels: array<Level>;
@@ -19,7 +19,7 @@ const LOWEST: f32 = -3.0e38;
 @group(0) @binding(7) var<storage, read_write> c_scores: array<f32>;
 @group(0) @binding(8) var<storage, read_write> c_ranges: array<atomic<u32>>; // [level][plane][maximum, ~minimum, own maximum]
 
-// Numbers as integers of the same order.
+// Converts numbers to integers of the same order.
 fn key(x: f32) -> u32 {
     let b = bitcast<u32>(x);
     return select(b | 0x80000000u, ~b, (b & 0x80000000u) != 0u);
@@ -97,7 +97,7 @@ fn combine(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
 // ---- transform of planes: down the columns, then along the rows, of 32 x 32 cells
 @group(0) @binding(1) var<storage, read> d_tiles: array<vec4<u32>>;          // level, first row, first column
 @group(0) @binding(2) var<storage, read> d_planes: array<u32>;
-@group(0) @binding(3) var<storage, read> d_springs: array<vec4<f32>>;        // of a plane: stiffness and best offset, y and x
+@group(0) @binding(3) var<storage, read> d_springs: array<vec4<f32>>;        // for each plane: stiffness and best offset, y and x
 @group(0) @binding(4) var<storage, read> d_costs: array<f32>;                // [plane][y, x][offset + REACH: 2 REACH]
 @group(0) @binding(5) var<storage, read> d_ranges: array<u32>;
 @group(0) @binding(6) var<storage, read> d_scores: array<f32>;
@@ -108,7 +108,7 @@ fn spread(most: u32, least: u32) -> f32 {
     let low = number(~least);
     return (high - low) + 1.0e-5 * (abs(high) + abs(low));
 }
-// First and last child that can be best for the parent at p: those of the CPU, or a few more.
+// First and last child that can be best for the parent at p: the same as on the CPU, or a few more.
 fn reach(p: i32, n: i32, stiffness: f32, centre: f32, spread: f32) -> vec2<i32> {
     let c = f32(p) + centre;
     let nearest = clamp(floor(c + 0.5), 0.0, f32(n - 1));
@@ -179,7 +179,7 @@ fn transform(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             }
         }
     }
-    // Turned round in shared memory, so that a store writes a row.
+    // Transposed in shared memory, so that a store writes a row.
     workgroupBarrier();
     @unroll j 0 8 1 { tile_of[lane * 33 + eight + $j] = out[$j]; }
     workgroupBarrier();
@@ -211,7 +211,7 @@ fn roots(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     r_roots[cell] = vec2<u32>(bitcast<u32>(best), kind);
 }
 
-// ---- roots with no better neighbour among the eight around them, and no equal one before them; of the others the type is 255
+// ---- roots with no better neighbour among the eight around them, and no equal one before them; other roots get type 255
 @group(0) @binding(1) var<storage, read> p_level_of_cell: array<u32>;
 @group(0) @binding(2) var<storage, read> p_roots: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read_write> p_peaks: array<vec2<u32>>;
@@ -235,7 +235,7 @@ fn peaks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     p_peaks[cell] = vec2<u32>(p_roots[cell].x, kind);
 }
 
-// ---- backtracking, one workgroup a root: @SLOTS@ parts of equal depth together, 32 threads for a type of each
+// ---- backtracking, one workgroup per root: @SLOTS@ parts of equal depth together, 32 threads for each type of each part
 @group(0) @binding(1) var<storage, read> t_level_of_cell: array<u32>;
 @group(0) @binding(2) var<storage, read> t_roots: array<u32>;                // cell x 8 + type
 @group(0) @binding(3) var<storage, read> t_parents: array<u32>;

@@ -1,8 +1,8 @@
-// Responses of the filters: for every cell and filter the sum over rows, columns and channels, one fused operation each, in the
-// order of `Extractor::direct`. A workgroup computes 64 cells by 160 planes, 8 by 10 a thread, 16 channels at a time through
-// shared memory; the next ones are fetched meanwhile.
+// Responses of the filters: for every cell and filter, the sum over rows, columns and channels, with one fused operation per term, in
+// the order of `Extractor::direct`. A workgroup computes 64 cells by 160 planes, 8 by 10 per thread. It loads 16 channels at a time
+// into shared memory, and fetches the next channels meanwhile.
 struct Level { rows: u32, cols: u32, area: u32, cell0: u32, feat0: u32, stride: u32, map0: u32, unused: u32 }
-const SIDE: u32 = @SIDE@u;      // of a filter, cells
+const SIDE: u32 = @SIDE@u;      // side of a filter, in cells
 const PLANES: u32 = @PLANES@u;  // parts x types
 
 @group(0) @binding(0) var<storage, read> levels: array<Level>;

@@ -1,6 +1,6 @@
 //! Half precision (IEEE 754 binary16).
 
-/// Bits of the nearest number of half precision, ties to even; what is too large becomes infinite.
+/// Bits of the nearest half-precision number, ties to even. Values that are too large become infinite.
 pub(crate) fn bits_of(value: f32) -> u16 {
     let bits = value.to_bits();
     let sign = (bits >> 16 & 0x8000) as u16;
@@ -12,21 +12,21 @@ pub(crate) fn bits_of(value: f32) -> u16 {
         return sign | 0x7c00; // 65520 and more
     }
     if magnitude < 0x3880_0000 {
-        // Below the smallest normal number steps are 2^-24 wide.
+        // Below the smallest normal number, the steps are 2^-24 wide.
         let steps = f32::from_bits(magnitude) * 16_777_216.0;
         return sign | steps.round_ties_even() as u16;
     }
-    // The exponent counts from 15 in place of 127; 13 bits of the fraction go.
+    // The exponent bias is 15 instead of 127; 13 bits of the fraction are dropped.
     let kept = magnitude - 0x3800_0000;
     let is_odd = kept >> 13 & 1;
     sign | ((kept + 0xfff + is_odd) >> 13) as u16
 }
 
-/// The value of bits of half precision.
+/// The value of a half-precision number given by its bits.
 pub fn value_of(bits: u16) -> f32 {
     let sign = u32::from(bits & 0x8000) << 16;
     let magnitude = u32::from(bits & 0x7fff) << 13;
-    // Exponents count from 15 in place of 127; this is exact, below the smallest normal number too.
+    // The exponent bias is 15 instead of 127. The result is exact, even below the smallest normal number.
     let scale = f32::from_bits((127 + 112) << 23);
     let magnitude = match bits >> 10 & 31 {
         31 => magnitude | 0x7f80_0000,

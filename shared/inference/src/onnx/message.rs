@@ -1,6 +1,7 @@
-//! The wire format of protocol buffers, as much of it as an ONNX file needs: fields of numbers, texts, bytes and messages.
+//! The part of the wire format of protocol buffers that an ONNX file needs: fields with numbers, texts, bytes and messages.
 
-/// A message in the wire format of protocol buffers that is being written: for parts of files that [`Network`](crate::onnx::Network) does not write.
+/// A message being written in the wire format of protocol buffers. It serves for parts of files that [`Network`](crate::onnx::Network) does
+/// not write.
 #[must_use]
 #[derive(Debug, Default, Clone)]
 pub struct Message(Vec<u8>);
@@ -10,14 +11,14 @@ const VARINT: u64 = 0;
 const BYTES: u64 = 2;
 
 impl Message {
-    /// A whole number.
+    /// Adds a field with an integer.
     pub fn number(mut self, field: u64, value: i64) -> Self {
         self.key(field, VARINT);
         self.varint(value as u64);
         self
     }
 
-    /// Bytes.
+    /// Adds a field with bytes.
     pub fn bytes(mut self, field: u64, value: &[u8]) -> Self {
         self.key(field, BYTES);
         self.varint(value.len() as u64);
@@ -25,17 +26,17 @@ impl Message {
         self
     }
 
-    /// A text.
+    /// Adds a field with text.
     pub fn text(self, field: u64, value: &str) -> Self {
         self.bytes(field, value.as_bytes())
     }
 
-    /// Another message.
+    /// Adds a field with another message.
     pub fn message(self, field: u64, value: &Self) -> Self {
         self.bytes(field, &value.0)
     }
 
-    /// One field for every item.
+    /// Adds one field for every item.
     pub fn each<T>(
         self,
         items: impl IntoIterator<Item = T>,

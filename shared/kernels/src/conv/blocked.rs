@@ -1,27 +1,27 @@
-//! Stacks of channels whose values lie in blocks of neighbouring channels.
+//! Stacks of channels whose values are stored in blocks of neighbouring channels.
 
 use crate::simd::{ROW, Row, flat, flat_mut};
 
-/// Channels that lie side by side.
+/// Number of channels stored next to each other.
 pub(super) const BLOCK: usize = 16;
 
-/// The sides of a [`Blocked`] stack.
+/// The shape of a [`Blocked`] stack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BlockedShape {
-    /// Channels.
+    /// Number of channels.
     pub(super) channels: usize,
-    /// Rows.
+    /// Number of rows.
     pub(super) rows: usize,
-    /// Columns.
+    /// Number of columns.
     pub(super) cols: usize,
-    /// Rows and columns of zeros on every side.
+    /// Number of rows and columns of zeros on every side.
     pub(super) border: usize,
-    /// Channels in a block.
+    /// Number of channels in a block.
     pub(super) width: usize,
 }
 
 impl BlockedShape {
-    /// Blocks of 16 channels; the last one is filled up with zeros.
+    /// Makes a shape with blocks of 16 channels; the last block is padded with zeros.
     pub fn new([channels, rows, cols]: [usize; 3], border: usize) -> Self {
         Self {
             channels,
@@ -32,7 +32,7 @@ impl BlockedShape {
         }
     }
 
-    /// One block of all channels: for pictures, that have three.
+    /// Makes a shape with one block of all channels, for pictures, which have three.
     pub fn packed([channels, rows, cols]: [usize; 3], border: usize) -> Self {
         Self {
             width: channels,
@@ -50,12 +50,12 @@ impl BlockedShape {
         self.channels.div_ceil(self.width.max(1))
     }
 
-    /// Floats from one row of a block to the next.
+    /// Number of floats from one row of a block to the next.
     pub(super) fn row(&self) -> usize {
         (self.cols + 2 * self.border) * self.width
     }
 
-    /// Floats from one block to the next.
+    /// Number of floats from one block to the next.
     pub(super) fn plane(&self) -> usize {
         (self.rows + 2 * self.border) * self.row()
     }
@@ -71,7 +71,7 @@ impl BlockedShape {
     }
 }
 
-/// A stack of channels: blocks of neighbouring channels, within them rows, columns, and the channels of the block. The
+/// A stack of channels. The order is: blocks of neighbouring channels, then rows, columns, and the channels of the block. The
 /// borders are zero.
 #[derive(Debug, Clone)]
 pub struct Blocked {
@@ -80,18 +80,18 @@ pub struct Blocked {
 }
 
 impl Blocked {
-    /// Zeros.
+    /// Makes a stack of zeros.
     pub fn new(shape: BlockedShape) -> Self {
         let rows = vec![Row::ZERO; shape.len().div_ceil(ROW)];
         Self { shape, rows }
     }
 
-    /// Its sides.
+    /// The shape of the stack.
     pub fn shape(&self) -> BlockedShape {
         self.shape
     }
 
-    /// At least as many values as the shape asks for.
+    /// The values, at least as many as the shape needs.
     #[inline(always)]
     pub(super) fn values(&self) -> &[f32] {
         flat(&self.rows)
@@ -102,7 +102,7 @@ impl Blocked {
         flat_mut(&mut self.rows)
     }
 
-    /// A value; zero outside of the rows and columns.
+    /// A value, or zero outside the rows and columns.
     pub(super) fn get(&self, channel: usize, [row, col]: [Option<usize>; 2]) -> f32 {
         let row = row.filter(|row| *row < self.shape.rows);
         let col = col.filter(|col| *col < self.shape.cols);
@@ -119,11 +119,11 @@ impl Blocked {
         self.values_mut()[at] = value;
     }
 
-    /// Takes values over that lie channel by channel and row by row.
+    /// Copies values that are stored channel by channel and row by row.
     ///
     /// # Panics
     ///
-    /// Unless there are as many as it has channels, rows and columns.
+    /// If the number of values does not match the channels, rows and columns.
     pub fn fill(&mut self, planes: &[f32]) {
         let shape = self.shape;
         let [channels, rows, cols] = shape.sides();
@@ -140,7 +140,7 @@ impl Blocked {
         }
     }
 
-    /// Puts its values channel by channel and row by row.
+    /// Writes the values channel by channel and row by row.
     pub fn write(&self, planes: &mut Vec<f32>) {
         let shape = self.shape;
         planes.clear();

@@ -1,4 +1,4 @@
-//! Convolutions a few neighbouring pixels and two registers of outputs at a time.
+//! Convolutions of a few neighbouring pixels and two registers of outputs at a time.
 #![expect(
     clippy::needless_range_loop,
     reason = "only ranges are unrolled surely, and that keeps sums in registers"
@@ -9,12 +9,12 @@ use super::{Blocked, BlockedShape, Conv, Outputs};
 use crate::isa::Isa;
 use crate::simd::{Kernel, Simd};
 
-/// Most pixels whose sums are under way at once.
+/// Largest number of pixels whose sums are computed at once.
 const MOST_PIXELS: usize = 8;
-/// Weights that stay in the first cache while the pixels pass by: floats for a block of outputs.
+/// Number of weights, in floats for a block of outputs, that stay in the first-level cache while the pixels are processed.
 const CHUNK: usize = 4608;
 
-/// The sides of the stacks have been checked by the caller.
+/// Convolves stacks whose shapes the caller has checked.
 pub(super) fn run(
     isa: Isa,
     conv: &Conv,
@@ -47,7 +47,7 @@ pub(super) struct Layer<'a> {
     pub(super) relu: Option<&'a mut [f32]>,
 }
 
-/// Consecutive pixels, row by row, and what is added to their sums.
+/// Consecutive pixels, row by row, with the residual that is added to their sums.
 struct Tile<const N: usize> {
     /// The first output in the registers.
     lane: usize,
@@ -57,13 +57,13 @@ struct Tile<const N: usize> {
     is_last: bool,
 }
 
-/// The place of a tile.
+/// The position of a tile.
 #[derive(Clone, Copy)]
 struct Place {
     lane: usize,
     row: usize,
     col: usize,
-    /// The first block of the input, and how many.
+    /// The first block of the input, and the number of blocks.
     block: usize,
     n_blocks: usize,
 }
@@ -95,7 +95,7 @@ impl Kernel for Layer<'_> {
 }
 
 impl<'a> Layer<'a> {
-    /// Weights of a block of outputs for a block of the input.
+    /// The weights of a block of outputs for a block of the input.
     #[inline(always)]
     fn per_block(&self) -> usize {
         let [rows, cols] = self.conv.size.kernel;
@@ -117,7 +117,7 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Sums at `N` pixels; moves the place behind them.
+    /// Computes the sums at `N` pixels, and moves the position behind them.
     #[inline(always)]
     fn tile<S: Simd, const N: usize>(&mut self, simd: S, place: &mut Place) {
         let (size, from) = (&self.conv.size, self.from);
@@ -144,7 +144,7 @@ impl<'a> Layer<'a> {
             is_last: block + n_blocks == from.n_blocks(),
         };
         let rows = [size.kernel[0], size.kernel[1] * from.width];
-        // Two registers lie in one block of outputs, or in two.
+        // The two registers are in one block of outputs, or in two.
         let weights = [
             self.weights(lane, block, n_blocks),
             self.weights(lane + S::LANES, block, n_blocks),
@@ -190,7 +190,7 @@ struct Ends<'a> {
 }
 
 impl Ends<'_> {
-    /// Biases, or what earlier blocks of the input gave.
+    /// Loads the biases, or the sums of earlier blocks of the input.
     ///
     /// * `half`: the first or the second register of sums.
     #[inline(always)]
@@ -218,7 +218,7 @@ impl Ends<'_> {
         }
     }
 
-    /// Writes sums, or the parts that they have so far.
+    /// Writes sums, which may still be partial.
     ///
     /// * `half`: the first or the second register of sums.
     #[inline(always)]
@@ -257,9 +257,9 @@ impl Ends<'_> {
     }
 }
 
-/// Products that are added to sums at a few pixels, two registers of outputs each.
+/// Products that are added to the sums at a few pixels, with two registers of outputs each.
 struct Products<'a, const N: usize> {
-    /// For each pixel, from the first value under the kernel on.
+    /// For each pixel, the values from the first one under the kernel.
     inputs: [&'a [f32]; N],
     /// Weights of the outputs in each register, [`BLOCK`] floats for each value under the kernel.
     weights: [&'a [f32]; 2],
@@ -267,7 +267,7 @@ struct Products<'a, const N: usize> {
     plane: usize,
     n_rows: usize,
     row: usize,
-    /// Neighbouring values in a row of the kernel and a block of channels.
+    /// Number of neighbouring values in a row of the kernel and a block of channels.
     run: usize,
     tile: Tile<N>,
     ends: Ends<'a>,
@@ -284,14 +284,14 @@ impl<const N: usize> Kernel for Products<'_, N> {
             for row in 0..self.n_rows {
                 let begin = block * self.plane + row * self.row;
                 for tap in begin..begin + self.run {
-                    // SAFETY: there are as many weights as the loops have turns, each of a block that a register fits in.
+                    // SAFETY: there are as many weights as iterations of the loops, each in a block that contains a register.
                     let low = unsafe { simd.load_at(self.weights[0], at) };
                     // SAFETY: as above.
                     let high = unsafe { simd.load_at(self.weights[1], at) };
                     at = at.wrapping_add(BLOCK);
                     for pixel in 0..N {
-                        // SAFETY: `Conv::check` has made sure that the input and its border hold all that the kernel
-                        // reaches over.
+                        // SAFETY: `Conv::check` has made sure that the input and its border contain everything that the kernel
+                        // reaches.
                         let value = unsafe { self.inputs[pixel].get_unchecked(tap) };
                         let value = simd.splat(*value);
                         sums[pixel][0] = simd.mul_add(value, low, sums[pixel][0]);

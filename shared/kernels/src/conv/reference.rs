@@ -3,7 +3,7 @@
 use super::blocked::BLOCK;
 use super::{Blocked, Conv, Outputs};
 
-/// Each output by itself.
+/// Computes each output separately.
 pub(super) fn run(
     conv: &Conv,
     input: &Blocked,

@@ -4,11 +4,11 @@ use super::{Blocked, Outputs, relu};
 use crate::dispatch::{Body, dispatch};
 use crate::isa::Isa;
 
-/// Writes `a + b`, each pixel of `b` repeated over `repeat x repeat` pixels.
+/// Writes `a + b`, with each pixel of `b` repeated over `repeat x repeat` pixels.
 ///
 /// # Panics
 ///
-/// Unless `b`, repeated, and the outputs have the sides of `a`.
+/// If the sizes of the repeated `b` or of the outputs differ from those of `a`.
 pub fn add_repeated(isa: Isa, a: &Blocked, b: &Blocked, repeat: usize, outputs: Outputs<'_>) {
     let [channels, rows, cols] = b.shape().sides();
     let sides = [channels, rows * repeat, cols * repeat];

@@ -1,11 +1,11 @@
-//! Convolutions against plain loops and against their definition.
+//! Compares convolutions with plain loops and with their definition.
 
 use proptest::prelude::*;
 
 use super::*;
 use crate::sized;
 
-/// Numbers that look drawn by chance, some of them zero.
+/// Pseudo-random numbers, some of them zero.
 fn noise(n: usize, seed: u64) -> Vec<f32> {
     let mut state = seed.wrapping_mul(6364136223846793005) | 1;
     let next = |_| {
@@ -26,7 +26,7 @@ fn bits(stack: &Blocked) -> Vec<u32> {
     stack.values().iter().map(|value| value.to_bits()).collect()
 }
 
-/// A layer that a user could ask for.
+/// A random valid layer.
 #[derive(Debug, Clone)]
 struct Case {
     size: ConvSize,
@@ -76,7 +76,7 @@ fn cases() -> impl Strategy<Value = Case> {
 }
 
 impl Case {
-    /// Rows and columns that come out where as much is padded behind as before.
+    /// Rows and columns of the output if the padding after the input equals that before.
     fn out(&self) -> [usize; 2] {
         [0, 1].map(|axis| {
             let padded = self.sides[axis] + 2 * self.size.pad[axis];

@@ -1,26 +1,25 @@
-//! The matrices of Toom-Cook correlation, made from the points that it interpolates at.
+//! The matrices of Toom-Cook correlation, computed from the interpolation points.
 
-/// Most values in a line of a tile.
+/// Largest number of values in a line of a tile.
 pub(super) const MAX_TILE: usize = 10;
-/// Most pairs of points.
+/// Largest number of pairs of points.
 const MAX_PAIRS: usize = 4;
 
 /// Points `0, p, -p, q, -q, .., infinity` for tiles of `2 pairs + 2` values, as polynomials.
 ///
-/// Correlating `d` with `g` is the transpose of multiplying polynomials, which is done by values at
-/// points: `y = A^T ((G g) . (B^T d))` with `A` and `G` the powers of the points (Winograd,
+/// Correlating `d` with `g` is the transpose of multiplying polynomials, which can be done by values at
+/// points: `y = A^T ((G g) . (B^T d))`, where `A` and `G` contain the powers of the points (Winograd,
 /// *Arithmetic Complexity of Computations*, 1980; Lavin & Gray, *Fast Algorithms for Convolutional
-/// Neural Networks*, 2016). The rows of `B^T` hold the coefficients of the polynomials that vanish
-/// at all other points, and the divisors go to `G`, which meets double precision only. With
-/// `w(z) = (z - p^2)(z - q^2)..` and `v_p(z) = w(z) / (z - p^2)` the rows are
-/// `w(x^2)` for 0, `x w(x^2)` for infinity, and `x^2 v_p(x^2) + p x v_p(x^2)` for `p`:
-/// even and odd values of a line never meet but in the last addition.
+/// Neural Networks*, 2016). The rows of `B^T` contain the coefficients of the polynomials that vanish
+/// at all other points. The divisors are part of `G`, which is only used in double precision. With
+/// `w(z) = (z - p^2)(z - q^2)..` and `v_p(z) = w(z) / (z - p^2)`, the rows are
+/// `w(x^2)` for 0, `x w(x^2)` for infinity, and `x^2 v_p(x^2) + p x v_p(x^2)` for `p`.
+/// Even and odd values of a line are therefore only combined in the last addition.
 ///
 /// All numbers here are exact in single precision: the points are `1`, `2`, `1/2` for tiles of 8 and
-/// `1`, `5/2`, `5/4`, `5/16` for tiles of 10. Of the sets of fractions up to 4 that were tried for
-/// the latter, this one is within a twentieth of the smallest [`amplification`](Self::amplification)
-/// (`1/4` in place of `5/16`), and its measured error is smaller by a third; the usual `1`, `2`,
-/// `1/2`, `4` amplifies 4 times as much.
+/// `1`, `5/2`, `5/4`, `5/16` for tiles of 10. For tiles of 10, sets of fractions up to 4 were tried. The smallest
+/// [`amplification`](Self::amplification) is that of `1/4` in place of `5/16`. The chosen set is within a twentieth of it,
+/// and its measured error is smaller by a third. The usual `1`, `2`, `1/2`, `4` amplifies 4 times as much.
 #[derive(Debug, Clone)]
 pub(super) struct Points {
     pub(super) n_pairs: usize,
@@ -28,7 +27,7 @@ pub(super) struct Points {
     pub(super) positive: [f32; MAX_PAIRS],
     /// Coefficients of `w`, lowest first; that of the highest power is 1.
     pub(super) whole: [f32; MAX_PAIRS],
-    /// Coefficients of `v_p`, as `whole`.
+    /// Coefficients of `v_p`, in the order of `whole`.
     pub(super) without: [[f32; MAX_PAIRS]; MAX_PAIRS],
     /// `powers[i][k] = positive[k]^i`.
     pub(super) powers: [[f32; MAX_PAIRS]; MAX_TILE],
@@ -60,7 +59,7 @@ impl Points {
         all
     }
 
-    /// Values in a line of a tile.
+    /// Number of values in a line of a tile.
     pub(super) fn tile(&self) -> usize {
         2 * self.n_pairs + 2
     }
@@ -71,7 +70,7 @@ impl Points {
         std::iter::once(0.0).chain(pairs.flat_map(|pair| [pair, -pair])).collect()
     }
 
-    /// `G`, `tile x taps`: what a line of a filter is multiplied with.
+    /// `G`, `tile x taps`: the matrix for a line of a filter.
     pub(super) fn of_filter(&self, taps: usize) -> Vec<Vec<f64>> {
         let points = self.finite();
         let row = |p: &f64| {
@@ -83,7 +82,7 @@ impl Points {
         points.iter().map(row).chain([last]).collect()
     }
 
-    /// `B^T`, `tile x tile`: what a line of cells is multiplied with.
+    /// `B^T`, `tile x tile`: the matrix for a line of cells.
     fn of_cells(&self) -> Vec<Vec<f64>> {
         let n = self.tile();
         let mut rows = vec![vec![0.0; n]; n];
@@ -107,7 +106,7 @@ impl Points {
         rows
     }
 
-    /// `A^T`, `placements x tile`: what a line of products is multiplied with.
+    /// `A^T`, `placements x tile`: the matrix for a line of products.
     fn of_products(&self, placements: usize) -> Vec<Vec<f64>> {
         let row = |i: usize| {
             let finite = self.finite().into_iter().map(|p| power(p, i));
@@ -116,8 +115,8 @@ impl Points {
         (0..placements).map(row).collect()
     }
 
-    /// Amount by which the terms of the sums are larger than those of the direct sum, at most:
-    /// the largest over placements `i` and taps `c` of `sum over a, j of |A_ij| |G_jc| |B_ja|`.
+    /// Upper bound of the ratio between the terms of the sums and those of the direct sum.
+    /// It is the largest `sum over a, j of |A_ij| |G_jc| |B_ja|` over placements `i` and taps `c`.
     pub(super) fn amplification(&self, taps: usize) -> f64 {
         let (a, b) = (self.of_products(self.tile() + 1 - taps), self.of_cells());
         let g = self.of_filter(taps);
@@ -130,14 +129,14 @@ impl Points {
         all.fold(0.0, f64::max)
     }
 
-    /// Roundings on the longest way from a cell and a weight to a response, but for the additions
+    /// Largest number of roundings between a cell or weight and a response, without the additions
     /// over channels: both lines of cells, the transformed weight, both lines of products.
     pub(super) fn roundings(&self) -> usize {
         2 * self.n_pairs + 1 + 2 * (self.n_pairs + 1)
     }
 }
 
-/// `p^n`. The library's may round in the middle, and differently on another machine.
+/// Computes `p^n`. The library's function may round in between, and differently on another machine.
 fn power(p: f64, n: usize) -> f64 {
     std::iter::repeat_n(p, n).product()
 }
@@ -160,7 +159,7 @@ mod tests {
     use super::*;
     use crate::sized;
 
-    /// Interpolation is exact: placement `i` meets tap `c` on cell `i + c` and on no other.
+    /// Tests that interpolation is exact: placement `i` combines tap `c` with cell `i + c` and with no other.
     #[test]
     fn the_matrices_correlate() {
         for n_pairs in [3, 4] {
@@ -182,7 +181,7 @@ mod tests {
         (0..a * b * c).map(move |i| (i / (b * c), i / c % b, i % c))
     }
 
-    /// Else the bound would have to count their roundings.
+    /// Tests that these numbers are exact, since the bound does not count their roundings.
     #[test]
     fn all_constants_are_exact_in_single_precision() {
         for n_pairs in [3, 4] {

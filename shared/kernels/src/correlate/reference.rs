@@ -1,4 +1,4 @@
-//! The definition in double precision, and both fast ways as they are read, to the bit.
+//! The definition in double precision, and readable versions of both fast methods with the same bits.
 
 use super::Template;
 #[cfg(test)]
@@ -12,7 +12,7 @@ use crate::N_CHANNELS;
 ///
 /// # Panics
 ///
-/// If a placement does not lie on the map.
+/// If a placement is not on the map.
 pub fn correlate_f64(
     filter: Template<'_>,
     map_size: [usize; 2],
@@ -31,7 +31,7 @@ pub fn correlate_f64(
     (0..size[0] * size[1]).map(|at| response(at / size[1], at % size[1])).collect()
 }
 
-/// The response map of one filter, the given way.
+/// The response map of one filter, computed by the given method.
 #[cfg(test)]
 pub(super) fn correlate(way: Method, filter: Template<'_>, level: Level<'_>) -> Vec<f32> {
     match way {
@@ -60,7 +60,7 @@ fn direct(filter: Template<'_>, Level { map, size }: Level<'_>) -> Vec<f32> {
     (0..size[0] * size[1]).map(|at| response(at / size[1], at % size[1])).collect()
 }
 
-/// `A^T ((sum over channels of (B^T d B) . (G w G^T))) A` on every tile.
+/// Computes `A^T ((sum over channels of (B^T d B) . (G w G^T))) A` on every tile.
 #[cfg(test)]
 fn tiled(form: &Form, filter: Template<'_>, Level { map, size }: Level<'_>) -> Vec<f32> {
     let n = form.points.tile();
@@ -101,7 +101,7 @@ fn tiled(form: &Form, filter: Template<'_>, Level { map, size }: Level<'_>) -> V
     out
 }
 
-/// `B^T` times a line, the even and the odd values apart.
+/// Multiplies a line by `B^T`, with even and odd values separately.
 #[cfg(test)]
 fn of_cells(form: &Form, line: &[f32]) -> Vec<f32> {
     let points = &form.points;
@@ -126,7 +126,7 @@ fn of_cells(form: &Form, line: &[f32]) -> Vec<f32> {
     out
 }
 
-/// `A^T` times a line, points and their opposites together.
+/// Multiplies a line by `A^T`, with points and their opposites together.
 #[cfg(test)]
 fn of_products(form: &Form, line: &[f32], placements: usize) -> Vec<f32> {
     let points = &form.points;

@@ -1,4 +1,4 @@
-//! Sums of products of a few cells with 32 filters: the loop that all the arithmetic is in.
+//! Sums of products of a few cells with 32 filters: the loop with nearly all the arithmetic.
 
 use std::borrow::Borrow;
 
@@ -6,21 +6,21 @@ use super::N_LANES;
 use crate::N_CHANNELS;
 use crate::simd::{Row, Simd};
 
-/// A filter's rows over the rows of a map, or one product per channel of transformed tiles.
+/// Either a filter's rows over the rows of a map, or one product per channel of transformed tiles.
 pub(super) struct Sums<'a, C> {
-    /// Begins with the cell under the first filter cell of the first sum.
+    /// Cells, from the one under the first filter cell of the first sum.
     pub(super) cells: &'a [C],
-    /// Cells from one row of the map to the next.
+    /// Number of cells from one row of the map to the next.
     pub(super) stride: usize,
-    /// Cells in a row of the filter.
+    /// Number of cells in a row of the filter.
     pub(super) filter_cols: usize,
     /// `filter rows x filter_cols x N_CHANNELS` rows of [`N_LANES`] filters.
     pub(super) weights: &'a [Row],
 }
 
-/// Writes the sums at `n` neighbouring cells, 1 to `S::BLOCK`, all filters of a cell together.
+/// Writes the sums at `n` neighbouring cells, 1 to `S::BLOCK`, with all filters of a cell together.
 ///
-/// Each starts at zero and adds row by row, cell by cell, channel by channel.
+/// Each sum starts at zero and adds row by row, cell by cell, channel by channel.
 #[inline(always)]
 pub(super) fn sums<S: Simd, C: Borrow<[f32; N_CHANNELS]>>(
     simd: S,
@@ -79,20 +79,20 @@ fn block<S: Simd, C: Borrow<[f32; N_CHANNELS]>, const N: usize>(
     }
 }
 
-/// A stretch of a row in the maps of consecutive filters.
+/// A part of a row in the maps of consecutive filters.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
-    /// Where it begins in the map of the first filter.
+    /// First index in the map of the first filter.
     pub(super) at: usize,
-    /// Values from the map of one filter to that of the next.
+    /// Number of values from the map of one filter to that of the next.
     pub(super) plane: usize,
-    /// At most [`N_LANES`].
+    /// Number of filters, at most [`N_LANES`].
     pub(super) n_filters: usize,
 }
 
-/// Writes values that lie filter by filter for each cell of a stretch cell by cell for each filter.
+/// Transposes the values of a stretch: from filters within each cell to cells within each filter.
 ///
-/// * `cells`: those of the stretch, and up to `S::LANES - 1` more that do not matter.
+/// * `cells`: cells of the stretch, followed by up to `S::LANES - 1` unused ones.
 #[inline(always)]
 pub(super) fn put<S: Simd>(simd: S, cells: &[Row], n: usize, to: Stretch, out: &mut [f32]) {
     for x in (0..n).step_by(S::LANES) {

@@ -1,11 +1,11 @@
-//! Every instruction set against the readable version, to the bit; that against the definition.
+//! Compares every instruction set with the readable version, bit for bit, and the readable version with the definition.
 
 use proptest::prelude::*;
 
 use super::*;
 use crate::sized;
 
-/// Numbers in -1..1 that look random and depend on the seed only.
+/// Pseudo-random numbers in -1..1 that depend only on the seed.
 fn noise(seed: u64, n: usize) -> Vec<f64> {
     let mut state = seed.wrapping_mul(2654435761) | 1;
     std::iter::repeat_with(|| {
@@ -16,11 +16,11 @@ fn noise(seed: u64, n: usize) -> Vec<f64> {
     .collect()
 }
 
-/// Filters of given sizes, and maps with a ring of cells that only some of them reach.
+/// Filters of given sizes, and maps with a ring of cells that only some filters reach.
 struct Problem {
     filters: Vec<([usize; 2], Vec<f64>)>,
     maps: Vec<([usize; 2], Vec<f32>)>,
-    /// The largest filter.
+    /// Size of the largest filter.
     largest: [usize; 2],
 }
 
@@ -125,7 +125,7 @@ fn largest_near(level: Level<'_>, filter: [usize; 2], at: [usize; 2]) -> [f64; N
     all
 }
 
-/// All responses keep the bound of [`FilterBank::correlate`]; returns the largest share of it.
+/// Checks the bound of [`FilterBank::correlate`] for all responses, and returns the largest ratio of error to bound.
 fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64 {
     let mut got = got.iter();
     let mut largest = 0.0_f64;
@@ -154,7 +154,7 @@ fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64
     largest
 }
 
-/// A size of filters, and how many there are.
+/// A size of filters, and the number of filters.
 fn filters() -> impl Strategy<Value = ([usize; 2], usize)> {
     let side = 1..sized(8, 4);
     ([side.clone(), side], 1..sized(20, 3))
@@ -163,7 +163,7 @@ fn filters() -> impl Strategy<Value = ([usize; 2], usize)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(sized(40, 1) as u32))]
 
-    /// Up to 70 columns and 40 filters of mixed sizes, so that every remainder occurs.
+    /// Uses up to 70 columns and 40 filters of mixed sizes, so that every remainder occurs.
     #[test]
     fn every_instruction_set_gives_the_bits_of_the_readable_version(
         sizes in prop::collection::vec([1..sized(12, 9), 1..sized(70, 20)], 1..sized(4, 2)),
@@ -179,7 +179,7 @@ proptest! {
         }
     }
 
-    /// Also where large terms cancel, which is where a tile is worst.
+    /// Includes large terms that cancel, for which a tile is least accurate.
     #[test]
     fn responses_keep_the_documented_error_bound(
         size in [1..sized(30, 9), 1..sized(30, 9)],
@@ -198,7 +198,7 @@ proptest! {
     }
 }
 
-/// Tiles of other levels and panels never change a response.
+/// Tests that tiles of other levels and panels never change a response.
 #[test]
 fn responses_do_not_depend_on_what_is_computed_together() {
     let sizes = [[7, 9], [1, 1], [21, 30], [40, 13], [2, 50]];
@@ -221,7 +221,7 @@ fn responses_do_not_depend_on_what_is_computed_together() {
     }
 }
 
-/// A bound for the worst case is far from what noise does, but not farther than this.
+/// The worst-case bound is far above the errors for noise, but not by more than this factor.
 #[test]
 fn the_error_bound_is_not_far_too_large() {
     for side in [1, 4, 5, 6].into_iter().take(sized(4, 2)) {
@@ -260,7 +260,7 @@ fn a_single_weight_copies_its_channel() {
     }
 }
 
-/// The sizes at which each method is chosen, so that a change of the rule is noticed.
+/// Tests the sizes for which each method is chosen, so that a change of the rule is noticed.
 #[test]
 fn the_method_depends_on_sizes_only() {
     assert_eq!(Problem::method([2, 5], [100, 100]), Method::Direct);

@@ -1,4 +1,4 @@
-//! Responses of a tile at once, with fewer products than the definition has.
+//! Computes the responses of a whole tile with fewer products than the definition needs.
 #![expect(
     clippy::needless_range_loop,
     reason = "only ranges are unrolled surely, and that keeps lines in registers: 2.5 times"
@@ -12,33 +12,33 @@ use super::{FeatureMap, N_LANES, Panel, blocks};
 use crate::N_CHANNELS;
 use crate::simd::{Row, Simd};
 
-/// Tiles that are transformed, multiplied and transformed back together.
+/// Number of tiles that are transformed, multiplied and transformed back together.
 const TILES: usize = 24;
-/// Neighbouring tiles whose responses are gathered before they are written.
+/// Number of neighbouring tiles whose responses are gathered before they are written.
 const GATHERED: usize = 8;
 
-/// A way to cut maps into tiles for filters of one size.
+/// A form of tiles for filters of one size.
 #[derive(Debug, Clone)]
 pub(super) struct Form {
     pub(super) points: Points,
-    /// Placements `[rows, cols]` that a tile answers.
+    /// Number of placements `[rows, cols]` covered by a tile.
     pub(super) placements: [usize; 2],
 }
 
 impl Form {
-    /// Tiles of `2 n_pairs + 2` cells a side.
+    /// Makes a form with tiles of `2 n_pairs + 2` cells a side.
     pub(super) fn new(n_pairs: usize, filter: [usize; 2]) -> Self {
         let points = Points::new(n_pairs);
         let placements = filter.map(|side| points.tile() + 1 - side);
         Self { points, placements }
     }
 
-    /// Values in a transformed tile.
+    /// Number of values in a transformed tile.
     pub(super) fn area(&self) -> usize {
         self.points.tile().pow(2)
     }
 
-    /// Tiles down and across that answer at all of `size`.
+    /// Number of tiles down and across that cover all placements of `size`.
     pub(super) fn tiles(&self, size: [usize; 2]) -> [usize; 2] {
         [0, 1].map(|i| size[i].div_ceil(self.placements[i]))
     }
@@ -64,10 +64,10 @@ impl Form {
     }
 }
 
-/// Where a tile's responses go.
+/// Destination of a tile's responses.
 #[derive(Debug, Clone, Copy)]
 struct Tile {
-    /// Where the level's maps begin.
+    /// First index of the level's maps.
     level: usize,
     /// Size `[rows, cols]` of a map.
     size: [usize; 2],
@@ -75,7 +75,7 @@ struct Tile {
     x: usize,
 }
 
-/// Tiles that wait for enough others, and the buffers for them.
+/// Tiles collected for the next computation, and the buffers for them.
 #[derive(Debug, Default)]
 pub(super) struct Pending {
     tiles: Vec<Tile>,
@@ -90,37 +90,37 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// Forgets tiles that a panic has left.
+    /// Removes tiles that remain after a panic.
     pub(super) fn clear(&mut self) {
         self.tiles.clear();
     }
 
-    /// Makes room; nothing to do from the second time on.
+    /// Allocates the buffers; later calls do nothing.
     pub(super) fn prepare(&mut self, form: &Form) {
         let [rows, cols] = form.placements;
         self.tiles.reserve(TILES.saturating_sub(self.tiles.len()));
         self.cells.resize(form.area() * TILES, Row::ZERO);
         self.products.resize(form.area() * TILES, Row::ZERO);
         self.between.resize(form.area(), Row::ZERO);
-        // Registers are read whole, so the last row has room for one more.
+        // Registers are read whole, so the last row has one more register.
         let n = rows * cols * GATHERED + N_LANES;
         self.gathered.resize(n.max(self.gathered.len()), Row::ZERO);
     }
 }
 
-/// The panels that answer, and where.
+/// The panels to compute, and the destination.
 pub(super) struct Answer<'a> {
     form: &'a Form,
-    /// Which of a panel's packed weights belong to the form.
+    /// Index of the form in a panel's packed weights.
     form_idx: usize,
     panels: &'a [Panel],
-    /// The filter whose maps are first in a level.
+    /// Index of the filter whose maps are first in a level.
     first_filter: usize,
     out: &'a mut [f32],
 }
 
 impl<'a> Answer<'a> {
-    /// Answers in tiles of one of the forms.
+    /// Computes the responses in tiles of one of the forms.
     #[inline(always)]
     pub(super) fn new(
         forms: &'a [Form],
@@ -138,7 +138,7 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// Takes in a level whose maps begin at `level` in the output; answers when enough tiles wait.
+/// Adds a level whose maps begin at `level` in the output, and computes when enough tiles are collected.
 #[inline(always)]
 pub(super) fn take<S: Simd>(
     simd: S,
@@ -164,7 +164,7 @@ pub(super) fn take<S: Simd>(
     }
 }
 
-/// Answers on all tiles that wait.
+/// Computes the responses of all collected tiles.
 #[inline(always)]
 pub(super) fn flush<S: Simd>(simd: S, pending: &mut Pending, answer: &mut Answer<'_>) {
     for panel in answer.panels {
@@ -182,7 +182,7 @@ pub(super) fn flush<S: Simd>(simd: S, pending: &mut Pending, answer: &mut Answer
     pending.tiles.clear();
 }
 
-/// How many of the first tiles lie side by side; at most [`GATHERED`].
+/// Number of tiles at the start of the list that are next to each other; at most [`GATHERED`].
 fn neighbours(tiles: &[Tile], step: usize) -> usize {
     let first = tiles[0];
     let beside = |(nth, tile): &(usize, &Tile)| {
@@ -226,7 +226,7 @@ fn transform<S: Simd, const K: usize>(
     }
 }
 
-/// `B^T` times a line of cells; see [`Points`].
+/// Multiplies a line of cells by `B^T`; see [`Points`].
 #[inline(always)]
 fn of_cells<S: Simd, const K: usize>(
     simd: S,
@@ -256,7 +256,7 @@ fn of_cells<S: Simd, const K: usize>(
     out
 }
 
-/// Sums over channels of transformed cells times transformed weights.
+/// Sums over channels of the products of transformed cells and transformed weights.
 #[inline(always)]
 fn multiply<S: Simd>(simd: S, weights: &[Row], pending: &mut Pending) {
     let each = weights.chunks_exact(N_CHANNELS);
@@ -275,7 +275,7 @@ fn multiply<S: Simd>(simd: S, weights: &[Row], pending: &mut Pending) {
     }
 }
 
-/// `A^T m A` of neighbouring tiles for all filters of a panel, written where they belong.
+/// Computes `A^T m A` of neighbouring tiles for all filters of a panel, and writes the results.
 #[inline(always)]
 fn write<S: Simd, const K: usize>(
     simd: S,
@@ -348,7 +348,7 @@ fn across<S: Simd, const K: usize>(
     store_line(simd, (values, to.len()), to, (1, lane));
 }
 
-/// `A^T` times a line of products, for a number of placements; see [`Points`].
+/// Multiplies a line of products by `A^T`, for a number of placements; see [`Points`].
 #[inline(always)]
 fn of_products<S: Simd, const K: usize>(
     simd: S,
@@ -395,7 +395,7 @@ fn placements<S: Simd, const K: usize, const N: usize>(
     out
 }
 
-/// The values of a line, `step` rows apart.
+/// Loads the values of a line, `step` rows apart.
 #[inline(always)]
 fn load_line<S: Simd, const K: usize>(
     simd: S,
@@ -409,7 +409,7 @@ fn load_line<S: Simd, const K: usize>(
     line
 }
 
-/// Writes the first `n` values of a line `step` rows apart.
+/// Writes the first `n` values of a line, `step` rows apart.
 #[inline(always)]
 fn store_line<S: Simd>(
     simd: S,

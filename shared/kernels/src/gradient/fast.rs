@@ -1,13 +1,13 @@
-//! Lanes are pixels: every lane makes the reference's decisions in the reference's order.
+//! Gradients with one pixel per lane; every lane follows the reference in the same order.
 
 use super::DIRECTIONS;
 use crate::Planes;
 
-/// Lengths (levels of grey) and orientations of the gradients of row `y`, first and last pixel left out.
+/// Lengths (levels of grey) and orientations of the gradients of row `y`, without the first and the last pixel.
 ///
-/// The decisions are made in double precision; only the length is rounded to single precision.
+/// Orientations are determined in double precision; only the length is rounded to single precision.
 ///
-/// * `lengths`, `bins`: a value per pixel but two; overwritten.
+/// * `lengths`, `bins`: two values fewer than pixels in the row; overwritten.
 #[inline(always)]
 pub(crate) fn gradients(image: &Planes, y: usize, lengths: &mut [f32], bins: &mut [u32]) {
     let n = image.width() - 2;

@@ -1,4 +1,4 @@
-//! The features a row of cells at a time. Lanes are pixels while gradients are taken, then cells.
+//! Computes the features one row of cells at a time. A lane is a pixel for the gradients, and a cell afterwards.
 
 use super::votes::Votes;
 use super::{CLIP, FLAT, HogShape, N_CHANNELS, N_UNSIGNED, TEXTURE};
@@ -6,24 +6,24 @@ use crate::Planes;
 use crate::dispatch::Body;
 use crate::gradient::N_ORIENTATIONS;
 
-/// Cells that are normalised at once.
+/// Number of cells that are normalised at once.
 const LANES: usize = 16;
 type Lanes = [f32; LANES];
 
-/// Buffers of [`hog`](super::hog()), used again from image to image.
+/// Buffers of [`hog`](super::hog()), reused from image to image.
 #[derive(Debug, Default)]
 pub struct HogWorkspace {
     votes: Votes,
-    /// Rows of cells that are not used up yet, by row modulo 3; `N_ORIENTATIONS x stride`.
+    /// Rows of cells that are still needed, by row modulo 3; `N_ORIENTATIONS x stride`.
     histograms: [Vec<f32>; 3],
     /// Energies of the cells of a row, by row modulo 2.
     energies: [Vec<f32>; 2],
-    /// Norms of the blocks of 2 x 2 cells at their upper left cell, by row modulo 2.
+    /// Norms of the blocks of 2 x 2 cells, stored at their upper left cell, by row modulo 2.
     norms: [Vec<f32>; 2],
 }
 
 impl HogWorkspace {
-    /// Makes room for images up to this size.
+    /// Reserves memory for images up to this size.
     pub fn reserve(&mut self, width: usize, height: usize, shape: HogShape) {
         let [_, cols] = shape.cells(width, height);
         self.prepare(stride(cols));
@@ -44,7 +44,7 @@ impl HogWorkspace {
     }
 }
 
-/// Length of a row of cells in memory: lanes that begin at the last cell still lie inside.
+/// Length of a row of cells in memory. Lanes that begin at the last cell are still inside the row.
 fn stride(cols: usize) -> usize {
     cols.next_multiple_of(LANES) + LANES
 }
@@ -91,7 +91,7 @@ impl Body for Hog<'_> {
 }
 
 impl HogWorkspace {
-    /// Energies of a finished row of cells, and norms of the blocks that it finishes.
+    /// Computes the energies of a finished row of cells, and the norms of the blocks that it completes.
     #[inline(always)]
     fn energies_of(&mut self, row: usize, stride: usize) {
         let [first, second] = &mut self.energies;
@@ -119,7 +119,7 @@ impl HogWorkspace {
         }
     }
 
-    /// Features of the row above `row`, of all its cells but the first and the last.
+    /// Computes the features of the row above `row`, for all its cells except the first and the last.
     #[inline(always)]
     fn features_above(&self, row: usize, stride: usize, out: &mut [[f32; N_CHANNELS]]) {
         let histogram = &self.histograms[(row - 1) % 3];
@@ -181,7 +181,7 @@ fn normalise(
     }
 }
 
-/// Half the sum of `value` under all norms, clipped; every term is added to its `sums` as well.
+/// Half the sum of `value` under all norms, clipped. Every term is also added to `sums`.
 #[inline(always)]
 fn clipped_sum(value: &Lanes, norms: &[Lanes; 4], sums: &mut [Lanes; 4]) -> Lanes {
     let mut channel = [0.0; LANES];
@@ -200,7 +200,7 @@ fn clipped_sum(value: &Lanes, norms: &[Lanes; 4], sums: &mut [Lanes; 4]) -> Lane
     channel.map(|channel| 0.5 * channel)
 }
 
-/// Writes the channels of one cell after those of the other.
+/// Writes the channels of the cells, one cell after the other.
 #[inline(always)]
 fn transpose(channels: &[Lanes; N_CHANNELS], out: &mut [[f32; N_CHANNELS]]) {
     for (lane, cell) in out.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! The features in double precision, written to be read.
+//! The features in double precision, in readable form.
 
 use super::{CLIP, FLAT, HogShape, N_CHANNELS, N_UNSIGNED, TEXTURE, Vote};
 use crate::Planes;
@@ -6,9 +6,9 @@ use crate::gradient::{N_ORIENTATIONS, gradient};
 
 /// Features of `image` with their padding, `rows x cols x N_CHANNELS` of [`HogShape::map_size`].
 ///
-/// Pixels vote with the length of their gradient, shared bilinearly between the four nearest cells.
-/// A cell's histogram is normalised by the energies of the four blocks of 2 x 2 cells that hold it
-/// and each result is clipped at 0.2.
+/// Each pixel votes with the length of its gradient, which is divided bilinearly between the four nearest cells.
+/// A cell's histogram is normalised by the energies of the four blocks of 2 x 2 cells that contain the cell.
+/// Each result is clipped at 0.2.
 pub fn hog_f64(image: &Planes, shape: HogShape) -> Vec<f64> {
     let [rows, cols] = shape.cells(image.width(), image.height());
     let histograms = histograms(image, shape.cell_px, [rows, cols]);

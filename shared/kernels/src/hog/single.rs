@@ -1,4 +1,4 @@
-//! The features in single precision, written to be read: what the shipped ones are, bit for bit.
+//! The features in single precision, in readable form: the same bits as those of the fast version.
 
 use super::{CLIP, FLAT, HogShape, N_CHANNELS, N_UNSIGNED, TEXTURE, Vote};
 use crate::Planes;
@@ -6,7 +6,7 @@ use crate::gradient::{N_ORIENTATIONS, gradient};
 
 type Histogram = [f32; N_ORIENTATIONS];
 
-/// See [`hog`](super::hog()).
+/// Readable version of [`hog`](super::hog()).
 pub(super) fn hog_f32(image: &Planes, shape: HogShape) -> Vec<f32> {
     let [map_rows, map_cols] = shape.map_size(image.width(), image.height());
     let mut map = vec![[f32::NAN; N_CHANNELS]; map_rows * map_cols];
@@ -35,7 +35,7 @@ pub(super) fn hog_f32(image: &Planes, shape: HogShape) -> Vec<f32> {
     map.concat()
 }
 
-/// A cell adds up the lower votes of the blocks above it, then the upper votes of those below.
+/// Histograms of all cells. A cell sums the lower votes of the blocks above it, then the upper votes of the blocks below.
 fn histograms(image: &Planes, cell_px: usize, [rows, cols]: [usize; 2]) -> Vec<Histogram> {
     let blocks: Vec<_> = (0..(rows + 1) * (cols + 1))
         .map(|at| {

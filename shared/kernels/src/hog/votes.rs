@@ -1,9 +1,9 @@
 //! Votes of pixels for the cells around them.
 //!
-//! The centres of four neighbouring cells are the corners of a block of `cell_px x cell_px` pixels
-//! that vote for these four cells and no others. A block sums up its votes, one pixel after the
-//! other, with one vector of four shares per pixel; then every cell adds up what its four blocks
-//! have for it.
+//! The centres of four neighbouring cells are the corners of a block of `cell_px x cell_px` pixels.
+//! These pixels vote only for these four cells. A block sums its votes, one pixel after the
+//! other, with one vector of four shares per pixel. Then every cell adds the sums of its four
+//! blocks.
 
 use super::Vote;
 use crate::Planes;
@@ -14,9 +14,9 @@ use crate::gradient::{N_ORIENTATIONS, gradients};
 pub(super) struct Votes {
     cell_px: usize,
     n_blocks: usize,
-    /// Shares of the pixels of a block, `[row][col]`, in the cells of its corners.
+    /// Shares of the pixels of a block, `[row][col]`, for the cells at its corners.
     shares: Vec<[f32; 4]>,
-    /// Gradients of a row of pixels, from the first pixel of the first block; length 0 where no
+    /// Gradients of a row of pixels, from the first pixel of the first block; the length is 0 where no
     /// pixel votes.
     lengths: Vec<f32>,
     bins: Vec<u32>,
@@ -44,13 +44,13 @@ impl Votes {
         self.sums.resize(N_ORIENTATIONS * self.n_blocks, [0.0; 4]);
     }
 
-    /// Sums up the votes of the `block`th row of blocks, the first of which lies half outside.
+    /// Sums the votes of the `block`th row of blocks. The first row is half outside the image.
     #[inline(always)]
     pub(super) fn count(&mut self, image: &Planes, block: usize, [rows, cols]: [usize; 2]) {
         self.sums.fill([0.0; 4]);
         let before = self.cell_px.div_ceil(2);
         for row in 0..self.cell_px {
-            // Counted from `before` rows above the image.
+            // Row number, counted from `before` rows above the image.
             let y = block * self.cell_px + row;
             if y <= before || y > before + rows * self.cell_px - 2 {
                 continue;
@@ -62,7 +62,7 @@ impl Votes {
         }
     }
 
-    /// Gradients of row `y`; the last one inside the image stands for those that lie behind it.
+    /// Gradients of row `y`. The last pixel inside the image is also used for those after it.
     #[inline(always)]
     fn take_gradients(&mut self, image: &Planes, y: usize, cols: usize) {
         let before = self.cell_px.div_ceil(2);
@@ -87,7 +87,7 @@ impl Votes {
         let n = self.cell_px;
         let shares = &self.shares[row * n..][..n];
         if let Ok(shares) = shares.try_into() {
-            // The cell size of all published models, unrolled.
+            // The loop is unrolled for the cell size of all published models.
             let (lengths, _) = self.lengths.as_chunks::<4>();
             let (bins, _) = self.bins.as_chunks::<4>();
             return add_blocks::<4>(shares, lengths, bins, &mut self.sums);
@@ -101,7 +101,7 @@ impl Votes {
         }
     }
 
-    /// Adds what the cells above this row of blocks get from it; `N_ORIENTATIONS x stride`.
+    /// Adds the sums of this row of blocks to the cells above it; `N_ORIENTATIONS x stride`.
     #[inline(always)]
     pub(super) fn add_upper(&self, cells: &mut [f32], stride: usize) {
         let lines = cells.chunks_exact_mut(stride);
@@ -113,7 +113,7 @@ impl Votes {
         }
     }
 
-    /// Puts what the cells below this row of blocks get from it; `N_ORIENTATIONS x stride`.
+    /// Writes the sums of this row of blocks to the cells below it; `N_ORIENTATIONS x stride`.
     #[inline(always)]
     pub(super) fn put_lower(&self, cells: &mut [f32], stride: usize) {
         let lines = cells.chunks_exact_mut(stride);

@@ -1,9 +1,9 @@
-//! Memory for scores that begins where a cache line does.
+//! Memory for scores, aligned to a cache line.
 
-/// Bytes of a cache line, and of the widest register.
+/// Size of a cache line, and of the widest register, in bytes.
 const LINE: usize = 64;
 
-/// A buffer of scores whose first one lies at the beginning of a cache line.
+/// A buffer of scores that begins at a cache line.
 #[derive(Debug, Default)]
 pub struct ScoreBuffer {
     data: Vec<f32>,
@@ -12,9 +12,9 @@ pub struct ScoreBuffer {
 }
 
 impl ScoreBuffer {
-    /// Makes the buffer hold `len` scores, whose values are unspecified.
+    /// Resizes the buffer to `len` scores with unspecified values.
     ///
-    /// * Returns whether they are still those of before.
+    /// * Returns true if the length did not change; the values are then kept.
     pub fn resize(&mut self, len: usize) -> bool {
         let same = len == self.len;
         self.len = len;
@@ -22,7 +22,7 @@ impl ScoreBuffer {
         if self.data.len() < room {
             self.data.resize(room, 0.0);
         }
-        // An interpreter may refuse to say how memory is aligned; the values do not depend on it.
+        // An interpreter may not know the alignment of memory, but the values do not depend on it.
         let start = self.data.as_ptr().align_offset(LINE);
         self.start = start.min(room - len);
         same
@@ -33,12 +33,12 @@ impl ScoreBuffer {
         &self.data[self.start..][..self.len]
     }
 
-    /// The scores, to be written.
+    /// The scores, as a mutable slice.
     pub fn scores_mut(&mut self) -> &mut [f32] {
         &mut self.data[self.start..][..self.len]
     }
 
-    /// Memory held, bytes.
+    /// Allocated memory, in bytes.
     pub fn bytes(&self) -> usize {
         self.data.capacity() * size_of::<f32>()
     }

@@ -1,4 +1,4 @@
-//! Lanes are cells of the parent; every lane evaluates its candidates in the order of their
+//! Each lane is a cell of the parent and evaluates its candidates in the order of their
 //! offsets.
 
 use std::hint::black_box;
@@ -13,11 +13,11 @@ use crate::simd::{Kernel, Simd};
 #[derive(Debug, Default)]
 pub struct MessageWorkspace {
     transforms: Vec<Transform>,
-    /// A block of rows after the vertical pass, with room for candidates beside the grid.
+    /// A block of rows after the vertical pass, with space for candidates outside the grid.
     middle: ScoreBuffer,
     /// A block of rows of every transform.
     transformed: ScoreBuffer,
-    /// For every plane of the parent.
+    /// Range of every plane of the parent.
     running: Vec<RunningRange>,
 }
 
@@ -61,7 +61,7 @@ impl Kernel for AddMessage<'_> {
 }
 
 impl MessageWorkspace {
-    /// Candidates that the last [`MessageRule::add_message`] on a grid of this size evaluated.
+    /// Number of candidates that the last [`MessageRule::add_message`] on a grid of this size evaluated.
     pub fn n_candidates(&self, rule: &MessageRule, grid: Grid) -> usize {
         let transforms = self.transforms.iter().take(rule.springs.len());
         let of_spring = transforms.map(|transform| {
@@ -95,13 +95,13 @@ impl MessageWorkspace {
     }
 }
 
-/// Length of a row between the passes: a run tries all offsets at which one of its cells has a
-/// candidate, so the others read at most one run beyond the ends of the row.
+/// Length of a row between the passes. A run tries all offsets at which any of its cells has a
+/// candidate, so its other cells read at most one run beyond the ends of the row.
 fn middle_stride(grid: Grid) -> usize {
     grid.stride() + 2 * ROW_ALIGN
 }
 
-/// Some rows of the parent, all of which try the same offsets.
+/// Rows of the parent that all try the same offsets.
 #[derive(Clone, Copy)]
 struct Block<'a> {
     rule: &'a MessageRule,
@@ -112,7 +112,7 @@ struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// Computes the message for the block: `R` rows, of which the last may not exist.
+    /// Computes the message for the block of `R` rows, of which the last rows may not exist.
     #[inline(always)]
     fn add_message<S: Simd, const R: usize>(
         &self,
@@ -171,8 +171,8 @@ impl Block<'_> {
             let mut best = [simd.splat(f32::NEG_INFINITY); R];
             for (step, [score, next]) in pairs.iter().enumerate() {
                 let (score, next) = (simd.splat(*score), simd.splat(*next));
-                // A row holds the candidates of one parent at this offset, and of the parent before
-                // it at the next one.
+                // A row contains the candidates of one parent at this offset, and of the previous parent
+                // at the next offset.
                 let mut candidates = load(2 * step, x);
                 for (r, best) in best.iter_mut().enumerate() {
                     *best = simd.max(simd.plus(candidates, one, score), *best);
@@ -216,7 +216,7 @@ impl Block<'_> {
             for (at, score) in scores.iter().enumerate() {
                 let score = simd.splat(*score);
                 for (r, best) in best.iter_mut().enumerate() {
-                    // SAFETY: `middle` has R rows, and the assertion above keeps `at` inside of one.
+                    // SAFETY: `middle` has R rows, and the assertion above keeps `at` inside one of them.
                     let candidates = unsafe { simd.load_at(middle, r * stride + first + at) };
                     *best = simd.max(simd.plus(candidates, one, score), *best);
                 }

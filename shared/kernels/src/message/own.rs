@@ -1,4 +1,4 @@
-//! The own scores of a part, in the layout for messages.
+//! The own scores of a part, in the layout used for messages.
 
 use std::hint::black_box;
 
@@ -13,20 +13,20 @@ use crate::simd::{Kernel, Simd};
 pub struct OwnScores<'a> {
     /// Response of the filter, `rows x cols`.
     pub map: &'a [f32],
-    /// Added cell by cell, `rows x cols`.
+    /// Term added cell by cell, `rows x cols`.
     pub term: Option<&'a [f32]>,
-    /// Added to every cell.
+    /// Constant added to every cell.
     pub constant: Option<f32>,
 }
 
 impl OwnScores<'_> {
-    /// Writes a plane and the margin before it, and returns the plane's span.
+    /// Writes a plane and the margin before it, and returns the range of the plane's scores.
     ///
-    /// * `plane`: [`Grid::len`] of one plane.
+    /// * `plane`: memory of [`Grid::len`] for one plane.
     ///
     /// # Panics
     ///
-    /// If the lengths disagree.
+    /// If the lengths do not match.
     pub fn write(&self, isa: Isa, grid: Grid, plane: &mut [f32]) -> ScoreRange {
         let cells = grid.rows * grid.cols;
         assert_eq!(self.map.len(), cells, "one response per cell");
@@ -63,7 +63,7 @@ impl Kernel for WriteOwnScores<'_> {
     }
 }
 
-/// As [`OwnScores::write`].
+/// Writes the plane as described in [`OwnScores::write`].
 #[inline(always)]
 fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> RunningRange {
     let (margin, plane) = plane.split_at_mut(MARGIN * grid.stride());
@@ -100,7 +100,7 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
     running
 }
 
-/// How the scores of a register are summed.
+/// Sums the scores of a register.
 struct Sum<'a, S: Simd> {
     simd: S,
     own: &'a OwnScores<'a>,
@@ -121,7 +121,7 @@ impl<S: Simd> Sum<'_, S> {
     }
 }
 
-/// Loads scores of which the first `n` count; there may be no others.
+/// Loads scores. Only the first `n` count; there may be no more.
 #[inline(always)]
 fn load<S: Simd>(simd: S, from: &[f32], at: usize, n: usize) -> S::V {
     if at + S::LANES <= from.len() {

@@ -1,4 +1,4 @@
-//! The minimum and maximum score of a plane, updated while it is written.
+//! The minimum and maximum score of a plane, updated while the plane is written.
 
 use super::ROW_ALIGN;
 use crate::simd::Simd;
@@ -6,24 +6,24 @@ use crate::simd::Simd;
 /// The minimum and maximum score of a plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoreRange {
-    /// The minimum.
+    /// The minimum score.
     pub min: f32,
-    /// The maximum.
+    /// The maximum score.
     pub max: f32,
 }
 
 impl ScoreRange {
-    /// The range of no scores.
+    /// The empty range.
     pub const NONE: Self = Self {
         min: f32::INFINITY,
         max: f32::NEG_INFINITY,
     };
 
-    /// The maximum difference between two scores, and a little more.
+    /// The maximum difference between two scores, with a small excess.
     ///
     /// The excess, 1e-5 of the scores themselves, is larger than the effect of rounding to single
-    /// precision on a difference. Infinite if some scores are minus infinity, NaN if all are: in
-    /// both cases the whole plane is searched.
+    /// precision on a difference. The result is infinite if some scores are minus infinity, and NaN if all are. In
+    /// both cases, the whole plane is searched.
     #[inline(always)]
     pub(crate) fn spread(self) -> f32 {
         (self.max - self.min) + 1e-5 * (self.max.abs() + self.min.abs())
@@ -38,7 +38,7 @@ pub(super) struct RunningRange {
 }
 
 impl RunningRange {
-    /// No scores yet.
+    /// The empty range.
     pub(super) const NONE: Self = Self {
         min: [f32::INFINITY; ROW_ALIGN],
         max: [f32::NEG_INFINITY; ROW_ALIGN],
@@ -55,7 +55,7 @@ impl RunningRange {
         simd.store(max, &mut self.max);
     }
 
-    /// Includes the scores of the first `n` lanes; the others hold minus infinity.
+    /// Includes the scores of the first `n` lanes; the other lanes contain minus infinity.
     #[inline(always)]
     pub(super) fn include<S: Simd>(
         simd: S,

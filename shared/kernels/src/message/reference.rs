@@ -1,4 +1,4 @@
-//! The definition: every candidate, one after the other.
+//! The definition, which evaluates every candidate, one after the other.
 
 use super::{Grid, MessageRule};
 use crate::spring::Spring;

@@ -1,4 +1,4 @@
-//! Properties of the messages, on small grids with few distinct scores so that ties are common.
+//! Tests the properties of messages, on small grids with few distinct scores so that ties are common.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -43,7 +43,7 @@ impl Case {
         (parent, of_parent)
     }
 
-    /// Planes in memory, without the margin after the last one.
+    /// Converts planes to the layout in memory, without the margin after the last one.
     fn padded(grid: Grid, dense: &[f32]) -> Vec<f32> {
         let mut all = Vec::new();
         for plane in dense.chunks_exact(grid.rows * grid.cols) {
@@ -80,7 +80,7 @@ fn springs() -> impl Strategy<Value = Spring> {
         })
 }
 
-/// Four values, sixteen of them and real ones; sometimes an impossible cell or an impossible plane.
+/// Scores with four values, with sixteen values, and real ones; sometimes a cell or a whole plane is impossible.
 fn scores() -> impl Strategy<Value = f32> {
     prop_oneof![
         30 => (-8..8_i8).prop_map(|value| f32::from(value) * 0.25),
@@ -210,7 +210,7 @@ proptest! {
     }
 }
 
-/// `(child type, column, row)` of the best child, the first one in this order, by looking at all.
+/// `(child type, column, row)` of the best child, the first one in this order, found by an exhaustive search.
 fn first_by_hand(case: &Case, l: usize, [y, x]: [usize; 2]) -> (usize, usize, usize) {
     let (grid, rule) = (case.grid, &case.rule);
     let mut best = (f32::NEG_INFINITY, (0, 0, 0));
@@ -238,7 +238,7 @@ fn first_by_hand(case: &Case, l: usize, [y, x]: [usize; 2]) -> (usize, usize, us
     best.1
 }
 
-/// Planes in memory, with the margin after the last one.
+/// Converts planes to the layout in memory, with the margin after the last one.
 fn with_margin(grid: Grid, dense: &[f32]) -> Vec<f32> {
     let mut all = Case::padded(grid, dense);
     all.resize(all.len() + grid.margin(), f32::NEG_INFINITY);

@@ -1,35 +1,34 @@
-//! Looks up which child a message entry came from: the arguments of the maxima, for one cell.
+//! Finds the child from which a message entry came: the arguments of the maxima, for one cell.
 
 use super::{ChildScores, Grid, MessageRule};
 use crate::spring::Spring;
 
-/// The child that a message entry came from.
+/// The child from which a message entry came.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TracedChild {
     /// Value of the entry.
     pub score: f32,
-    /// The child's type.
+    /// Type of the child.
     pub child_type: usize,
-    /// The child's row.
+    /// Row of the child.
     pub y: usize,
-    /// The child's column.
+    /// Column of the child.
     pub x: usize,
 }
 
 impl MessageRule {
-    /// The child that the message entry at one cell of the parent came from.
+    /// The child from which the message entry at one cell of the parent came.
     ///
-    /// Evaluates the same expressions as [`add_message`](Self::add_message), so `score` is what
-    /// that added, bit for bit. Ties go to the first choice, then to the first column, then to the
+    /// This evaluates the same expressions as [`add_message`](Self::add_message), so `score` is the
+    /// added value, bit for bit. Ties go to the first choice, then to the first column, then to the
     /// first row, as in the reference programs. `None` if every child is impossible.
-    /// reference programs. `None` if every child is impossible.
     ///
     /// * `child`: as for [`add_message`](Self::add_message).
     /// * `at`: `[row, column]` of the parent.
     ///
     /// # Panics
     ///
-    /// If the lengths disagree or `parent_type` or `at` is out of range.
+    /// If the lengths do not match, or `parent_type` or `at` is out of range.
     pub fn trace(
         &self,
         child: ChildScores<'_>,
@@ -64,11 +63,11 @@ impl MessageRule {
     /// The value of a message entry for a given child, or minus infinity if the pair of types is
     /// not allowed.
     ///
-    /// The same expression as in [`add_message`](Self::add_message): `((score + vertical) +
+    /// The expression is the same as in [`add_message`](Self::add_message): `((score + vertical) +
     /// horizontal) + bias`.
     ///
-    /// * `child_score`: of the child at `child`, `[row, column]`.
-    /// * `types`: the parent's and the child's.
+    /// * `child_score`: score of the child at `child`, `[row, column]`.
+    /// * `types`: types of the parent and of the child.
     pub fn value(
         &self,
         child_score: f32,

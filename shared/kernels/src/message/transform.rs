@@ -8,7 +8,7 @@ use crate::spring::{Axis, Spring};
 /// The precomputed data of a transform.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Transform {
-    /// The child's plane.
+    /// Index of the child's plane.
     pub(super) plane: usize,
     /// True if the whole plane is minus infinity.
     pub(super) impossible: bool,
@@ -21,9 +21,9 @@ pub(super) struct Transform {
 /// One pass of a transform.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Pass {
-    /// Offsets that every block of parents tries.
+    /// Range of offsets that every block of parents tries.
     blocks: Vec<Range<isize>>,
-    /// Scores that the spring adds, from the first offset of any block on.
+    /// Scores that the spring adds, starting at the first offset of any block.
     scores: Vec<f32>,
     first: isize,
 }
@@ -44,14 +44,14 @@ impl Pass {
         self.scores.extend(all.map(|offset| axis.score(offset)));
     }
 
-    /// Candidates that all parents of a line try.
+    /// Number of candidates that all parents of a line try.
     pub(super) fn n_candidates(&self, n: usize, block: usize) -> usize {
         let parents = (0..n).step_by(block).map(|first| block.min(n - first));
         let offsets = self.blocks.iter().map(|block| (block.end - block.start) as usize);
         parents.zip(offsets).map(|(parents, offsets)| parents * offsets).sum()
     }
 
-    /// The first offset that a block tries, and what the spring adds at this and the following ones.
+    /// The first offset that a block tries, and the scores that the spring adds at this and the following offsets.
     #[inline(always)]
     pub(super) fn of_block(&self, block: usize) -> (isize, &[f32]) {
         let offsets = &self.blocks[block];

@@ -1,9 +1,9 @@
-//! How images are made smaller, written to be read.
+//! Readable versions of the functions that reduce the size of images.
 
 use super::{Border, Planes, first, folded, inside};
 use crate::Rgb8View;
 
-/// The input samples that one output sample is the weighted sum of.
+/// The input samples whose weighted sum is one output sample.
 struct Taps {
     first: usize,
     weights: Vec<f64>,
@@ -11,8 +11,8 @@ struct Taps {
 
 /// Taps of an area average from `from` to `to` samples.
 ///
-/// Output `d` covers the input interval `[d inv, (d + 1) inv)`, `inv = from / to`; partly covered
-/// samples count by their share, shares up to 1e-3 are dropped.
+/// Output `d` covers the input interval `[d inv, (d + 1) inv)`, where `inv = from / to`. Partly covered
+/// samples count with their share; shares up to 1e-3 are dropped.
 fn area_taps(from: usize, to: usize) -> Vec<Taps> {
     let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
     let taps_of = |d: usize| {

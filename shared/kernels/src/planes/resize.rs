@@ -1,4 +1,4 @@
-//! The area average, a row of pixels at a time.
+//! Computes the area average, one row of pixels at a time.
 
 use std::ops::Range;
 
@@ -6,14 +6,14 @@ use super::{PartOfResized, Planes, ShrinkWorkspace};
 use crate::Rgb8View;
 use crate::dispatch::Body;
 
-/// Taps of all output samples of one axis, equally many each.
+/// Taps of all output samples of one axis, with the same number for each.
 #[derive(Debug, Default)]
 pub(super) struct Taps {
-    /// Taps of an output sample.
+    /// Number of taps of an output sample.
     n: usize,
     /// The first input sample of every output sample.
     first: Vec<usize>,
-    /// `n` weights per output sample; zero where it has fewer taps.
+    /// `n` weights per output sample; zero for missing taps.
     weights: Vec<f64>,
 }
 
@@ -21,16 +21,16 @@ impl Taps {
     pub(super) fn reserve(&mut self, from: usize) {
         self.first.clear();
         self.first.reserve(from);
-        // `(ceil(from / to) + 1) to` of them at most.
+        // There are at most `(ceil(from / to) + 1) to` weights.
         self.weights.clear();
         self.weights.reserve(3 * from);
     }
 
-    /// Taps of some samples of an area average from `from` to `to` samples: those of the reference,
-    /// in its order, with zeros before or after them.
+    /// Computes the taps of some samples of an area average from `from` to `to` samples. They are the taps of the reference,
+    /// in the same order, with zeros before or after them.
     fn cover(&mut self, from: usize, to: usize, samples: Range<usize>) {
         let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
-        // A sample that is covered partly on both sides of those that are covered whole.
+        // The fully covered samples may have a partly covered sample on both sides.
         self.n = (inverse.ceil() as usize + 1).min(from);
         self.first.clear();
         self.weights.clear();
@@ -61,7 +61,7 @@ pub(super) struct Resize<'a> {
     pub(super) image: Rgb8View<'a>,
     pub(super) part: &'a PartOfResized,
     pub(super) workspace: &'a mut ShrinkWorkspace,
-    /// Has its new size already.
+    /// The output, which already has its new size.
     pub(super) out: &'a mut Planes,
 }
 
@@ -83,13 +83,13 @@ impl Body for Resize<'_> {
         let [width, height] = part.size;
         down.cover(image.height(), height, part.y.clone());
         along.cover(image.width(), width, part.x.clone());
-        // The columns that any sample of the part is made of.
+        // The columns that the samples of the part need.
         let left = along.first.first().map_or(0, |value| 3 * value);
         let right = along.first.last().map_or(0, |value| 3 * (value + along.n));
         along.first.iter_mut().for_each(|index| *index -= left / 3);
         let stride = 3 * image.width();
         line.clear();
-        // The fourth sample of the last pixel is read and not used.
+        // The fourth sample of the last pixel is read but not used.
         line.resize(right - left + 1, 0.0);
         pixels.resize(out.width, [0.0; 4]);
         for y in 0..out.height {
@@ -107,7 +107,7 @@ impl Body for Resize<'_> {
     }
 }
 
-/// Weighted sums of the columns of the rows that `rows` begins with, `stride` apart.
+/// Weighted sums down the columns of some rows, which are `stride` apart and begin with `rows`.
 #[inline(always)]
 fn sum_down(rows: &[u8], stride: usize, weights: &[f64], out: &mut [f64]) {
     let n = out.len();
@@ -140,7 +140,7 @@ fn sum_down(rows: &[u8], stride: usize, weights: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Weighted sums along one interleaved row of column sums; lanes are the colours of a pixel.
+/// Weighted sums along one interleaved row of column sums. Each lane is a colour of a pixel.
 #[inline(always)]
 fn sum_along<const N: usize>(line: &[f64], along: &Taps, out: &mut [[f64; 4]]) {
     let (weights, _) = along.weights.as_chunks::<N>();
@@ -164,7 +164,7 @@ fn split_colours(pixels: &[[f64; 4]], [red, green, blue]: [&mut [f64]; 3]) {
     }
 }
 
-/// As [`sum_along`], for any number of taps.
+/// The same as [`sum_along`], for any number of taps.
 #[inline(always)]
 fn sum_many_along(line: &[f64], along: &Taps, out: &mut [[f64; 4]]) {
     let weights = along.weights.chunks_exact(along.n);

@@ -1,8 +1,8 @@
-//! Whatever the target guarantees, four lanes at a time: what SSE2 and NEON hold in a register.
+//! Four lanes with the instructions that the target guarantees: the size of a register of SSE2 and NEON.
 
 use super::{Kernel, Row, Simd};
 
-/// Needs nothing, so anyone may make one.
+/// The portable instruction set. It has no requirements, so it can always be constructed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Portable;
 
@@ -34,9 +34,9 @@ impl Simd for Portable {
     #[inline(always)]
     unsafe fn load_at(self, from: &[f32], at: usize) -> Four {
         debug_assert!(at + 4 <= from.len(), "the caller's promise");
-        // SAFETY: the caller promises that `at` is inside of the slice.
+        // SAFETY: the caller promises that `at` is inside the slice.
         let from = unsafe { from.as_ptr().add(at) };
-        // SAFETY: the caller promises four floats from here on, whose alignment is that of an array.
+        // SAFETY: the caller promises that four floats follow; an array has the same alignment.
         unsafe { from.cast::<Four>().read() }
     }
 
@@ -97,7 +97,7 @@ impl Simd for Portable {
     }
 }
 
-/// Copies as much as fits of a register of eight or four, without a call for the odd lengths.
+/// Copies as much of a register of eight or four values as fits, without a function call for odd lengths.
 #[inline(always)]
 pub(super) fn copy_partial(value: &[f32], to: &mut [f32]) {
     if to.len() >= value.len() {

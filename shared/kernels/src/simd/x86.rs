@@ -14,11 +14,11 @@ use std::arch::x86_64::{
 use super::portable::copy_partial;
 use super::{Kernel, Row, Simd};
 
-/// AVX2 and FMA. The private field keeps others from making one without them.
+/// AVX2 and FMA. Because of the private field, a value can only be made where they were detected.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Avx2(());
 
-/// AVX-512 F and VL. The private field keeps others from making one without them.
+/// AVX-512 F and VL. Because of the private field, a value can only be made where they were detected.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Avx512(());
 
@@ -56,9 +56,9 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn load_at(self, from: &[f32], at: usize) -> __m256 {
         debug_assert!(at + 8 <= from.len(), "the caller's promise");
-        // SAFETY: the caller promises that `at` is inside of the slice.
+        // SAFETY: the caller promises that `at` is inside the slice.
         let from = unsafe { from.as_ptr().add(at) };
-        // SAFETY: the caller promises eight floats from here on, and `self` only exists where AVX2
+        // SAFETY: the caller promises that eight floats follow, and `self` only exists where AVX2
         // was detected.
         unsafe { _mm256_loadu_ps(from) }
     }
@@ -164,9 +164,9 @@ impl Simd for Avx512 {
     #[inline(always)]
     unsafe fn load_at(self, from: &[f32], at: usize) -> __m512 {
         debug_assert!(at + 16 <= from.len(), "the caller's promise");
-        // SAFETY: the caller promises that `at` is inside of the slice.
+        // SAFETY: the caller promises that `at` is inside the slice.
         let from = unsafe { from.as_ptr().add(at) };
-        // SAFETY: the caller promises sixteen floats from here on, and `self` only exists where AVX-512 F
+        // SAFETY: the caller promises that sixteen floats follow, and `self` only exists where AVX-512 F
         // was detected.
         unsafe { _mm512_loadu_ps(from) }
     }
@@ -273,7 +273,7 @@ fn transpose8(rows: &[__m256; 8]) -> [__m256; 8] {
     columns
 }
 
-/// As [`transpose8`].
+/// Does the same as [`transpose8`] for sixteen registers.
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
 #[inline]
 fn transpose16(rows: &[__m512; 16]) -> [__m512; 16] {

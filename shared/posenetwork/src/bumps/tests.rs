@@ -41,7 +41,7 @@ fn bump(joint: usize, at: [f32; 2], heat: f32, sigma: [f32; 2], turned: f32) -> 
     }
 }
 
-/// The maps of Gaussians, the Gaussians that are found in them, and the maps of those.
+/// Returns the maps of the given Gaussians, the Gaussians fitted to those maps, and the maps of the fitted Gaussians.
 fn there_and_back(given: &[Bump]) -> (Vec<f32>, Vec<Bump>, Vec<f32>) {
     let sent = filled(given);
     let found = bumps(&maps(&sent), &SETTINGS);
@@ -49,7 +49,7 @@ fn there_and_back(given: &[Bump]) -> (Vec<f32>, Vec<Bump>, Vec<f32>) {
     (sent, found, received)
 }
 
-/// The largest difference of heat.
+/// The largest difference in heat.
 fn off(a: &[f32], b: &[f32]) -> f64 {
     let each = a.iter().zip(b);
     let each = each.map(|(a, b)| (SETTINGS.heat(*a) - SETTINGS.heat(*b)).abs());
@@ -88,7 +88,7 @@ fn two_people_and_a_ridge_come_back_to_a_few_hundredths() {
         bump(4, [25.0, 40.0], 0.5, [2.0, 2.0], 0.0),
         bump(4, [55.0, 70.0], 0.4, [2.0, 2.0], 0.0),
     ];
-    // A limb along which the joint may lie anywhere.
+    // The joint may be anywhere along a limb.
     given.extend((0..6).map(|i| {
         bump(
             8,

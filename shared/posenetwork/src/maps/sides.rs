@@ -1,10 +1,10 @@
-//! Left and right of maps: exchanged, or named by what one view shows.
+//! Left and right of the maps: exchanged, or assigned from what one view shows.
 
 use super::JointMaps;
 use crate::network::PoseNetwork;
 
 impl JointMaps {
-    /// Exchanges what the network calls left and right of the joints; [`Self::keypoint`] stays as it is.
+    /// Exchanges the left and right joints as named by the network; [`Self::keypoint`] does not change.
     pub fn exchange_sides(&mut self) {
         let area = self.rows * self.columns;
         for [right, left] in skeleton::SIDES {
@@ -18,11 +18,11 @@ impl JointMaps {
         }
     }
 
-    /// Makes left and right those of the person, where they are those of the picture, by the direction of the trunk that
-    /// the network alone gives: a person seen from behind has them exchanged. Over several views more is known (`multiview`).
+    /// Renames left and right from sides of the picture to sides of the person, using the trunk's direction from the network. They are
+    /// exchanged for a person seen from behind. Several views give more information (`multiview`).
     ///
-    /// * `network`: what the maps were read from.
-    /// * `front`: what it said of the direction ([`Sight::front`](crate::Sight::front)).
+    /// * `network`: the network that produced the maps.
+    /// * `front`: direction in which the trunk faces ([`Sight::front`](crate::Sight::front)).
     pub fn name_sides(&mut self, network: &PoseNetwork, front: Option<[f32; 2]>) {
         let is_as_seen = network.card().keypoints.sides == keypoints::Sides::Seen;
         let is_from_behind = front.is_some_and(|[_, towards]| towards < 0.0);

@@ -1,11 +1,11 @@
-//! Tests of the maps of keypoints that another program saw.
+//! Tests of the maps made from another program's keypoints.
 
 use keypoints::{BODY_25, COCO_17, joint_ways};
 
 use super::*;
 use crate::found::NOWHERE;
 
-/// A person of 400 pixels height about column 300, with all scores 0.8; the neck is the second keypoint.
+/// A person 400 pixels high near column 300. All scores are 0.8; the neck is the second keypoint.
 fn person() -> Vec<Option<Keypoint>> {
     let keypoint = |nth: usize| Keypoint {
         at: [
@@ -33,7 +33,7 @@ const SETTINGS: MapSettings = MapSettings {
     eps: 0.02,
     point_sigma: 0.0,
 };
-/// The neck of `skeleton::PARSE14`, and of `body-25`.
+/// Index of the neck in `skeleton::PARSE14` and in `body-25`.
 const NECK: usize = 12;
 const NECK_25: usize = 1;
 
@@ -44,14 +44,14 @@ fn a_joint_is_highest_where_its_keypoint_lies_and_as_high_as_its_score() {
     assert_eq!(PARSE14.joints[NECK].name, "neck");
     let neck = keypoints[NECK_25].unwrap();
     assert_eq!(maps.peaks()[NECK], Some(neck));
-    // The peak lies within half a cell of the highest one: 500 / 64 pixels for a cell.
+    // The peak is within half a cell of the highest cell; a cell is 500 / 64 pixels wide.
     let (at, value) = maps.maxima(NECK, 1)[0];
     let away = (at[0] - neck.at[0]).hypot(at[1] - neck.at[1]);
     assert!(away < 0.71 * 500.0 / 64.0, "{away}");
     assert!(value <= 0.82_f32.ln() && value > 0.5_f32.ln(), "{value}");
     let here = maps.at(NECK, neck.at);
     assert!((here - 0.82_f32.ln()).abs() < 0.05, "{here}");
-    // One standard deviation beside, by the bump itself: 0.02 of the box of 500 pixels.
+    // One standard deviation away from the peak of the Gaussian: 0.02 of the 500-pixel box.
     let beside = maps.at(NECK, [neck.at[0] + 10.0, neck.at[1]]);
     let expected = (0.8 * (-0.5_f32).exp() + 0.02).ln();
     assert!((beside - expected).abs() < 0.05, "{beside} {expected}");
@@ -104,7 +104,7 @@ fn a_keypoint_that_was_not_found_takes_its_joints_with_it() {
 fn a_head_by_one_ear_is_there_and_says_that_it_is_less_sure() {
     let mut keypoints = person();
     let all = maps(&keypoints);
-    // Both eyes and the left ear of a profile are not seen.
+    // In a profile, both eyes and the left ear are not seen.
     for hidden in [15, 16, 18] {
         keypoints[hidden] = None;
     }
@@ -175,7 +175,7 @@ fn a_small_or_strange_box_has_maps_too() {
 fn frames_after_the_first_need_no_further_memory() {
     let mut maps = maps(&person());
     let before = [maps.values.capacity(), maps.peaks.capacity()];
-    // As wide as it gets.
+    // The widest grid possible.
     let mut wide = vec![None; 25];
     for (nth, x) in [(0, 0.0), (1, 5000.0)] {
         wide[nth] = Some(Keypoint {

@@ -1,12 +1,12 @@
-//! Why a network cannot be used, or says nothing.
+//! Reasons why a network cannot be used or gives no result.
 
 use inference::RunError;
 use keypoints::OutputError;
 
-/// Why a network does not fit its card.
+/// Reason why a network does not match its card.
 #[derive(Debug, thiserror::Error)]
 pub enum FitError {
-    /// Names on the card are not those of the network.
+    /// The card names an input or output that the network does not have.
     #[error("the card names the {what} `{wanted}`, but the network has {has}")]
     Name {
         /// `input` or `output`.
@@ -16,52 +16,52 @@ pub enum FitError {
         /// The names in the file.
         has: String,
     },
-    /// There are several, and the card does not say which one is meant.
+    /// There are several inputs or outputs, and the card does not select one.
     #[error("the network has the {what}s {has}: the card must name one (`{key}`)")]
     Several {
         /// `input` or `output`.
         what: &'static str,
         /// The names in the file.
         has: String,
-        /// The key of the card.
+        /// The key of the card that selects one.
         key: &'static str,
     },
-    /// The input has other sides.
+    /// The input's dimensions differ from those on the card.
     #[error("the input `{name}` of the network is {got}, but the card says {expected}")]
     InputShape {
-        /// Its name.
+        /// Name of the input.
         name: String,
-        /// Its sides in the file.
+        /// Dimensions of the input in the file.
         got: String,
-        /// Its sides by the card.
+        /// Dimensions of the input on the card.
         expected: String,
     },
-    /// It cannot be shown mirror images.
-    #[error("it cannot process mirror images too: {0}")]
+    /// The network cannot process mirror images.
+    #[error("the network cannot process mirror images: {0}")]
     Mirror(String),
-    /// It could not be tried.
+    /// The test run of the network failed.
     #[error(transparent)]
     Look(#[from] LookError),
 }
 
-/// Why a network says nothing about a picture.
+/// Reason why a network gives no result for a picture.
 #[derive(Debug, thiserror::Error)]
 pub enum LookError {
-    /// The library could not run it.
+    /// The library could not run the network.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// An output is not what the card says.
+    /// An output does not match the card.
     #[error("output `{name}`: {error}")]
     Output {
-        /// Its name.
+        /// Name of the output.
         name: String,
-        /// Error of the output.
+        /// Mismatch of the output.
         error: OutputError,
     },
-    /// An output does not consist of numbers in single precision.
+    /// An output does not consist of single-precision numbers.
     #[error("output `{name}` is not of type f32")]
     Type {
-        /// Its name.
+        /// Name of the output.
         name: String,
     },
 }

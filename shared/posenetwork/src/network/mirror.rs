@@ -1,19 +1,19 @@
-//! Look at the mirror image of a window, beside the look at the window.
+//! Running the network on the mirror image of a window as well as on the window.
 
 use keypoints::{Card, Codec, Layout, mirrored};
 
 use super::{PoseNetwork, Tensor};
 
-/// How the output for a mirror image becomes that for the picture.
+/// Mapping of the output for a mirror image to the output for the picture.
 #[derive(Debug)]
 pub(super) struct Mirror {
-    /// The keypoint of the picture that every keypoint of the mirror image is.
+    /// For each keypoint of the mirror image, the index of the keypoint of the picture.
     partner: Vec<usize>,
 }
 
 impl Mirror {
-    /// * `names`: of the keypoints.
-    /// * Returns what is wrong with a network that cannot be used so.
+    /// * `names`: names of the keypoints.
+    /// * Returns an error if the network cannot process mirror images.
     pub(super) fn new(card: &Card, names: &[String]) -> Result<Self, String> {
         if matches!(card.output, Codec::Keypoints { .. }) {
             return Err("positions cannot be compared with those of a mirror image".to_owned());
@@ -41,15 +41,15 @@ impl Mirror {
             Layout::Pixels => {
                 for row in values.chunks_exact_mut(3 * width) {
                     row.reverse();
-                    // The colours of every pixel are the other way round now.
+                    // `reverse` has also reversed the colours of every pixel.
                     row.chunks_exact_mut(3).for_each(<[f32]>::reverse);
                 }
             }
         }
     }
 
-    /// Replaces the outputs for the picture by the mean of both. Outputs of an unexpected shape are left as they are: they are refused
-    /// later.
+    /// Replaces the outputs for the picture by the mean of both outputs. Outputs of an unexpected shape are not changed, because a later
+    /// check refuses them.
     pub(super) fn blend(&self, network: &PoseNetwork, outputs: &mut [Tensor], seen: &[Tensor]) {
         let card = &network.card;
         let n_outputs = if matches!(card.output, Codec::Simcc { .. }) {
@@ -89,8 +89,8 @@ impl Mirror {
         }
     }
 
-    /// * `is_symmetric`: whether the cells of a mirror image lie on cells of the picture. Those that lie on the first of their pixels
-    ///   are moved by a cell, to less than half a cell from there.
+    /// * `is_symmetric`: true if the cells of a mirror image coincide with cells of the picture. Otherwise each cell is at the first of its
+    ///   pixels, and the mirror image is moved by one cell. The remaining offset is less than half a cell.
     fn blend_maps(
         &self,
         to: &mut Tensor,
@@ -119,7 +119,8 @@ impl Mirror {
         }
     }
 
-    /// * `bins`: for a pixel, of a distribution over columns; that over rows is the same in a mirror image.
+    /// * `bins`: number of bins per pixel of a distribution over columns. `None` for a distribution over rows, which is the same in a
+    ///   mirror image.
     fn blend_bins(&self, to: &mut Tensor, from: &Tensor, bins: Option<usize>) {
         let n = to.values.len() / self.partner.len().max(1);
         for (at, &partner) in self.partner.iter().enumerate() {
@@ -145,7 +146,7 @@ impl Mirror {
     }
 }
 
-/// Towards the right is towards the left in a mirror image.
+/// The right of the picture is the left of the mirror image.
 fn blend_front(to: &mut Tensor, from: &Tensor) {
     for ((it, other), sign) in to.values.iter_mut().zip(&from.values).zip([-1.0, 1.0]) {
         *it = f32::midpoint(*it, sign * other);

@@ -1,4 +1,4 @@
-//! Networks that look at mirror images: what looks the same on both sides is seen as without them.
+//! Tests of networks that also process mirror images: a symmetric picture gives the same result as without mirror images.
 
 use inference::onnx::{Attribute, Network};
 
@@ -90,7 +90,7 @@ fn towards_the_right_is_towards_the_left_in_a_mirror() {
 #[test]
 fn cells_on_the_first_of_their_pixels_are_moved_by_one() {
     let [plain, mirrored] = both(&pooled(), CARD);
-    // The first column has no partner; the second one's is the third of the mirror image, which is the first of the picture.
+    // The first column has no partner. The partner of the second is the third of the mirror image, which is the first of the picture.
     for row in 0..12 {
         let [first, second, third] = [0, 1, 2].map(|i| plain[0][3 * row + i]);
         let expected = [
@@ -108,6 +108,6 @@ fn a_network_that_cannot_is_refused() {
     let refused = fitted(&network("Relu"), &lonely).unwrap().mirrored();
     assert_eq!(
         refused.unwrap_err().to_string(),
-        "it cannot process mirror images too: there is a keypoint `left hip`, but no `right hip`"
+        "the network cannot process mirror images: there is a keypoint `left hip`, but no `right hip`"
     );
 }

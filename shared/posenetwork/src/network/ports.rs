@@ -54,7 +54,7 @@ pub(crate) fn input_of(input_card: &keypoints::Input, inputs: &[Port]) -> Result
     Ok(input.name.clone())
 }
 
-/// The names of the outputs that the codec reads, and of those beside them.
+/// The names of the outputs that the codec reads, and of the additional outputs.
 pub(super) fn outputs_of(card: &Card, outputs: &[Port]) -> Result<Vec<String>, FitError> {
     let mut names = outputs_of_codec(card, outputs)?;
     let also = [
@@ -80,7 +80,7 @@ fn outputs_of_codec(card: &Card, outputs: &[Port]) -> Result<Vec<String>, FitErr
     }
 }
 
-/// The output of a name, or the only one.
+/// The output with a given name, or the only output.
 pub(crate) fn only(
     name: Option<&String>,
     outputs: &[Port],

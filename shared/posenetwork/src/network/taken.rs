@@ -1,11 +1,11 @@
-//! Numbers of the type that a network takes.
+//! Conversion of input values to the network's number type.
 
 use inference::Values;
 use keypoints::Numbers;
 
-/// The values of an input as numbers of the type that the network takes.
+/// Converts the values of an input to the number type of the network.
 ///
-/// * `memory`: used again from picture to picture; not touched for [`Numbers::F32`].
+/// * `memory`: reused from picture to picture; not used for [`Numbers::F32`].
 pub(crate) fn as_taken<'a>(
     numbers: Numbers,
     values: &'a [f32],

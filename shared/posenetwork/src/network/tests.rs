@@ -1,4 +1,4 @@
-//! Networks of the test's own making, and cards that fit them or not.
+//! Tests with small networks made here, and cards that match them or not.
 
 use inference::onnx::{Attribute, Network, Side};
 
@@ -25,7 +25,7 @@ pub(super) fn sides(sides: &[usize]) -> Vec<Side> {
     sides.iter().map(|side| Side::Fixed(*side)).collect()
 }
 
-/// Gives what `operator` makes of its input as three maps.
+/// Makes a network that returns `operator` of its input as three maps.
 pub(super) fn network(operator: &str) -> Network {
     let mut net = Network::default();
     net.inputs.push(("picture".to_owned(), sides(&[1, 3, 16, 12])));
@@ -39,12 +39,12 @@ pub(super) fn fitted(net: &Network, card: &str) -> Result<PoseNetwork, FitError>
     PoseNetwork::new(session, Card::parse(card).unwrap())
 }
 
-/// Returns the message for a network that does not fit.
+/// Returns the message for a network that does not match its card.
 fn refused(net: &Network, card: &str) -> String {
     fitted(net, card).unwrap_err().to_string()
 }
 
-/// Looks at a black picture of the input's size with some white pixels.
+/// Runs the network on a black picture of the input's size with some white pixels.
 fn keypoints(net: &Network, card: &str, white: &[[usize; 2]]) -> Vec<Keypoint> {
     let network = fitted(net, card).unwrap();
     let mut rgb = vec![0; 3 * 12 * 16];
@@ -131,7 +131,7 @@ fn values_that_are_no_numbers_are_refused_when_they_come() {
         refused(&network("Log"), CARD),
         "output `maps`: value 0 of the output is -inf"
     );
-    // On the empty picture of the trial all is well.
+    // The first run on an empty picture succeeds.
     let shifted = CARD.replace("[crop]", "mean = [-1.0, -1.0, -1.0]\n[crop]");
     let mut net = network("Relu");
     net.nodes.clear();
@@ -165,7 +165,7 @@ fn whole_numbers_as_output_are_refused() {
     assert_eq!(refused(&net, CARD), "output `maps` is not of type f32");
 }
 
-/// Gives distributions over columns and rows, by the brightest pixel of each; and its card.
+/// Makes a network that returns distributions over columns and rows, from the brightest pixel of each; and its card.
 pub(super) fn distributions() -> (Network, String) {
     let mut net = network("Relu");
     net.nodes.clear();
@@ -219,7 +219,7 @@ fn a_cell_lies_on_the_first_of_its_pixels_or_in_their_middle() {
         let sight = network.look(image, [0.0, 0.0, 12.0, 16.0], &mut workspace);
         let sight = sight.unwrap().unwrap();
         assert_eq!(sight.keypoints().unwrap()[0].at, expected);
-        // What fusion looks at lies where the keypoints do.
+        // The peaks of the maps used by fusion are at the keypoints.
         let mut maps = JointMaps::default();
         maps.read(&sight, &MapSettings::default()).unwrap();
         assert_eq!(maps.maxima(2, 1)[0].0, expected);
@@ -233,7 +233,7 @@ fn a_list_is_read_with_its_unit() {
     let mut net = network("Relu");
     net.nodes.clear();
     net.outputs[0].1 = sides(&[1, 1, 3, 3]);
-    // The mean of the picture, which is black, and positions.
+    // Returns the mean of the picture, which is black, and positions.
     net.floats(
         "places",
         &[9],
@@ -264,7 +264,7 @@ fn a_network_of_bytes_is_taken_by_the_card_of_one_of_whole_numbers() {
         "maps",
         vec![("to", Attribute::Int(1))],
     );
-    // The type of the input: bytes in place of single precision.
+    // Changes the type of the input to bytes instead of single precision.
     let mut file = net.file();
     let input = file.windows(7).rposition(|window| window == b"picture").unwrap();
     let kind = file[input..].windows(3).position(|window| window == [8, 1, 18]);
@@ -283,6 +283,6 @@ fn a_network_of_bytes_is_taken_by_the_card_of_one_of_whole_numbers() {
         let network = fitted(numbers).unwrap();
         assert_eq!(network.card().input.numbers, Numbers::U8);
     }
-    // What was prepared for single precision would be something else.
+    // Input prepared for single precision would not fit this type.
     fitted("f32").unwrap_err();
 }

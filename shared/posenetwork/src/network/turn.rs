@@ -1,28 +1,28 @@
-//! Pictures that are turned by quarters for a network: people who lie or stand on their hands are upright in its input.
+//! Rotation of pictures by quarter turns, so that people who lie or do a handstand are upright in the network's input.
 
 use keypoints::{Card, Codec, Layout};
 
 use super::{PoseNetwork, Tensor};
 
-/// Where the head of a person points in the picture: the picture is turned so that it points upward in the input.
+/// Direction in which a person's head points in the picture. The picture is rotated so that the head points upward in the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Turn {
-    /// Upward: nothing is turned.
+    /// Upward: the picture is not rotated.
     #[default]
     Up,
-    /// To the right.
+    /// To the right of the picture.
     Right,
-    /// Downward.
+    /// Downward in the picture.
     Down,
-    /// To the left.
+    /// To the left of the picture.
     Left,
 }
 
 impl Turn {
-    /// All of them, in order.
+    /// All directions, in order.
     pub(crate) const ALL: [Self; 4] = [Self::Up, Self::Right, Self::Down, Self::Left];
 
-    /// The direction, radians clockwise from upward, -pi to pi.
+    /// The direction, in radians clockwise from upward, -pi to pi.
     fn angle(self) -> f64 {
         let quarters = match self {
             Self::Up => 0.0,
@@ -33,9 +33,9 @@ impl Turn {
         quarters * core::f64::consts::FRAC_PI_2
     }
 
-    /// The turn of a head that points somewhere; `self` if that is off by at most `most` from it, radians.
+    /// The direction nearest to that of the head. `self` is kept if it differs from the head's direction by at most `most`, in radians.
     ///
-    /// * `towards`: pixels of the picture, across and down.
+    /// * `towards`: direction of the head, in pixels of the picture, across and down.
     pub(crate) fn towards(self, [x, y]: [f64; 2], most: f64) -> Self {
         let angle = x.atan2(-y);
         let off = |turn: &Self| {
@@ -49,12 +49,12 @@ impl Turn {
         all.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(self)
     }
 
-    /// Returns true if columns become rows.
+    /// Returns true if the rotation exchanges columns and rows.
     pub(super) fn is_sideways(self) -> bool {
         matches!(self, Self::Right | Self::Left)
     }
 
-    /// The place in the input of a place in the window, both column first.
+    /// Converts a position in the window to the position in the input, both column first.
     ///
     /// * `last`: the last column and row of the window.
     fn in_input(self, [x, y]: [usize; 2], last: [usize; 2]) -> [usize; 2] {
@@ -67,10 +67,10 @@ impl Turn {
         }
     }
 
-    /// Turns the values of a window to those of the input.
+    /// Rotates the values of a window to those of the input.
     ///
-    /// * `window`: its width and height, pixels.
-    /// * `memory`: used again from picture to picture.
+    /// * `window`: width and height of the window, in pixels.
+    /// * `memory`: reused from picture to picture.
     pub(super) fn turn_input(
         self,
         card: &Card,
@@ -98,8 +98,8 @@ impl Turn {
         core::mem::swap(values, memory);
     }
 
-    /// Turns the outputs for an input back to those for the window. Outputs of an unexpected shape are left as they are: they are refused
-    /// later.
+    /// Rotates the outputs for an input back to the window. Outputs of an unexpected shape are not changed, because a later check
+    /// refuses them.
     pub(super) fn turn_back(self, network: &PoseNetwork, outputs: &mut [Tensor]) {
         let card = &network.card;
         match &card.output {
@@ -134,13 +134,14 @@ impl Turn {
         let mut named = network.outputs.iter().zip(outputs).rev();
         let found = named.find(|output| Some(output.0.as_str()) == front);
         if let Some(right) = found.and_then(|output| output.1.values.first_mut()) {
-            // Towards the side of the input is up or down in the picture, of which nothing is told.
+            // With a sideways rotation, left and right of the input are up and down of the picture, for which the network gives no
+            // direction.
             *right = if self == Self::Down { -*right } else { 0.0 };
         }
     }
 
-    /// * `is_symmetric`: whether the cells of a turned picture lie on cells of the picture. Those that lie on the first of their pixels
-    ///   are moved by a cell, to less than half a cell from there.
+    /// * `is_symmetric`: true if the cells of a rotated picture coincide with cells of the picture. Otherwise each cell is at the first of
+    ///   its pixels, and the rotated maps are moved by one cell. The remaining offset is less than half a cell.
     fn turn_maps(self, maps: &mut Tensor, (layout, is_symmetric, width): (Layout, bool, usize)) {
         let Some([channels, rows, columns]) = maps.map_sides(layout) else {
             return;
@@ -179,9 +180,9 @@ impl Turn {
     }
 }
 
-/// Turns distributions round: pixel `x` of `n` becomes pixel `n - 1 - x`.
+/// Reverses distributions: pixel `x` of `n` becomes pixel `n - 1 - x`.
 ///
-/// * `bins`: for a pixel.
+/// * `bins`: number of bins per pixel.
 fn reverse(of: &mut Tensor, n_keypoints: usize, bins: usize) {
     let n = of.values.len() / n_keypoints.max(1);
     for values in of.values.chunks_exact_mut(n.max(1)) {
@@ -205,7 +206,7 @@ mod tests {
             (Turn::Down, [3, 4]),
             (Turn::Left, [0, 2]),
         ] {
-            // A window of 7 x 5 cells, and the middle of the side at which the head is.
+            // A window of 7 x 5 cells, and the middle of the side at the head.
             let [u, v] = turn.in_input(head, [6, 4]);
             let middle = if turn.is_sideways() { 2 } else { 3 };
             assert_eq!([u, v], [middle, 0], "{turn:?}");

@@ -1,4 +1,4 @@
-//! Networks that see turned pictures: what does not care how a picture is turned sees the same.
+//! Tests of networks with rotated pictures: a network that is independent of rotation gives the same result.
 
 use inference::onnx::Network;
 
@@ -12,7 +12,7 @@ fn picture() -> Vec<u8> {
     (0..3 * 16 * 16).map(|i| (i * 37 % 251) as u8).collect()
 }
 
-/// The keypoints in a square box of the picture.
+/// The keypoints found in a square box of the picture.
 fn found(net: &Network, card: &str, turn: Turn) -> Vec<Keypoint> {
     let rgb = picture();
     let image = Rgb8View::new(16, 16, &rgb).unwrap();
@@ -25,7 +25,7 @@ fn found(net: &Network, card: &str, turn: Turn) -> Vec<Keypoint> {
 
 #[test]
 fn whoever_does_not_care_sees_the_same_in_every_turn() {
-    // The window is 12 x 16 or 16 x 12 pixels, widened to hold the box.
+    // The window is 12 x 16 or 16 x 12 pixels, widened to contain the box.
     let upright = found(&network("Relu"), CARD, Turn::Up);
     let place = |keypoint: &Keypoint| keypoint.at.map(|at| at.round() as i64);
     for turn in TURNS {

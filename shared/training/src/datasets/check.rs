@@ -1,4 +1,4 @@
-//! Validates every annotation; reports at most one fault each.
+//! Validates every annotation, and reports at most one fault per person.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -9,20 +9,20 @@ use rayon::prelude::*;
 
 use crate::datasets::{Fault, People, Person, Problem, ReadOptions};
 
-/// A person of a data set as it was read, not validated yet.
+/// A person of a data set before validation.
 #[derive(Debug)]
 pub(crate) struct Row {
-    /// Row of the data set, from 1.
+    /// Number of the row in the data set, from 1.
     pub(crate) number: usize,
-    /// The same for messages.
+    /// Position of the row, as text for messages.
     pub(crate) place: String,
-    /// The name, where there is one.
+    /// Name of the person, if given.
     pub(crate) name: Option<String>,
     /// The person, or the fault of the row.
     pub(crate) person: Result<Person, Fault>,
 }
 
-/// Smaller people are a fault, pixels.
+/// Least extent of a person, in pixels; a smaller extent is a fault.
 const MIN_EXTENT_PX: f64 = 1.0;
 
 /// Separates the valid people from those with a fault.
@@ -51,7 +51,7 @@ pub(crate) fn validate(file: &Path, rows: Vec<Row>, options: &ReadOptions) -> Pe
 
 type Sizes = BTreeMap<PathBuf, Result<Size, FootageError>>;
 
-/// Decodes every image once, to check it.
+/// Decodes every image once as a check, and returns the sizes.
 fn image_sizes(rows: &[Row]) -> Sizes {
     let mut images: Vec<&Path> = rows
         .iter()
@@ -91,7 +91,7 @@ impl Validator<'_> {
         self.numbers(&person)?;
         let size = match sizes.get(&person.image) {
             Some(Ok(size)) => *size,
-            // Errors cannot be copied: for other people on an invalid image it is decoded again.
+            // Errors cannot be cloned, so an invalid image is decoded again for each further person on it.
             _ => match sizes.remove(&person.image) {
                 Some(size) => size?,
                 None => footage::read_image(&person.image)?.0,

@@ -18,13 +18,13 @@ struct Line {
     name: Option<String>,
 }
 
-/// Parses one line: the person, with `image` as written and an empty `row`, and the name.
+/// Parses one line into a person and an optional name. The person has `image` as written and an empty `row`.
 ///
 /// Unknown joints become NaN and are not visible.
 ///
 /// # Errors
 ///
-/// [`Fault::Syntax`], and [`Fault::Count`] if there are not as many marks of visibility as joints.
+/// [`Fault::Syntax`], and [`Fault::Count`] if `visible` and `joints` differ in length.
 pub fn parse_line(line: &str) -> Result<(Person, Option<String>), Fault> {
     let line: Line = serde_json::from_str(line).map_err(|error| Fault::Syntax {
         message: error.to_string(),
@@ -51,13 +51,13 @@ pub fn parse_line(line: &str) -> Result<(Person, Option<String>), Fault> {
     Ok((person, line.name))
 }
 
-/// Writes a person as a line, without the end of the line.
+/// Formats a person as a line, without a line break.
 ///
 /// Joints that are not finite are written as unknown. [`parse_line`] returns the same person, with an empty `row`.
 ///
 /// # Errors
 ///
-/// Only for an image whose path is not Unicode.
+/// Only if the path of the image is not Unicode.
 pub fn to_line(person: &Person, name: Option<&str>) -> Result<String, serde_json::Error> {
     let known = |joint: &[f64; 2]| {
         let is_finite = joint.iter().all(|value| value.is_finite());

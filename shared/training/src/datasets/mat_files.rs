@@ -2,36 +2,36 @@
 
 use formats::mat5::{ContainerError, Numbers, Value};
 
-/// Joints of one person and whether they are visible.
+/// Joints of one person, and flags for visible joints.
 pub type Annotation = (Vec<[f64; 2]>, Vec<bool>);
 
-/// Why a MATLAB file is not an annotation.
+/// Reason why a MATLAB file is not an annotation.
 #[derive(Debug, thiserror::Error)]
 pub enum MatLayoutError {
     /// The MATLAB file cannot be read.
     #[error("not a readable MATLAB level 5 file")]
     Container(#[from] ContainerError),
     /// The variable is missing, or not an array of real numbers.
-    #[error("it holds no array of real numbers called `{variable}`")]
+    #[error("it contains no array of real numbers called `{variable}`")]
     Missing {
-        /// Its name.
+        /// Name of the variable.
         variable: &'static str,
     },
-    /// The array has other sizes.
+    /// The array has unexpected sizes.
     #[error("`{variable}` is {}, expected {expected}", times(.got))]
     Size {
-        /// Its name.
+        /// Name of the variable.
         variable: &'static str,
-        /// Its sizes.
+        /// Sizes of the array.
         got: Vec<usize>,
-        /// Sizes that are accepted.
+        /// Expected sizes.
         expected: &'static str,
     },
 }
 
-/// Reads PARSE's `labels.mat`: `ptsAll`, joints x 2 x people, pixels from 1.
+/// Reads PARSE's `labels.mat`: `ptsAll`, joints x 2 x people, in pixels from 1.
 ///
-/// * Returns one annotation per person, from 0, all joints visible.
+/// * Returns one annotation per person, in pixels from 0; all joints are visible.
 ///
 /// # Errors
 ///
@@ -54,13 +54,13 @@ pub fn parse_labels(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
     })
 }
 
-/// Reads LSP's `joints.mat`: `joints`, pixels from 1.
+/// Reads LSP's `joints.mat`: `joints`, in pixels from 1.
 ///
-/// The original set is 3 x joints x people with a flag that is 1 where the joint is hidden, the extended
-/// set joints x 3 x people with a flag that is 1 where it is visible (Johnson & Everingham 2010, 2011).
-/// 3 x 3 x people is taken for the original layout.
+/// The original set is 3 x joints x people, with a flag that is 1 if the joint is hidden. The extended
+/// set is joints x 3 x people, with a flag that is 1 if the joint is visible (Johnson & Everingham 2010, 2011).
+/// An array of 3 x 3 x people is read in the original layout.
 ///
-/// * Returns one annotation per person, from 0.
+/// * Returns one annotation per person, in pixels from 0.
 ///
 /// # Errors
 ///
@@ -94,7 +94,7 @@ pub fn parse_joints(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
     })
 }
 
-/// Finds the variable, and reads it.
+/// Finds the variable and reads its numbers.
 fn with_numbers(
     file: &[u8],
     variable: &'static str,
@@ -109,7 +109,7 @@ fn with_numbers(
     Err(MatLayoutError::Missing { variable })
 }
 
-/// The three sizes; MATLAB leaves out a last size of 1. Zeros if there are more than three.
+/// The three sizes of the array, or zeros if there are more. MATLAB omits a last size of 1.
 fn three_sizes(numbers: &Numbers<'_>) -> [usize; 3] {
     match *numbers.sizes() {
         [rows, columns] => [rows, columns, 1],

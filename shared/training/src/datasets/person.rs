@@ -7,28 +7,28 @@ use footage::{FootageError, Size};
 /// One annotated person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// The image.
+    /// Path of the image.
     pub image: PathBuf,
-    /// The place in the data set, for messages.
+    /// Position of the row in the data set, as text for messages.
     pub row: String,
-    /// The joints, `[x, y]` in pixels, the centre of the top-left pixel at `(0, 0)`. Unknown joints
-    /// are NaN; there are none unless [`ReadOptions::unknown_joints`](crate::datasets::ReadOptions) is set.
+    /// The joints, `[x, y]` in pixels, with the centre of the top-left pixel at `(0, 0)`. Unknown joints
+    /// are NaN; they occur only if [`ReadOptions::unknown_joints`](crate::datasets::ReadOptions) is set.
     pub joints: Vec<[f64; 2]>,
-    /// True if the joint is visible according to the annotation.
+    /// For each joint, true if it is visible according to the annotation.
     pub visible: Vec<bool>,
 }
 
-/// The valid people of a data set, and the problems of the others.
+/// The valid people of a data set, and the problems of the people left out.
 #[derive(Debug, Default)]
 pub struct People {
-    /// In the order of the data set.
+    /// Valid people, in the order of the data set.
     pub people: Vec<Person>,
     /// One for each person that was left out because of a fault, in the order of the data set.
     pub problems: Vec<Problem>,
 }
 
 impl People {
-    /// The number of problems of every kind that occurs.
+    /// Number of problems of each kind that occurs.
     pub fn counts(&self) -> Vec<(FaultKind, usize)> {
         FaultKind::ALL
             .into_iter()
@@ -53,14 +53,14 @@ impl People {
 pub struct Problem {
     /// The annotation file.
     pub file: PathBuf,
-    /// The place of the person in the file.
+    /// Position of the person in the file.
     pub row: String,
     /// The fault.
     #[source]
     pub fault: Fault,
 }
 
-/// The fault of a person. Joints count from 1.
+/// The fault of a person. Joints are numbered from 1.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
     /// The line does not describe a person.
@@ -72,73 +72,73 @@ pub enum Fault {
     /// More or fewer joints than the skeleton has.
     #[error("{got} {what}, expected {expected}")]
     Count {
-        /// Entries that are counted: joints, or marks of visibility.
+        /// The counted entries: joints, or marks of visibility.
         what: &'static str,
-        /// The number found.
+        /// Number of entries found.
         got: usize,
-        /// The number expected.
+        /// Number of entries expected.
         expected: usize,
     },
     /// A joint is unknown: `null` in JSON lines, both coordinates NaN in other files.
-    #[error("joint {joint} is not known")]
+    #[error("joint {joint} is unknown")]
     Unknown {
-        /// Which, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
     },
     /// A coordinate is infinite, or one of the two is NaN.
-    #[error("joint {joint} lies at ({}, {})", at[0], at[1])]
+    #[error("joint {joint} is at ({}, {})", at[0], at[1])]
     NotFinite {
-        /// Which, from 1.
+        /// Number of the joint, from 1.
         joint: usize,
-        /// Its coordinates.
+        /// Coordinates of the joint.
         at: [f64; 2],
     },
-    /// All joints lie at one place.
-    #[error("all joints lie within {extent_px:.3} px of ({:.1}, {:.1})", at[0], at[1])]
+    /// All joints are at the same position.
+    #[error("all joints are within {extent_px:.3} px of ({:.1}, {:.1})", at[0], at[1])]
     ZeroSize {
-        /// Where, pixels.
+        /// Centre of the joints, in pixels.
         at: [f64; 2],
-        /// Longer side of the rectangle around the joints, pixels.
+        /// Longer side of the rectangle around the joints, in pixels.
         extent_px: f64,
     },
-    /// The image is absent, empty or damaged.
+    /// The image is missing, empty or damaged.
     #[error("the image cannot be used")]
     Image(#[from] FootageError),
-    /// A joint lies outside the image.
+    /// A joint is outside the image.
     #[error(
-        "joint {joint} at ({:.1}, {:.1}) lies {by_px:.1} px outside the image of {size}, more than {limit_px}",
+        "joint {joint} at ({:.1}, {:.1}) is {by_px:.1} px outside the image of {size}, more than {limit_px}",
         at[0], at[1]
     )]
     Outside {
-        /// The joint, from 1, that lies farthest outside.
+        /// Number of the joint farthest outside, from 1.
         joint: usize,
-        /// Where, pixels.
+        /// Position of the joint, in pixels.
         at: [f64; 2],
         /// Size of the image.
         size: Size,
-        /// How far beyond the border, pixels.
+        /// Distance beyond the border, in pixels.
         by_px: f64,
-        /// How far is accepted, pixels.
+        /// Accepted distance, in pixels.
         limit_px: f64,
     },
-    /// The same joints on the same image.
+    /// A person with the same joints on the same image.
     #[error("the same image and joints as {before}")]
     Twice {
-        /// Place of the first occurrence.
+        /// Position of the first occurrence in the data set.
         before: String,
     },
     /// Another person has the same name.
-    #[error("the name {name:?} is already that of {before}")]
+    #[error("the name {name:?} is already used in {before}")]
     SameName {
-        /// The name.
+        /// The duplicate name.
         name: String,
-        /// Place of the first person with that name.
+        /// Position of the first person with that name.
         before: String,
     },
 }
 
 impl Fault {
-    /// Its kind.
+    /// Kind of the fault.
     pub fn kind(&self) -> FaultKind {
         match self {
             Self::Syntax { .. } => FaultKind::Syntax,
@@ -154,7 +154,7 @@ impl Fault {
     }
 }
 
-/// Kinds of [`Fault`], to count them and to choose the fatal ones.
+/// Kinds of [`Fault`], used to count faults and to choose the fatal ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaultKind {
     /// [`Fault::Syntax`]
@@ -178,7 +178,7 @@ pub enum FaultKind {
 }
 
 impl FaultKind {
-    /// All of them.
+    /// All kinds of faults.
     pub const ALL: [Self; 9] = [
         Self::Syntax,
         Self::Count,
@@ -191,7 +191,7 @@ impl FaultKind {
         Self::SameName,
     ];
 
-    /// Its name on the command line.
+    /// Name of the kind on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Syntax => "syntax",
@@ -206,7 +206,7 @@ impl FaultKind {
         }
     }
 
-    /// The kind of that name, if there is one.
+    /// Returns the kind with a given name, if there is one.
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use footage::{FootageError, Size};
 use kernels::Rgb8View;
 
-/// Interleaved 8-bit RGB, row major, without padding between rows.
+/// An image of interleaved 8-bit RGB, row major, without padding between rows.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Picture {
     size: Size,
@@ -13,7 +13,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// An image of one colour.
+    /// Makes an image of one colour.
     pub fn filled(size: Size, colour: [u8; 3]) -> Self {
         Self {
             size,
@@ -21,19 +21,19 @@ impl Picture {
         }
     }
 
-    /// An image of given pixels.
+    /// Makes an image of given pixels.
     ///
     /// * `rgb`: `width * height * 3` bytes.
     ///
     /// # Errors
     ///
-    /// [`ImageSizeError`](kernels::ImageSizeError) if there are more or fewer.
+    /// [`ImageSizeError`](kernels::ImageSizeError) if there are more or fewer bytes.
     pub fn new(size: Size, rgb: Vec<u8>) -> Result<Self, kernels::ImageSizeError> {
         Rgb8View::new(size.width, size.height, &rgb)?;
         Ok(Self { size, rgb })
     }
 
-    /// Decodes an image file, to the same pixels as [`footage::Source`] does for detection.
+    /// Decodes an image file. The pixels are the same as those that [`footage::Source`] gives for detection.
     ///
     /// # Errors
     ///
@@ -43,7 +43,7 @@ impl Picture {
         Ok(Self { size, rgb })
     }
 
-    /// Width and height, pixels.
+    /// Width and height, in pixels.
     pub fn size(&self) -> Size {
         self.size
     }
@@ -53,12 +53,12 @@ impl Picture {
         &self.rgb
     }
 
-    /// The bytes, to be written.
+    /// The bytes, as a mutable slice.
     pub fn rgb_mut(&mut self) -> &mut [u8] {
         &mut self.rgb
     }
 
-    /// A view of the pixels, as detection takes it.
+    /// A view of the pixels, in the type that detection takes.
     ///
     /// # Panics
     ///
@@ -72,7 +72,7 @@ impl Picture {
         view.expect("the number of bytes is checked when a picture is made")
     }
 
-    /// The part of the image within a rectangle `[x1, y1, x2, y2]` (pixels), and the position of its top-left pixel.
+    /// The part of the image within a rectangle `[x1, y1, x2, y2]` in pixels, and the position of its top-left pixel.
     pub fn crop(&self, within: [f64; 4]) -> (Self, [f64; 2]) {
         let range = |low: f64, high: f64, n: usize| {
             let start = low.floor().clamp(0.0, n as f64) as usize;
@@ -95,7 +95,7 @@ impl Picture {
 }
 
 impl std::fmt::Debug for Picture {
-    /// The size only: the pixels are too many to print.
+    /// Prints only the size, because the pixels are too many to print.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(out, "Picture({})", self.size)
     }

@@ -1,4 +1,4 @@
-//! Reads data sets of all supported layouts.
+//! Reading of data sets of all supported layouts.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,10 +12,10 @@ use crate::datasets::{
     parse_labels, parse_line,
 };
 
-/// Why a data set cannot be read at all.
+/// Reason why a data set cannot be read at all.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The layout is not known.
+    /// The layout is unknown.
     #[error(
         "{} is not a data set: expected a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a \
          file of JSON lines",
@@ -25,8 +25,8 @@ pub enum DatasetError {
         /// The folder or file.
         path: PathBuf,
     },
-    /// The folder has two layouts.
-    #[error("{} holds both labels.mat and joints.mat: name one of the two", path.display())]
+    /// The folder has files of two layouts.
+    #[error("{} contains both labels.mat and joints.mat: give the path of one of them", path.display())]
     Ambiguous {
         /// The folder.
         path: PathBuf,
@@ -44,15 +44,15 @@ pub enum DatasetError {
     Mat {
         /// The file.
         path: PathBuf,
-        /// Fault of its layout.
+        /// Error of the file's layout.
         source: MatLayoutError,
     },
-    /// The list of images does not fit the people.
-    #[error("{} names {got} images for {expected} people", path.display())]
+    /// The number of images in the list is not the number of people.
+    #[error("{} lists {got} images for {expected} people", path.display())]
     ImageList {
-        /// The list.
+        /// Path of the list.
         path: PathBuf,
-        /// Number of images that it names.
+        /// Number of images in the list.
         got: usize,
         /// Number of people.
         expected: usize,
@@ -61,13 +61,13 @@ pub enum DatasetError {
     #[error(transparent)]
     Select(#[from] SelectError),
     /// People have a fault of a fatal kind.
-    #[error("{n_fatal} of {n_people} people have a fault that was called fatal")]
+    #[error("{n_fatal} of {n_people} people have a fault of a fatal kind")]
     Fatal {
-        /// How many.
+        /// Number of people with such a fault.
         n_fatal: usize,
-        /// Out of how many.
+        /// Number of people in the data set.
         n_people: usize,
-        /// The first of them.
+        /// The first fault.
         #[source]
         first: Box<Problem>,
     },
@@ -77,9 +77,9 @@ pub enum DatasetError {
 ///
 /// The layout is detected from the files:
 /// * PARSE: `labels.mat`, images `im0001.jpg`... beside it (Ramanan 2006);
-/// * LSP: `joints.mat`, images in `images/`, `im0001.jpg`... or `im00001.jpg`..., or those that
-///   `images.txt` beside it names, one per person (Johnson & Everingham 2010, 2011);
-/// * that of Parallax: a file of JSON lines.
+/// * LSP: `joints.mat`, and images in `images/`. Their names are `im0001.jpg`... or `im00001.jpg`..., or are listed in
+///   `images.txt` beside it, one per person (Johnson & Everingham 2010, 2011);
+/// * Parallax: a file of JSON lines.
 ///
 /// All images of the selected people are decoded once, to check them. The result
 /// does not depend on the number of threads.
@@ -88,7 +88,7 @@ pub enum DatasetError {
 ///
 /// # Errors
 ///
-/// [`DatasetError`]. A person with a fault is listed in [`People::problems`], and is an error only if its kind is
+/// [`DatasetError`]. A person with a fault is listed in [`People::problems`]. The fault is an error only if its kind is
 /// in [`ReadOptions::fatal`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<People, DatasetError> {
     let file = annotation_file(path)?;
@@ -130,14 +130,14 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<People, DatasetError> 
 const LABELS: &str = "labels.mat";
 const JOINTS: &str = "joints.mat";
 
-/// The path of the image of a person, counted from 0.
+/// Returns the path of a person's image. People are numbered from 0.
 type ImageOf = Box<dyn Fn(usize) -> PathBuf>;
 
 fn is_called(file: &Path, name: &str) -> bool {
     file.file_name().is_some_and(|file_name| file_name == name)
 }
 
-/// The file with the annotations; in a folder the one with a known name.
+/// Finds the file with the annotations: `path` itself, or in a folder the file with a known name.
 fn annotation_file(path: &Path) -> Result<PathBuf, DatasetError> {
     let unrecognised = || DatasetError::Unrecognised {
         path: path.to_owned(),
@@ -182,7 +182,7 @@ fn with_images(
     Ok(people.into_iter().enumerate().map(row).collect())
 }
 
-/// Images with a number from 1 in their names, with the first of the numbers of digits that any file has.
+/// Paths of numbered images, from 1. The number of digits is the first one for which a file exists.
 fn numbered_images(folder: &Path, digits: &[usize]) -> ImageOf {
     let names: Vec<String> = fs::read_dir(folder)
         .into_iter()

@@ -1,15 +1,15 @@
-//! One person with the pixels, and its augmentation by rotation and mirroring.
+//! One person with the pixels, and augmentation by rotation and mirroring.
 
 use footage::{Affine, Fill, FootageError, Size, Warp, WarpError};
 
 use crate::datasets::{Person, Picture};
 
-/// One annotated person and the image.
+/// One annotated person with the image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// The image.
     pub image: Picture,
-    /// The joints, `[x, y]` in pixels of the image, the centre of the top-left pixel at `(0, 0)`.
+    /// The joints, `[x, y]` in pixels of the image, with the centre of the top-left pixel at `(0, 0)`.
     pub joints: Vec<[f64; 2]>,
 }
 
@@ -26,9 +26,9 @@ impl Sample {
         })
     }
 
-    /// The mirror image: `x` becomes `width - 1 - x`, and the joints of the left side those of the right.
+    /// The mirror image: `x` becomes `width - 1 - x`, and left and right joints are exchanged.
     ///
-    /// * `joint_mirror`: the joint on the other side for every joint, see
+    /// * `joint_mirror`: for every joint, the joint on the other side, see
     ///   [`SkeletonTable::joint_mirror`](crate::datasets::SkeletonTable::joint_mirror).
     ///
     /// # Panics
@@ -59,20 +59,20 @@ impl Sample {
         Self { image, joints }
     }
 
-    /// Rotated about the centre of the image, anticlockwise as seen (as MATLAB's `imrotate`).
+    /// Rotates the sample about the centre of the image, anticlockwise as seen (like MATLAB's `imrotate`).
     ///
-    /// The canvas grows so that no pixel is lost: `width |cos| + height |sin|`, rounded up. Pixels are
-    /// bilinear samples of the source, which lies in the middle of the canvas; the joints are rotated by
-    /// the same map. `Fill::Black` fills the corners as `imrotate` does; `Fill::Replicate` makes no
+    /// The canvas is enlarged so that no pixel is lost: `width |cos| + height |sin|`, rounded up. Pixels are
+    /// bilinear samples of the source, which is centred on the canvas. The joints are rotated by
+    /// the same map. `Fill::Black` fills the corners as `imrotate` does. `Fill::Replicate` makes no
     /// edges there that a detector could learn.
     ///
     /// # Errors
     ///
-    /// [`WarpError`] for an image without pixels, or an angle that is not a number.
+    /// [`WarpError`] if the image has no pixels or the angle is not a number.
     pub fn rotated(&self, degrees: f64, fill: Fill) -> Result<Self, WarpError> {
         let source = self.image.size();
         let (sin, cos) = degrees.to_radians().sin_cos();
-        // Quarter turns are exact: remove the rounding error of a sine or cosine of 0.
+        // Removes the rounding error of a sine or cosine of 0, so that quarter turns are exact.
         let [sin, cos] = [sin, cos].map(|value| if value.abs() < 1e-12 { 0.0 } else { value });
         let [width, height] = [source.width, source.height].map(|value| value as f64);
         let grown = |value: f64| (value - 1e-6).ceil().max(1.0) as usize;
@@ -83,7 +83,7 @@ impl Sample {
         let centre = |value: usize| (value as f64 - 1.0) / 2.0;
         let from = [centre(source.width), centre(source.height)];
         let to = [centre(output.width), centre(output.height)];
-        // Rows point down, so (cos, -sin; sin, cos) rotates a point of the output clockwise, which is the inverse.
+        // The rows point down, so (cos, -sin; sin, cos) rotates a point of the output clockwise. That is the inverse rotation.
         let source_from_output: Affine = [
             [cos, -sin, from[0] - cos * to[0] + sin * to[1]],
             [sin, cos, from[1] - sin * to[0] - cos * to[1]],
@@ -111,7 +111,7 @@ mod tests {
 
     const MIRROR: [usize; 3] = [1, 0, 2];
 
-    /// A grey image with a round dot at the last joint, smooth so that sampling does not move it.
+    /// A grey image with a round dot at the last joint. The dot is smooth, so that sampling does not move it.
     fn sample_with_dot(size: Size, joint: [usize; 2]) -> Sample {
         let mut image = Picture::filled(size, [64; 3]);
         for (at, pixel) in image.rgb_mut().as_chunks_mut::<3>().0.iter_mut().enumerate() {

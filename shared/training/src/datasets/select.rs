@@ -8,54 +8,54 @@ use std::path::{Path, PathBuf};
 
 /// Some of the people of a data set.
 ///
-/// Written as ranges of rows from 1 (`1-100,150`), or as the path of a list file with a range, a row or
-/// the file name of an image per line. Every entry must match: because of a typing error in the list of a
-/// test set, its people would otherwise be used for training.
+/// A selection is written as ranges of rows from 1 (`1-100,150`), or as the path of a list file. Each line of the file is a range, a row or
+/// the file name of an image. Every entry must match a person. Otherwise, a typing error in the list of a
+/// test set would add its people to the training set.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Selection {
     rows: Vec<RangeInclusive<usize>>,
     images: BTreeSet<String>,
 }
 
-/// Why a selection is invalid.
+/// Reason why a selection is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {
-    /// Neither ranges nor a list file.
+    /// The text is neither ranges of rows nor the path of a list file.
     #[error("{text:?} is neither rows (1-100,150) nor a file with a list of rows or image names")]
     NotASelection {
-        /// As the user wrote it.
+        /// The text as written by the user.
         text: String,
-        /// Error of the operating system on reading a file of that name.
+        /// Error of the operating system when reading a file of that name.
         source: io::Error,
     },
-    /// A range that ends before it begins, or begins at 0.
+    /// A range ends before it begins, or begins at 0.
     #[error("there are no rows {first}-{last}: rows count from 1")]
     BadRange {
-        /// First row.
+        /// First row of the range.
         first: usize,
-        /// Last row.
+        /// Last row of the range.
         last: usize,
     },
     /// The list file is empty.
-    #[error("the list {} is empty: it names no rows or images", path.display())]
+    #[error("the list {} is empty: it has no rows or images", path.display())]
     EmptyList {
         /// The file.
         path: PathBuf,
     },
-    /// A named image has no people.
+    /// No person is on the named image.
     #[error("{name} of the selection is not an image of {}", data.display())]
     NoSuchImage {
-        /// The image.
+        /// Name of the image.
         name: String,
         /// The data set.
         data: PathBuf,
     },
-    /// A range of rows has no people.
+    /// No person is in the range of rows.
     #[error("the rows {first}-{last} of the selection are not in {}", data.display())]
     NoSuchRows {
-        /// First row.
+        /// First row of the range.
         first: usize,
-        /// Last row.
+        /// Last row of the range.
         last: usize,
         /// The data set.
         data: PathBuf,
@@ -63,7 +63,7 @@ pub enum SelectError {
 }
 
 impl Selection {
-    /// Reads an argument of the command line: ranges of rows, else the path of a list file.
+    /// Parses a command-line argument: ranges of rows, or else the path of a list file.
     ///
     /// # Errors
     ///
@@ -85,9 +85,9 @@ impl Selection {
         }
     }
 
-    /// Reads the text of a list file.
+    /// Parses the text of a list file.
     ///
-    /// * `path`: where it is from, for messages.
+    /// * `path`: path of the file, for messages.
     ///
     /// # Errors
     ///
@@ -112,7 +112,7 @@ impl Selection {
 
     /// Returns true if a person is selected.
     ///
-    /// * `row`: from 1.
+    /// * `row`: number of the person's row, from 1.
     pub fn contains(&self, row: usize, image: &Path) -> bool {
         let by_name = || {
             let name = image.file_name().unwrap_or_default().to_string_lossy();
@@ -155,7 +155,7 @@ impl Selection {
     }
 }
 
-/// Ranges of rows, separated by commas; `None` if the text is something else.
+/// Parses ranges of rows separated by commas; `None` if the text is anything else.
 fn ranges(text: &str) -> Option<Result<Vec<RangeInclusive<usize>>, SelectError>> {
     let number = |text: &str| text.trim().parse::<usize>().ok();
     let ranges: Option<Vec<_>> = text
@@ -217,7 +217,7 @@ mod tests {
         let empty = Selection::from_list(Path::new("l"), "\n \n").unwrap_err();
         assert_eq!(
             empty.to_string(),
-            "the list l is empty: it names no rows or images"
+            "the list l is empty: it has no rows or images"
         );
     }
 

@@ -1,12 +1,12 @@
-//! Recordings of one person by several calibrated cameras, with the true joints in space where they are known.
+//! Recordings of one person by several calibrated cameras, with the true positions of the joints where they are known.
 //!
 //! [`read`] takes the folder of a data set in its own layout (`HumanEva-I`, UMPM, synthetic scenes of
-//! Parallax), or a file that describes any other sequence, and returns [`Sequence`]s. No pixels
-//! are read here: a [`View`] has the footage to open and the frame at which the sequence begins.
+//! Parallax), or a file that describes any other sequence, and returns [`Sequence`]s. It does not read any
+//! pixels: a [`View`] contains the footage to open and the frame at which the sequence begins.
 //!
-//! [`read_motion`] takes a C3D or TRC file alone: the motion of one person, without cameras.
+//! [`read_motion`] takes a single C3D or TRC file: the motion of one person, without cameras.
 //!
-//! Metres; the world is that of the calibration.
+//! Lengths are in metres, in the world frame of the calibration.
 
 mod error;
 mod sequence;

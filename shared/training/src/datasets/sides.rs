@@ -8,19 +8,19 @@ use crate::datasets::Person;
 
 /// The convention of left and right for the joints of a data set.
 ///
-/// A model of parts distinguishes the arms by the side of the picture, because that is all a single view
-/// shows for certain; LSP and LSP-extended use the anatomical sides. The two differ for
+/// A model of parts distinguishes the arms by the side of the picture, because a single view
+/// shows nothing else with certainty. LSP and LSP-extended use the anatomical sides. The two conventions differ for
 /// people seen from behind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sides {
-    /// As annotated.
+    /// Sides as annotated.
     #[default]
     Marked,
-    /// As if all people faced the camera: left and right are exchanged for people seen from behind.
+    /// Sides as if all people faced the camera: left and right are exchanged for people seen from behind.
     Seen,
 }
 
-/// An unknown name of a convention.
+/// Error for an unknown name of a convention.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected marked or seen")]
 pub struct UnknownSides;
@@ -40,7 +40,7 @@ impl FromStr for Sides {
 impl Sides {
     /// Applies the convention to the joints of a person.
     ///
-    /// * `joint_mirror`: the joint on the other side for every joint, see
+    /// * `joint_mirror`: for every joint, the joint on the other side, see
     ///   [`SkeletonTable::joint_mirror`](crate::datasets::SkeletonTable::joint_mirror).
     ///
     /// # Panics
@@ -66,10 +66,10 @@ impl Sides {
     }
 }
 
-/// Returns true if the right joints lie further right in the picture than the left ones: by the median
-/// over all known pairs, so that crossed hands or feet have no influence.
+/// Returns true if the right joints are further right in the picture than the left ones. The median
+/// over all known pairs is used, so that crossed hands or feet have no influence.
 ///
-/// The first one of two joints that mirror each other is the right one, as in PARSE and LSP.
+/// The first of two joints that mirror each other is the right one, as in PARSE and LSP.
 fn is_from_behind(joints: &[[f64; 2]], joint_mirror: &[usize]) -> bool {
     let pairs = joint_mirror.iter().enumerate();
     let ahead: Vec<f64> = pairs
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::datasets::SkeletonTable;
 
-    /// A person that faces the camera, arms and legs apart: the right side is on the left of the picture.
+    /// A person facing the camera with arms and legs apart: the right side is on the left of the picture.
     fn facing() -> Person {
         let right = [[40, 90], [41, 70], [42, 50], [58, 50], [59, 70], [60, 90]];
         let arms = [[30, 50], [33, 40], [40, 30], [60, 30], [67, 40], [70, 50]];
@@ -107,7 +107,7 @@ mod tests {
         SkeletonTable::published().joint_mirror().to_vec()
     }
 
-    /// The annotation of the same picture if it showed the person's back.
+    /// The annotation of the same picture, had it shown the person's back.
     fn from_behind(person: &Person) -> Person {
         let mirror = mirror();
         Person {

@@ -5,44 +5,44 @@ mod published;
 
 pub use file::SkeletonFileError;
 
-/// The definition of a skeleton, not validated yet.
+/// The definition of a skeleton before validation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonSpec {
     /// Names of the parts.
     pub names: Vec<String>,
     /// Parent of every part; `None` for the root, which is part 0.
     pub parent: Vec<Option<usize>>,
-    /// The part on the other side of the body; a part in the middle is its own.
+    /// For each part, the part on the other side of the body; a part in the middle is its own mirror.
     pub mirror: Vec<usize>,
-    /// Joints and weights whose weighted sum is the part, for every part.
+    /// For every part, the joints and weights of its weighted sum.
     pub weights: Vec<Vec<(usize, f64)>>,
     /// Names of the joints, in the order of the annotation.
     pub joint_names: Vec<String>,
-    /// The joint on the other side of the body; a joint in the middle is its own.
+    /// For each joint, the joint on the other side of the body; a joint in the middle is its own mirror.
     pub joint_mirror: Vec<usize>,
 }
 
 /// A validated skeleton, for which a model is trained.
 ///
-/// * The parts are a tree: part 0 and only part 0 is the root, every other part comes after its parent.
-/// * Both mirrors are their own inverses; that of the parts keeps the tree, and the part on the other side
-///   lies between the joints on the other side. So the parts of a mirrored person are the mirrored
+/// * The parts form a tree: only part 0 is a root, and every other part comes after its parent.
+/// * Both mirrors are their own inverses. The mirror of the parts keeps the tree, and a mirrored part
+///   is between the mirrored joints. The parts of a mirrored person are therefore the mirrored
 ///   parts.
 /// * The weights of every part add up to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonTable(SkeletonSpec);
 
-/// Why a skeleton was refused. Parts and joints count from 1.
+/// Reason why a skeleton is invalid. Parts and joints are numbered from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TableError {
-    /// No part, no joint, or too many parts.
+    /// There is no part, no joint, or too many of them.
     #[error("the skeleton has {got} {what}, expected 1 to {max}")]
     Number {
-        /// Parts or joints.
+        /// The counted entries: parts or joints.
         what: &'static str,
-        /// How many there are.
+        /// Number found.
         got: usize,
-        /// Most that are accepted.
+        /// Largest number accepted.
         max: usize,
     },
     /// A list does not have one entry per part or joint.
@@ -50,110 +50,108 @@ pub enum TableError {
     Length {
         /// Name of the entries.
         what: &'static str,
-        /// Entries there are.
+        /// Number of entries found.
         got: usize,
-        /// Entries expected.
+        /// Number of entries expected.
         expected: usize,
     },
-    /// Two have the same name.
+    /// Two parts or two joints have the same name.
     #[error("{what} {first} and {second} are both called {name:?}")]
     SameName {
         /// `parts` or `joints`.
         what: &'static str,
-        /// From 1.
+        /// Number of the first, from 1.
         first: usize,
-        /// From 1.
+        /// Number of the second, from 1.
         second: usize,
-        /// The name.
+        /// The duplicate name.
         name: String,
     },
-    /// The first part has a parent, or another has none.
+    /// The first part has a parent, or another part has none.
     #[error(
-        "part {part} ({name}) has {} parent: the first part and only the first is the root",
+        "part {part} ({name}) has {} parent: the first part, and no other, is the root",
         if *.part == 1 { "a" } else { "no" }
     )]
     Root {
-        /// From 1.
+        /// Number of the part, from 1.
         part: usize,
-        /// Its name.
+        /// Name of the part.
         name: String,
     },
     /// A parent does not come before its child.
     #[error("part {part} ({name}) has part {parent} as its parent, which does not come before it")]
     Tree {
-        /// From 1.
+        /// Number of the part, from 1.
         part: usize,
-        /// Its name.
+        /// Name of the part.
         name: String,
-        /// From 1.
+        /// Number of the parent, from 1.
         parent: usize,
     },
     /// A mirror that is not its own inverse.
     #[error(
-        "the mirror of {what} {index} ({name}) is {other}, but not the other way round or not there"
+        "the mirror of {what} {index} ({name}) is {other}, but not vice versa, or it does not exist"
     )]
     Mirror {
         /// `part` or `joint`.
         what: &'static str,
-        /// From 1.
+        /// Number of the part or joint, from 1.
         index: usize,
-        /// Its name.
+        /// Name of the part or joint.
         name: String,
-        /// From 1.
+        /// Number of its mirror image, from 1.
         other: usize,
     },
     /// The mirror does not keep the tree.
-    #[error(
-        "the mirror of part {part} ({name}) hangs on another part than the mirror of its parent"
-    )]
+    #[error("the mirror of part {part} ({name}) is not a child of the mirror of its parent")]
     MirrorTree {
-        /// From 1.
+        /// Number of the part, from 1.
         part: usize,
-        /// Its name.
+        /// Name of the part.
         name: String,
     },
-    /// A part and its mirror image lie at different places between the joints.
+    /// A part and its mirror image have different positions between the joints.
     #[error(
-        "part {part} ({name}) and its mirror image {other} do not lie between the same joints of either side"
+        "part {part} ({name}) and its mirror image {other} are not between corresponding joints"
     )]
     MirrorWeights {
-        /// From 1.
+        /// Number of the part, from 1.
         part: usize,
-        /// Its name.
+        /// Name of the part.
         name: String,
-        /// Name of its mirror image.
+        /// Name of the mirror image.
         other: String,
     },
     /// A part refers to a joint that does not exist.
-    #[error("part {part} ({name}) names joint {joint}, but there are {n_joints}")]
+    #[error("part {part} ({name}) uses joint {joint}, but there are only {n_joints}")]
     Joint {
-        /// From 1.
+        /// Number of the part, from 1.
         part: usize,
-        /// Its name.
+        /// Name of the part.
         name: String,
-        /// From 1.
+        /// Number of the joint, from 1.
         joint: usize,
-        /// How many there are.
+        /// Number of joints.
         n_joints: usize,
     },
     /// The weights of a part do not add up to 1.
     #[error("the weights of part {part} ({name}) add up to {sum}, expected 1")]
     Weights {
-        /// From 1.
+        /// Number of the part, from 1.
         part: usize,
-        /// Its name.
+        /// Name of the part.
         name: String,
-        /// Their sum.
+        /// Sum of the weights.
         sum: f64,
     },
 }
 
-/// Tolerance of the sum of weights, and of the differences of the two sides: thirds are written with a few
-/// digits.
+/// Tolerance for the sum of weights and for differences between the two sides. Fractions such as thirds are
+/// written with few digits.
 const TOLERANCE: f64 = 1e-3;
 
 impl SkeletonTable {
-    /// Most parts and most joints.
+    /// Largest number of parts and of joints.
     pub const MAX: usize = 64;
 
     /// Checks `spec`.
@@ -173,7 +171,7 @@ impl SkeletonTable {
         Ok(Self(spec))
     }
 
-    /// Its definition.
+    /// The definition of the skeleton.
     pub fn spec(&self) -> &SkeletonSpec {
         &self.0
     }
@@ -193,12 +191,12 @@ impl SkeletonTable {
         &self.0.names
     }
 
-    /// Parent of every part, which comes before it; `None` for part 0.
+    /// Parent of every part, which precedes the part; `None` for part 0.
     pub fn parent(&self) -> &[Option<usize>] {
         &self.0.parent
     }
 
-    /// The part on the other side of the body.
+    /// For each part, the part on the other side of the body.
     pub fn mirror(&self) -> &[usize] {
         &self.0.mirror
     }
@@ -208,14 +206,14 @@ impl SkeletonTable {
         &self.0.weights
     }
 
-    /// The joint on the other side of the body.
+    /// For each joint, the joint on the other side of the body.
     pub fn joint_mirror(&self) -> &[usize] {
         &self.0.joint_mirror
     }
 
-    /// The parts of a person.
+    /// Computes the parts of a person.
     ///
-    /// * `joints`: one per joint of the skeleton, any unit; the parts that depend on a NaN are NaN.
+    /// * `joints`: one point per joint of the skeleton, in any unit. Parts that depend on a NaN are NaN.
     /// * Returns one point per part, in the unit of the joints.
     ///
     /// # Panics
@@ -332,7 +330,7 @@ fn check_weights(spec: &SkeletonSpec) -> Result<(), TableError> {
     Ok(())
 }
 
-/// The mirror keeps the tree, and takes joints of one side to joints of the other.
+/// Checks that the mirror keeps the tree, and maps joints of one side to joints of the other.
 fn check_mirror(spec: &SkeletonSpec) -> Result<(), TableError> {
     let n_joints = spec.joint_names.len();
     for (part, &other) in spec.mirror.iter().enumerate() {

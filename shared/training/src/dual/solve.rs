@@ -7,11 +7,11 @@ use super::{Entry, Machine};
 /// The duality gap of the solution on the working set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
-    /// Value of the primal objective: an upper bound of the best.
+    /// Value of the primal objective: an upper bound of the optimum.
     pub primal: f64,
-    /// Value of the dual objective: a lower bound of the best.
+    /// Value of the dual objective: a lower bound of the optimum.
     pub dual: f64,
-    /// Examples with a share in the solution: support vectors.
+    /// Number of support vectors: examples with a share in the solution.
     pub n_support: usize,
 }
 
@@ -31,23 +31,23 @@ impl Gap {
 pub struct Effort {
     /// Duality gap at which to stop, as a share of the objective.
     pub tolerance: f64,
-    /// Most passes over all examples.
+    /// Largest number of passes over all examples.
     pub max_passes: usize,
 }
 
-/// Most passes over the active examples between two passes over all.
+/// Largest number of passes over the active examples between two passes over all examples.
 const PASSES_OVER_MOVING: usize = 10;
 
-/// Slope, in margins, up to which an example with a share below its cost is at its optimum.
+/// Slope, in margins, below which an example with a share between 0 and its cost counts as optimal.
 const RESTING: f64 = 0.01;
 
-/// Slack up to which examples without a share stay active until the next pass over all.
+/// Slack below which an example without a share stays active until the next pass over all examples.
 const NEAR: f64 = 0.05;
 
 impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
-    /// Improves the solution until the gap is small enough, or the passes are used up.
+    /// Improves the solution until the gap is small enough or the number of passes is reached.
     ///
-    /// * `go_on`: called with the gap before the first and after every pass; returns whether to continue.
+    /// * `go_on`: called with the gap before the first and after every pass; returns true to continue.
     pub fn solve(
         &mut self,
         effort: Effort,
@@ -64,8 +64,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             let at_stake = |i: &usize| self.entries[*i].share > 0.0 || slopes[*i] > -NEAR;
             let mut moving: Vec<_> = (0..self.entries.len()).filter(at_stake).collect();
             for _ in 0..PASSES_OVER_MOVING {
-                // Examples of one image side by side would be faster to read, but the descent needs
-                // several times as many passes then: right and wrong ones must take turns to settle
+                // Keeping the examples of one image together would make memory access faster. The descent would then
+                // need several times as many passes, because right and wrong examples must alternate to settle
                 // the root's bias.
                 random.shuffle(&mut moving);
                 moving.retain(|&i| self.step(i));
@@ -105,7 +105,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         }
     }
 
-    /// Amount by which an example misses its margin: the slope of the dual objective along its share.
+    /// Amount by which an example misses its margin. This is the slope of the dual objective along its share.
     pub(super) fn slope(&self, at: usize) -> f64 {
         let Entry { margin, x, .. } = &self.entries[at];
         margin - x.dot(&self.solution)
@@ -127,9 +127,9 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         }
     }
 
-    /// Moves the share of one example to its best value while the others are held; within a group
-    /// whose shares are used up, takes from another of the group. `true` if it moved far enough to stay
-    /// active.
+    /// Sets the share of one example to its best value while all other shares are fixed. If the shares of its group
+    /// are used up, the share is taken from another example of the group. Returns `true` if the share changed enough for the example
+    /// to stay active.
     fn step(&mut self, at: usize) -> bool {
         let slope = self.slope(at);
         let entry = &self.entries[at];
@@ -142,7 +142,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         self.change(at, wanted.clamp(-entry.share, room.max(0.0))) && slope.abs() > RESTING
     }
 
-    /// Takes a share from the member of the group that needs it least, if that is better.
+    /// Takes a share from the member of the group that needs it least, if this improves the solution.
     fn exchange(&mut self, at: usize, slope: f64) -> bool {
         let members = &self.groups[self.entries[at].group].members;
         let givers = members
@@ -181,7 +181,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     }
 }
 
-/// The Newton step along a slope; unbounded where the curvature is 0 (an example of zeros, or a duplicate).
+/// The Newton step along a slope. It is unlimited if the curvature is 0 (an example of zeros, or a duplicate).
 fn newton(slope: f64, curvature: f64) -> f64 {
     if curvature > 0.0 {
         slope / curvature
@@ -192,5 +192,5 @@ fn newton(slope: f64, curvature: f64) -> f64 {
     }
 }
 
-/// Slack of a group, as a share of its cost, below which it counts as full (rounding).
+/// Unused share of a group, relative to its cost, below which the group counts as full despite rounding.
 const FULL: f64 = 1e-9;

@@ -25,8 +25,8 @@ fn cost(group: usize, of_unit: f64) -> Cost<usize> {
 
 #[test]
 fn two_points_are_separated_in_the_middle() {
-    // w x + b with points at 1 (wrong) and 3 (right): w = 1, b = -2, were the bias free; it is
-    // regularised too, so that min w^2 + b^2 under w + b <= -1, 3 w + b >= 1 is asked for.
+    // The model is w x + b, with points at 1 (wrong) and 3 (right). Without regularisation of b, w = 1 and b = -2. As b is
+    // regularised too, the problem is min w^2 + b^2 with w + b <= -1 and 3 w + b >= 1.
     let mut machine = Machine::new(2, 0..0);
     machine.add(cost(0, 1e6), (), demand(&[3.0, 1.0], 1.0), 0.0);
     machine.add(cost(1, 1e6), (), demand(&[-1.0, -1.0], 1.0), 0.0);
@@ -44,7 +44,7 @@ fn a_cheap_example_is_given_up() {
     machine.add(cost(0, 10.0), (), demand(&[1.0], 1.0), 0.0);
     machine.add(cost(1, 0.1), (), demand(&[-1.0], 1.0), 0.0);
     solve(&mut machine, EXACT);
-    // min v^2 / 2 + 10 max(0, 1 - v) + 0.1 max(0, 1 + v): at v = 1.
+    // The minimum of v^2 / 2 + 10 max(0, 1 - v) + 0.1 max(0, 1 + v) is at v = 1.
     assert!((machine.solution()[0] - 1.0).abs() < 1e-6);
 }
 
@@ -64,7 +64,7 @@ fn only_the_worst_example_of_a_group_counts() {
 
 #[test]
 fn an_example_of_zeros_takes_the_whole_cost_of_its_group() {
-    // No solution meets its margin: the loss is its cost, of which the dual knows once it has it all.
+    // No solution meets the margin, so the loss equals the cost. The dual objective reaches it when the share is the full cost.
     let mut machine = Machine::new(1, 0..0);
     machine.add(cost(0, 0.3), "zeros", demand(&[0.0], 1.0), 0.0);
     let gap = solve(&mut machine, EXACT);
@@ -120,8 +120,8 @@ proptest! {
         let mut machine = filled(&examples);
         let before = machine.gap();
         prop_assert!(before.dual <= before.primal + 1e-9);
-        // Groups that pull against each other along a direction that hardly costs anything settle
-        // slowly: a few of ten thousand such problems need more than 3000 passes.
+        // Groups that pull against each other along a direction with hardly any cost settle
+        // slowly. A few of ten thousand such problems need more than 3000 passes.
         let gap = solve(&mut machine, Effort { tolerance: 1e-4, max_passes: 100_000 });
         prop_assert!(gap.dual <= gap.primal + 1e-6);
         prop_assert!(gap.relative() <= 1e-4 || gap.primal < 1e-9, "{gap:?}");

@@ -1,4 +1,4 @@
-//! Poses near a marked person, compared with an exhaustive search.
+//! Compares poses near a marked person with an exhaustive search.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ fn marked(types: Option<Vec<usize>>) -> Marked {
     }
 }
 
-/// The score of a pose by its feature vector.
+/// The score of a pose, from its feature vector.
 fn score(v: &[f64], pyramid: &FeaturePyramid<'_>, pose: &Pose) -> f64 {
     let (shape, v) = (
         shape(),
@@ -30,7 +30,7 @@ fn score(v: &[f64], pyramid: &FeaturePyramid<'_>, pose: &Pose) -> f64 {
     example.features.dot(&v) + example.fixed
 }
 
-/// Intersection over union of a part's box with the marked one.
+/// Intersection over union of a part's box and the marked box.
 fn overlap(model: &Model, layout: &Layout, pose: &Pose, part: usize) -> f64 {
     let it = pose.part_box(model, layout, part);
     let (marked, half) = (marked(None), 6.5);
@@ -50,7 +50,7 @@ fn overlap(model: &Model, layout: &Layout, pose: &Pose, part: usize) -> f64 {
     common / (area(it) + area(other) - common)
 }
 
-/// All placements of a part that overlap its mark and have its type.
+/// All placements of a part that overlap its marked box and have its type.
 fn placements(
     model: &Model,
     layout: &Layout,

@@ -1,4 +1,4 @@
-//! The parameters of a network that was trained before, from which a training goes on.
+//! The parameters of a previously trained network, from which a new training starts.
 
 use std::collections::BTreeMap;
 
@@ -7,56 +7,58 @@ use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
 use crate::networks::parameters::{GAIN_OF_RELU, Parameter};
 
-/// Why a training cannot go on from a network.
+/// Reason why a training run cannot start from a network.
 #[derive(Debug, thiserror::Error)]
 pub enum BeginError {
-    /// The file is no ONNX file.
+    /// The file is not an ONNX file.
     #[error("it is not an ONNX file")]
     Read(#[from] rten_onnx::protobuf::ProtobufError),
-    /// A layer is missing: the network is another kind's, or smaller.
-    #[error("it has no constant {name}; the network of the settings needs it, {expected:?}")]
+    /// A layer is missing: the network is of another kind or smaller.
+    #[error(
+        "it has no constant {name}; the network in the settings needs one with the dimensions {expected:?}"
+    )]
     Missing {
-        /// The layer and its role.
+        /// Name of the layer and its role.
         name: String,
-        /// The dimensions that it should have.
+        /// Expected dimensions.
         expected: Vec<usize>,
     },
-    /// A layer has another size.
-    #[error("its {name} has the dimensions {got:?}, the network of the settings has {expected:?}")]
+    /// A layer has other dimensions than expected.
+    #[error("its {name} has the dimensions {got:?}, the network in the settings has {expected:?}")]
     Size {
-        /// The layer and its role.
+        /// Name of the layer and its role.
         name: String,
-        /// Its dimensions.
+        /// Dimensions in the file.
         got: Vec<i64>,
-        /// Those that it should have.
+        /// Expected dimensions.
         expected: Vec<usize>,
     },
-    /// A number is not finite, or the bytes of a constant are too few or too many, or of another type.
-    #[error("its {name} does not hold {n} finite numbers of half or single precision")]
+    /// A constant has a value that is not finite, the wrong number of bytes, or another type.
+    #[error("its {name} does not consist of {n} finite numbers of half or single precision")]
     Numbers {
-        /// The layer and its role.
+        /// Name of the layer and its role.
         name: String,
-        /// How many there should be.
+        /// Expected number of values.
         n: usize,
     },
 }
 
-/// A network that a training goes on from.
+/// A trained network from which a training run starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Begun {
-    /// In the order of the untrained ones.
+    /// Parameters, in the order of the untrained ones.
     pub parameters: Vec<Parameter>,
-    /// The numbers of the constants of the file, by the names of the parameters that they stand for.
+    /// Values of the constants in the file, by the names of the corresponding parameters.
     pub constants: BTreeMap<String, Vec<f32>>,
 }
 
 /// Reads the parameters of a network that this crate wrote.
 ///
-/// The weights in the file are standardised ones: every channel gets its length as gain, and weights of the length that they have
-/// at the beginning of a training. The network gives what the file gives, but for roundings.
+/// The weights in the file are standardised. The length of every channel becomes its gain, and the weights get the length that they have
+/// at the beginning of a training run. The resulting network gives the same output as the file, except for rounding.
 ///
-/// * `all`: the untrained parameters of the network; weights of channels that are 0 in the file stay.
-/// * `may_lack`: how the names of layers begin that the file may lack; they stay untrained.
+/// * `all`: the untrained parameters of the network. They are kept for channels that are 0 in the file.
+/// * `may_lack`: prefix of the names of layers that the file may lack; these layers stay untrained.
 ///
 /// # Errors
 ///
@@ -100,7 +102,7 @@ fn is_gain(parameter: &Parameter) -> bool {
     parameter.name.rsplit_once('.').is_some_and(|name| name.1 == "gain")
 }
 
-/// Standardised weights as weights and gains.
+/// Splits standardised weights into weights and gains.
 fn split(standardised: &[f32], weights: &mut [f32], gains: &mut [f32]) {
     let n_inputs = standardised.len() / gains.len();
     let channels = standardised.chunks_exact(n_inputs);
@@ -121,7 +123,7 @@ fn length(of: &[f32]) -> f32 {
     of.iter().map(|value| value * value).sum::<f32>().sqrt()
 }
 
-/// The numbers of a parameter in the file.
+/// The values of a parameter in the file.
 fn numbers(constants: &[TensorProto], of: &Parameter) -> Result<Vec<f32>, BeginError> {
     let Parameter { name, dims, .. } = of;
     let half = format!("{name}.half");

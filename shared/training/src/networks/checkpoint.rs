@@ -1,4 +1,4 @@
-//! Files of trainings: a header with a checksum, then the content.
+//! Files of a training run: a header with a checksum, then the content.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -12,27 +12,27 @@ use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
 use formats::checksum::{Envelope, EnvelopeError};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// Kind of a file that holds the state of a training.
+/// Kind of a file with the state of a training run.
 pub(crate) const CHECKPOINT: [u8; 8] = *b"PLXTRAIN";
-/// Most bytes of a payload.
+/// Largest size of a payload, in bytes.
 const MAX_BYTES: usize = 16 << 30;
 
-/// Why bytes cannot be read or written.
+/// Reason why bytes cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// Another kind or version of file, or a damaged one.
+    /// The file has another kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The checksum is right, but what it is of is not what the header says.
+    /// The checksum is right, but the payload does not have the form that the header names.
     #[error("the payload does not have the expected form")]
     Payload(#[source] Box<bincode::error::DecodeError>),
-    /// Too large for the format.
+    /// The content is too large for the format.
     #[error("it cannot be written")]
     Encode(#[source] Box<bincode::error::EncodeError>),
-    /// Something follows the content in the payload.
+    /// The payload has bytes after its content.
     #[error("its payload has {left} bytes after the end of its content")]
     Left {
-        /// Bytes that follow.
+        /// Number of additional bytes.
         left: usize,
     },
 }
@@ -52,7 +52,7 @@ pub(crate) fn wrap<T: Serialize>(magic: [u8; 8], payload: &T) -> Result<Vec<u8>,
     Ok(envelope(magic).seal(&payload))
 }
 
-/// The payload behind a header that fits it.
+/// Reads the payload, after checking the header.
 pub(crate) fn unwrap<T: DeserializeOwned>(magic: [u8; 8], bytes: &[u8]) -> Result<T, StoreError> {
     let payload = envelope(magic).open(bytes)?;
     let decoded = bincode::serde::decode_from_slice(payload, configuration());

@@ -13,7 +13,7 @@ pub(crate) struct Computer {
 }
 
 impl Computer {
-    /// The outputs of a network for a batch.
+    /// Returns the outputs of a network for a batch.
     pub(crate) fn find(
         self,
         network: &impl Network,
@@ -29,9 +29,9 @@ impl Computer {
         }
     }
 
-    /// The gradients of the cost of a batch.
+    /// Returns the gradients of the cost of a batch.
     ///
-    /// * `cost`: the gradients of the cost of the outputs that it is given.
+    /// * `cost`: computes the gradients of the cost from the outputs of the network.
     pub(crate) fn learn(
         self,
         network: &impl Network,

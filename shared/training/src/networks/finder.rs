@@ -1,10 +1,10 @@
-//! The network that finds people in a whole picture: which pictures it learns from, and how.
+//! The network that finds people in a whole picture: its training data and its training.
 //!
-//! * [`Picture`]: a picture with a box around everybody.
-//! * [`varied`], [`plain`]: what the network is shown of pictures, and what it should find.
+//! * [`Picture`]: a picture with a box around each person.
+//! * [`varied`], [`plain`]: the inputs made from pictures, and the outputs that the network should give.
 //! * [`FinderTask`]: the training.
-//! * [`card()`]: how the trained network is used; `keypoints::DetectorCard` reads it, and decodes what the network gives.
-//! * [`Score`]: how good it is on pictures.
+//! * [`card()`]: how to use the trained network. `keypoints::DetectorCard` reads the card and decodes the outputs of the network.
+//! * [`Score`]: measures of the network's quality.
 //!
 //! Pixels have their centres at integers.
 

@@ -1,18 +1,18 @@
-//! Inputs of a network in training, and the gradients that follow from them.
+//! Inputs of a network in training, and the resulting gradients.
 
 use fastrand::Rng;
 
 use crate::networks::parameters::Parameter;
 
-/// Returns the gradients of a cost by the outputs of a network.
+/// Returns the gradients of a cost with respect to the outputs of a network.
 pub(crate) type Cost<'a> = dyn FnMut(&[Vec<f32>]) -> Vec<Vec<f32>> + 'a;
 
-/// Inputs of a network: a batch.
+/// Inputs of a network for one batch.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shown {
-    /// Samples.
+    /// Number of samples.
     pub n: usize,
-    /// The numbers of every input, in the order of [`Network::inputs`](crate::networks::Network::inputs).
+    /// Values of every input, in the order of [`Network::inputs`](crate::networks::Network::inputs).
     pub inputs: Vec<Vec<f32>>,
 }
 
@@ -20,25 +20,25 @@ pub struct Shown {
 #[derive(Debug, Clone)]
 pub(crate) struct Running<'a> {
     pub(crate) parameters: &'a [Parameter],
-    /// For every parameter, true if its gradient is wanted.
+    /// For every parameter, true if its gradient is requested.
     pub(crate) learned: &'a [bool],
-    /// For dropout.
+    /// Random generator for dropout.
     pub(crate) dice: Rng,
 }
 
-/// Mean and variance of every channel of a batch where it was normalised.
+/// Mean and variance of every channel of a batch, at one normalisation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Statistics {
-    /// The parameter that holds the running mean; the variance follows it.
+    /// Index of the parameter with the running mean; the variance follows it.
     pub(crate) at: usize,
     pub(crate) mean: Vec<f32>,
     pub(crate) variance: Vec<f32>,
 }
 
-/// Result of a batch.
+/// Gradients and statistics of a batch.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Lesson {
-    /// Gradient of every parameter; `None` for those that are not learned.
+    /// Gradient of every parameter; `None` for parameters that are not trained.
     pub(crate) gradients: Vec<Option<Vec<f32>>>,
     pub(crate) statistics: Vec<Statistics>,
 }

@@ -9,26 +9,27 @@ use crate::networks::ops::{
 };
 use crate::networks::parameters::{EPSILON_OF_BATCH, Parameter, standardised};
 
-/// How a network is written.
+/// Options for writing a network.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Document {
     /// Name of the graph.
     pub name: String,
-    /// Keys and values that the file carries.
+    /// Keys and values of the file's metadata.
     pub metadata: Vec<(String, String)>,
     /// True if weights are stored in half precision.
     pub has_half_weights: bool,
-    /// Weights of layers, by their names, that are written in place of those that follow from the parameters.
+    /// Weights of layers by name. They are written instead of the weights that follow from the parameters.
     pub kept: BTreeMap<String, Vec<f32>>,
 }
 
-/// Writes a network: standardised weights become plain ones, batch normalisations a part of the convolutions, dropout goes.
+/// Writes a network. Standardised weights become plain weights, batch normalisation is merged into the convolutions, and dropout is
+/// removed.
 ///
 /// * `parameters`: in the order of [`initial`](crate::networks::initial).
 ///
 /// # Panics
 ///
-/// If the parameters are another network's.
+/// If the parameters belong to another network.
 pub fn write(network: &impl Network, parameters: &[Parameter], document: Document) -> Vec<u8> {
     let inputs = network.inputs();
     let mut writer = Writer {
@@ -74,11 +75,11 @@ fn ints(all: &[usize]) -> Attribute {
 #[derive(Debug, Clone)]
 struct Value {
     name: String,
-    /// Without the batch.
+    /// Dimensions without the batch.
     dims: Dims,
 }
 
-/// Weights and bias of a convolution as the file holds them.
+/// Weights and bias of a convolution in the form used in the file.
 struct Folded {
     weights: Vec<f32>,
     bias: Vec<f32>,
@@ -104,7 +105,7 @@ impl<'a> Writer<'a> {
         found
     }
 
-    /// Writes a parameter as it is.
+    /// Writes a parameter without change.
     fn constant(&mut self, name: &str) -> &'a Parameter {
         let found = self.parameter(name);
         self.graph.floats(name, &found.dims, found.values.clone());
@@ -133,7 +134,7 @@ impl<'a> Writer<'a> {
         Value { name, dims }
     }
 
-    /// Another shape for a value, `[n, dims...]`.
+    /// Reshapes a value to `[n, dims...]`.
     fn reshaped(&mut self, value: &Value, dims: &[usize]) -> Value {
         let shape = format!("shape_{}", self.n);
         let sizes = core::iter::once(-1).chain(dims.iter().map(|dim| *dim as i64));
@@ -141,13 +142,13 @@ impl<'a> Writer<'a> {
         self.node("Reshape", &[&value.name, &shape], vec![], dims.to_vec())
     }
 
-    /// The cells of every channel in a row.
+    /// Reshapes a map so that the cells of every channel form a row.
     fn rows(&mut self, map: &Value) -> Value {
         let dims = [map.dims[0], map.dims[1..].iter().product()];
         self.reshaped(map, &dims)
     }
 
-    /// Weights around every place along one side of a map, `[n, places, cells]`.
+    /// Weights around every position along one side of a map, `[n, positions, cells]`.
     fn along(&mut self, list: &Value, columns: &[usize], along: &Along) -> Value {
         let id = self.n;
         let [index, centre, scale] =
@@ -167,7 +168,7 @@ impl<'a> Writer<'a> {
         self.node("Exp", &[&scaled.name], vec![], dims)
     }
 
-    /// Takes the parameters of a convolution, and folds into weights and bias what scales them.
+    /// Takes the parameters of a convolution, and merges their scaling into weights and bias.
     fn folded(&mut self, name: &str, weight: &Parameter, scaling: Scaling) -> Folded {
         let mut values = |what: &str| &self.parameter(&format!("{name}.{what}")).values;
         match scaling {
@@ -251,7 +252,7 @@ impl Ops for Writer<'_> {
         let factors = format!("factors_{}", self.n);
         self.graph.floats(&factors, &[4], vec![1.0, 1.0, 2.0, 2.0]);
         let dims = vec![map.dims[0], 2 * map.dims[1], 2 * map.dims[2]];
-        // Of the nearest neighbour, rounded down: every cell becomes four equal ones.
+        // Nearest neighbour, rounded down: every cell becomes four equal cells.
         self.node("Resize", &[&map.name, "", &factors], vec![], dims)
     }
 
@@ -290,7 +291,7 @@ impl Ops for Writer<'_> {
         let sharp = self.node("Mul", &[&rows.name, &factor], vec![], rows.dims);
         let axis = vec![("axis", Attribute::Int(2))];
         let name = self.node("Softmax", &[&sharp.name], axis, sharp.dims).name;
-        // In rows already; only its name matters to what follows.
+        // The value already has rows; the next operations only use its name.
         Value {
             name,
             dims: maps.dims.clone(),

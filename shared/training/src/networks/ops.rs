@@ -1,52 +1,52 @@
-//! The operations that networks are made of, and what a network is.
+//! The operations that networks consist of, and the definition of a network.
 
-/// How the weights and outputs of a convolution are scaled.
+/// Scaling of the weights and outputs of a convolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scaling {
-    /// Weights and bias as they are.
+    /// No scaling of weights and bias.
     Plain,
     /// Weights are standardised: every channel has mean 0, the length that keeps the variance of positive parts, and a gain
     /// (Brock et al. 2021, "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`").
     Standardised {
-        /// Gain of every channel at the beginning.
+        /// Initial gain of every channel.
         gain: f32,
     },
-    /// Outputs are normalised over the batch, which has a shift in place of the bias.
+    /// Outputs are normalised over the batch; the normalisation has a shift that replaces the bias.
     Batch,
 }
 
-/// A convolution, padded so that the size stays at stride 1.
+/// A convolution, padded such that stride 1 keeps the size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conv {
-    /// Output channels.
+    /// Number of output channels.
     pub channels: usize,
-    /// Side of the square kernel, odd.
+    /// Side of the square kernel; odd.
     pub kernel: usize,
-    /// Step between two outputs.
+    /// Step between neighbouring outputs.
     pub stride: usize,
-    /// Depthwise: one filter for every channel; `channels` is the number of input channels.
+    /// True for a depthwise convolution, with one filter for every channel; `channels` is then the number of input channels.
     pub by_channel: bool,
     /// Scaling of weights and outputs.
     pub scaling: Scaling,
 }
 
-/// The places of parts in a list, and how far around them a network looks.
+/// Positions of parts in a list, and the area around them that a network uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Places {
-    /// Columns of the list with the places across the input, in heights of the input from its centre.
+    /// Columns of the list with the horizontal positions, in heights of the input from its centre.
     pub x: Vec<usize>,
-    /// Columns with the places down the input.
+    /// Columns of the list with the vertical positions, in heights of the input from its centre.
     pub y: Vec<usize>,
-    /// Width of the input in its heights.
+    /// Width of the input, in heights of the input.
     pub width: f32,
-    /// Deviation of the Gaussian around a place, cells of the map.
+    /// Standard deviation of the Gaussian around a position, in cells of the map.
     pub deviation: f32,
 }
 
-/// Sizes of a value, without that of the batch: `[channels, rows, columns]` or `[values]`.
+/// Dimensions of a value without the batch: `[channels, rows, columns]` or `[values]`.
 pub type Dims = Vec<usize>;
 
-/// The operations that networks are made of: planning parameters, computing and writing ONNX implement them.
+/// The operations that networks consist of. They are implemented for planning parameters, for computing, and for writing ONNX.
 ///
 /// The first dimension of a value is the batch: maps are `[n, channels, rows, columns]`, lists `[n, values]`. Parameters are
 /// used in the order of the calls, which is the same for every implementation.
@@ -54,70 +54,70 @@ pub trait Ops {
     /// A map or a list.
     type Value: Clone;
 
-    /// The input of a name, see [`Network::inputs`].
+    /// Returns the input with a given name, see [`Network::inputs`].
     fn input(&mut self, name: &'static str) -> Self::Value;
-    /// A list minus the fixed mean of every column, times its fixed factor.
+    /// Subtracts the fixed mean of every column of a list, and multiplies by the column's fixed factor.
     fn centred(&mut self, list: &Self::Value, name: &str) -> Self::Value;
     /// Convolves a map.
     fn conv(&mut self, map: &Self::Value, name: &str, conv: Conv) -> Self::Value;
-    /// The positive part.
+    /// Replaces negative values with 0.
     fn relu(&mut self, value: &Self::Value) -> Self::Value;
-    /// The sum of two values of one shape.
+    /// Adds two values of the same shape.
     fn add(&mut self, a: &Self::Value, b: &Self::Value) -> Self::Value;
-    /// A map with every cell doubled across and down.
+    /// Doubles every cell of a map across and down.
     fn doubled(&mut self, map: &Self::Value) -> Self::Value;
-    /// The largest of every 2 x 2 cells of a map.
+    /// Returns the largest of every 2 x 2 cells of a map.
     fn pool(&mut self, map: &Self::Value) -> Self::Value;
-    /// The mean of every channel of a map: a list.
+    /// Returns the mean of every channel of a map, as a list.
     fn mean(&mut self, map: &Self::Value) -> Self::Value;
-    /// The largest value of every channel of a map: a list.
+    /// Returns the largest value of every channel of a map, as a list.
     fn highest(&mut self, map: &Self::Value) -> Self::Value;
-    /// A map as a list.
+    /// Returns the values of a map as a list.
     fn flat(&mut self, map: &Self::Value) -> Self::Value;
-    /// A value through which nothing is learned.
+    /// Returns the same value without gradient: nothing before it is trained through it.
     fn fixed(&mut self, value: &Self::Value) -> Self::Value;
-    /// The softmax over the cells of every map times `sharpness`: weights around its maximum.
+    /// Softmax over the cells of every map times `sharpness`: weights around the map's maximum.
     fn softmax(&mut self, maps: &Self::Value, sharpness: f32) -> Self::Value;
-    /// Gaussian weights around places in a list, one map a place, of the size of the map `like`.
+    /// Gaussian weights around the positions in a list: one map for each position, of the size of the map `like`.
     ///
-    /// Nothing is learned through them.
+    /// The weights have no gradient.
     fn around(&mut self, list: &Self::Value, like: &Self::Value, places: &Places) -> Self::Value;
-    /// The sums of the channels of a map with the weights of every map of `weights`: a list of the channels by the first, by
-    /// the second, and so on.
+    /// Weighted sums of the channels of a map, with each map of `weights`. The result is a list: all channels for the first weights, then
+    /// all channels for the second, and so on.
     fn look(&mut self, map: &Self::Value, weights: &Self::Value) -> Self::Value;
-    /// The means of places with the weights of maps: a list of x, y and x² + y² by the first map, by the second, and so on; x
-    /// and y as `grid` says.
+    /// Weighted means of the cell positions, for each map of weights. The result is a list of x, y and x² + y² for the first map, then for
+    /// the second, and so on. `grid` defines x and y.
     fn place(&mut self, weights: &Self::Value) -> Self::Value;
-    /// Concatenates lists, or the channels of maps of one size.
+    /// Concatenates lists, or the channels of maps of the same size.
     fn join(&mut self, lists: &[&Self::Value]) -> Self::Value;
     /// A dense layer with bias.
     fn dense(&mut self, list: &Self::Value, name: &str, values: usize) -> Self::Value;
-    /// `ReLU` with a learned slope for negative values, one a value of the list.
+    /// `ReLU` with a learned slope for negative values; each value of the list has its own slope.
     fn prelu(&mut self, list: &Self::Value, name: &str) -> Self::Value;
-    /// While training, sets this share of the values of a list to 0 and enlarges the others.
+    /// During training, sets this share of the values of a list to 0 and scales up the others.
     fn dropout(&mut self, list: &Self::Value, share: f32) -> Self::Value;
 }
 
 /// An output of a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {
-    /// Its name in the ONNX file.
+    /// Name of the output in the ONNX file.
     pub name: &'static str,
-    /// True if the network gives natural logarithms, whose exponentials the file gives.
+    /// True if the network returns natural logarithms; the ONNX file then returns their exponentials.
     pub is_logarithm: bool,
 }
 
-/// A network, defined once for all that is done with it.
+/// A network, defined once for training, running and writing it.
 pub trait Network {
-    /// Names and sizes of its inputs.
+    /// Names and dimensions of the inputs.
     fn inputs(&self) -> Vec<(&'static str, Dims)>;
-    /// Its outputs, in the order of [`Self::run`].
+    /// Outputs, in the order of [`Self::run`].
     fn outputs(&self) -> Vec<Output>;
-    /// Runs it.
+    /// Runs the network with the given operations.
     fn run<O: Ops>(&self, ops: &mut O) -> Vec<O::Value>;
 }
 
-/// x, y and x² + y² of every cell, row by row: -1 to 1 from the left to the right, and from the top down.
+/// Returns x, y and x² + y² of every cell, row by row. x is -1 to 1 from left to right, y from top to bottom.
 pub(crate) fn grid(columns: usize, rows: usize) -> Vec<f32> {
     let middle = |at: usize, n: usize| (2 * at + 1) as f32 / n as f32 - 1.0;
     let mut all = Vec::with_capacity(3 * columns * rows);
@@ -130,17 +130,17 @@ pub(crate) fn grid(columns: usize, rows: usize) -> Vec<f32> {
     all
 }
 
-/// The cells along one side of a map, for weights around a place.
+/// The cells along one side of a map, for weights around a position.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Along {
-    /// Where their centres lie, heights of the input from its centre.
+    /// Positions of the cell centres, in heights of the input from its centre.
     pub(crate) centres: Vec<f32>,
-    /// Factor of the squared distance from a centre before the exponential.
+    /// Factor of the squared distance from a centre in the exponent.
     pub(crate) factor: f32,
 }
 
 impl Along {
-    /// The cells along a side of some length, heights of the input; `deviation` in cells.
+    /// The cells along a side of the given length, in heights of the input. `deviation` is in cells.
     pub(crate) fn new(cells: usize, side: f32, deviation: f32) -> Self {
         let cell = side / cells as f32;
         let centre = |at: usize| (at as f32 + 0.5) * cell - 0.5 * side;
@@ -150,7 +150,7 @@ impl Along {
         }
     }
 
-    /// The weight of every cell around a place.
+    /// The weight of every cell for a given position.
     pub(crate) fn weights(&self, place: f32) -> impl Iterator<Item = f32> {
         let weight = move |centre: &f32| ((place - centre).powi(2) * self.factor).exp();
         self.centres.iter().map(weight)
@@ -163,7 +163,7 @@ pub(crate) fn convolved(map: &[usize], conv: Conv) -> Dims {
     vec![conv.channels, side(map[1]), side(map[2])]
 }
 
-/// Dimensions of what is concatenated.
+/// Dimensions after concatenation.
 pub(crate) fn joined(parts: &[&[usize]]) -> Dims {
     let mut dims = parts.first().map_or_else(Dims::new, |first| first.to_vec());
     if let Some(channels) = dims.first_mut() {

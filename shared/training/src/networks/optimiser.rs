@@ -7,24 +7,24 @@ use crate::networks::parameters::{Parameter, Role};
 
 /// Decay of the running means of gradients and of their squares (`AdamW`: Loshchilov and Hutter 2019).
 const DECAYS: [f32; 2] = [0.9, 0.999];
-/// Added to the root of the mean square of a gradient.
+/// Value added to the root of the mean square of a gradient.
 const EPSILON: f32 = 1e-8;
 /// Share of a running statistic that every batch replaces.
 const MOMENTUM_OF_STATISTICS: f32 = 0.05;
 
-/// Lengths of steps that rise, then fall to 0 as a cosine (Loshchilov and Hutter 2017).
+/// Step lengths that rise and then fall to 0 as a cosine (Loshchilov and Hutter 2017).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Schedule {
     /// Number of steps.
     pub(crate) steps: usize,
-    /// Share of the steps, the first ones, in which the length rises.
+    /// Share of the steps, from the first, in which the length rises.
     pub(crate) rising: f32,
-    /// The longest step.
+    /// Length of the longest step.
     pub(crate) longest: f32,
 }
 
 impl Schedule {
-    /// Length of a step.
+    /// Returns the length of a step.
     pub(crate) fn length(&self, nth: usize) -> f32 {
         let done = (nth as f32 + 0.5) / self.steps as f32;
         if done < self.rising {
@@ -38,43 +38,43 @@ impl Schedule {
 /// The direction of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
-    /// Against the gradient, and a share of the last step again.
+    /// Against the gradient, plus a share of the last step.
     Momentum(f32),
-    /// Against the mean gradient over the root of the mean square (`AdamW`).
+    /// Against the mean gradient divided by the root of the mean square (`AdamW`).
     Adam,
 }
 
-/// How one step changes the parameters.
+/// Settings of one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Its direction.
+    /// Rule for the direction.
     pub rule: Rule,
-    /// Its length.
+    /// Length of the step.
     pub rate: f32,
-    /// Share of every weight that is taken away, times the rate.
+    /// Share of every weight that is subtracted, times the rate.
     pub decay: f32,
-    /// Longer gradients are scaled to this length.
+    /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,
     /// Share of the mean of the parameters that every step replaces.
     pub averaged: f32,
 }
 
-/// Everything that learning changes.
+/// The state that training changes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Memory {
     pub(crate) parameters: Vec<Parameter>,
-    /// Their mean over the last steps.
+    /// Mean of the parameters over the last steps.
     pub(crate) averages: Vec<Parameter>,
     /// The last step, or the running mean of the gradients; empty before the first step.
     first: Vec<Vec<f32>>,
-    /// The running mean of their squares; empty where no step asked for it.
+    /// The running mean of the squared gradients; empty if no step has needed it.
     second: Vec<Vec<f32>>,
-    /// Steps done.
+    /// Number of finished steps.
     steps: u64,
 }
 
 impl Memory {
-    /// At the beginning.
+    /// The state before the first step.
     pub(crate) fn new(parameters: Vec<Parameter>) -> Self {
         let nothing = vec![Vec::new(); parameters.len()];
         Self {
@@ -86,13 +86,13 @@ impl Memory {
         }
     }
 
-    /// Begins anew from the averaged parameters.
+    /// Restarts from the averaged parameters.
     #[must_use]
     pub(crate) fn restarted(self) -> Self {
         Self::new(self.averages)
     }
 
-    /// Changes the parameters; a gradient that is not finite changes nothing.
+    /// Changes the parameters, unless the gradient is not finite.
     pub(crate) fn change(&mut self, lesson: &Lesson, step: Step) {
         let all = lesson.gradients.iter().flatten().flatten();
         let squared: f64 = all.map(|value| f64::from(*value).powi(2)).sum();

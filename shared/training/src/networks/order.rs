@@ -1,25 +1,25 @@
-//! The order in which samples are shown: it follows from the number of a sample alone.
+//! The order of the samples, which depends only on the number of a sample.
 
 use fastrand::Rng;
 
-/// An odd number whose multiples are spread over all numbers.
+/// An odd number whose multiples are spread over the whole range.
 const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// The sample of a number: everybody once before anybody twice.
+/// Index of the sample with a given number. All samples are used once before any is used again.
 ///
-/// * `n`: how many there are.
+/// * `n`: number of different samples.
 pub(crate) fn shown(number: usize, n: usize, seed: u64) -> usize {
     shuffled(number % n, n, seed.wrapping_add((number / n) as u64))
 }
 
-/// A random generator for the thing of a number.
+/// Returns the random generator for the item with a given number.
 pub(crate) fn dice(number: usize, seed: u64) -> Rng {
     Rng::with_seed(seed ^ (number as u64 + 1).wrapping_mul(SPREAD))
 }
 
-/// The number at a place of a random order of `0..n`.
+/// The number at an index of a random order of `0..n`.
 ///
-/// A Feistel network over the next power of 4, walked until it is within `n`: no list has to be kept.
+/// It is computed by a Feistel network over the next power of 4, repeated until the result is below `n`. No list has to be stored.
 fn shuffled(place: usize, n: usize, seed: u64) -> usize {
     let half = (usize::BITS - (n.max(2) - 1).leading_zeros()).div_ceil(2);
     let mask = (1usize << half) - 1;

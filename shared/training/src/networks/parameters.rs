@@ -1,15 +1,15 @@
-//! The parameters of a network, their initialisation, and the standardised weights that it convolves with.
+//! The parameters of a network, their initialisation, and the standardised weights of its convolutions.
 
 use fastrand::Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::networks::ops::{Conv, Dims, Network, Ops, Places, Scaling, convolved, joined};
 
-/// Gain that keeps the variance of a positive part of a normal variable: `sqrt(2 / (1 - 1 / pi))`.
+/// Gain that keeps the variance of the positive part of a normal variable: `sqrt(2 / (1 - 1 / pi))`.
 pub(crate) const GAIN_OF_RELU: f32 = 1.712_858_6;
-/// Added to the squared length of a channel of weights before the root is taken.
+/// Value added to the squared length of a channel of weights before the root.
 pub(crate) const EPSILON_OF_LENGTH: f32 = 1e-8;
-/// Added to the variance over a batch before the root is taken.
+/// Value added to the variance over a batch before the root.
 pub(crate) const EPSILON_OF_BATCH: f32 = 1e-5;
 
 /// The role of a list of parameters.
@@ -28,18 +28,18 @@ pub enum Role {
 pub struct Parameter {
     /// Layer and role, for example `stem1.weight`.
     pub name: String,
-    /// Its dimensions, row-major.
+    /// Dimensions, row-major.
     pub dims: Vec<usize>,
     /// Its role in the network.
     pub role: Role,
-    /// The numbers.
+    /// Values of the parameters.
     pub values: Vec<f32>,
 }
 
-/// The parameters of a network at the beginning, in the order in which it takes them.
+/// The initial parameters of a network, in the order in which the network uses them.
 ///
-/// Weights are drawn from a normal distribution with the deviation `sqrt(2 / n_inputs)` (He et al. 2015), slopes are 1/4, gains as
-/// the network says, biases and means 0, factors and variances 1.
+/// Weights are drawn from a normal distribution with the standard deviation `sqrt(2 / n_inputs)` (He et al. 2015). Slopes are 1/4, gains
+/// are set by the network, biases and means are 0, factors and variances are 1.
 pub fn initial(network: &impl Network, seed: u64) -> Vec<Parameter> {
     let mut plan = Plan {
         inputs: network.inputs(),
@@ -82,14 +82,14 @@ impl Plan {
     }
 }
 
-/// A number of the standard normal distribution (Box and Muller).
+/// A random number of the standard normal distribution (Box and Muller).
 pub(crate) fn normal(rng: &mut Rng) -> f32 {
     let radius = (-2.0 * (1.0 - rng.f64()).ln()).sqrt();
     (radius * (core::f64::consts::TAU * rng.f64()).cos()) as f32
 }
 
-/// The weights of a convolution as they are used: every channel with mean 0, of the length that keeps the variance of positive parts,
-/// times its gain.
+/// The standardised weights of a convolution. Every channel has mean 0, the length that keeps the variance of positive parts,
+/// and its gain as a factor.
 ///
 /// * `weights`: `gains.len()` channels, one after the other.
 pub(crate) fn standardised(weights: &[f32], gains: &[f32]) -> Vec<f32> {

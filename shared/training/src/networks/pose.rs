@@ -1,15 +1,15 @@
-//! The network that finds joints in the picture of one person: who it learns from, and how.
+//! The network that finds joints in the picture of one person: its training data and its training.
 //!
-//! * [`Person`]: a picture of a person whose joints are known; [`Marks`] makes one of what was marked and what a
-//!   teacher found.
-//! * [`varied`], [`plain`]: what the network is shown of a person, and what it should find.
+//! * [`Person`]: a picture of a person whose joints are known. [`Marks`] makes one from an annotator's marks and a
+//!   teacher's results.
+//! * [`varied`], [`plain`]: the inputs made from a person, and the outputs that the network should give.
 //! * [`PoseTask`]: the training.
-//! * [`begun`]: the parameters of a network that was trained before, to go on from.
-//! * [`file()`]: a trained network as an ONNX file; [`card()`] says how it is used.
-//! * [`Score`]: how good it is on people.
+//! * [`begun`]: the parameters of a previously trained network, from which a training run starts.
+//! * [`file()`]: a trained network as an ONNX file; [`card()`] says how to use it.
+//! * [`Score`]: measures of the network's quality.
 //!
-//! Labels are **as seen**: a person seen from behind has the joints of left and right exchanged, so that the label follows
-//! the picture. In which direction the person faces is an output of its own.
+//! Labels are **as seen**: for a person seen from behind, left and right joints are exchanged, so that the label follows
+//! the picture. The direction in which the person faces is a separate output.
 //!
 //! Pixels have their centres at integers.
 
@@ -37,12 +37,12 @@ pub use task::{Found, PoseTask, TooFew, file};
 pub use vary::{DEVIATION, FILL, MARGIN, MEAN, NetworkSample, plain, varied};
 pub(in crate::networks) use vary::{coarsen, recolour};
 
-/// The keypoint that is the mirror image of another.
+/// For each keypoint, the keypoint that is its mirror image.
 pub const MIRROR: [usize; N_KEYPOINTS] = [
     5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13, 14, 16, 15, 18, 17,
 ];
 
-/// Where a map is highest, cells: between cells by a quarter towards the higher neighbour.
+/// Position of the maximum of a map, in cells. It is moved by a quarter cell towards the higher neighbour.
 ///
 /// * `map`: row major, `columns` wide.
 pub fn peak(map: &[f32], columns: usize) -> [f32; 2] {

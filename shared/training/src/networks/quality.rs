@@ -1,8 +1,8 @@
-//! The networks that predict the error of every part in a single view (the paper's section 4.3): samples, and how they are learned.
+//! The networks that predict the error of every part in a single view (the paper's section 4.3): samples and training.
 //!
-//! * [`Sample`](sample::Sample): a person in a picture, what the search knows of the pose, and the errors of the parts.
-//! * [`QualityTask`](task::QualityTask): the training, by passes over the samples until the validation does not improve any more.
-//! * [`Kind`](network::Kind): the networks, among them the paper's VGG-16, whose weights [`vgg`] reads.
+//! * [`Sample`](sample::Sample): a person in a picture, the evidence of the search about the pose, and the errors of the parts.
+//! * [`QualityTask`](task::QualityTask): the training, by passes over the samples until the validation stops improving.
+//! * [`Kind`](network::Kind): the networks, including the paper's VGG-16, whose weights [`vgg`] reads.
 
 pub mod judge;
 pub mod network;

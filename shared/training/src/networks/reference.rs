@@ -1,7 +1,7 @@
-//! Runs and trains networks in Rust: every operation is recorded with what its gradient asks for (reverse-mode differentiation).
+//! Runs and trains networks in Rust. Every operation is recorded with the data that its gradient needs (reverse-mode differentiation).
 //!
-//! Batches are computed sample by sample on rayon's current pool; the order of all sums is fixed, so that equal numbers give equal
-//! bits, whatever the number of threads.
+//! Batches are computed sample by sample on rayon's current pool. The order of all sums is fixed, so that equal inputs give equal
+//! bits for any number of threads.
 
 mod batch;
 mod convolution;
@@ -18,7 +18,7 @@ use crate::networks::lesson::{Cost, Lesson, Running, Shown};
 use crate::networks::ops::Network;
 use crate::networks::parameters::Parameter;
 
-/// The outputs of a network.
+/// Returns the outputs of a network.
 pub(crate) fn find(
     network: &impl Network,
     parameters: &[Parameter],
@@ -30,10 +30,10 @@ pub(crate) fn find(
     values.collect()
 }
 
-/// The gradients of a cost.
+/// Returns the gradients of a cost.
 ///
-/// * `learned`: of every parameter, whether its gradient is wanted.
-/// * `cost`: the gradients of the cost of outputs.
+/// * `learned`: for every parameter, true if its gradient is requested.
+/// * `cost`: computes the gradients of the cost from the outputs.
 pub(crate) fn learn(
     network: &impl Network,
     running: Running<'_>,

@@ -1,12 +1,12 @@
-//! Settings that all trainings have in common.
+//! Settings common to all training runs.
 
 use serde::{Deserialize, Serialize};
 
-/// Library that computes.
+/// Library that computes networks and gradients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Backend {
-    /// Rust: nothing has to be installed.
+    /// Rust; needs no installation.
     #[default]
     BuiltIn,
     /// `LibTorch`, on the processor.
@@ -15,31 +15,31 @@ pub enum Backend {
     LibTorch,
 }
 
-/// The numbers of the maps between layers. Weights, and what is learned of them, are single precision always.
+/// Precision of the maps between layers. Weights and their gradients are always in single precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
     /// Single precision.
     #[default]
     F32,
-    /// Half as many bits, on `LibTorch` alone: faster where the processor has instructions for it (`avx512_bf16`), much slower
-    /// elsewhere.
+    /// Half as many bits, only with `LibTorch`. It is faster if the processor has instructions for it (`avx512_bf16`), and much slower
+    /// otherwise.
     Bf16,
 }
 
-/// A setting that cannot be used.
+/// A setting with an invalid value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{setting} is {got}, expected {expected}")]
 pub struct SettingsError {
-    /// Its name.
+    /// Name of the setting.
     pub setting: &'static str,
-    /// Its value.
+    /// Value of the setting.
     pub got: String,
     /// Accepted values.
     pub expected: String,
 }
 
-/// A setting that is a number, and the largest that is accepted.
+/// A numeric setting with its largest accepted value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bounded<T> {
     pub(crate) setting: &'static str,
@@ -47,7 +47,7 @@ pub(crate) struct Bounded<T> {
     pub(crate) most: T,
 }
 
-/// A setting from 0 up.
+/// A setting of at least 0.
 pub(crate) fn from_zero(setting: &'static str, value: f32, most: f32) -> Bounded<f32> {
     Bounded {
         setting,
@@ -56,7 +56,7 @@ pub(crate) fn from_zero(setting: &'static str, value: f32, most: f32) -> Bounded
     }
 }
 
-/// A count from 1 up.
+/// A count of at least 1.
 pub(crate) fn count(setting: &'static str, value: usize, most: usize) -> Bounded<usize> {
     Bounded {
         setting,
@@ -65,7 +65,7 @@ pub(crate) fn count(setting: &'static str, value: usize, most: usize) -> Bounded
     }
 }
 
-/// Checks that settings are 0 or more, and counts 1 or more, and none more than its most.
+/// Checks that settings are at least 0, counts are at least 1, and all are within their limits.
 pub(crate) fn check(
     numbers: &[Bounded<f32>],
     counts: &[Bounded<usize>],

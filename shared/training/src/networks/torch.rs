@@ -1,6 +1,6 @@
 //! Runs and trains networks on `LibTorch`, which records the forward pass itself.
 //!
-//! Maps lie here with the channels of a cell side by side, as the convolutions want them.
+//! Maps are stored here with the channels of a cell next to each other, the layout that the convolutions need.
 
 use std::rc::Rc;
 
@@ -12,7 +12,7 @@ use crate::networks::ops::{Along, Conv, Dims, Network, Ops, Places, Scaling, gri
 use crate::networks::parameters::{EPSILON_OF_BATCH, EPSILON_OF_LENGTH, GAIN_OF_RELU, Parameter};
 use crate::networks::settings::Precision;
 
-/// The outputs of a network.
+/// Returns the outputs of a network.
 pub(crate) fn find(
     network: &impl Network,
     parameters: &[Parameter],
@@ -26,9 +26,9 @@ pub(crate) fn find(
     })
 }
 
-/// The gradients of a cost.
+/// Returns the gradients of a cost.
 ///
-/// * `cost`: the gradients of the cost of outputs.
+/// * `cost`: computes the gradients of the cost from the outputs.
 pub(crate) fn learn(
     network: &impl Network,
     running: Running<'_>,
@@ -40,7 +40,7 @@ pub(crate) fn learn(
     forward.dice = Some(running.dice);
     let outputs = network.run(&mut forward);
     let values: Vec<Vec<f32>> = outputs.iter().map(|output| numbers(output)).collect();
-    // Its gradients by the outputs are those of the cost.
+    // The gradients of this value with respect to the outputs are those of the cost.
     let slope = outputs
         .iter()
         .zip(cost(&values))
@@ -74,13 +74,13 @@ fn tensors(parameters: &[Parameter], learned: &dyn Fn(usize) -> bool) -> Vec<Ten
     parameters.iter().enumerate().map(tensor).collect()
 }
 
-/// The values in the order of the dimensions.
+/// The values of a tensor, in the order of its dimensions.
 fn numbers(value: &Tensor) -> Vec<f32> {
     let flat = value.detach().to_kind(Kind::Float).contiguous().flatten(0, -1);
     Vec::try_from(flat).unwrap_or_default()
 }
 
-/// The same numbers, with the channels of a cell side by side.
+/// Converts a map to the layout with the channels of a cell next to each other.
 fn channels_last(map: &Tensor) -> Tensor {
     map.permute([0, 2, 3, 1]).contiguous().permute([0, 3, 1, 2])
 }
@@ -89,15 +89,15 @@ fn channels_last(map: &Tensor) -> Tensor {
 struct Forward<'a> {
     n: usize,
     inputs: Vec<(&'static str, Dims, &'a [f32])>,
-    /// Names and sizes.
+    /// Names and dimensions of the parameters.
     parameters: &'a [Parameter],
-    /// The same values as flat tensors.
+    /// The parameters as flat tensors.
     tensors: &'a [Tensor],
-    /// Type of the numbers in maps.
+    /// Number type of the maps.
     numbers: Kind,
-    /// Number of the next parameter.
+    /// Index of the next parameter.
     next: usize,
-    /// Nothing outside training.
+    /// Random generator for training; `None` otherwise.
     dice: Option<Rng>,
     statistics: Vec<Statistics>,
 }
@@ -138,7 +138,7 @@ impl<'a> Forward<'a> {
         core::array::from_fn(|at| self.parameters[self.next].dims[at] as i64)
     }
 
-    /// The weights of a convolution, [standardised](crate::networks::parameters::standardised) where it asks for that.
+    /// The weights of a convolution, [standardised](crate::networks::parameters::standardised) if its scaling says so.
     fn weight(&mut self, name: &str, scaling: Scaling) -> Tensor {
         let dims: [i64; 4] = self.dims();
         let weight = self.parameter(&format!("{name}.weight"));
@@ -156,7 +156,7 @@ impl<'a> Forward<'a> {
         channels_last(&rows.reshape(dims).to_kind(self.numbers))
     }
 
-    /// Normalises every channel over the batch; outside training by running statistics.
+    /// Normalises every channel over the batch, or by running statistics if the network is not being trained.
     fn normalised(&mut self, map: &Tensor, name: &str) -> Tensor {
         let [scale, shift] =
             ["scale", "shift"].map(|what| self.parameter(&format!("{name}.{what}")));
@@ -184,7 +184,7 @@ impl<'a> Forward<'a> {
     }
 }
 
-/// The cells of every channel in a row, single precision.
+/// Reshapes a map so that the cells of every channel form a row, in single precision.
 fn rows(map: &Tensor) -> Tensor {
     map.to_kind(Kind::Float).flatten(2, 3)
 }

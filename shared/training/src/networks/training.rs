@@ -1,4 +1,4 @@
-//! A training: steps over samples, a look at those that are kept apart now and then, a state that can be kept.
+//! A training run: steps over samples, regular evaluations on held-out samples, and a state that can be saved.
 
 use core::fmt::Debug;
 
@@ -17,112 +17,112 @@ use crate::networks::settings::{Backend, Precision};
 /// A batch of samples.
 #[derive(Debug)]
 pub struct Batch<N, T> {
-    /// The network, for the size of the inputs of this step.
+    /// The network, for the input size of this step.
     pub network: N,
-    /// Its inputs.
+    /// Inputs of the network.
     pub shown: Shown,
-    /// The truth for its outputs.
+    /// True outputs of the network.
     pub truth: T,
 }
 
 /// The cost of a batch.
 #[derive(Debug)]
 pub struct Costed<C> {
-    /// The cost.
+    /// Cost of the batch.
     pub cost: C,
-    /// Its gradients by the outputs of the network.
+    /// Gradients of the cost with respect to the outputs of the network.
     pub gradients: Vec<Vec<f32>>,
 }
 
-/// The next pass of a training.
+/// The next pass of a training run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
-    /// Its steps.
+    /// Number of steps.
     pub steps: usize,
-    /// True if the network is judged after it.
+    /// True if the network is evaluated after the pass.
     pub is_judged: bool,
 }
 
-/// Numbers that a training reports and keeps.
+/// Values that a training run reports and saves.
 pub trait Kept: Copy + Debug + PartialEq + Serialize + DeserializeOwned {}
 
 impl<T: Copy + Debug + PartialEq + Serialize + DeserializeOwned> Kept for T {}
 
-/// Samples, truth, cost and steps of a training: everything that differs between trainings.
+/// Samples, truth, cost and steps of a training run: everything that differs between training tasks.
 ///
-/// All that it says of a step follows from the number of the step alone.
+/// All data of a step depend only on the number of the step.
 pub trait Task: Sync {
-    /// The network that learns.
+    /// Type of the network.
     type Network: Network;
     /// The truth of a batch.
     type Truth;
     /// The cost of a batch.
     type Cost: Kept;
-    /// How good the network is.
+    /// Measures of the network's quality.
     type Score: Kept;
 
-    /// Who is learned from, for messages: `people`.
+    /// Name of the samples in messages: `people`.
     const LEARNED_FROM: &'static str;
 
-    /// A hash of everything that the result depends on.
+    /// Hash of everything that the result depends on.
     fn stamp(&self) -> u64;
-    /// The network at the size at which it is used.
+    /// Returns the network for the input size at which it is used.
     fn network(&self) -> Self::Network;
-    /// The numbers between layers.
+    /// Returns the precision of the maps between layers.
     fn precision(&self) -> Precision {
         Precision::F32
     }
-    /// The parameters to begin with.
+    /// Returns the initial parameters.
     fn begin(&self) -> Vec<Parameter>;
-    /// Seed of everything random.
+    /// Returns the seed of all random numbers.
     fn seed(&self) -> u64;
-    /// Steps of the whole training.
+    /// Returns the number of steps of the whole training.
     fn n_steps(&self) -> usize;
-    /// The pass after some steps and passes.
+    /// Returns the pass that follows the given numbers of steps and passes.
     fn plan(&self, steps: usize, passes: usize) -> Plan;
-    /// Returns true if the averaged parameters begin a training of their own with a step.
+    /// Returns true if the training restarts from the averaged parameters at a step.
     fn restarts(&self, _nth: usize) -> bool {
         false
     }
-    /// Returns for every parameter true if a step learns it.
+    /// Returns for every parameter true if the step trains it.
     fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool>;
-    /// How a step changes the parameters.
+    /// Returns how a step changes the parameters.
     fn step(&self, nth: usize) -> Step;
-    /// The samples of a step.
+    /// Returns the samples of a step.
     fn batch(&self, nth: usize) -> Batch<Self::Network, Self::Truth>;
-    /// The cost of the outputs of the network at a step.
+    /// Returns the cost of the network's outputs at a step.
     fn cost(&self, nth: usize, truth: &Self::Truth, outputs: &[Vec<f32>]) -> Costed<Self::Cost>;
-    /// The mean of the costs of steps, each with its number of samples.
+    /// Returns the mean of the costs of several steps, each given with its number of samples.
     fn mean(&self, costs: &[(usize, Self::Cost)]) -> Self::Cost;
-    /// How good a network is on samples that are kept apart.
+    /// Evaluates a network on held-out samples.
     fn score(&self, find: &dyn Fn(&Shown) -> Vec<Vec<f32>>) -> Self::Score;
-    /// By what the network of the best pass is kept: lower is better. Nothing where the last one counts.
+    /// Returns the value by which the best pass is chosen: lower is better. `None` if the last pass is used.
     fn rank(&self, _score: &Self::Score) -> Option<f32> {
         None
     }
-    /// Returns true if a training ends early.
+    /// Returns true if the training should end early.
     ///
-    /// * `since`: passes since the best one.
+    /// * `since`: number of passes since the best one.
     fn is_enough(&self, _since: usize) -> bool {
         false
     }
 }
 
-/// The results of some steps of a training.
+/// The results of one pass of a training run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pass<C, S> {
-    /// Steps done after them.
+    /// Number of finished steps after the pass.
     pub step: usize,
-    /// Their mean cost.
+    /// Mean cost of the steps.
     pub cost: C,
-    /// How good the network is on those that are kept apart.
+    /// Result of the evaluation on held-out samples, if there was one.
     pub score: Option<S>,
 }
 
 /// The best network so far.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Best {
-    /// The number of its pass.
+    /// Number of the best pass.
     pass: usize,
     rank: f32,
     parameters: Vec<Parameter>,
@@ -138,26 +138,26 @@ struct State<C, S> {
     best: Option<Best>,
 }
 
-/// Why a training cannot start or resume.
+/// Reason why a training run cannot start or resume.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// The checkpoint is not one, or was changed.
+    /// The bytes are not a checkpoint, or were changed.
     #[error("the checkpoint cannot be used")]
     Checkpoint(#[from] StoreError),
-    /// It is of another training.
+    /// The checkpoint belongs to another training run.
     #[error(
         "the checkpoint is of a training with other {learned_from} or settings, or from another network"
     )]
     Other {
-        /// Who is learned from.
+        /// Name of the samples, such as `people`.
         learned_from: &'static str,
     },
-    /// The settings ask for numbers that only `LibTorch` computes with.
+    /// The settings choose a precision that only `LibTorch` supports.
     #[error("precision is \"bf16\", which needs the backend libtorch")]
     Precision,
 }
 
-/// A training.
+/// A training run in progress.
 #[derive(Debug)]
 pub struct Trainer<T: Task> {
     task: T,
@@ -166,7 +166,7 @@ pub struct Trainer<T: Task> {
 }
 
 impl<T: Task> Trainer<T> {
-    /// Prepares a training, from the start or from a checkpoint.
+    /// Prepares a training run, from the start or from a checkpoint.
     ///
     /// * `checkpoint`: bytes of [`Self::checkpoint`].
     ///
@@ -205,22 +205,22 @@ impl<T: Task> Trainer<T> {
         })
     }
 
-    /// The task that is learned.
+    /// The task of the training.
     pub fn task(&self) -> &T {
         &self.task
     }
 
-    /// Steps done.
+    /// Number of finished steps.
     pub fn step(&self) -> usize {
         self.state.step
     }
 
-    /// The results so far.
+    /// The results of the passes so far.
     pub fn passes(&self) -> &[Pass<T::Cost, T::Score>] {
         &self.state.passes
     }
 
-    /// The number of the best pass, where the network of the best one is kept.
+    /// Number of the best pass, if the task keeps the network of the best pass.
     pub fn best(&self) -> Option<usize> {
         self.state.best.as_ref().map(|best| best.pass)
     }
@@ -236,13 +236,13 @@ impl<T: Task> Trainer<T> {
         &self.state.memory.parameters
     }
 
-    /// The parameters that the network is used with: those of the best pass, or the mean over the last steps.
+    /// The parameters of the resulting network: those of the best pass, or the mean over the last steps.
     pub fn trained(&self) -> &[Parameter] {
         let best = self.state.best.as_ref();
         best.map_or(&self.state.memory.averages, |best| &best.parameters)
     }
 
-    /// The state as bytes.
+    /// The state of the training as bytes.
     ///
     /// # Errors
     ///
@@ -251,16 +251,16 @@ impl<T: Task> Trainer<T> {
         wrap(CHECKPOINT, &self.state)
     }
 
-    /// The next pass.
+    /// Runs the next pass.
     ///
-    /// * `go_on`: called before every step, with the steps done; `false` aborts.
-    /// * Returns whether it was finished; if not, nothing has changed.
+    /// * `go_on`: called before every step with the number of finished steps; `false` aborts the pass.
+    /// * Returns true if the pass was finished. Otherwise, nothing has changed.
     pub fn pass(&mut self, go_on: &mut dyn FnMut(usize) -> bool) -> bool {
         let plan = self.task.plan(self.state.step, self.state.passes.len());
         self.run(plan, go_on)
     }
 
-    /// Some steps, as another plan says.
+    /// Runs the steps of a given plan.
     ///
     /// * See [`Self::pass`].
     pub fn run(&mut self, plan: Plan, go_on: &mut dyn FnMut(usize) -> bool) -> bool {
@@ -297,7 +297,7 @@ impl<T: Task> Trainer<T> {
         true
     }
 
-    /// One step: the number of samples, and their cost before it.
+    /// Runs one step. Returns the number of samples, and their cost before the step.
     fn learn(&self, memory: &mut Memory, nth: usize) -> Option<(usize, T::Cost)> {
         let Batch {
             network,
@@ -326,7 +326,7 @@ impl<T: Task> Trainer<T> {
         self.task.score(&find)
     }
 
-    /// The outputs of the trained network.
+    /// Returns the outputs of the trained network.
     pub fn find(&self, shown: &Shown) -> Vec<Vec<f32>> {
         let network = self.task.network();
         self.computer.find(&network, self.trained(), shown)

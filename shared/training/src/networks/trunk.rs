@@ -1,7 +1,7 @@
-//! The residual network over a picture that the networks for joints and for people have in common.
+//! The residual network over a picture, used by the networks for joints and for people.
 //!
-//! Convolutions are followed by no normalisation over the batch. Their weights are standardised instead (Brock et al. 2021,
-//! "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`"), and every residual block begins
+//! The convolutions are not followed by batch normalisation. Their weights are standardised instead (Brock et al. 2021,
+//! "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`"). Every residual block begins
 //! as the identity.
 
 use crate::networks::ops::{Conv, Ops, Scaling};
@@ -9,20 +9,20 @@ use crate::networks::ops::{Conv, Ops, Scaling};
 /// The sizes of a trunk.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Trunk {
-    /// Channels of the first layer.
+    /// Number of channels of the first layer.
     pub(crate) stem: usize,
-    /// Channels at strides 4, 8, 16 and 32.
+    /// Numbers of channels at strides 4, 8, 16 and 32.
     pub(crate) channels: [usize; 4],
-    /// Residual blocks at these strides.
+    /// Numbers of residual blocks at strides 4, 8, 16 and 32.
     pub(crate) blocks: [usize; 4],
-    /// Residual blocks at stride 4 after everything came back to it.
+    /// Number of residual blocks at stride 4 after the features of all strides were added there.
     pub(crate) refined: usize,
-    /// Channels within these.
+    /// Number of channels inside these blocks.
     pub(crate) hidden: usize,
 }
 
 impl Trunk {
-    /// Features at stride 4, and the deepest ones, which are positive.
+    /// Returns the features at stride 4 and the deepest features, which are positive.
     pub(crate) fn run<O: Ops>(&self, ops: &mut O, picture: &O::Value) -> [O::Value; 2] {
         let stem = ops.conv(picture, "stem1", plain(self.stem, 3, 2));
         let stem = ops.relu(&stem);
@@ -70,7 +70,7 @@ pub(crate) fn plain(channels: usize, kernel: usize, stride: usize) -> Conv {
     }
 }
 
-/// The same convolution with another gain at the beginning.
+/// The same convolution with another initial gain.
 pub(crate) fn with_gain(gain: f32, conv: Conv) -> Conv {
     Conv {
         scaling: Scaling::Standardised { gain },
@@ -78,7 +78,7 @@ pub(crate) fn with_gain(gain: f32, conv: Conv) -> Conv {
     }
 }
 
-/// A residual block: narrowed, convolved, widened, added.
+/// A residual block: reduces the channels, convolves, restores the channels, and adds the input.
 pub(crate) fn block<O: Ops>(
     ops: &mut O,
     at: &O::Value,

@@ -1,4 +1,4 @@
-//! The state of a training, from which it continues exactly as if it had not been interrupted.
+//! The state of a training run, from which the training continues exactly as if it had not been interrupted.
 
 mod bytes;
 
@@ -13,10 +13,10 @@ use crate::watch::Watch;
 
 pub use bytes::CheckpointBytesError;
 
-/// The state of a training between two steps.
+/// The state of a training run between two steps.
 ///
-/// Examples are stored by their origin, a hundred bytes each; their features are computed from the images
-/// again.
+/// Examples are stored by their origin, with a hundred bytes each. Their features are recomputed from the
+/// images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
     /// Fingerprint of the plan and the settings.
@@ -28,16 +28,16 @@ pub struct Checkpoint {
     examples: Vec<(Origin, f64)>,
 }
 
-/// Why a training cannot be resumed from a checkpoint.
+/// Reason why a training run cannot be resumed from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// It belongs to another training.
+    /// The checkpoint belongs to another training run.
     #[error(
         "the checkpoint is of another training: people, images without people or settings have changed"
     )]
     Other,
-    /// It is damaged.
-    #[error("the checkpoint does not fit its own training: {what}")]
+    /// The checkpoint is damaged.
+    #[error("the checkpoint contradicts itself: {what}")]
     Damaged {
         /// The fault.
         what: &'static str,
@@ -48,7 +48,7 @@ pub enum CheckpointError {
 }
 
 impl Checkpoint {
-    /// Number of steps that are done.
+    /// Number of finished steps.
     pub fn n_done(&self) -> usize {
         self.n_done
     }
@@ -128,7 +128,7 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    /// FNV-1a of everything that the training depends on but the pixels.
+    /// FNV-1a hash of everything that the training depends on, except the pixels.
     fn fingerprint(&self) -> u64 {
         let n_images = self.album.n_backgrounds();
         let text = format!("{:?} {:?} {n_images}", self.settings, self.plan);

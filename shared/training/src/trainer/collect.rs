@@ -1,4 +1,4 @@
-//! Work on images: placing people, mining hard negatives and wrong poses, computing features.
+//! Work on images: placing people, mining hard negatives and wrong poses, and computing features.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,12 +18,12 @@ use crate::origin::{Origin, Placed};
 use crate::shape::Shape;
 use crate::watch::{Event, Step};
 
-/// Background images for the windows of the initial filters, and windows of each.
+/// Number of background images for the windows of the initial filters, and number of windows of each image.
 const WINDOW_IMAGES: usize = 100;
 const WINDOWS: usize = 20;
 
 impl Trainer<'_> {
-    /// Runs `visit` for every item of `all` in parallel; the results in order.
+    /// Runs `visit` for every item of `all` in parallel, and returns the results in order.
     fn visit_all<S: Sync, T: Send>(
         &self,
         all: &[S],
@@ -42,7 +42,7 @@ impl Trainer<'_> {
             .collect()
     }
 
-    /// The surroundings of a person.
+    /// The part of the image around a person, and the marked parts in it.
     fn person(&self, it: usize, with_types: bool) -> Result<(Picture, Marked), TrainError> {
         let person = self.plan.person(it);
         let image = self.album.person(person).map_err(|source| {
@@ -64,7 +64,7 @@ impl Trainer<'_> {
         })
     }
 
-    /// The current model, for background images.
+    /// The current model, with the interval for background images.
     fn mining_model(&self) -> Result<Model, TrainError> {
         let shape = Shape {
             interval: self.settings.mining_interval,
@@ -73,7 +73,7 @@ impl Trainer<'_> {
         Ok(shape.model(&self.v, 0.0)?)
     }
 
-    /// All marked people, as close to the marks as the cells allow, with the types of the clusters.
+    /// Examples of all people, placed as close to the marks as the cells allow, with the types of the clusters.
     pub(super) fn nearest(&self) -> Result<Vec<Example>, TrainError> {
         let model = self.model()?;
         let all: Vec<_> = (0..self.plan.n_people()).collect();
@@ -93,7 +93,7 @@ impl Trainer<'_> {
         Ok(placed)
     }
 
-    /// Random windows of background images.
+    /// Features of random windows in background images.
     pub(super) fn windows(&self) -> Result<Vec<Vec<f32>>, TrainError> {
         let model = self.model()?;
         let side = self.plan.shape().side;
@@ -115,7 +115,7 @@ impl Trainer<'_> {
         Ok(found.concat())
     }
 
-    /// The best poses of all people near their marks under the current model, and the scores.
+    /// The best poses of all people near their marks under the current model, with their scores.
     pub(super) fn best_placements(
         &self,
         with_types: bool,
@@ -149,7 +149,7 @@ impl Trainer<'_> {
             return Ok(());
         };
         let share = |n: usize, salt: usize| {
-            // The same order in all batches of a pass.
+            // The order is the same in all batches of a pass.
             let mut order: Vec<usize> = (0..n).collect();
             let salt = (round * self.settings.passes + pass) * 2 + salt;
             fastrand::Rng::with_seed(self.seed_of(usize::MAX - salt)).shuffle(&mut order);
@@ -191,7 +191,7 @@ impl Trainer<'_> {
         }
         let found = self.visit_all(images, |&image| {
             let picture = self.background(image)?;
-            // The ones in the working set may all score best, as each may keep some slack.
+            // All poses in the working set may score best, since each may have some slack. The search therefore allows for that many more.
             let n_held = n_held.get(&image).copied().unwrap_or(0);
             let poses = miner.search(&picture, -1.0, self.settings.per_image + n_held);
             let origins = poses.iter().map(|pose| Origin::Background {
@@ -245,7 +245,7 @@ impl Trainer<'_> {
         Ok(made.into_iter().flatten().collect())
     }
 
-    /// `None` if a pose does not lie on the image.
+    /// Returns `None` if a pose is not on the image.
     fn of_background(
         &self,
         model: &Model,
@@ -267,7 +267,7 @@ impl Trainer<'_> {
         }))
     }
 
-    /// `None` if a pose does not lie on the image.
+    /// Returns `None` if a pose is not on the image.
     fn of_person(
         &self,
         model: &Model,
@@ -299,7 +299,7 @@ impl Trainer<'_> {
         }))
     }
 
-    /// The features of a background image, kept as long as examples use them.
+    /// The features of a background image, which are kept while examples use them.
     fn cells(&self, image: usize, pyramid: &FeaturePyramid<'_>, layout: &Layout) -> Arc<Cells> {
         let held = || self.cells.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(it) = held().get(&image) {
@@ -310,7 +310,7 @@ impl Trainer<'_> {
     }
 }
 
-/// The pose, if it lies on the image.
+/// Returns the pose if it is on the image.
 fn on_layout(placed: &Placed, layout: &Layout) -> Option<Pose> {
     let pose = placed.pose();
     let level = layout.levels.get(usize::from(pose.level))?;
@@ -320,7 +320,7 @@ fn on_layout(placed: &Placed, layout: &Layout) -> Option<Pose> {
     pose.parts.iter().all(lies).then_some(pose)
 }
 
-/// Runs `visit` on the features of an image, if it is large enough for the model.
+/// Runs `visit` on the features of an image if the image is large enough for the model.
 fn on_pyramid<T>(
     model: &Model,
     image: &Picture,

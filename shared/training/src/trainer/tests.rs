@@ -1,4 +1,4 @@
-//! Complete trainings on drawn figures.
+//! Tests of complete training runs on drawn figures.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -14,7 +14,7 @@ use crate::settings::Settings;
 use crate::testing::noise;
 use crate::watch::{Event, Step, Watch};
 
-/// Figures of three parts: a bright square with stripes on noise.
+/// Figures of three parts: bright squares with stripes on noise.
 struct Figures {
     n_people: usize,
     n_backgrounds: usize,
@@ -67,7 +67,7 @@ impl Album for Figures {
     }
 }
 
-/// Stops after a number of calls of `go_on`.
+/// A watch that stops the training after a number of calls of `go_on`.
 struct Quiet {
     left: AtomicUsize,
     placed: AtomicBool,
@@ -139,7 +139,7 @@ fn trained(settings: &Settings) -> Model {
     trainer.model().unwrap()
 }
 
-/// Farthest that a part of the best pose lies from where it was drawn, pixels.
+/// Largest distance of a part of the best pose from its drawn position, in pixels.
 fn off(model: &Model, person: usize) -> f64 {
     let model = std::sync::Arc::new(model.clone());
     let picture = Figures::drawn(person);
@@ -276,7 +276,7 @@ fn without_backgrounds_nothing_is_trained() {
 #[test]
 fn people_stay_in_the_working_set_however_well_they_are_separated() {
     let (album, watch) = (figures(), Quiet::endless());
-    // Almost no example without a share is kept.
+    // With these settings, hardly any example without a share is kept.
     let settings = Settings {
         room: 0.0,
         cache_mib: 1,

@@ -1,11 +1,11 @@
-//! Clusters and their mirror images.
+//! Tests of clusters and their mirror images.
 
 use super::*;
 
 const PARENTS: [Option<usize>; 3] = [None, Some(0), Some(1)];
 
-/// People whose second part hangs to the left, below, or to the right, and whose third one always
-/// lies below that.
+/// People whose second part is left of, below, or right of the first. The third part is always
+/// below the second.
 fn people() -> Vec<Vec<[f64; 2]>> {
     let person = |i: usize| {
         let jitter = 0.1 * (i % 7) as f64;
@@ -76,11 +76,11 @@ fn the_seed_determines_the_result() {
     assert_eq!(twice[0], twice[1]);
 }
 
-/// The parts of a small body, root in the middle, and an arm on either side.
+/// Parents of the parts of a small body: a root in the middle, one more part, and an arm on either side.
 const BODY: [Option<usize>; 4] = [None, Some(0), Some(0), Some(0)];
 const SIDES: [usize; 4] = [0, 1, 3, 2];
 
-/// People and their mirror images, arms here and there.
+/// People with different arm positions, and their mirror images.
 fn with_mirror_images() -> Vec<Vec<[f64; 2]>> {
     let person = |i: usize| {
         let lean = (i % 5) as f64 - 1.5;

@@ -1,4 +1,4 @@
-//! Cards are read back as they were written, and invalid entries are rejected by name.
+//! Tests that cards are read back as written, and that invalid entries are rejected by name.
 
 use proptest::prelude::*;
 

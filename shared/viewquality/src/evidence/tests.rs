@@ -1,4 +1,4 @@
-//! Every value of the evidence belongs to its name.
+//! Tests that every value of the evidence corresponds to its name.
 
 use fmp::{Edge, Filter, ModelSpec, N_CHANNELS, PartSpec, Placement, Spring};
 
@@ -98,14 +98,14 @@ fn a_model_with_26_parts_has_424_values_with_distinct_names() {
 #[test]
 fn spring_and_bias_scores_are_those_of_the_model() {
     let at = numbers(&[pose(2.0, [8, 9])]);
-    // Parent (5, 4) + anchor (1, 2) - child (8, 9): (-2, -3).
+    // Displacement: parent (5, 4) + anchor (1, 2) - child (8, 9) = (-2, -3).
     let expected = -(0.01 * 4.0 - 0.1 * 2.0 + 0.02 * 9.0 - 0.2 * 3.0);
     assert!((at("part 2 spring") - expected).abs() < 1e-6);
-    // The other child is at (0, 0): displaced by the anchor alone.
+    // The other child is at (0, 0), displaced by the anchor alone.
     let other = -(0.01 + 0.1 + 0.02 * 4.0 + 0.2 * 2.0);
     assert!((at("springs") - at("part 2 spring") - other).abs() < 1e-6);
     assert_eq!(at("part 1 spring"), 0.0);
-    // Type 1 of the child under type 2 of the parent.
+    // The bias of type 1 of the child with type 2 of the parent.
     assert_eq!(at("part 2 pair_bias"), 10.0);
     assert_eq!(at("part 1 pair_bias"), 0.0);
 }
@@ -118,13 +118,13 @@ fn types_and_scores_are_those_of_the_pose() {
     let local = ["response", "contrast", "margin"].map(|name| at(&format!("part 2 {name}")));
     assert_eq!(local, [0.5, -1.0, 0.25]);
     assert_eq!((at("score"), at("responses")), (2.0, 5.5));
-    // Three cells of four pixels.
+    // The box has three cells of four pixels.
     assert!((at("log_box_side") - 12.0_f32.ln()).abs() < 1e-6);
 }
 
 #[test]
 fn distances_are_measured_in_box_sides() {
-    // The mirrored part is 3 columns and 4 rows away, 5 cells of 4 pixels, a box has 3.
+    // The mirrored part is 3 columns and 4 rows away: 5 cells of 4 pixels. A box has 3 cells.
     let at = numbers(&[pose(2.0, [8, 8])]);
     assert!((at("part 3 from_mirror") - 5.0 / 3.0).abs() < 1e-6);
     assert_eq!(at("part 3 from_mirror"), at("part 2 from_mirror"));
@@ -138,7 +138,7 @@ fn distances_are_measured_in_box_sides() {
 
 #[test]
 fn inside_is_negative_for_a_part_outside_the_frame() {
-    // The padding is one cell: column 0 begins at -4 pixels, its box's centre is at 1.5.
+    // The padding is one cell. Column 0 begins at -4 pixels, and the centre of its box is at 1.5.
     let at = numbers(&[pose(2.0, [0, 8])]);
     assert!((at("part 2 inside") - 1.5 / 12.0).abs() < 1e-6);
     let at = numbers(&[pose(2.0, [20, 8])]);
@@ -162,6 +162,6 @@ fn rejects_poses_that_do_not_fit() {
     );
     assert_eq!(
         said(&many, &candidates, &SCORES),
-        "part 1 has 7 types, the evidence has room for 6"
+        "part 1 has 7 types, but the evidence allows at most 6"
     );
 }

@@ -1,4 +1,4 @@
-//! Networks with known outputs give them, and invalid networks are rejected.
+//! Tests that networks return their known outputs, and that invalid networks are rejected.
 
 use inference::onnx::Side;
 use proptest::prelude::*;
@@ -13,7 +13,7 @@ const SHAPE: TileShape = TileShape {
     width: 3,
 };
 
-/// `sigma = the first two numbers of the evidence`.
+/// A network that returns the first two values of the evidence as `sigma`.
 fn of_evidence() -> inference::onnx::Network {
     let k = n_evidence(N_PARTS);
     let mut net = inference::onnx::Network::default();

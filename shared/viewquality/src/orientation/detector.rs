@@ -8,7 +8,7 @@ use crate::orientation::features::{Buffers, features};
 use crate::orientation::network::Network;
 use crate::orientation::tile::{Crop, Tile};
 
-/// Finds from the picture in which direction a person faces.
+/// Estimates the direction in which a person faces from the picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     network: Network,
@@ -22,9 +22,9 @@ pub struct Workspace {
     features: Vec<f32>,
 }
 
-/// The middle of head and neck, `[x, y]` in the unit of the parts: parts 0 and 1 of the published model.
+/// The midpoint between head and neck, `[x, y]` in the unit of the parts. They are parts 0 and 1 of the published model.
 ///
-/// * Returns `None` for a model with another number of parts than the 26 of the published one.
+/// * Returns `None` for a model whose number of parts is not 26, as in the published model.
 pub fn head_of(parts: &[[f64; 2]]) -> Option<[f64; 2]> {
     const N_PARTS: usize = 26;
     let ([head, neck, ..], N_PARTS) = (parts, parts.len()) else {
@@ -34,16 +34,16 @@ pub fn head_of(parts: &[[f64; 2]]) -> Option<[f64; 2]> {
 }
 
 impl Detector {
-    /// A detector with the numbers of a network.
+    /// Makes a detector from a network.
     pub fn new(network: Network) -> Self {
         Self { network }
     }
 
-    /// Returns the evidence of the picture about the person of a pose.
+    /// Returns the picture's evidence about the person of a pose.
     ///
-    /// * `bounds`: the pose's box in the frame, `[x1, y1, x2, y2]`, pixels.
-    /// * `head`: the middle of its head and neck in the frame, `[x, y]`, pixels.
-    /// * Returns zeros, which say nothing, for a pose that is not finite.
+    /// * `bounds`: the pose's box in the frame, `[x1, y1, x2, y2]` in pixels.
+    /// * `head`: the midpoint between head and neck in the frame, `[x, y]` in pixels.
+    /// * Returns zeros, which are no evidence, for a pose that is not finite.
     pub fn evidence(
         &self,
         frame: Rgb8View<'_>,
@@ -57,7 +57,7 @@ impl Detector {
         }
     }
 
-    /// Returns the evidence of a tile: the mean over it and its mirror image.
+    /// Returns the evidence of a tile: the mean over the tile and its mirror image.
     pub fn of_tile(&self, tile: &Tile, workspace: &mut Workspace) -> FrontEvidence {
         let mut look = |mirrored: bool| {
             let crop = Crop {

@@ -1,4 +1,4 @@
-//! Features for the network: gradients and colours of three patches about the head.
+//! Features for the network: gradients and colours of three patches around the head.
 
 use kernels::{HogShape, HogWorkspace, Isa, Planes, Rgb8View, ShrinkWorkspace, hog, resize};
 
@@ -6,18 +6,18 @@ use crate::orientation::tile::{Crop, Tile};
 
 /// A square patch.
 struct Patch {
-    /// How far its centre is below the head's, pixels of the tile.
+    /// Distance of the patch's centre below the head's, in pixels of the tile.
     below: f32,
-    /// Its side, pixels of the patch.
+    /// Side of the patch, in pixels of the patch.
     side: usize,
     /// Pixels of the tile per pixel of the patch.
     scale: f32,
-    /// Side of a cell, pixels of the patch.
+    /// Side of a cell, in pixels of the patch.
     cell: usize,
 }
 
-/// The head with the shoulders, the face, and the upper part of the body. Chosen among eight sets by the people of
-/// `LSP-extended` who were kept apart; whole bodies and feet did not help.
+/// Patches for the head with the shoulders, for the face, and for the upper part of the body. They were chosen among eight sets by the
+/// results on held-out people of `LSP-extended`. Patches of whole bodies and of feet did not help.
 const PATCHES: [Patch; 3] = [
     Patch {
         below: 0.0,
@@ -39,7 +39,7 @@ const PATCHES: [Patch; 3] = [
     },
 ];
 
-/// Channels of colour of a cell.
+/// Number of colour channels of a cell.
 const N_COLOURS: usize = 3;
 
 impl Patch {
@@ -55,7 +55,7 @@ impl Patch {
         rows * columns * kernels::N_CHANNELS
     }
 
-    /// Cells of a side.
+    /// Number of cells along a side.
     fn n_cells(&self) -> usize {
         self.side / self.cell
     }
@@ -77,9 +77,9 @@ pub(crate) struct Buffers {
     means: Vec<[f32; 3]>,
 }
 
-/// The features of a tile as a crop shows it.
+/// Computes the features of a tile for a given crop.
 ///
-/// * `out`: overwritten; [`n_features`] values.
+/// * `out`: overwritten with [`n_features`] values.
 pub(crate) fn features(tile: &Tile, crop: &Crop, buffers: &mut Buffers, out: &mut Vec<f32>) {
     out.clear();
     for patch in &PATCHES {
@@ -95,7 +95,7 @@ fn gradients(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     let side = patch.side;
     let before = out.len();
     out.resize(before + patch.n_gradients(), 0.0);
-    // A patch has the size of its view: this cannot fail.
+    // The patch has the size of the view, so this cannot fail.
     if let Ok(view) = Rgb8View::new(side, side, &buffers.patch) {
         let planes = &mut buffers.planes;
         resize(isa, view, [side; 2], &mut buffers.shrink, planes);
@@ -109,7 +109,7 @@ fn gradients(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     }
 }
 
-/// Brightness of every cell relative to the patch's, and how red and blue it is.
+/// Brightness of every cell relative to the patch's, and the red and blue components of its colour.
 fn colours(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     let (side, cell, n) = (patch.side, patch.cell, patch.n_cells());
     buffers.means.clear();

@@ -1,17 +1,17 @@
 //! The file of a network.
 //!
-//! | values | what |
+//! | values | content |
 //! |---|---|
 //! | 1, u32 | number of features |
 //! | 1, u32 | number of hidden units |
 //! | features, f32 | means |
-//! | features, f32 | one over the deviations |
+//! | features, f32 | one over the standard deviations |
 //! | units x features, f32 | weights of the hidden units |
-//! | units, f32 | what is added to them |
+//! | units, f32 | biases of the hidden units |
 //! | 2 x units, f32 | weights of the outputs |
-//! | 2, f32 | what is added to them |
+//! | 2, f32 | biases of the outputs |
 //!
-//! All little-endian, behind the checked header of [`formats::checksum::Envelope`].
+//! All values are little-endian. They follow the checked header of [`formats::checksum::Envelope`].
 
 use formats::checksum::{Envelope, EnvelopeError};
 
@@ -23,49 +23,49 @@ const ENVELOPE: Envelope = Envelope {
     version: 1,
 };
 
-/// Most hidden units of a file that is read.
+/// Largest number of hidden units accepted in a file.
 const MAX_HIDDEN: usize = 4096;
 
-/// Why bytes are not the file of a network.
+/// Reason why bytes are not the file of a network.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FileError {
-    /// Another kind of file, another version, or a damaged one.
+    /// The file has another kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// It was made for other features.
-    #[error("the network takes {got} features, this Parallax computes {expected}")]
+    /// The network was made for other features.
+    #[error("the network takes {got} features, but this Parallax computes {expected}")]
     Features {
-        /// The file's.
+        /// Number of features in the file.
         got: usize,
-        /// Ours.
+        /// Number of features that this version computes.
         expected: usize,
     },
-    /// It has no hidden units, or too many.
+    /// The network has no hidden units, or too many.
     #[error("the network has {got} hidden units; 1 to {MAX_HIDDEN} can be read")]
     Hidden {
-        /// The file's.
+        /// Number of hidden units in the file.
         got: usize,
     },
-    /// The numbers do not fill the file.
-    #[error("{got} bytes of numbers, the sizes at the beginning need {expected}")]
+    /// The length of the file does not match its sizes.
+    #[error("there are {got} bytes of values, but the sizes in the header need {expected}")]
     Length {
-        /// Bytes there are.
+        /// Number of bytes found.
         got: usize,
-        /// Bytes that there should be.
+        /// Number of bytes expected.
         expected: usize,
     },
-    /// A number is infinite or none.
-    #[error("number {index} is {value}")]
+    /// A value is infinite or NaN.
+    #[error("value {index} is {value}")]
     NotFinite {
-        /// Its index among the numbers, from 0.
+        /// Index of the value, from 0.
         index: usize,
-        /// The number.
+        /// The invalid value.
         value: f32,
     },
 }
 
 impl Network {
-    /// The bytes of its file.
+    /// The bytes of the network's file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut payload = Vec::new();
         for size in [self.n_features(), self.n_hidden()] {
@@ -173,7 +173,7 @@ mod tests {
         assert!(read(payload([n + 1, 3], 0)).contains("features"));
         assert!(read(payload([n, 0], 0)).contains("0 hidden units"));
         assert!(read(payload([n, 5000], 0)).contains("5000 hidden units"));
-        assert!(read(payload([n, 3], 40)).contains("48 bytes of numbers"));
+        assert!(read(payload([n, 3], 40)).contains("48 bytes of values"));
         assert!(read(ENVELOPE.seal(&[1, 2, 3])).contains("3 bytes"));
     }
 
@@ -182,7 +182,7 @@ mod tests {
         let mut network = network(2);
         network.mean[7] = f32::NAN;
         let error = Network::from_bytes(&network.to_bytes()).unwrap_err();
-        assert_eq!(error.to_string(), "number 7 is NaN");
+        assert_eq!(error.to_string(), "value 7 is NaN");
     }
 
     proptest! {

@@ -2,27 +2,27 @@
 
 use rayon::prelude::*;
 
-/// Outputs: the two components of the evidence.
+/// Number of outputs: the two components of the evidence.
 pub(crate) const N_OUTPUTS: usize = 2;
 
-/// The numbers of a detector: features are standardised, go through one hidden layer of rectified linear units, and
-/// give two numbers.
+/// The parameters of a detector. Features are standardised and passed through one hidden layer of rectified linear units,
+/// which gives two outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     /// Mean of every feature.
     pub(crate) mean: Vec<f32>,
-    /// One over the deviation of every feature.
+    /// One over the standard deviation of every feature.
     pub(crate) inverse: Vec<f32>,
-    /// Weights of the hidden units, `[unit][feature]`, and what is added.
+    /// Weights of the hidden units, `[unit][feature]`; their biases follow.
     pub(crate) hidden: Vec<f32>,
     pub(crate) hidden_bias: Vec<f32>,
-    /// Weights of the outputs, `[output][unit]`, and what is added.
+    /// Weights of the outputs, `[output][unit]`; their biases follow.
     pub(crate) output: Vec<f32>,
     pub(crate) output_bias: [f32; N_OUTPUTS],
 }
 
 impl Network {
-    /// Number of features that it takes.
+    /// Number of features that the network takes.
     pub fn n_features(&self) -> usize {
         self.mean.len()
     }
@@ -40,7 +40,7 @@ impl Network {
         }
     }
 
-    /// The sums of the hidden units, before they are rectified.
+    /// The sums of the hidden units before rectification.
     pub(crate) fn sums(&self, features: &[f32]) -> Vec<f32> {
         let rows = self.hidden.chunks_exact(self.n_features().max(1));
         let sums = rows.zip(&self.hidden_bias);
@@ -66,7 +66,7 @@ impl Network {
         self.outputs(&units)
     }
 
-    /// Adds the steps of the hidden units' weights; rows in parallel.
+    /// Calls a function for the weights of every hidden unit, with rows in parallel.
     pub(crate) fn for_each_unit(
         &mut self,
         steps: &mut [f32],
@@ -81,7 +81,7 @@ impl Network {
     }
 }
 
-/// The scalar product, in one order on every machine.
+/// The scalar product, computed in the same order on every machine.
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     const LANES: usize = 16;
     let mut sums = [0.0_f32; LANES];

@@ -1,4 +1,4 @@
-//! How often a network is right about people whose direction is known.
+//! Evaluation of a network on people whose direction is known.
 
 use rayon::prelude::*;
 
@@ -8,27 +8,27 @@ use crate::orientation::train::Sample;
 /// How often a detector distinguishes a direction from its opposite.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Score {
-    /// People.
+    /// Number of people.
     pub n: usize,
-    /// Those whose true direction is the more likely one.
+    /// Number of people whose true direction is rated as the more likely one.
     pub n_right: usize,
-    /// Mean surprise, nats; `ln 2` for a detector that says nothing.
+    /// Mean negative log-likelihood in nats; `ln 2` for a detector without information.
     pub surprise: f64,
 }
 
 impl Score {
-    /// Share that is right, from 0 to 1.
+    /// Share of people for whom the detector is right, from 0 to 1.
     pub fn share(&self) -> f64 {
         self.n_right as f64 / self.n.max(1) as f64
     }
 }
 
-/// Scores a detector on samples; in parallel, the same bits on any number of threads.
+/// Evaluates a detector on samples. It runs in parallel, with the same bits for any number of threads.
 pub fn score(detector: &Detector, samples: &[Sample]) -> Score {
     let log_ratio = |workspace: &mut Workspace, sample: &Sample| {
         let evidence = detector.of_tile(&sample.tile, workspace);
         let [right, towards] = sample.front;
-        // Of unit length in the picture: the direction out of it is not known of photographs.
+        // The direction is scaled to unit length in the picture plane, because photographs do not show the depth component.
         let length = right.hypot(towards).max(0.3);
         f64::from(2.0 * (evidence[0] * right + evidence[1] * towards) / length)
     };

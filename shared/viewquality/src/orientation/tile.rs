@@ -9,27 +9,27 @@ pub const TILE: TileShape = TileShape {
     width: 128,
 };
 
-/// The tile that the box of the pose fills, up to a margin; the rest of [`TILE`] is around it.
+/// The part of [`TILE`] that the box of the pose fills, up to a margin.
 const BOX: TileShape = TileShape {
     height: 160,
     width: 96,
 };
 
-/// The surroundings of a pose at a scale of their own: what the detector looks at.
+/// The surroundings of a pose at a fixed scale: the detector's input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile {
     /// Red, green and blue of every pixel, row major: `192 x 128 x 3`.
     pub rgb: Vec<u8>,
-    /// The middle of the head and the neck in the tile, `[x, y]`, pixels.
+    /// The midpoint between head and neck in the tile, `[x, y]` in pixels.
     pub head: [f32; 2],
 }
 
 impl Tile {
     /// The tile around a pose.
     ///
-    /// * `bounds`: the pose's box in the frame, `[x1, y1, x2, y2]`, pixels.
-    /// * `head`: the middle of its head and neck in the frame, `[x, y]`, pixels.
-    /// * Returns `None` if these are not finite, or the box is empty.
+    /// * `bounds`: the pose's box in the frame, `[x1, y1, x2, y2]` in pixels.
+    /// * `head`: the midpoint between head and neck in the frame, `[x, y]` in pixels.
+    /// * Returns `None` if `bounds` or `head` is not finite, or if the box is empty.
     pub fn around(
         frame: Rgb8View<'_>,
         bounds: [f64; 4],
@@ -63,7 +63,7 @@ impl Tile {
         })
     }
 
-    /// One colour at a place, by bilinear interpolation; the border is repeated beyond the tile.
+    /// The colour at a position, interpolated bilinearly; outside the tile, the border is repeated.
     fn at(&self, [x, y]: [f32; 2]) -> [f32; 3] {
         let x = x.clamp(0.0, (TILE.width - 1) as f32);
         let y = y.clamp(0.0, (TILE.height - 1) as f32);
@@ -81,10 +81,10 @@ impl Tile {
             .map(|k| (a[k] * (1.0 - u) + b[k] * u) * (1.0 - v) + (c[k] * (1.0 - u) + d[k] * u) * v)
     }
 
-    /// A square patch as the crop shows it.
+    /// Samples a square patch with the variation of a crop.
     ///
-    /// * `below`: how far the patch's centre is below [`Tile::head`], pixels of the tile.
-    /// * `side`: pixels of the patch.
+    /// * `below`: distance of the patch's centre below [`Tile::head`], in pixels of the tile.
+    /// * `side`: side of the patch in pixels.
     /// * `scale`: pixels of the tile per pixel of the patch.
     /// * `out`: `side x side x 3`, overwritten.
     pub(crate) fn patch(
@@ -121,16 +121,16 @@ impl Tile {
     }
 }
 
-/// How a tile is looked at: unchanged by the detector, varied in training.
+/// Variation of a tile: none in the detector, random in training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crop {
-    /// Left and right exchanged.
+    /// True if left and right are exchanged.
     pub mirrored: bool,
     /// Factor of the patches' size.
     pub scale: f32,
-    /// Shift of the patches' centres, `[x, y]`, pixels of the tile.
+    /// Shift of the patches' centres, `[x, y]` in pixels of the tile.
     pub shift_px: [f32; 2],
-    /// Turn about the centres, radians.
+    /// Rotation about the centres, in radians.
     pub turn: f32,
     /// Factors of red, green and blue.
     pub gain: [f32; 3],

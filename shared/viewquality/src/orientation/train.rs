@@ -1,4 +1,4 @@
-//! Learns a network: stochastic gradient descent with momentum on the likelihood of the true direction over its
+//! Trains a network by stochastic gradient descent with momentum. The loss is the negative log-likelihood of the true direction versus its
 //! opposite.
 
 use fastrand::Rng;
@@ -11,29 +11,29 @@ use crate::orientation::tile::{Crop, Tile};
 /// A person whose direction is known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
-    /// Tile that the detector looks at.
+    /// Tile with the person.
     pub tile: Tile,
-    /// The direction in which the person faces: towards the right of the picture, towards the camera; of length 1 at
-    /// most.
+    /// The direction in which the person faces: components towards the right of the picture and towards the camera. Its length is at
+    /// most 1.
     pub front: [f32; 2],
-    /// A photograph of a person: those who are seen from behind weigh as much as those who are not, together.
+    /// True for a photograph. Photographs of people seen from behind are weighted to count as much in total as all other photographs.
     pub is_photograph: bool,
 }
 
 /// Settings of the training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Hidden units.
+    /// Number of hidden units.
     pub hidden: usize,
-    /// Passes through all samples.
+    /// Number of passes over all samples.
     pub passes: usize,
-    /// Samples of a step.
+    /// Number of samples per step.
     pub batch: usize,
-    /// Step width at the beginning; it falls to 0 as half a cosine.
+    /// Initial step length; it falls to 0 as half a cosine.
     pub rate: f32,
     /// Weight decay.
     pub decay: f32,
-    /// Random seed.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -50,30 +50,30 @@ impl Default for Settings {
     }
 }
 
-/// How far a training is.
+/// Progress of a training run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pass {
-    /// The pass that is done, from 1.
+    /// Number of the finished pass, from 1.
     pub nth: usize,
     /// Number of passes.
     pub of: usize,
-    /// Mean loss of the pass, nats.
+    /// Mean loss of the pass, in nats.
     pub loss: f64,
 }
 
-/// Share of the features, and of the hidden units, that are left out of a step at random.
+/// Shares of the features, and of the hidden units, that are left out of a step at random.
 const FEATURES_OUT: f32 = 0.15;
 const UNITS_OUT: f32 = 0.5;
-/// Deviation below which a feature is not enlarged any more.
+/// Least standard deviation by which a feature is divided.
 const MIN_DEVIATION: f32 = 0.02;
-/// Steps until the step width is reached.
+/// Number of steps until the full step length is reached.
 const WARM_UP: f32 = 200.0;
 const MOMENTUM: f32 = 0.9;
 
-/// Learns a network from samples, on rayon's current pool; the same bits on any number of threads.
+/// Trains a network on samples, on rayon's current pool. The result has the same bits for any number of threads.
 ///
-/// * `watch`: called after every pass; ends the training by `false`.
-/// * Returns `None` without samples, or if `watch` ended it.
+/// * `watch`: called after every pass; ends the training by returning `false`.
+/// * Returns `None` if there are no samples or `watch` ended the training.
 pub fn train(
     samples: &[Sample],
     settings: &Settings,
@@ -117,7 +117,7 @@ pub fn train(
     Some(trainer.network)
 }
 
-/// How many times a photograph of a person from behind counts.
+/// Weight of a photograph of a person from behind.
 fn weight_behind(samples: &[Sample]) -> f32 {
     let photographs = || samples.iter().filter(|sample| sample.is_photograph);
     let behind = photographs().filter(|photograph| photograph.front[1] < 0.0).count();
@@ -170,7 +170,7 @@ fn beginning(samples: &[Sample], settings: &Settings, rng: &mut Rng) -> Network 
     }
 }
 
-/// A crop that differs as boxes, lamps and people do.
+/// A random crop, within the variation of boxes, lighting and people.
 fn vary(rng: &mut Rng) -> Crop {
     let mut within = |most: f32| most * (2.0 * rng.f32() - 1.0);
     let bright = 1.0 + within(0.35);
@@ -192,7 +192,7 @@ struct Trainer {
 }
 
 impl Trainer {
-    /// Goes one step; returns the sum of the losses.
+    /// Makes one step, and returns the sum of the losses.
     fn step(&mut self, batch: &[(&Sample, Crop, u64)], rate: f32) -> f64 {
         let network = &self.network;
         let inputs: Vec<Vec<f32>> = batch
@@ -209,7 +209,7 @@ impl Trainer {
         let hidden = network.n_hidden();
         let mut of_output = vec![0.0; N_OUTPUTS * hidden];
         let mut of_bias = [0.0; N_OUTPUTS];
-        // The derivative of the loss by the sum of every hidden unit, of every sample.
+        // For every sample, the derivative of the loss with respect to the sum of every hidden unit.
         let mut of_sums = vec![vec![0.0; hidden]; batch.len()];
         let mut loss = 0.0;
         for (((sample, crop, seed), sums), of_sums) in batch.iter().zip(&sums).zip(&mut of_sums) {
@@ -243,7 +243,7 @@ impl Trainer {
         loss
     }
 
-    /// Moves all numbers against their derivatives.
+    /// Changes all parameters against their derivatives.
     fn go(
         &mut self,
         rate: f32,
@@ -281,7 +281,7 @@ impl Trainer {
     }
 }
 
-/// Sets a share of values to 0 at random, and enlarges the others so that their sum is expected to stay.
+/// Sets a random share of the values to 0, and scales the others so that the expected sum does not change.
 fn leave_out(values: &mut [f32], share: f32, seed: u64) {
     let mut rng = Rng::with_seed(seed);
     let limit = (share * 256.0) as u8;

@@ -1,10 +1,10 @@
-//! Tiles show the right part of the frame, and resampling is a weighted mean at every scale.
+//! Tests that tiles show the right part of the frame, and that resampling is a weighted mean at every scale.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// Colours unchanged, from 0 to 255.
+/// A normalisation that keeps colours from 0 to 255.
 const PLAIN: Normalisation = Normalisation {
     mean: [0.0; 3],
     deviation: [1.0 / 255.0; 3],
@@ -22,7 +22,7 @@ fn sampled(size: [usize; 2], data: &[u8], tile: &Tile) -> Vec<f32> {
     out
 }
 
-/// Red is the column, green the row, blue always 7.
+/// An image in which red is the column, green the row, and blue always 7.
 fn ramp([width, height]: [usize; 2]) -> Vec<u8> {
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| [x as u8, y as u8, 7]));
     pixels.flatten().collect()
@@ -134,7 +134,7 @@ fn colours_are_normalised() {
     assert_eq!(out, [1.0, -2.0, 0.2]);
 }
 
-/// The same sum as one formula, in f64.
+/// The same sum as a single formula, in f64.
 fn reference(size: [usize; 2], data: &[u8], tile: &Tile, [row, col, channel]: [usize; 3]) -> f64 {
     let reach = tile.scale.max(1.0);
     let TileShape { height, width } = tile.shape;

@@ -12,7 +12,7 @@ use statistics::score::Point;
 use crate::datasets::sequences::error::{invalid, text};
 use crate::datasets::sequences::{Frame, Options, Sequence, SequenceError, View};
 
-/// The description. Paths are relative to its file.
+/// Content of the description file. Paths are relative to the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -24,14 +24,14 @@ struct Description {
     /// Name of the subject.
     #[serde(default)]
     subject: String,
-    /// Name of the action; that of the sequence, if not given.
+    /// Name of the action; by default, the name of the sequence.
     #[serde(default)]
     action: Option<String>,
-    /// The calibration.
+    /// Path of the calibration.
     rig: PathBuf,
     /// The views.
     camera: Vec<CameraEntry>,
-    /// The joints in space.
+    /// The true joints in space.
     truth: Truth,
 }
 
@@ -49,12 +49,12 @@ struct CameraEntry {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Truth {
-    /// A TRC file.
+    /// Path of a TRC file.
     trc: PathBuf,
-    /// Frame of the sequence that corresponds to its first row.
+    /// Frame of the sequence that corresponds to the first row of the file.
     #[serde(default)]
     first_frame: u64,
-    /// Which of the file's axes are the world's x, y and z; `["z", "x", "y"]` where y is up.
+    /// Axes of the file that are the world's x, y and z; `["z", "x", "y"]` if y is up.
     world_from_file: [Axis; 3],
     /// Name of the joint set.
     joints: String,

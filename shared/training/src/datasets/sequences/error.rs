@@ -1,4 +1,4 @@
-//! Why a sequence could not be read.
+//! Reasons why a sequence could not be read.
 
 use std::path::{Path, PathBuf};
 
@@ -7,10 +7,10 @@ use formats::trc::TrcError;
 use geometry::RigError;
 use geometry::files::RigFileError;
 
-/// Why a sequence could not be read.
+/// Reason why a sequence could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
-    /// Neither a known data set, nor a description.
+    /// The path is neither a known data set nor a description.
     #[error(
         "{}: neither a folder of HumanEva-I, UMPM or `parallax-lab synth`, nor a description (.toml)",
         .path.display()
@@ -24,26 +24,26 @@ pub enum SequenceError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The footage of a camera is missing.
     #[error("{}: {hint}", .path.display())]
     NoFootage {
-        /// Where it should be.
+        /// Path where the footage is expected.
         path: PathBuf,
         /// Advice.
         hint: &'static str,
     },
     /// The calibration cannot be read.
-    #[error("the calibration")]
+    #[error("cannot read the calibration")]
     Rig(#[from] RigFileError),
     /// The cameras are not a valid rig.
-    #[error("{}: the cameras", .path.display())]
+    #[error("{}: invalid cameras", .path.display())]
     Cameras {
         /// The calibration.
         path: PathBuf,
-        /// Why.
+        /// Fault of the rig.
         source: RigError,
     },
     /// The rig lacks a camera.
@@ -51,15 +51,15 @@ pub enum SequenceError {
     NoCamera {
         /// The calibration, or the file that refers to the camera.
         path: PathBuf,
-        /// The camera.
+        /// Name of the camera.
         name: String,
     },
-    /// Motion capture cannot be read.
+    /// A motion capture file cannot be read.
     #[error("{}", .path.display())]
     C3d {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file's content.
         source: C3dError,
     },
     /// A motion capture file lacks a point.
@@ -67,10 +67,10 @@ pub enum SequenceError {
     NoPoint {
         /// The file.
         path: PathBuf,
-        /// The point.
+        /// Name of the point.
         name: String,
     },
-    /// The unit of motion capture is not known.
+    /// The unit of a motion capture file is unknown.
     #[error("{}: unit {units:?} is not known", .path.display())]
     Units {
         /// The file.
@@ -78,20 +78,20 @@ pub enum SequenceError {
         /// The unit in the file.
         units: String,
     },
-    /// The reference cannot be read.
+    /// The file with the true joints cannot be read.
     #[error("{}", .path.display())]
     Trc {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file's content.
         source: TrcError,
     },
-    /// A text is invalid.
+    /// A text file is invalid.
     #[error("{}, line {line}: {what}", .path.display())]
     Text {
         /// The file.
         path: PathBuf,
-        /// Line, from 1; 0 for the whole file.
+        /// Number of the line, from 1; 0 for the whole file.
         line: usize,
         /// Fault of the line.
         what: String,
@@ -99,36 +99,36 @@ pub enum SequenceError {
     /// The streams of a trial cannot be synchronised.
     #[error("{}", .path.display())]
     Sync {
-        /// The folder.
+        /// Folder of the trial.
         path: PathBuf,
-        /// Why.
+        /// Reason why they cannot be synchronised.
         source: SyncError,
     },
 }
 
-/// Why the streams of a trial cannot be synchronised.
+/// Reason why the streams of a trial cannot be synchronised.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SyncError {
     /// No camera has an offset.
-    #[error("no camera says when it began (.ofs)")]
+    #[error("no camera has a start offset (.ofs)")]
     Nothing,
-    /// A rate that is not positive.
+    /// A rate is not positive.
     #[error(
         "there are {rate} frames of motion capture for each frame of a camera, expected more than 0"
     )]
     Rate {
-        /// The rate.
+        /// Frames of motion capture per camera frame.
         rate: f64,
     },
-    /// A stream that would begin before its first frame.
-    #[error("a camera would begin at its frame {offset}, before its first frame, 1")]
+    /// A stream would begin before its first frame.
+    #[error("a camera would begin at frame {offset}, before its first frame, 1")]
     Before {
-        /// The frame, from 1.
+        /// Number of the frame, from 1.
         offset: f64,
     },
 }
 
-/// Reads a text file; the error names it.
+/// Reads a text file; an error names the file.
 pub(crate) fn text(path: &Path) -> Result<String, SequenceError> {
     files::read_text(path, files::RESULTS).map_err(|source| io(path, source))
 }
@@ -146,7 +146,7 @@ pub(crate) fn invalid(path: &Path, line: usize, what: impl Into<String>) -> Sequ
     }
 }
 
-/// Reads a motion capture file; also returns metres per unit.
+/// Reads a motion capture file, and returns it with the length of its unit in metres.
 pub(crate) fn motion(path: &Path) -> Result<(formats::c3d::C3d, f64), SequenceError> {
     let bytes = files::read(path, files::RESULTS).map_err(|source| io(path, source))?;
     let path = path.to_owned();

@@ -1,8 +1,8 @@
 //! `HumanEva-I` in its own layout: a folder for each subject.
 //!
-//! `Image_Data/Walking_1_(C1).avi` (or a folder of its pictures, without the extension),
+//! A folder contains `Image_Data/Walking_1_(C1).avi` (or a folder of pictures, without the extension),
 //! `Calibration_Data/C1.cal`, `Sync_Data/Walking_1_(C1).ofs`, `Mocap_Data/Walking_1.c3d`, `Static.c3d` and
-//! `S1.mp`. The first five frames of every video are one frame repeated, so trials begin at frame 6.
+//! `S1.mp`. The first five frames of every video repeat one frame, so trials begin at frame 6.
 
 mod body;
 mod sync;
@@ -28,10 +28,10 @@ const ALL_CAMERAS: [&str; 7] = ["C1", "C2", "C3", "BW1", "BW2", "BW3", "BW4"];
 /// Frames per second of the colour cameras.
 const FRAME_RATE_HZ: f64 = 60.0;
 
-/// The trial whose first half is the paper's test set: the part that the data set's authors intended for validation.
+/// The trial whose first half is the paper's test set. The data set's authors intended this part for validation.
 pub const TRIAL: u32 = 1;
 
-/// The frames that the paper tests on, of one subject and action.
+/// The test frames of the paper for one subject and action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PaperTest {
     /// The subject.
@@ -42,7 +42,7 @@ pub struct PaperTest {
     pub first: u64,
     /// The last frame.
     pub last: u64,
-    /// Number of frames of each camera: those with complete motion capture.
+    /// Number of frames of each camera with complete motion capture.
     pub n_frames: usize,
 }
 
@@ -77,7 +77,7 @@ pub const PAPER_TEST: [PaperTest; 12] = [
     test("S3", "Walking", [6, 448], 412),
 ];
 
-/// Reads the paper's test sequences of one subject, those that exist.
+/// Reads those of the paper's test sequences of one subject that exist.
 pub(crate) fn read_subject(
     folder: &Path,
     options: &Options,

@@ -1,8 +1,8 @@
-//! The motion of one person from a C3D or TRC file: joints over time, in metres and z up.
+//! The motion of one person from a C3D or TRC file: joints over time, in metres, z up.
 //!
 //! A [`MarkerTable`] converts markers to joints. Gaps are interpolated up to a limit. The motion is checked for
-//! plausibility: the length of the legs, the head above the feet, and knees that bend backward, which they do not
-//! if axes are mirrored or sides exchanged.
+//! plausibility: the legs have a possible length, the head is above the feet, and the knees bend backward. The last check finds
+//! mirrored axes and exchanged sides.
 
 mod check;
 mod error;
@@ -22,14 +22,14 @@ use trial::Trial;
 /// Options for reading a motion file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionOptions {
-    /// First and last frame, numbered as in the file; all if not set.
+    /// First and last frame, numbered as in the file; all frames if `None`.
     pub frames: Option<[u32; 2]>,
-    /// The longest gap of a marker that is interpolated linearly, seconds.
+    /// Longest gap of a marker that is interpolated linearly, in seconds.
     pub max_gap_s: f64,
 }
 
 impl Default for MotionOptions {
-    /// All frames; a quarter of a second.
+    /// All frames; gaps up to a quarter of a second.
     fn default() -> Self {
         Self {
             frames: None,
@@ -38,20 +38,20 @@ impl Default for MotionOptions {
     }
 }
 
-/// The joints of a person over time: metres, z up.
+/// The joints of a person over time, in metres, z up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
-    /// Postures a second.
+    /// Number of postures per second.
     pub rate_hz: f64,
-    /// `[frame]`: the joints of `skeleton::PARSE14`.
+    /// The joints of `skeleton::PARSE14` in each frame.
     pub joints: Vec<[[f64; 3]; 14]>,
-    /// `[frame]`: the toes of the right and of the left foot; `None` if the table does not have them.
+    /// The toes of the right and of the left foot in each frame; `None` if the table does not define them.
     pub toes: Option<Vec<[[f64; 3]; 2]>>,
 }
 
 /// Reads a file.
 ///
-/// * `table`: converts markers to joints; if not given, the first of [`PRESETS`] whose markers all exist.
+/// * `table`: converts markers to joints; if `None`, the first of [`PRESETS`] whose markers all exist.
 ///
 /// # Errors
 ///
@@ -96,7 +96,7 @@ fn preset_for(trial: &Trial) -> Option<MarkerTable> {
     tables.find(|table| table.markers().all(|name| trial.marker(name).is_some()))
 }
 
-/// The markers that a table needs, without gaps: metres, z up.
+/// The markers that a table needs, without gaps, in metres, z up.
 struct Columns<'a> {
     path: &'a Path,
     of_marker: Vec<(String, Vec<[f64; 3]>)>,
@@ -164,11 +164,11 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// A marker without gaps: interpolated linearly between visible frames, constant at the ends.
+/// Fills the gaps of a marker: linearly between visible frames, constant at the ends.
 ///
 /// # Errors
 ///
-/// The first and last frame of the first gap that is longer than `longest` frames; of all, if it was never visible.
+/// The first and last frame of the first gap longer than `longest` frames; of all frames if the marker was never visible.
 fn interpolated(seen: &[Option<[f64; 3]>], longest: f64) -> Result<Vec<[f64; 3]>, [usize; 2]> {
     let mut points: Vec<[f64; 3]> = Vec::with_capacity(seen.len());
     while points.len() < seen.len() {

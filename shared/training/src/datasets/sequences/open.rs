@@ -1,4 +1,4 @@
-//! Finds the sequences that a path stands for.
+//! Finds the sequences at a path.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use crate::datasets::sequences::{
     Options, Sequence, SequenceError, described, humaneva, synthetic, umpm,
 };
 
-/// Reads all sequences that a path stands for.
+/// Reads all sequences at a path.
 ///
 /// | path | sequences |
 /// |---|---|
@@ -15,7 +15,7 @@ use crate::datasets::sequences::{
 /// | a folder with `truth.jsonl` | a sequence of `parallax-lab synth` |
 /// | a folder with `Image_Data` and `Mocap_Data` | a subject of `HumanEva-I`: the paper's test frames of every action |
 /// | a folder with `NAME.json` and `Groundtruth` | a sequence of UMPM |
-/// | a folder of such folders | all of them, in the order of their names |
+/// | a folder of such folders | all their sequences, in the order of the folder names |
 ///
 /// # Errors
 ///
@@ -46,7 +46,7 @@ pub fn read(path: &Path, options: &Options) -> Result<Vec<Sequence>, SequenceErr
     Ok(sequences)
 }
 
-/// The sequences of a folder; `None` if its layout is not known.
+/// The sequences of a folder; `None` if its layout is unknown.
 fn folder(path: &Path, options: &Options) -> Option<Result<Vec<Sequence>, SequenceError>> {
     if path.join(synthetic::TRUTH).is_file() {
         return Some(synthetic::read(path, options).map(|sequence| vec![sequence]));

@@ -4,12 +4,12 @@ use geometry::Rig;
 use skeleton::JointSet;
 use statistics::score::Point;
 
-/// One person doing one action in front of one rig.
+/// A sequence of one person doing one action in front of one rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
-    /// Name, different for all sequences of a data set: `S1 Walking`.
+    /// Name of the sequence, unique in the data set: `S1 Walking`.
     pub name: String,
-    /// Name of the data set: `HumanEva`, `UMPM`, `synthetic`, or that of a description.
+    /// Name of the data set: `HumanEva`, `UMPM`, `synthetic`, or a name from a description.
     pub dataset: String,
     /// Name of the subject: `S1`; may be empty.
     pub subject: String,
@@ -17,13 +17,13 @@ pub struct Sequence {
     pub action: String,
     /// The calibrated cameras, in the order of the views.
     pub rig: Rig,
-    /// The footage, one for each camera.
+    /// The footage, one item for each camera.
     pub views: Vec<View>,
     /// Frames per second of the footage.
     pub frame_rate_hz: Option<f64>,
-    /// The set of the true joints.
+    /// Names of the true joints.
     pub joints: &'static JointSet,
-    /// The frames that are evaluated, ascending.
+    /// The frames to evaluate, in ascending order.
     pub frames: Vec<Frame>,
 }
 
@@ -32,33 +32,33 @@ pub struct Sequence {
 pub struct View {
     /// Name of the camera in the rig.
     pub camera: String,
-    /// The footage to open: a video, a folder of images, a pattern.
+    /// The footage to open: a video, a folder of images, or a pattern.
     pub source: String,
-    /// Frame of the footage (from 0) that is frame 0 of the sequence.
+    /// Number of the footage's frame (from 0) that is frame 0 of the sequence.
     pub first: u64,
-    /// The calibrated pixel of the footage's top-left pixel, if it lacks rows or columns.
+    /// The calibrated pixel of the footage's top-left pixel, if the footage lacks rows or columns.
     pub source_offset_px: Option<[u32; 2]>,
 }
 
-/// One instant.
+/// One frame of a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Number in the data set.
+    /// Number of the frame in the data set.
     pub number: u64,
-    /// Frame of the sequence, from 0: [`View::first`] plus this is the frame of the footage.
+    /// Index of the frame in the sequence, from 0. [`View::first`] plus this index is the frame of the footage.
     pub index: u64,
-    /// The joints of the sequence's joint set, metres; `None` where one is unknown.
+    /// The joints of the sequence's joint set, in metres; `None` if a joint is unknown.
     pub joints: Vec<Option<Point>>,
 }
 
-/// How the frames of UMPM correspond to its motion capture, which is twice as fast.
+/// Alignment of UMPM's frames with its motion capture, which has twice the rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Alignment {
     /// The first frame corresponds to the first pose, as documented by the data set.
     #[default]
     Direct,
-    /// Every frame corresponds to the pose of the frame before it: as computed by the tool that was
-    /// released with the paper, apparently by mistake.
+    /// Every frame corresponds to the pose of the frame before it. The tool released with the paper computes this,
+    /// apparently by mistake.
     OneLate,
 }
 
@@ -67,12 +67,12 @@ pub enum Alignment {
 pub struct Options {
     /// The alignment of UMPM.
     pub alignment: Alignment,
-    /// Which share of the frames to read, from and to, 0..1; all if not set.
+    /// Share of the frames to read, as start and end from 0 to 1; all if `None`.
     pub share: Option<[f64; 2]>,
 }
 
 impl Options {
-    /// The chosen range of `n` frames.
+    /// The chosen range out of `n` frames.
     pub(crate) fn range(&self, n: usize) -> std::ops::Range<usize> {
         let [from, to] = self.share.unwrap_or([0.0, 1.0]);
         let at = |share: f64| ((share.clamp(0.0, 1.0) * n as f64).round() as usize).min(n);
@@ -83,8 +83,8 @@ impl Options {
 impl Sequence {
     /// Keeps some of the frames.
     ///
-    /// * `every`: the distance between frames, from the first.
-    /// * `most`: the largest number of frames.
+    /// * `every`: distance between two kept frames, counted from the first.
+    /// * `most`: largest number of frames.
     pub fn thin_out(&mut self, every: usize, most: Option<usize>) {
         let kept = std::mem::take(&mut self.frames).into_iter();
         let kept = kept.step_by(every.max(1));

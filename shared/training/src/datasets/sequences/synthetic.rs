@@ -9,10 +9,10 @@ use skeleton::PARSE14;
 use crate::datasets::sequences::error::{invalid, text};
 use crate::datasets::sequences::{Frame, Options, Sequence, SequenceError, View};
 
-/// The file that identifies such a folder.
+/// Name of the file that identifies such a folder.
 pub(crate) const TRUTH: &str = "truth.jsonl";
 
-/// The part of the first line that is needed here; the format is documented in the crate `scene`.
+/// The part of the first line that is needed here. The crate `scene` documents the format.
 #[derive(Debug, Deserialize)]
 struct Header {
     format: String,

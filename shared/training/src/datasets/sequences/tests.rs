@@ -1,4 +1,4 @@
-//! Every layout, written to disk and read back.
+//! Tests that write and read every layout.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use testkit::c3d::{Processor, Trial, write};
 
 use crate::datasets::sequences::{Alignment, Options, SequenceError, read};
 
-/// Cameras on a circle of 4 m.
+/// A rig of cameras on a circle of 4 m.
 pub(crate) fn rig(names: &[&str], size: [u32; 2]) -> Rig {
     let camera = |(nth, name): (usize, &&str)| {
         let angle = 0.9 * nth as f64;

@@ -1,8 +1,8 @@
-//! UMPM in its own layout: a folder for each sequence, calibrations beside them.
+//! UMPM in its own layout: a folder for each sequence, with the calibrations beside the folders.
 //!
-//! `SEQ/SEQ.json` names the calibration, `SEQ/Video/SEQ_{f,l,r,s}.avi` are 50 frames a second of 644x486,
-//! and `SEQ/Groundtruth/SEQ_vm.c3d` has the 15 joints of the person (of several people, the first is
-//! used) at 100 Hz, so that every second pose corresponds to a frame. The videos are distributed packed
+//! `SEQ/SEQ.json` names the calibration. `SEQ/Video/SEQ_{f,l,r,s}.avi` have 50 frames per second of 644x486 pixels.
+//! `SEQ/Groundtruth/SEQ_vm.c3d` has the 15 joints of the person at 100 Hz, so that every second pose corresponds to a frame.
+//! If there are several people, the first is used. The videos are distributed packed
 //! (`.avi.xz`).
 
 use std::path::{Path, PathBuf};
@@ -17,13 +17,13 @@ use crate::datasets::sequences::{Alignment, Frame, Options, Sequence, SequenceEr
 
 const CAMERAS: [&str; 4] = ["f", "l", "r", "s"];
 
-/// Poses for each frame of a camera.
+/// Number of poses per camera frame.
 const POSES_PER_FRAME: usize = 2;
 
 /// Frames per second of the cameras.
 const FRAME_RATE_HZ: f64 = 50.0;
 
-/// The description of the sequence in a folder, if it is one of UMPM.
+/// Path of the description of the sequence in a folder, if it is a sequence of UMPM.
 pub(crate) fn description(folder: &Path) -> Option<PathBuf> {
     let name = folder.file_name()?.to_str()?;
     let file = folder.join(format!("{name}.json"));
@@ -64,7 +64,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
             joints: joints.collect(),
         })
     };
-    // `p1_chair_2`: people, action, trial.
+    // The parts of `p1_chair_2` are people, action and trial.
     let mut words = name.split('_');
     let subject = words.next().unwrap_or_default().to_owned();
     let action = words.next().map_or_else(|| name.to_string(), capital);
@@ -127,7 +127,7 @@ fn cameras(
     Ok((rig, views))
 }
 
-/// A string in a JSON object. Some files of the set have a trailing comma, so they are not parsed.
+/// Finds a string in a JSON object. Some files of the data set have a trailing comma, so they cannot be parsed as JSON.
 fn value(text: &str, key: &str) -> Option<String> {
     let (_, rest) = text.split_once(&format!("\"{key}\""))?;
     let rest = rest.trim_start().strip_prefix(':')?.trim_start();
@@ -135,7 +135,7 @@ fn value(text: &str, key: &str) -> Option<String> {
     Some(value.to_owned())
 }
 
-/// `chair` as in the paper's tables: `Chair`.
+/// Capitalises a word as in the paper's tables: `chair` becomes `Chair`.
 fn capital(word: &str) -> String {
     let mut letters = word.chars();
     let first = letters.next().map(|letter| letter.to_ascii_uppercase());

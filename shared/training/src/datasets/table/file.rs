@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::{SkeletonSpec, SkeletonTable, TableError};
 
-/// Why a skeleton file cannot be used.
+/// Reason why a skeleton file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SkeletonFileError {
     /// The file cannot be read.
@@ -20,27 +20,27 @@ pub enum SkeletonFileError {
         /// Error of the operating system.
         source: io::Error,
     },
-    /// Not TOML, or with other keys.
+    /// The text is not TOML, or has unknown keys.
     #[error("not a skeleton")]
     Syntax(#[from] toml::de::Error),
-    /// An unknown name of a part or a joint.
+    /// The name of a part or joint is unknown.
     #[error("{whose} names the {what} {name:?}, which does not exist")]
     NoSuch {
-        /// Where it is used.
+        /// Text that says where the name is used.
         whose: String,
         /// `part`, or `joint`.
         what: &'static str,
-        /// The name.
+        /// The unknown name.
         name: String,
     },
-    /// A joint in two pairs of the mirror.
+    /// A joint is in two pairs of the mirror.
     #[error("the joint {name:?} is in two pairs of `joint_mirror`")]
     MirroredTwice {
-        /// Its name.
+        /// Name of the joint.
         name: String,
     },
     /// The skeleton in the file is invalid.
-    #[error("the skeleton was refused")]
+    #[error("the skeleton is invalid")]
     Table(#[from] TableError),
 }
 
@@ -76,11 +76,11 @@ impl SkeletonTable {
         Self::parse(&text)
     }
 
-    /// Reads the text of a TOML file.
+    /// Parses the text of a TOML file.
     ///
-    /// `joints` names the joints in the order of the annotation, `joint_mirror` the pairs that the mirror
-    /// exchanges; every `[[part]]` has a `name`, a `parent` (all but the first), the `joints` it lies
-    /// between with their weights, and its `mirror` where that is not itself. Names are exact.
+    /// `joints` lists the names of the joints in the order of the annotation. `joint_mirror` lists the pairs that the mirror
+    /// exchanges. Every `[[part]]` has a `name`, a `parent` (except the first), and the `joints` with the weights that
+    /// determine its position. A part that is not its own mirror image also has a `mirror`. Names must match exactly.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! The published models' 26 parts between the 14 joints of PARSE and LSP.
+//! The published models' 26 parts, derived from the 14 joints of PARSE and LSP.
 
 use skeleton::{MIRROR, PARENT, PARSE14, PART_NAMES};
 
@@ -7,10 +7,10 @@ use super::{SkeletonSpec, SkeletonTable};
 const THIRD: f64 = 1.0 / 3.0;
 const TWO_THIRDS: f64 = 2.0 / 3.0;
 
-/// The joint on the other side, in the order of `skeleton::PARSE14`.
+/// For each joint, the joint on the other side, in the order of `skeleton::PARSE14`.
 const JOINT_MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
 
-/// Source: Yang & Ramanan's release 1.3, `PARSE_data`.
+/// Joints and weights of each part. Source: Yang & Ramanan's release 1.3, `PARSE_data`.
 const WEIGHTS: [&[(usize, f64)]; 26] = [
     &[(13, 1.0)],
     &[(12, 1.0)],
@@ -41,7 +41,7 @@ const WEIGHTS: [&[(usize, f64)]; 26] = [
 ];
 
 impl SkeletonTable {
-    /// The 26 parts of the published models from the 14 joints of PARSE and LSP.
+    /// The 26 parts of the published models, derived from the 14 joints of PARSE and LSP.
     pub fn published() -> Self {
         Self(SkeletonSpec {
             names: PART_NAMES.map(str::to_owned).to_vec(),

@@ -15,7 +15,7 @@ fn upper_body() -> SkeletonTable {
 
 type Change = fn(&mut SkeletonSpec);
 
-/// The error after one change to the published skeleton.
+/// Returns the error after one change to the published skeleton.
 fn error_after(change: impl FnOnce(&mut SkeletonSpec)) -> String {
     let mut spec = SkeletonTable::published().0;
     change(&mut spec);
@@ -73,11 +73,11 @@ fn errors_of_invalid_skeletons_have_name_and_number() {
             table.names[2] = "head".to_owned();
         }),
         (
-            "part 1 (head) has a parent: the first part and only the first is the root",
+            "part 1 (head) has a parent: the first part, and no other, is the root",
             |table| table.parent[0] = Some(1),
         ),
         (
-            "part 3 (right shoulder) has no parent: the first part and only the first is the root",
+            "part 3 (right shoulder) has no parent: the first part, and no other, is the root",
             |table| table.parent[2] = None,
         ),
         (
@@ -85,15 +85,15 @@ fn errors_of_invalid_skeletons_have_name_and_number() {
             |table| table.parent[2] = Some(2),
         ),
         (
-            "the mirror of part 15 (left shoulder) is 3, but not the other way round or not there",
+            "the mirror of part 15 (left shoulder) is 3, but not vice versa, or it does not exist",
             |table| table.mirror[2] = 2,
         ),
         (
-            "the mirror of joint 14 (head) is 100, but not the other way round or not there",
+            "the mirror of joint 14 (head) is 100, but not vice versa, or it does not exist",
             |table| table.joint_mirror[13] = 99,
         ),
         (
-            "the mirror of part 4 (right upper arm) hangs on another part than the mirror of its parent",
+            "the mirror of part 4 (right upper arm) is not a child of the mirror of its parent",
             |table| {
                 table.mirror[2] = 2;
                 table.mirror[14] = 14;
@@ -102,13 +102,15 @@ fn errors_of_invalid_skeletons_have_name_and_number() {
             },
         ),
         (
-            "part 4 (right upper arm) and its mirror image left upper arm do not lie between the same joints of \
-             either side",
+            "part 4 (right upper arm) and its mirror image left upper arm are not between corresponding joints",
             |table| table.weights[3] = vec![(8, 0.4), (7, 0.6)],
         ),
-        ("part 2 (neck) names joint 15, but there are 14", |table| {
-            table.weights[1] = vec![(14, 1.0)];
-        }),
+        (
+            "part 2 (neck) uses joint 15, but there are only 14",
+            |table| {
+                table.weights[1] = vec![(14, 1.0)];
+            },
+        ),
         (
             "the weights of part 2 (neck) add up to 0.9, expected 1",
             |table| table.weights[1] = vec![(12, 0.9)],
@@ -146,7 +148,7 @@ fn invalid_skeleton_files_are_refused() {
             "name = \"r\"\nparent = \"q\"",
             "the part \"r\" names the part \"q\", which does not exist",
         ),
-        ("a = 0.5", "a = 0.25", "the skeleton was refused"),
+        ("a = 0.5", "a = 0.25", "the skeleton is invalid"),
         ("joints = {", "joint = {", "not a skeleton"),
     ];
     for (from, to, expected) in cases {

@@ -1,29 +1,29 @@
-//! The card of a trained network: what Parallax has to know to use it.
+//! The card of a trained network: the information that Parallax needs to use the network.
 
 use super::network::{BOXES, PICTURE, STRIDE, Shape};
 use super::score::Score;
 use crate::networks::pose::{DEVIATION, FILL, MEAN};
 
-/// Boxes with a lower score are dropped.
+/// Least score of a box that is kept.
 const LEAST_SCORE: f64 = 0.2;
-/// The worse of two boxes that share more than this of their union is dropped: people who stand in front of each other share more
-/// than half.
+/// Overlap (intersection over union) above which the worse of two boxes is dropped. Boxes of people who stand in front of each other can
+/// overlap by more than half.
 const MOST_OVERLAP: f64 = 0.65;
 
-/// Facts that a card tells beside how the network is used.
+/// Information for a card about the training.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct About {
-    /// Pictures learned from, and kept apart.
+    /// Number of training pictures and of held-out pictures.
     pub pictures: [usize; 2],
-    /// Samples that the network was shown.
+    /// Number of samples used for training.
     pub samples: usize,
-    /// Set where it went on from a network that was trained before.
+    /// True if the training started from a previously trained network.
     pub goes_on: bool,
-    /// How good it is on those that were kept apart.
+    /// Quality of the network on the held-out pictures.
     pub score: Score,
 }
 
-/// The text of the card, TOML.
+/// The text of the card, in TOML.
 pub fn card(shape: &Shape, about: &About) -> String {
     let [learnt, kept] = about.pictures;
     let Score {
@@ -33,15 +33,15 @@ pub fn card(shape: &Shape, about: &About) -> String {
         ..
     } = about.score;
     let before = if about.goes_on {
-        " after those of another network that it began with"
+        " after those of the network from which it started"
     } else {
         ""
     };
     let (recall, fill, side) = (100.0 * recall, FILL as u8, shape.side);
     format!(
         "\
-# A network of `parallax-lab train finder`: {learnt} pictures, {samples} samples{before}. In {kept} pictures that were kept apart it finds
-# {recall:.1} % of {people} people, and {false_boxes:.2} boxes a picture that are of nobody.
+# A network of `parallax-lab train finder`: {learnt} pictures, {samples} samples{before}. In {kept} held-out pictures, it finds
+# {recall:.1} % of {people} people, and {false_boxes:.2} boxes per picture without a person.
 format = \"parallax-detector\"
 version = 1
 name = \"Parallax, boxes of people, {side}x{side}\"

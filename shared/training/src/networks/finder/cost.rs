@@ -1,20 +1,20 @@
-//! The cost of what the network finds in place of what it should find, and its gradients.
+//! The cost of the network's output compared with the truth, and its gradients.
 
 use serde::{Deserialize, Serialize};
 
 use super::network::CHANNELS;
 
-/// Where the logarithm of a side counts as it is.
+/// Range in which the logarithm of a side is not clamped.
 const LOGARITHMS: core::ops::RangeInclusive<f32> = -3.0..=5.0;
-/// Log-odds beyond which a cell counts as it does there.
+/// Limit of the log-odds of a cell, beyond which they are clamped.
 const MOST_LOG_ODDS: f32 = 15.0;
 
-/// The boxes that should be found in a batch, as heat and sides.
+/// The true boxes of a batch, as heat and sides.
 #[derive(Debug, Clone, Default)]
 pub struct Truth {
-    /// Heat of every cell, 0 to 1, exactly 1 where the middle of a box lies: `[n, rows, columns]`. Below 0: the cell does not count.
+    /// Heat of every cell, 0 to 1, exactly 1 at the middle of a box: `[n, rows, columns]`. Cells below 0 do not count.
     pub heat: Vec<f32>,
-    /// Distances from the middle of every cell to the sides of the box that it belongs to, cells; 0 where it belongs to none:
+    /// Distances from the centre of every cell to the sides of its box, in cells; 0 if the cell belongs to no box:
     /// `[n, 4, rows, columns]`.
     pub sides: Vec<f32>,
 }
@@ -22,20 +22,21 @@ pub struct Truth {
 /// The parts of the cost of a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// The cost of the heat, for each person.
+    /// The cost of the heat, per person.
     pub heat: f32,
-    /// The cost of the boxes: the mean negative logarithm of what a box shares with the true one, as a share of their union.
+    /// The cost of the boxes: the mean negative logarithm of the intersection over union with the true boxes.
     pub sides: f32,
 }
 
 impl Truth {
-    /// The cost, and its gradient by the output of the network.
+    /// Returns the cost, and its gradient with respect to the output of the network.
     ///
-    /// For the heat the focal loss with fewer penalties around a middle (Law and Deng 2018, "`CornerNet`", equation 1); of the boxes
-    /// the logarithm of the intersection over union (Yu et al. 2016, "`UnitBox`"), in cells as much as they have heat.
+    /// The cost of the heat is the focal loss with lower penalties around a middle (Law and Deng 2018, "`CornerNet`", equation 1). The cost
+    /// of the boxes is the negative logarithm of the intersection over union (Yu et al. 2016, "`UnitBox`"), with cells weighted by their
+    /// heat.
     ///
     /// * `cells`: columns times rows.
-    /// * `weight`: what the boxes count beside the heat.
+    /// * `weight`: weight of the boxes relative to the heat.
     pub fn cost(&self, found: &[f32], cells: usize, weight: f32) -> (Cost, Vec<f32>) {
         let mut cost = Cost::default();
         let mut gradient = vec![0.0; found.len()];
@@ -67,7 +68,7 @@ impl Truth {
         (cost, gradient)
     }
 
-    /// The heat of all cells that belong to a box.
+    /// The sum of the heat over all cells that belong to a box.
     fn heat_of_boxes(&self, cells: usize) -> f32 {
         let heat = self.heat.chunks_exact(cells);
         let each = heat.zip(self.sides.chunks_exact(4 * cells));
@@ -77,7 +78,7 @@ impl Truth {
     }
 }
 
-/// The focal loss of a cell, and its slope by the log-odds.
+/// The focal loss of a cell, and its derivative with respect to the log-odds.
 fn focal(log_odds: f32, heat: f32) -> [f32; 2] {
     let x = log_odds.clamp(-MOST_LOG_ODDS, MOST_LOG_ODDS);
     let p = 1.0 / (1.0 + (-x).exp());
@@ -95,7 +96,8 @@ fn focal(log_odds: f32, heat: f32) -> [f32; 2] {
     ]
 }
 
-/// The negative logarithm of the intersection over union of two boxes around a point, and its slopes by the logarithms of the sides.
+/// The negative logarithm of the intersection over union of two boxes around a point, and its derivatives with respect to the logarithms
+/// of the sides.
 fn union(logarithms: [f32; 4], truth: [f32; 4]) -> (f32, [f32; 4]) {
     let sides = logarithms.map(|side| side.clamp(*LOGARITHMS.start(), *LOGARITHMS.end()).exp());
     let area = |[left, top, right, bottom]: [f32; 4]| (left + right) * (top + bottom);
@@ -137,7 +139,7 @@ mod tests {
         truth.sides[2] = 0.0;
         let mut found: Vec<f32> =
             (0..2 * CHANNELS * cells).map(|_| 3.0 * rng.f32() - 1.5).collect();
-        // Where a side is that of the truth, the cost has a corner.
+        // The cost has a corner where a side equals the true side.
         for (nth, side) in truth.sides.iter().enumerate() {
             let [sample, within] = [nth / (4 * cells), nth % (4 * cells)];
             let found = &mut found[sample * CHANNELS * cells + cells + within];

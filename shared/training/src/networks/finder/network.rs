@@ -1,7 +1,7 @@
 //! The network that finds people.
 //!
-//! A whole picture goes in. Of every cell of four by four pixels it gives the log-odds that the middle of a person's box
-//! lies in it, and the natural logarithms of the distances from the middle of the cell to the left, top, right and
+//! The input is a whole picture. For every cell of four by four pixels, the output has the log-odds that the cell contains the middle of a
+//! person's box. It also has the natural logarithms of the distances from the centre of the cell to the left, top, right and
 //! bottom of that box, in cells.
 
 use crate::networks::begun::{self, BeginError, Begun};
@@ -9,33 +9,33 @@ use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::trunk::{Trunk, plain, with_gain};
 
-/// Pixels of the input for a cell of the output.
+/// Pixels of the input per cell of the output.
 pub const STRIDE: usize = 4;
-/// Numbers of a cell: the log-odds and four sides.
+/// Values per cell: the log-odds and four sides.
 pub const CHANNELS: usize = 5;
 /// Name of the input, `[n, 3, height, width]`.
 pub const PICTURE: &str = "picture";
 /// Name of the output, `[n, 5, rows, columns]`.
 pub const BOXES: &str = "boxes";
-/// Sides of the input are multiples of it.
+/// Sides of the input are multiples of this number.
 pub(crate) const MULTIPLE: usize = 32;
 
 /// The log-odds of an untrained cell.
 const HEAT_BIAS: f32 = -4.6;
-/// Logarithms of the sides of an untrained box, cells: a person who is as high as a third of the picture.
+/// Logarithms of the sides of an untrained box, in cells: a person one third as high as the picture.
 const SIDE_BIAS: [f32; 4] = [1.4, 2.3, 1.4, 2.3];
 
 /// The sizes of the network.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shape {
-    /// Side of the square input, pixels: a multiple of 32.
+    /// Side of the square input, in pixels: a multiple of 32.
     pub side: usize,
-    /// Channels of the first layer.
+    /// Number of channels of the first layer.
     pub stem: usize,
-    /// Channels at strides 4, 8, 16 and 32.
+    /// Numbers of channels at strides 4, 8, 16 and 32.
     pub channels: [usize; 4],
-    /// Residual blocks at these strides.
+    /// Numbers of residual blocks at strides 4, 8, 16 and 32.
     pub blocks: [usize; 4],
 }
 
@@ -51,7 +51,7 @@ impl Default for Shape {
 }
 
 impl Shape {
-    /// The same network for an input of three quarters of the side.
+    /// The same network for an input with three quarters of the side.
     #[must_use]
     pub fn smaller(&self) -> Self {
         let side = (self.side * 3 / 4 / MULTIPLE * MULTIPLE).max(MULTIPLE);
@@ -61,7 +61,7 @@ impl Shape {
         }
     }
 
-    /// Columns, and rows, of the output.
+    /// Number of columns, and of rows, of the output.
     pub fn cells(&self) -> usize {
         self.side / STRIDE
     }
@@ -94,7 +94,7 @@ impl Network for Shape {
     }
 }
 
-/// The parameters of an untrained network, which finds nobody.
+/// The parameters of an untrained network, which finds no people.
 pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     let mut all = parameters::initial(shape, seed);
     let bias = all.iter_mut().find(|parameter| parameter.name == "boxes.bias");
@@ -105,10 +105,10 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     all
 }
 
-/// Reads the parameters of a network that [`file()`](super::file()) wrote, to go on from.
+/// Reads the parameters of a network that [`file()`](super::file()) wrote, from which a training run starts.
 ///
-/// * `shape`: its size. The side of the input may be another than that of the file.
-/// * `seed`: of the weights of channels that are 0 in the file.
+/// * `shape`: sizes of the network. The side of the input may differ from that of the file.
+/// * `seed`: seed for the weights of channels that are 0 in the file.
 ///
 /// # Errors
 ///

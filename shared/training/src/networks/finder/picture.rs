@@ -1,34 +1,34 @@
-//! A picture to learn from.
+//! A training picture with its boxes.
 
 use serde::{Deserialize, Serialize};
 
-/// Longest side of the pictures that are kept, pixels.
+/// Longest side of stored pictures, in pixels.
 pub const SIDE: usize = 320;
 
 /// A box around a person.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Around {
-    /// Left, top, right, bottom, pixels.
+    /// Left, top, right, bottom, in pixels.
     pub outline: [f32; 4],
-    /// Set where the network should find it. Otherwise it is not asked: hardly anything is seen of the person, or nobody knows
-    /// whether it is one.
+    /// True if the network should find this person. Otherwise the box is ignored: hardly anything of the person is visible, or
+    /// it is uncertain whether it is a person.
     pub counts: bool,
 }
 
 impl Around {
-    /// Width times height.
+    /// Area of the box: width times height.
     pub fn area(&self) -> f32 {
         let [left, top, right, bottom] = self.outline;
         (right - left).max(0.0) * (bottom - top).max(0.0)
     }
 
-    /// Returns what it shares with another box, as a share of their union.
+    /// Returns the overlap with another box (intersection over union).
     pub fn overlap(&self, other: &Self) -> f32 {
         let shared = self.cut(other.outline).area();
         shared / (self.area() + other.area() - shared).max(f32::MIN_POSITIVE)
     }
 
-    /// The part within limits.
+    /// Returns the part of the box within limits.
     #[must_use]
     pub fn cut(&self, [left, top, right, bottom]: [f32; 4]) -> Self {
         let own = self.outline;
@@ -44,21 +44,21 @@ impl Around {
     }
 }
 
-/// A picture, and the boxes of everybody in it.
+/// A picture, with the boxes of all people in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
-    /// Its name in messages.
+    /// Name of the picture in messages.
     pub name: String,
-    /// Width and height, pixels, [`SIDE`] at most.
+    /// Width and height in pixels, at most [`SIDE`].
     pub size: [usize; 2],
     /// The pixels, row by row, red first.
     pub rgb: Vec<u8>,
-    /// Everybody in it.
+    /// All people in the picture.
     pub people: Vec<Around>,
 }
 
 impl Picture {
-    /// Returns whether it has as many pixels as it says.
+    /// Returns true if the number of pixels matches the size.
     pub fn is_whole(&self) -> bool {
         let [width, height] = self.size;
         width > 0 && height > 0 && self.rgb.len() == 3 * width * height

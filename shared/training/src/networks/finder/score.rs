@@ -1,28 +1,28 @@
-//! How good a network is on pictures in which everybody has a box.
+//! Quality of a network on pictures with a box for each person.
 
 use serde::{Deserialize, Serialize};
 
 use super::picture::Around;
 
-/// A found box and a true one that is the same share this of their union, at least.
+/// Least overlap (intersection over union) for a found box to match a true one.
 const SAME: f32 = 0.5;
-/// A box that shares this with a person who does not count is not false.
+/// Overlap with a person that does not count from which a box is not false.
 const UNASKED: f32 = 0.3;
 
-/// How good a network is.
+/// Measures of a network's quality.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Score {
-    /// Pictures.
+    /// Number of pictures.
     pub pictures: usize,
-    /// People in them who should be found.
+    /// Number of people to be found in the pictures.
     pub people: usize,
-    /// Share of these who are found.
+    /// Share of these people who are found.
     pub recall: f32,
-    /// Boxes without a person, for each picture.
+    /// Number of boxes without a person, per picture.
     pub false_boxes: f32,
-    /// Pictures without people.
+    /// Number of pictures without people.
     pub empty: usize,
-    /// Share of these in which nobody is found.
+    /// Share of these pictures in which no box is found.
     pub quiet: f32,
 }
 
@@ -30,7 +30,7 @@ impl core::fmt::Display for Score {
     fn fmt(&self, to: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(
             to,
-            "{} pictures kept apart: {:.1} % of {} people found, {:.2} false boxes a picture, none in {:.1} % of {} pictures without people",
+            "{} held-out pictures: {:.1} % of {} people found, {:.2} false boxes per picture, no box in {:.1} % of {} pictures without people",
             self.pictures,
             100.0 * self.recall,
             self.people,
@@ -41,7 +41,7 @@ impl core::fmt::Display for Score {
     }
 }
 
-/// The counts that a score is made of.
+/// The counts from which a score is computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
     pictures: usize,
@@ -55,7 +55,7 @@ pub struct Tally {
 impl Tally {
     /// Adds a picture.
     ///
-    /// * `found`: the boxes that were found, the surest first; each is one person at most, and so is each person's box.
+    /// * `found`: the found boxes, the most certain first. A found box matches at most one person, and a person at most one found box.
     pub fn add(&mut self, people: &[Around], found: &[[f32; 4]]) {
         let mut left: Vec<&Around> = people.iter().filter(|person| person.counts).collect();
         self.pictures += 1;

@@ -5,49 +5,49 @@ use serde::{Deserialize, Serialize};
 use super::network::{MULTIPLE, Shape};
 use crate::networks::settings::{Precision, SettingsError, check, count, from_zero};
 
-/// Settings of a training.
+/// Settings of a training run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Random seed.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// The sizes of the network.
     pub shape: Shape,
-    /// Numbers between layers.
+    /// Precision of the maps between layers.
     pub precision: Precision,
-    /// Samples a step.
+    /// Number of samples per step.
     pub batch: usize,
-    /// Steps of the training.
+    /// Number of steps of the training.
     pub steps: usize,
-    /// Share of the steps, the first ones, that are shown inputs of three quarters of the side.
+    /// Share of the steps, from the first, that use inputs of three quarters of the side.
     pub small: f32,
-    /// Longest step: reached after a twentieth of the training, from where it falls as a cosine.
+    /// Length of the longest step. It is reached after a twentieth of the training, and then decreases as a cosine.
     pub rate: f32,
-    /// Share of every weight that is taken away, times the rate.
+    /// Share of every weight that is subtracted, times the rate.
     pub decay: f32,
     /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,
     /// Share of the mean of the parameters that every step replaces.
     pub averaged: f32,
-    /// Weight of the sides of boxes beside the heat.
+    /// Weight of the sides of boxes relative to the heat.
     pub sides: f32,
-    /// How samples are varied.
+    /// Random variation of the samples.
     pub vary: Vary,
 }
 
-/// How samples are varied.
+/// Random variation of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {
-    /// Share of samples that show one picture; the others get people of further pictures pasted into it.
+    /// Share of samples that show one picture. People from other pictures are pasted into the rest.
     pub single: f32,
-    /// Most pictures that are pasted.
+    /// Largest number of pasted pictures.
     pub most_pasted: usize,
-    /// Height of a person, shares of the height of the picture that is shown, the least.
+    /// Least height of a person, as a share of the height of the shown picture.
     pub least_height: f32,
-    /// The most.
+    /// Largest height of a person, as a share of the height of the shown picture.
     pub most_height: f32,
-    /// Share of samples of low resolution.
+    /// Share of samples with reduced resolution.
     pub coarse: f32,
     /// Share of samples without colour.
     pub grey: f32,
@@ -90,7 +90,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// The first that cannot be used.
+    /// The first invalid setting.
     pub fn check(&self) -> Result<(), SettingsError> {
         let Shape {
             side,

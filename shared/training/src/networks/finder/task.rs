@@ -1,4 +1,4 @@
-//! The training of the network that finds people: steps of Adam, first over smaller pictures.
+//! The training of the network that finds people: steps of Adam, with smaller pictures at first.
 
 use keypoints::DetectorCard;
 use rayon::prelude::*;
@@ -19,23 +19,23 @@ use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
-/// Pictures that are judged at once.
+/// Number of pictures that are evaluated at once.
 const JUDGED_AT_ONCE: usize = 32;
-/// Share of the steps in which their length rises.
+/// Share of the steps in which the step length rises.
 const RISING: f32 = 0.05;
-/// Steps of a pass.
+/// Number of steps in a pass.
 const STEPS: usize = 100;
-/// Passes between two looks at the pictures that are kept apart.
+/// Number of passes between two evaluations on the held-out pictures.
 const JUDGED: usize = 10;
 
 /// Writes a network as an ONNX file, with weights in half precision.
 ///
 /// * `parameters`: in the order of [`initial`].
-/// * `metadata`: keys and values that the file carries.
+/// * `metadata`: keys and values of the file's metadata.
 ///
 /// # Panics
 ///
-/// If the parameters are another network's.
+/// If the parameters belong to another network.
 pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
     onnx::write(shape, parameters, document(metadata))
 }
@@ -49,13 +49,13 @@ fn document(metadata: &[(String, String)]) -> Document {
     }
 }
 
-/// There is nothing to learn from, or nothing is kept apart.
+/// There are no training pictures, or no held-out pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{learnt} pictures to learn from and {kept} kept apart are too few")]
+#[error("{learnt} pictures for training and {kept} held out are too few")]
 pub struct NobodyShown {
-    /// To learn from.
+    /// Number of training pictures.
     pub learnt: usize,
-    /// Kept apart.
+    /// Number of held-out pictures.
     pub kept: usize,
 }
 
@@ -71,10 +71,10 @@ pub struct FinderTask<'a> {
 }
 
 impl<'a> FinderTask<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
-    /// * `learnt`, `kept`: pictures to learn from, and others, on which it is judged.
-    /// * `from`: the network of [`begun`](super::begun), to begin with in place of random parameters.
+    /// * `learnt`, `kept`: training pictures, and held-out pictures for the evaluation.
+    /// * `from`: the network read by [`begun`](super::begun), used instead of random parameters.
     ///
     /// # Errors
     ///
@@ -105,7 +105,7 @@ impl<'a> FinderTask<'a> {
         })
     }
 
-    /// The network with the size of the input at a step.
+    /// The network with the input size of a step.
     fn shape_at(&self, nth: usize) -> Shape {
         let settings = self.settings;
         if (nth as f32) < settings.small * settings.steps as f32 {
@@ -127,7 +127,7 @@ impl<'a> FinderTask<'a> {
         )
     }
 
-    /// The length of a step.
+    /// Returns the length of a step.
     fn rate(&self, nth: usize) -> f32 {
         let schedule = Schedule {
             steps: self.settings.steps,
@@ -190,7 +190,7 @@ impl Task for FinderTask<'_> {
             rate: self.rate(nth),
             decay: settings.decay,
             longest: settings.longest,
-            // At the beginning a mean over few steps.
+            // At the beginning, the mean is over few steps.
             averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
         }
     }
@@ -251,7 +251,7 @@ impl Task for FinderTask<'_> {
 }
 
 impl FinderTask<'_> {
-    /// The boxes that the network's output means, pixels of the picture; none where it is not finite.
+    /// Decodes the network's output to boxes, in pixels of the picture; no boxes if the output is not finite.
     fn boxes(&self, picture: &Picture, found: &[f32]) -> Vec<[f32; 4]> {
         let Shape { side, .. } = self.settings.shape;
         let cells = self.settings.shape.cells();
@@ -265,7 +265,7 @@ impl FinderTask<'_> {
 }
 
 impl Trainer<FinderTask<'_>> {
-    /// The output of the trained network for pictures, `[n, 3, side, side]`: `[n, 5, rows, columns]`.
+    /// Returns the output `[n, 5, rows, columns]` of the trained network for pictures `[n, 3, side, side]`.
     pub fn find_in(&self, n: usize, pictures: &[f32]) -> Vec<f32> {
         let inputs = vec![pictures.to_vec()];
         let found = self.find(&Shown { n, inputs });
@@ -274,7 +274,7 @@ impl Trainer<FinderTask<'_>> {
 
     /// The trained network as an ONNX file.
     ///
-    /// * `metadata`: keys and values that the file carries.
+    /// * `metadata`: keys and values of the file's metadata.
     pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
         self.file(document(metadata))
     }
@@ -288,7 +288,7 @@ fn shown(seen: &[FinderSample]) -> Shown {
     }
 }
 
-/// A hash of everything that the result depends on.
+/// Hash of everything that the result depends on.
 fn stamp(settings: &Settings, pictures: [&[Picture]; 2], from: Option<&Begun>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for picture in pictures.into_iter().flatten() {

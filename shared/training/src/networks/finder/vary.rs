@@ -1,4 +1,4 @@
-//! Samples: pictures as the network is shown them, and the boxes that it should find.
+//! Samples: inputs made from pictures, and the boxes that the network should find.
 
 use fastrand::Rng;
 
@@ -13,18 +13,18 @@ mod layer;
 
 use self::layer::Layer;
 
-/// The input of the network, and the output that it should have.
+/// An input of the network, and the true output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FinderSample {
-    /// `[3, side, side]`
+    /// Input picture, `[3, side, side]`.
     pub picture: Vec<f32>,
-    /// See [`Truth`](super::Truth): `[rows, columns]`.
+    /// Heat, `[rows, columns]`; see [`Truth`](super::Truth).
     pub heat: Vec<f32>,
-    /// `[4, rows, columns]`
+    /// Distances to the sides of the boxes, `[4, rows, columns]`.
     pub sides: Vec<f32>,
 }
 
-/// A picture as the network sees it in use: the whole of it, from the top-left corner on.
+/// A picture as in normal use of the network: all of it, placed at the top-left corner.
 pub fn plain(picture: &Picture, shape: &Shape) -> FinderSample {
     let [width, height] = picture.size.map(|side| side as f32);
     let step = width.max(height) / shape.side as f32;
@@ -40,9 +40,9 @@ pub fn plain(picture: &Picture, shape: &Shape) -> FinderSample {
     sample(&rgb, &layer::boxes(&[layer]), shape)
 }
 
-/// A picture, varied at random, with people of others in it.
+/// A randomly varied picture with people from other pictures.
 ///
-/// * `others`: pictures to take people from.
+/// * `others`: pictures from which people are taken.
 pub fn varied(
     picture: &Picture,
     others: &[Picture],

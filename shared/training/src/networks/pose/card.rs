@@ -1,4 +1,4 @@
-//! The card of a trained network: what Parallax has to know to use it.
+//! The card of a trained network: the information that Parallax needs to use the network.
 
 use skeleton::PARSE14;
 
@@ -6,22 +6,22 @@ use super::network::{ERROR, EXTRAS, FRONT, MAPS, PICTURE, Shape};
 use super::score::Score;
 use super::vary::{DEVIATION, FILL, MARGIN, MEAN};
 
-/// Further contents of a card, beside how the network is used.
+/// Information for a card about the training.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct About {
-    /// People learned from, and kept apart.
+    /// Number of training people and of held-out people.
     pub people: [usize; 2],
-    /// Samples that the network was shown.
+    /// Number of samples used for training.
     pub samples: usize,
-    /// True if it went on from a network that was trained before.
+    /// True if the training started from a previously trained network.
     pub goes_on: bool,
-    /// Set where it learned the extra keypoints alone.
+    /// True if only the extra keypoints were trained.
     pub extras_alone: bool,
-    /// How good it is on those who were kept apart.
+    /// Quality of the network on the held-out people.
     pub score: Score,
 }
 
-/// The text of the card, TOML.
+/// The text of the card, in TOML.
 pub fn card(shape: &Shape, about: &About) -> String {
     let [learnt, kept] = about.people;
     let Score {
@@ -37,9 +37,9 @@ pub fn card(shape: &Shape, about: &About) -> String {
     let Shape { width, height, .. } = shape;
     let before = match (about.goes_on, about.extras_alone) {
         (true, true) => {
-            ", for the extra keypoints alone; all else is that of the network that it began with"
+            ", for the extra keypoints alone; all other parts are those of the network from which it started"
         }
-        (true, false) => ", after those of another network that it began with",
+        (true, false) => ", after those of the network from which it started",
         (false, _) => "",
     };
     let names: Vec<String> = names().map(|name| format!("{name:?}")).collect();
@@ -47,10 +47,10 @@ pub fn card(shape: &Shape, about: &About) -> String {
     let fill = FILL as u8;
     format!(
         "\
-# A network of `parallax-lab train network`: {learnt} people, {samples} samples{before}. Of {judged} of {kept} people who were kept apart it finds
-# {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both, and tells {front:.1} % of the directions from their
-# opposites; joints that are off by more than half a head are told from others with an area under the curve of {area:.3};
-# {extras:.1} % of the extra keypoints lie within a fifth of the trunk.
+# A network of `parallax-lab train network`: {learnt} people, {samples} samples{before}. On {judged} of {kept} held-out people, it finds
+# {mean_of_ends:.1} % of the limbs by the mean of both ends and {both_ends:.1} % by both ends. It distinguishes {front:.1} % of the directions from
+# their opposites. Joints with an error of more than half a head are recognised with an area under the curve of {area:.3}.
+# {extras:.1} % of the extra keypoints are within a fifth of the trunk.
 format = \"parallax-keypoint-network\"
 version = 1
 name = \"Parallax, LSP-14, nose and feet as seen, {height}x{width}\"
@@ -84,7 +84,7 @@ error = \"{ERROR}\"
     )
 }
 
-/// Names of the keypoints in a card.
+/// Names of the keypoints as written in a card.
 fn names() -> impl Iterator<Item = &'static str> {
     let of_cards = |name| if name == "head" { "head top" } else { name };
     let joints = PARSE14.joints.iter().map(|joint| joint.name);

@@ -1,15 +1,15 @@
-//! The cost of what the network finds in place of what it should find, and its gradients.
+//! The cost of the network's output compared with the truth, and its gradients.
 
 use serde::{Deserialize, Serialize};
 
 use super::network::{N_JOINTS, N_KEYPOINTS, STRIDE};
 use super::peak;
 
-/// Where the logarithm of an expected error counts as it is.
+/// Range in which the logarithm of an expected error is not clamped.
 const LOGARITHMS: core::ops::RangeInclusive<f32> = -8.0..=2.0;
-/// How much more a cell of heat 1 counts than one of heat 0.
+/// Additional weight of a cell with heat 1, relative to a cell with heat 0.
 const HEAT: f32 = 9.0;
-/// Weight of all cells of a map without heat together, about.
+/// Approximate weight of all cells of a map without heat.
 const CELLS: f32 = 40.0;
 
 /// The truth of a batch.
@@ -17,13 +17,13 @@ const CELLS: f32 = 40.0;
 pub struct Truth {
     /// Columns and rows of the maps.
     pub cells: [usize; 2],
-    /// Heat of every keypoint, 0 to 1: `[n, keypoints, rows, columns]`.
+    /// True heat of every keypoint, 0 to 1: `[n, keypoints, rows, columns]`.
     pub maps: Vec<f32>,
-    /// How much the map of every keypoint counts: `[n, keypoints]`.
+    /// Weight of the map of every keypoint: `[n, keypoints]`.
     pub weights: Vec<f32>,
-    /// The direction of the trunk, of a length from 0 to 1, its certainty: `[n, 2]`.
+    /// Direction of the trunk; its length, 0 to 1, is the certainty: `[n, 2]`.
     pub fronts: Vec<f32>,
-    /// Where the keypoints are, cells of the maps, NaN where that is not certain: `[n, keypoints, 2]`.
+    /// Positions of the keypoints in cells of the maps, NaN if not certain: `[n, keypoints, 2]`.
     pub places: Vec<f32>,
 }
 
@@ -32,19 +32,19 @@ pub struct Truth {
 pub struct Cost {
     /// Cost of the maps.
     pub maps: f32,
-    /// Cost of the direction, nats a person of certain direction.
+    /// Cost of the direction, in nats per person of certain direction.
     pub front: f32,
     /// Cost of the expected errors.
     pub error: f32,
 }
 
-/// A part of the cost, and its gradient by an output of the network.
+/// A part of the cost, and its gradient with respect to an output of the network.
 pub(super) struct Part {
     pub(super) cost: f32,
     pub(super) gradient: Vec<f32>,
 }
 
-/// log(1 + exp(x)), without overflow.
+/// Returns log(1 + exp(x)), without overflow.
 fn softplus(x: f32) -> f32 {
     x.max(0.0) + (-x.abs()).exp().ln_1p()
 }
@@ -54,12 +54,12 @@ fn sigmoid(x: f32) -> f32 {
 }
 
 impl Truth {
-    /// Columns and rows for an input of some width and height.
+    /// Number of columns and rows of the maps for an input of some width and height.
     pub(super) fn cells([width, height]: [usize; 2]) -> [usize; 2] {
         [width, height].map(|side| side / STRIDE)
     }
 
-    /// Makes nothing of the joints count, so that the extra keypoints are learned alone.
+    /// Sets the weights of the joints to zero, so that only the extra keypoints are trained.
     pub(super) fn forget_joints(&mut self) {
         for weights in self.weights.as_chunks_mut::<N_KEYPOINTS>().0 {
             weights[..N_JOINTS].fill(0.0);
@@ -69,7 +69,7 @@ impl Truth {
         }
     }
 
-    /// Cross-entropy of the maps, heat counting tenfold: the mean over joints, a cell of heat 1 worth.
+    /// Cross-entropy of the maps, in which cells of heat 1 have ten times the weight. It is a mean over joints, relative to `CELLS`.
     pub(super) fn of_maps(&self, maps: &[f32]) -> Part {
         let [columns, rows] = self.cells;
         let all = self.weights.iter().sum::<f32>().max(1.0) * CELLS;
@@ -92,7 +92,7 @@ impl Truth {
         }
     }
 
-    /// Surprise about the direction, weighted by its certainty.
+    /// Negative log-likelihood of the direction, weighted by its certainty.
     pub(super) fn of_front(&self, evidence: &[f32]) -> Part {
         let directions = self.fronts.as_chunks::<2>().0;
         let lengths: Vec<f32> = directions.iter().map(|[x, y]| x.hypot(*y)).collect();
@@ -111,7 +111,8 @@ impl Truth {
         Part { cost, gradient }
     }
 
-    /// Surprise about how far off the maxima of maps are, if that is distributed exponentially with the expected error as mean.
+    /// Negative log-likelihood of the errors of the maxima of the maps. They are assumed to be exponentially distributed with the expected
+    /// error as mean.
     pub(super) fn of_error(&self, logarithms: &[f32], maps: &[f32]) -> Part {
         let off = self.off(maps);
         let n_known = off.iter().flatten().count().max(1) as f32;
@@ -128,7 +129,7 @@ impl Truth {
         Part { cost, gradient }
     }
 
-    /// How far off the maxima of maps are, heights of the input; nothing where the joint is not certain.
+    /// Errors of the maxima of the maps, in heights of the input; `None` if the joint's position is not certain.
     fn off(&self, maps: &[f32]) -> Vec<Option<f32>> {
         let [columns, rows] = self.cells;
         let known = self.places.as_chunks::<2>().0;
@@ -148,7 +149,7 @@ mod tests {
 
     use super::*;
 
-    /// The gradient of a part is its change with every output.
+    /// Checks that the gradient of a part matches its change with every output.
     fn check(outputs: &[f32], part: &dyn Fn(&[f32]) -> Part) {
         let step = 1e-2;
         let gradient = part(outputs).gradient;

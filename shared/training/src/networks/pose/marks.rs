@@ -1,48 +1,48 @@
-//! Keypoints to learn of a person, by the marks of an annotator and by a teacher: another network.
+//! True keypoints of a person, combined from the marks of an annotator and the results of a teacher, which is another network.
 
 use super::person::Target;
 use super::{MIRROR, N_JOINTS, N_KEYPOINTS};
 
-/// Peak of the teacher above which a joint of a pair counts in the question of its sides.
+/// Peak of the teacher above which a joint of a pair is used to decide about left and right.
 const SURE_OF_SIDES: f32 = 0.55;
-/// Peak above which its joint stands beside a mark that contradicts it.
+/// Peak above which the teacher's joint is kept as an alternative to a mark that contradicts it.
 const SURE: f32 = 0.7;
-/// Peak above which its joint is used with a mark that it agrees with.
+/// Peak above which the teacher's joint is averaged with a mark that agrees.
 const USABLE: f32 = 0.4;
-/// Peak above which its joint is used where nothing is marked.
+/// Peak above which the teacher's joint is used if there is no mark.
 const ALONE: f32 = 0.5;
-/// Distance up to which a mark and the teacher agree, lengths of the trunk.
+/// Largest distance at which a mark and the teacher agree, in lengths of the trunk.
 const AGREED: f32 = 0.24;
-/// Least distance between the sides of a limb for a decision about them, lengths of the trunk.
+/// Least distance between left and right joints for a decision about the sides, in lengths of the trunk.
 const APART: f32 = 0.23;
-/// An exchanged limb must be nearer to the teacher than this share of the distance as it is.
+/// Largest ratio of the limb's distance to the teacher after and before an exchange for which the sides are exchanged.
 const NEARER: f32 = 0.6;
 
 /// Certainty of the teacher above which its extra keypoints are used.
 const SURE_OF_EXTRAS: f32 = 0.6;
-/// Distance up to which mark and teacher agree about the joint beside an extra keypoint, lengths of the trunk.
+/// Largest distance at which a mark and the teacher agree about the joint near an extra keypoint, in lengths of the trunk.
 const AGREED_BESIDE: f32 = 0.18;
-/// The joint beside every extra keypoint: neck, then the ankles.
+/// The joint near every extra keypoint: neck, then the ankles.
 const BESIDE: [usize; N_KEYPOINTS - N_JOINTS] = [12, 5, 0, 5, 0];
 
-/// Both legs, both arms.
+/// Joints of both legs, and of both arms.
 const LIMBS: [[usize; 6]; 2] = [[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]];
 
-/// Keypoints of a person, in the order of [`Person::targets`](super::Person::targets), by annotator and teacher; not finite where
-/// unknown.
+/// Keypoints of a person according to the annotator and the teacher, in the order of [`Person::targets`](super::Person::targets). Unknown
+/// positions are not finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marks {
-    /// By the annotator, left and right as the person would call them, pixels.
+    /// Positions marked by the annotator, in pixels, with the person's own left and right.
     pub marked: [[f32; 2]; N_KEYPOINTS],
-    /// By the teacher, and the height of its peak, 0 to 1.
+    /// Positions found by the teacher, and the heights of the peaks, 0 to 1.
     pub taught: [([f32; 2], f32); N_KEYPOINTS],
-    /// Length of the trunk, pixels.
+    /// Length of the trunk, in pixels.
     pub trunk: f32,
 }
 
 /// The same keypoints with left and right exchanged.
 ///
-/// * `of`: all of them, or the joints alone.
+/// * `of`: all keypoints, or only the joints.
 pub fn exchange_sides<T: Copy, const N: usize>(of: &[T; N]) -> [T; N] {
     core::array::from_fn(|keypoint| of[MIRROR[keypoint]])
 }
@@ -56,9 +56,9 @@ fn mean(of: &[f32]) -> f32 {
 }
 
 impl Marks {
-    /// Exchanges the sides of limbs whose marks the teacher surely contradicts.
+    /// Exchanges left and right of limbs whose marks the teacher clearly contradicts.
     ///
-    /// * Returns whether legs, and whether arms were exchanged.
+    /// * Returns true for exchanged legs, and true for exchanged arms.
     pub fn mend_sides(&mut self) -> [bool; 2] {
         LIMBS.map(|limb| {
             let is_sure = |joint: &usize| {
@@ -88,10 +88,10 @@ impl Marks {
         })
     }
 
-    /// Takes the extra keypoints that the teacher does not know from another one, where that finds the joint beside them at its
+    /// Adds the extra keypoints that the teacher does not have from another teacher, if that teacher finds the joint near them at its
     /// mark.
     ///
-    /// * `other`: as [`taught`](Self::taught), with the same sides.
+    /// * `other`: results of the other teacher, as in [`taught`](Self::taught), with the same sides.
     pub fn add_extras(&mut self, other: &[([f32; 2], f32); N_KEYPOINTS]) {
         for keypoint in N_JOINTS..N_KEYPOINTS {
             if self.taught[keypoint].1 <= 0.0 && self.is_beside(keypoint, other) {
@@ -100,13 +100,13 @@ impl Marks {
         }
     }
 
-    /// Returns true if a teacher finds the joint beside an extra keypoint at its mark.
+    /// Returns true if a teacher finds the joint near an extra keypoint at its mark.
     fn is_beside(&self, keypoint: usize, taught: &[([f32; 2], f32); N_KEYPOINTS]) -> bool {
         let beside = BESIDE[keypoint - N_JOINTS];
         distance(self.marked[beside], taught[beside].0) < AGREED_BESIDE * self.trunk
     }
 
-    /// Exchanges left and right of marks and teacher.
+    /// Exchanges left and right in both marks and the teacher's results.
     pub fn exchange(&mut self) {
         self.marked = exchange_sides(&self.marked);
         self.taught = exchange_sides(&self.taught);
@@ -114,9 +114,9 @@ impl Marks {
 
     /// Returns the keypoints that the network should find.
     ///
-    /// The mean of both where they agree; both places where they differ and the teacher is sure; the teacher's, weighted by its
-    /// peak, where nothing is marked. An extra keypoint that is not marked is the teacher's, if the teacher is sure of it and finds
-    /// the joint beside it where it is marked.
+    /// If mark and teacher agree, the target is their mean. If they differ and the teacher is certain, both positions are targets. Without
+    /// a mark, the target is the teacher's position, weighted by its peak. An extra keypoint without a mark is taken from the teacher if
+    /// the teacher is certain of it and finds the nearby joint at its mark.
     pub fn targets(&self) -> [Target; N_KEYPOINTS] {
         core::array::from_fn(|joint| {
             let marked = self.marked[joint];
@@ -154,7 +154,7 @@ impl Marks {
         })
     }
 
-    /// An extra keypoint of the teacher.
+    /// An extra keypoint found by the teacher.
     fn extra(&self, keypoint: usize) -> Target {
         let (at, peak) = self.taught[keypoint];
         if peak > SURE_OF_EXTRAS && self.is_beside(keypoint, &self.taught) {

@@ -1,9 +1,9 @@
 //! The network that finds joints.
 //!
-//! One picture of a person goes in; three things come out: a map of log-odds for every keypoint, the evidence for the
+//! The input is a picture of one person. There are three outputs: a map of log-odds for every keypoint, the evidence for the
 //! direction in which the trunk faces, and the expected error of every keypoint.
 //!
-//! The maps of the [extra keypoints](EXTRAS) have a small head of their own over the features of the joints, so that it can be
+//! The maps of the [extra keypoints](EXTRAS) have a small head of their own over the features of the joints. This head can be
 //! trained alone.
 
 use skeleton::PARSE14;
@@ -13,7 +13,7 @@ use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::trunk::{Trunk, block, plain, with_gain};
 
-/// Joints that have a map: those of [`PARSE14`], in its order.
+/// Number of joints with a map: those of [`PARSE14`], in its order.
 pub const N_JOINTS: usize = PARSE14.joints.len();
 /// Names of the keypoints whose maps follow those of the joints.
 pub const EXTRAS: [&str; 5] = [
@@ -23,20 +23,20 @@ pub const EXTRAS: [&str; 5] = [
     "left big toe",
     "right big toe",
 ];
-/// Keypoints that have a map: the joints, then [`EXTRAS`].
+/// Number of keypoints with a map: the joints, then [`EXTRAS`].
 pub const N_KEYPOINTS: usize = N_JOINTS + EXTRAS.len();
-/// How the names of the layers begin that only the extra keypoints have.
+/// Prefix of the names of layers used only for the extra keypoints.
 pub(crate) const OF_EXTRAS: &str = "extra_";
 
-/// Pixels of the input for a cell of the maps.
+/// Pixels of the input per cell of the maps.
 pub const STRIDE: usize = 4;
 
 /// The sides of the input must be multiples of this.
 pub(crate) const MULTIPLE: usize = 32;
 
-/// How much the logits of a map are sharpened where features are looked up at its maximum.
+/// Factor of the logits of a map in the softmax for features at its maximum.
 const SHARPNESS: f32 = 2.0;
-/// How much they are sharpened where lower maxima should count, too.
+/// Factor of the logits in the softmax in which lower maxima should also count.
 const WIDE: f32 = 1.0;
 
 /// The log-odds of an untrained map.
@@ -48,17 +48,17 @@ const ERROR_BIAS: f32 = -2.3;
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shape {
-    /// Width of the input, pixels: a multiple of 32.
+    /// Width of the input in pixels: a multiple of 32.
     pub width: usize,
-    /// Its height.
+    /// Height of the input in pixels: a multiple of 32.
     pub height: usize,
-    /// Channels of the first layer.
+    /// Number of channels of the first layer.
     pub stem: usize,
-    /// Channels at strides 4, 8, 16 and 32.
+    /// Numbers of channels at strides 4, 8, 16 and 32.
     pub channels: [usize; 4],
-    /// Residual blocks at these strides.
+    /// Numbers of residual blocks at strides 4, 8, 16 and 32.
     pub blocks: [usize; 4],
-    /// Values of the hidden layers of the direction and of the expected error.
+    /// Size of the hidden layers for the direction and for the expected error.
     pub hidden: usize,
 }
 
@@ -76,7 +76,7 @@ impl Default for Shape {
 }
 
 impl Shape {
-    /// The same network for a smaller input, by 32 pixels across and down where that leaves anything.
+    /// The same network for an input that is 32 pixels smaller across and down, if it is large enough.
     #[must_use]
     pub fn smaller(&self) -> Self {
         let less = |side: usize| side.saturating_sub(MULTIPLE).max(MULTIPLE);
@@ -97,12 +97,12 @@ impl Shape {
 pub const PICTURE: &str = "picture";
 /// Name of the output with the log-odds of every keypoint in every cell, `[n, keypoints, rows, columns]`.
 pub const MAPS: &str = "maps";
-/// Name of the output with the evidence for the direction of the trunk, `[n, 2]`: towards the right of the picture and towards
+/// Name of the output with the evidence for the direction of the trunk, `[n, 2]`: components towards the right of the picture and towards
 /// the camera.
 ///
-/// Twice its scalar product with a direction is the log-likelihood ratio of facing there over facing away from there.
+/// Twice the scalar product of the evidence with a direction is a log-likelihood ratio: facing there versus facing away from there.
 pub const FRONT: &str = "front";
-/// Name of the output with the expected errors of the keypoints in heights of the input, `[n, keypoints]`.
+/// Name of the output with the expected errors of the keypoints, in heights of the input, `[n, keypoints]`.
 pub const ERROR: &str = "error";
 
 impl Network for Shape {
@@ -124,7 +124,7 @@ impl Network for Shape {
     }
 }
 
-/// The parameters of an untrained network; the last dense layers give what is likely for everybody.
+/// The parameters of an untrained network. The last dense layers give outputs that are likely for all people.
 pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     let mut all = parameters::initial(shape, seed);
     for parameter in &mut all {
@@ -140,12 +140,12 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     all
 }
 
-/// Reads the parameters of a network that [`file()`](super::file()) wrote, to go on from.
+/// Reads the parameters of a network that [`file()`](super::file()) wrote, from which a training run starts.
 ///
-/// A network without the layers of the [extra keypoints](EXTRAS) gets untrained ones.
+/// If the file lacks the layers of the [extra keypoints](EXTRAS), these layers stay untrained.
 ///
-/// * `shape`: its size. Width and height of the input may be others than those of the file.
-/// * `seed`: of the weights of channels that are 0 in the file.
+/// * `shape`: sizes of the network. Width and height of the input may differ from those of the file.
+/// * `seed`: seed for the weights of channels that are 0 in the file.
 ///
 /// # Errors
 ///
@@ -154,7 +154,7 @@ pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError>
     crate::networks::begun::begun(initial(shape, seed), Some(OF_EXTRAS), file)
 }
 
-/// Runs the network: maps, evidence for the direction, logarithms of expected errors.
+/// Runs the network. Returns the maps, the evidence for the direction, and the logarithms of the expected errors.
 fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
     let trunk = Trunk {
         stem: shape.stem,
@@ -186,7 +186,7 @@ fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
     vec![maps, front, errors]
 }
 
-/// By the features at the joints and the deepest features of the whole picture.
+/// Computes the direction from the features at the joints and the deepest features of the whole picture.
 fn front<O: Ops>(
     ops: &mut O,
     shape: &Shape,
@@ -200,10 +200,11 @@ fn front<O: Ops>(
     ops.dense(&hidden, "front2", 2)
 }
 
-/// The same, from which the features learn nothing, and how high the maps are, where, and how far their heat is spread.
+/// Computes the expected errors from the same features, and from the heights, positions and spreads of the maps. No gradient flows
+/// back to the features.
 ///
-/// * `name`: how the names of its layers begin.
-/// * `hidden`, `n`: values of the hidden layer, and keypoints.
+/// * `name`: prefix of the names of the layers.
+/// * `hidden`, `n`: size of the hidden layer, and number of keypoints.
 /// * `places`: the maps of the keypoints.
 fn error<O: Ops>(
     ops: &mut O,

@@ -1,54 +1,54 @@
-//! A person to learn from.
+//! A person for training, with picture and true keypoints.
 
 use serde::{Deserialize, Serialize};
 
 use super::{N_JOINTS, N_KEYPOINTS};
 
-/// Side of the square picture that is kept of a person, pixels.
+/// Side of the square picture that is stored for a person, in pixels.
 pub const SIDE: usize = 256;
-/// Height of the network's window in it, as the box around the marked joints asks for, pixels.
+/// Height of the network's window in this picture, according to the box around the marked joints, in pixels.
 pub const WINDOW: f64 = 176.0;
 
-/// Where a picture comes from.
+/// Origin of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Source {
     /// A photograph, marked by hand.
     Photograph,
-    /// A scene that does not exist.
+    /// A synthetic scene.
     Scene,
 }
 
 /// Target of the network for a keypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Target {
-    /// Where it is, pixels; not finite if nobody knows.
+    /// Position in pixels; not finite if unknown.
     pub at: [f32; 2],
-    /// Another place that is as likely, where the mark and the teacher contradict each other.
+    /// An equally likely position, if the mark and the teacher contradict each other.
     pub or: Option<[f32; 2]>,
-    /// How much it counts, 0 to 1.
+    /// Weight of the keypoint, 0 to 1.
     pub weight: f32,
-    /// True if it was marked, is exact, or is an extra keypoint that the teacher is sure of.
+    /// True if the keypoint was marked, is exact, or is an extra keypoint of which the teacher is certain.
     pub is_marked: bool,
 }
 
-/// A picture of a person, and where the keypoints are: as seen.
+/// A picture of a person, and the keypoints as seen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Person {
-    /// Where it comes from.
+    /// Origin of the picture.
     pub source: Source,
-    /// Name in messages.
+    /// Name of the picture in messages.
     pub name: String,
-    /// The picture: [`SIDE`] pixels square, red first.
+    /// Pixels of the picture, [`SIDE`] x [`SIDE`], red first.
     pub rgb: Vec<u8>,
-    /// The joints, in the order of `skeleton::PARSE14`, then [`EXTRAS`](super::EXTRAS).
+    /// Targets of the joints, in the order of `skeleton::PARSE14`, then of [`EXTRAS`](super::EXTRAS).
     pub targets: [Target; N_KEYPOINTS],
-    /// In which direction the person faces: towards the right of the picture, downwards, towards the camera; its length is the
-    /// certainty, 0 to 1.
+    /// Direction in which the person faces: components towards the right of the picture, downwards, and towards the camera. Its length is
+    /// the certainty, 0 to 1.
     pub front: [f32; 3],
 }
 
 impl Person {
-    /// The places of the joints that are known well enough to lay a box around them.
+    /// The positions of the joints that are known well enough to determine a box around them.
     pub fn places(&self) -> impl Iterator<Item = [f32; 2]> {
         let is_known =
             |target: &&Target| target.weight > 0.0 && target.at.iter().all(|side| side.is_finite());
@@ -56,7 +56,7 @@ impl Person {
         joints.filter(is_known).map(|target| target.at)
     }
 
-    /// From the middle of the hips to the neck, pixels; not finite if one of them is not known.
+    /// Vector from the middle of the hips to the neck, in pixels; not finite if one of the joints is unknown.
     pub fn trunk(&self) -> [f32; 2] {
         let [right, left, neck] = [2, 3, 12].map(|joint: usize| self.targets[joint].at);
         [0, 1].map(|axis| neck[axis] - f32::midpoint(right[axis], left[axis]))

@@ -1,10 +1,10 @@
-//! How good a network is on people whose joints are known.
+//! Quality of a network on people whose joints are known.
 
 use serde::{Deserialize, Serialize};
 
 use super::{N_JOINTS, N_KEYPOINTS};
 
-/// The limbs whose ends are judged (PCP): joints whose mean is one end, and the other.
+/// The limbs whose ends are evaluated (PCP). Each end is the mean of the listed joints.
 const STICKS: [(&[usize], &[usize]); 10] = [
     (&[8, 9], &[2, 3]),
     (&[2], &[1]),
@@ -21,36 +21,36 @@ const STICKS: [(&[usize], &[usize]); 10] = [
 /// Neck and top of the head.
 const HEAD: [usize; 2] = [12, 13];
 
-/// Keypoints found of one person, and their truth.
+/// Found keypoints of one person, and the true ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// Where the keypoints were found, cells.
+    /// Positions of the found keypoints, in cells.
     pub found: [[f32; 2]; N_KEYPOINTS],
-    /// Their expected errors, any unit that all people share.
+    /// Expected errors of the keypoints, in any unit common to all people.
     pub expected: [f32; N_KEYPOINTS],
-    /// Evidence for the direction.
+    /// Evidence for the direction of the trunk.
     pub front: [f32; 2],
-    /// Where they are; NaN where that is not known.
+    /// True positions of the keypoints, in cells; NaN if unknown.
     pub truth: [[f32; 2]; N_KEYPOINTS],
-    /// The direction; its length is its certainty.
+    /// True direction of the trunk; its length is the certainty.
     pub facing: [f32; 2],
 }
 
-/// How good a network is.
+/// Measures of a network's quality.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Score {
-    /// People.
+    /// Number of people.
     pub people: usize,
-    /// Share of limbs of which the mean distance of both ends is at most half their length.
+    /// Share of limbs for which the mean error of both ends is at most half the length of the limb.
     pub mean_of_ends: f32,
-    /// Share of limbs of which both ends are at most half their length off.
+    /// Share of limbs for which the error of each end is at most half the length of the limb.
     pub both_ends: f32,
-    /// Share of people with a surely known direction for whom it distinguishes the direction from its opposite.
+    /// Share of people with certain direction for whom the network distinguishes it from the opposite direction.
     pub front: f32,
-    /// Area under the curve: the probability that a joint that is off by more than half a head is expected to be farther off
-    /// than one that is not.
+    /// Area under the ROC curve: the probability that a joint with an error of more than half a head has a larger expected error
+    /// than a joint with a smaller error.
     pub area: f32,
-    /// Share of extra keypoints that are at most a fifth of the trunk off.
+    /// Share of extra keypoints with an error of at most a fifth of the trunk.
     pub extras: f32,
 }
 
@@ -64,7 +64,7 @@ fn end(of: &[[f32; 2]], joints: &[usize]) -> [f32; 2] {
 }
 
 impl Score {
-    /// Judges what was found.
+    /// Computes the measures from the results for people.
     pub fn new(people: &[Judged]) -> Self {
         let mut limbs = [0.0f32; 3];
         let mut fronts = [0.0f32; 2];
@@ -116,7 +116,7 @@ impl Score {
     }
 }
 
-/// The area under the curve (Mann and Whitney); NaN if all joints are alike.
+/// The area under the curve (Mann and Whitney); NaN if all joints are in the same class.
 fn area(mut joints: Vec<(f32, bool)>) -> f32 {
     joints.sort_by(|a, b| a.0.total_cmp(&b.0));
     let far = joints.iter().filter(|joint| joint.1).count();

@@ -5,60 +5,60 @@ use serde::{Deserialize, Serialize};
 use super::network::{MULTIPLE, Shape};
 use crate::networks::settings::{Precision, SettingsError, check, count, from_zero};
 
-/// Settings of a training.
+/// Settings of a training run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Random seed.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// The sizes of the network.
     pub shape: Shape,
-    /// Numbers between layers.
+    /// Precision of the maps between layers.
     pub precision: Precision,
-    /// Samples a step.
+    /// Number of samples per step.
     pub batch: usize,
-    /// Steps of the training.
+    /// Number of steps of the training.
     pub steps: usize,
-    /// Share of the steps, the first ones, that are shown inputs of 32 pixels less across and down: three fifths of the pixels by
+    /// Share of the steps, from the first, with inputs that are 32 pixels smaller across and down: three fifths of the pixels by
     /// default.
     pub small: f32,
-    /// Steps after them that learn the expected error alone, on people who are kept apart.
+    /// Number of later steps that train only the expected error, on held-out people.
     pub error_steps: usize,
-    /// Longest step: reached after a tenth of the training, from where it falls as a cosine.
+    /// Length of the longest step. It is reached after a tenth of the training, and then decreases as a cosine.
     pub rate: f32,
-    /// Share of every weight that is taken away, times the rate.
+    /// Share of every weight that is subtracted, times the rate.
     pub decay: f32,
     /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,
     /// Share of the mean of the parameters that every step replaces.
     pub averaged: f32,
-    /// Learn the extra keypoints alone: everything else stays in the file as it is in the network that the training goes on from.
+    /// True to train only the extra keypoints. All other parameters in the file stay as in the network from which the training starts.
     pub extras_alone: bool,
-    /// Weight of the direction beside the maps.
+    /// Weight of the direction relative to the maps.
     pub front: f32,
-    /// Weight of the expected error beside the maps.
+    /// Weight of the expected error relative to the maps.
     pub error: f32,
-    /// How samples are varied.
+    /// Random variation of the samples.
     pub vary: Vary,
 }
 
-/// How samples are varied.
+/// Random variation of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {
-    /// Share of the samples that are turned until the trunk is upright, before they are turned at random.
+    /// Share of the samples that are rotated until the trunk is upright, before a random rotation.
     pub upright: f32,
-    /// Deviation of the angle of those, degrees.
+    /// Standard deviation of the angle for these samples, in degrees.
     pub turn_upright: f32,
-    /// Deviation of the angle of the others.
+    /// Standard deviation of the angle for all other samples, in degrees.
     pub turn: f32,
-    /// Deviation of the logarithm of the scale.
+    /// Standard deviation of the logarithm of the scale.
     pub scale: f32,
-    /// Deviation of the place, window heights.
+    /// Standard deviation of the position, in heights of the window.
     pub shift: f32,
-    /// Share of samples of which a part is covered.
+    /// Share of samples that are partly covered.
     pub covered: f32,
-    /// Share of samples of low resolution.
+    /// Share of samples with reduced resolution.
     pub coarse: f32,
     /// Share of samples without colour.
     pub grey: f32,
@@ -106,7 +106,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// The first that cannot be used.
+    /// The first invalid setting.
     pub fn check(&self) -> Result<(), SettingsError> {
         let shape = &self.shape;
         for (setting, side) in [("shape.width", shape.width), ("shape.height", shape.height)] {

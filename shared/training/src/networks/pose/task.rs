@@ -1,4 +1,4 @@
-//! The training of the network that finds joints: steps of Adam with growing pictures, then some for the expected error alone.
+//! The training of the network that finds joints: steps of Adam with growing pictures, then steps for the expected error alone.
 
 use rayon::prelude::*;
 
@@ -18,27 +18,27 @@ use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
-/// People in a row that belong together.
+/// Number of consecutive people that belong together.
 const RUN: usize = 16;
-/// People that are judged at once.
+/// Number of people that are evaluated at once.
 const JUDGED_AT_ONCE: usize = 32;
-/// Share of the steps in which their length rises.
+/// Share of the steps in which the step length rises.
 const RISING: f32 = 0.1;
-/// Length of the steps that learn the expected error alone.
+/// Length of the steps that train only the expected error.
 const ERROR_RATE: f32 = 3e-4;
-/// Steps of a pass.
+/// Number of steps in a pass.
 const STEPS: usize = 100;
-/// Passes between two looks at the people who are kept apart.
+/// Number of passes between two evaluations on held-out people.
 const JUDGED: usize = 10;
 
 /// Writes a network as an ONNX file, with weights in half precision.
 ///
 /// * `parameters`: in the order of [`initial`].
-/// * `metadata`: keys and values that the file carries.
+/// * `metadata`: keys and values of the file's metadata.
 ///
 /// # Panics
 ///
-/// If the parameters are another network's.
+/// If the parameters belong to another network.
 pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
     onnx::write(shape, parameters, document(metadata))
 }
@@ -55,11 +55,11 @@ fn document(metadata: &[(String, String)]) -> Document {
 /// Outputs of the network for pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Found {
-    /// Log-odds: `[n, keypoints, rows, columns]`.
+    /// Log-odds, `[n, keypoints, rows, columns]`.
     pub maps: Vec<f32>,
-    /// `[n, 2]`
+    /// Evidence for the direction, `[n, 2]`.
     pub fronts: Vec<f32>,
-    /// Natural logarithms of expected errors, heights of the input: `[n, keypoints]`.
+    /// Natural logarithms of the expected errors in heights of the input, `[n, keypoints]`.
     pub errors: Vec<f32>,
 }
 
@@ -75,7 +75,7 @@ impl Found {
     }
 }
 
-/// People who are kept apart: the expected error is learned on some of them and judged on the others, with everything else.
+/// Held-out people. The expected error is trained on some of them; all outputs are evaluated on the others.
 #[derive(Debug)]
 struct KeptApart<'a> {
     calibrating: Vec<&'a Person>,
@@ -83,8 +83,8 @@ struct KeptApart<'a> {
 }
 
 impl<'a> KeptApart<'a> {
-    /// In turn [`RUN`] for the one and for the other: neighbours in a list can be pictures of one person. All for both where
-    /// they are too few.
+    /// Assigns [`RUN`] people alternately to each part, since neighbours in a list can be pictures of the same person. If there are
+    /// too few people, all are used for both.
     fn new(people: &'a [Person]) -> Self {
         let (calibrating, judged): (Vec<_>, Vec<_>) =
             people.iter().enumerate().partition(|(at, _)| (at / RUN).is_multiple_of(2));
@@ -105,13 +105,13 @@ impl<'a> KeptApart<'a> {
     }
 }
 
-/// There are no people to learn from, or none are kept apart.
+/// There are no training people, or no held-out people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{learnt} people to learn from and {kept} kept apart are too few")]
+#[error("{learnt} people for training and {kept} held out are too few")]
 pub struct TooFew {
-    /// To learn from.
+    /// Number of training people.
     pub learnt: usize,
-    /// Kept apart.
+    /// Number of held-out people.
     pub kept: usize,
 }
 
@@ -126,10 +126,10 @@ pub struct PoseTask<'a> {
 }
 
 impl<'a> PoseTask<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
-    /// * `learnt`, `kept`: people to learn from, and others, on whom it is judged and on whom the expected error is learned.
-    /// * `from`: what [`begun`](super::begun) read, to begin with in place of random parameters.
+    /// * `learnt`, `kept`: training people, and held-out people for the evaluation and the training of the expected error.
+    /// * `from`: the network read by [`begun`](super::begun), used instead of random parameters.
     ///
     /// # Errors
     ///
@@ -152,7 +152,7 @@ impl<'a> PoseTask<'a> {
         })
     }
 
-    /// The network with the size of the input at a step.
+    /// The network with the input size of a step.
     fn shape_at(&self, nth: usize) -> Shape {
         let settings = self.settings;
         if (nth as f32) < settings.small * settings.steps as f32 {
@@ -162,12 +162,12 @@ impl<'a> PoseTask<'a> {
         }
     }
 
-    /// Returns true if a step learns the expected error alone.
+    /// Returns true if a step trains only the expected error.
     fn is_for_error(&self, nth: usize) -> bool {
         nth >= self.settings.steps
     }
 
-    /// The sample of a number.
+    /// Returns the sample with a given number.
     fn sample(&self, people: &[&Person], at: usize, shape: &Shape) -> Option<NetworkSample> {
         let (settings, seed) = (self.settings, self.settings.seed);
         let person = people[order::shown(at, people.len(), seed)];
@@ -176,7 +176,7 @@ impl<'a> PoseTask<'a> {
         varied(person, other, (shape, &settings.vary), &mut dice)
     }
 
-    /// The length of a step.
+    /// Returns the length of a step.
     fn rate(&self, nth: usize) -> f32 {
         if self.is_for_error(nth) {
             return ERROR_RATE;
@@ -224,7 +224,7 @@ impl Task for PoseTask<'_> {
         self.settings.steps + self.settings.error_steps
     }
 
-    /// Ends a pass where the expected error alone begins to be learned; that pass and the last one are judged.
+    /// Ends a pass at the start of the training of the expected error alone. That pass and the last one are evaluated.
     fn plan(&self, steps: usize, passes: usize) -> Plan {
         let end = if self.is_for_error(steps) {
             self.n_steps()
@@ -259,7 +259,7 @@ impl Task for PoseTask<'_> {
             rate: self.rate(nth),
             decay: settings.decay,
             longest: settings.longest,
-            // At the beginning a mean over few steps.
+            // At the beginning, the mean is over few steps.
             averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
         }
     }
@@ -332,7 +332,7 @@ impl Task for PoseTask<'_> {
 }
 
 impl Trainer<PoseTask<'_>> {
-    /// How good the trained network is on people.
+    /// Evaluates the trained network on people.
     pub fn judge(&self, people: &[Person]) -> Score {
         let people: Vec<&Person> = people.iter().collect();
         score(
@@ -350,7 +350,7 @@ impl Trainer<PoseTask<'_>> {
 
     /// The trained network as an ONNX file.
     ///
-    /// * `metadata`: keys and values that the file carries.
+    /// * `metadata`: keys and values of the file's metadata.
     pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
         let mut document = document(metadata);
         let PoseTask { settings, from, .. } = self.task();
@@ -410,7 +410,7 @@ fn judged(found: &Found, seen: &NetworkSample, (at, cells): (usize, [usize; 2]))
     }
 }
 
-/// A hash of everything that the result depends on.
+/// Hash of everything that the result depends on.
 fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&Begun>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for person in people.into_iter().flatten() {

@@ -1,4 +1,4 @@
-//! Varied pictures of a person for the network, and the keypoints in them.
+//! Randomly varied pictures of a person as inputs, and the keypoints in them.
 
 use fastrand::Rng;
 
@@ -8,42 +8,42 @@ use super::settings::Vary;
 use super::{MIRROR, exchange_sides};
 use crate::networks::parameters::normal;
 
-/// The box around the joints is enlarged by it: what [`Shape`]'s card says to the program that uses the network.
+/// Factor by which the box around the joints is enlarged. [`Shape`]'s card tells it to the program that uses the network.
 pub const MARGIN: f32 = 1.25;
-/// Amount by which hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+/// Margin for hands, feet and hair beyond the joints, on each side, as a share of the longer side.
 const BEYOND: f32 = 0.05;
-/// Where there is no picture.
+/// Colour outside the picture.
 pub const FILL: f32 = 110.0;
-/// Subtracted from a colour, which is then divided by [`DEVIATION`].
+/// Value subtracted from a colour before it is divided by [`DEVIATION`].
 pub const MEAN: f32 = 110.0;
-/// See [`MEAN`].
+/// Value by which a colour is divided after [`MEAN`] is subtracted.
 pub const DEVIATION: f32 = 60.0;
-/// Longest shift that is made, deviations.
+/// Largest shift, in standard deviations.
 const MOST: f32 = 2.5;
 
-/// A picture for the network, and its truth.
+/// An input of the network, and the true outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkSample {
-    /// `[3, height, width]`
+    /// Input picture, `[3, height, width]`.
     pub picture: Vec<f32>,
     /// Heat of every keypoint, 0 to 1: `[keypoints, rows, columns]`.
     pub maps: Vec<f32>,
-    /// How much the map of every keypoint counts.
+    /// Weight of the map of every keypoint.
     pub weights: [f32; N_KEYPOINTS],
-    /// Direction of the trunk, towards the right of the picture and towards the camera; its length is its certainty.
+    /// Direction of the trunk: components towards the right of the picture and towards the camera. Its length is the certainty.
     pub front: [f32; 2],
-    /// Where the keypoints are, cells; NaN where that is not certain.
+    /// Positions of the keypoints, in cells; NaN if not certain.
     pub places: [[f32; 2]; N_KEYPOINTS],
 }
 
-/// How a picture becomes the input: turned, moved, scaled, mirrored.
+/// Mapping of a picture to the input: it is rotated, moved, scaled, and possibly mirrored.
 #[derive(Debug, Clone, Copy)]
 struct View {
-    /// Cosine and sine of the angle by which the picture is turned.
+    /// Cosine and sine of the angle by which the picture is rotated.
     turn: [f32; 2],
-    /// Middle of the window in the turned picture, whose origin is the middle of the picture, pixels.
+    /// Centre of the window in the rotated picture, in pixels. The origin is the centre of the picture.
     centre: [f32; 2],
-    /// Pixels of the picture for a pixel of the input.
+    /// Pixels of the picture per pixel of the input.
     step: f32,
     size: [usize; 2],
     is_mirrored: bool,
@@ -54,7 +54,7 @@ impl View {
         turned(at, self.turn)
     }
 
-    /// The point of the input at a point of the picture.
+    /// Converts a point of the picture to the input.
     fn in_input(&self, at: [f32; 2]) -> [f32; 2] {
         let at = self.turned(at);
         let [x, y] = [0, 1]
@@ -66,7 +66,7 @@ impl View {
         }
     }
 
-    /// The point of the picture at a point of the input.
+    /// Converts a point of the input to the picture.
     fn in_picture(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let x = if self.is_mirrored {
             (self.size[0] - 1) as f32 - x
@@ -89,19 +89,19 @@ fn middle() -> f32 {
     0.5 * (SIDE - 1) as f32
 }
 
-/// A point of the picture after the picture was turned about its middle, which becomes the origin.
+/// Rotates a point of the picture about the picture's centre, which becomes the origin.
 fn turned(at: [f32; 2], [cosine, sine]: [f32; 2]) -> [f32; 2] {
     let [x, y] = at.map(|side| side - middle());
     [cosine * x - sine * y, sine * x + cosine * y]
 }
 
-/// A person as the network sees one in use: in the box around the joints, upright or not.
+/// A person as in normal use of the network: in the box around the joints, upright or not.
 pub fn plain(person: &Person, shape: &Shape) -> Option<NetworkSample> {
     let view = view(person, shape, [1.0, 0.0], (1.0, [0.0; 2], false))?;
     Some(sample(person, shape, &view, &pixels(person, &view)))
 }
 
-/// A person, varied at random.
+/// A randomly varied person.
 ///
 /// * `other`: another person, who may cover parts of this one.
 pub fn varied(
@@ -137,14 +137,14 @@ pub fn varied(
     Some(sample(person, shape, &view, &rgb))
 }
 
-/// The angle between the trunk and upright, clockwise in the picture, radians; 0 where the trunk is not known.
+/// The angle between the trunk and upright, clockwise in the picture, in radians; 0 if the trunk is unknown.
 fn lean(person: &Person) -> f32 {
     let [x, y] = person.trunk();
     let angle = x.atan2(-y);
     if angle.is_finite() { angle } else { 0.0 }
 }
 
-/// The window around the joints; nothing if they have no extent.
+/// The window around the joints; `None` if they have hardly any extent.
 fn view(
     person: &Person,
     shape: &Shape,
@@ -179,7 +179,7 @@ fn view(
     })
 }
 
-/// The window, bilinear: `[height][width]`, red first, 0 to 255.
+/// The pixels of the window, interpolated: `[height][width]`, red first, 0 to 255.
 fn pixels(person: &Person, view: &View) -> Vec<[f32; 3]> {
     let [width, height] = view.size;
     let mut all = Vec::with_capacity(width * height);
@@ -192,7 +192,7 @@ fn pixels(person: &Person, view: &View) -> Vec<[f32; 3]> {
     all
 }
 
-/// The colour between four pixels.
+/// Interpolates the colour between four pixels.
 fn colour(rgb: &[u8], [x, y]: [f32; 2]) -> [f32; 3] {
     let (left, top) = (x.floor(), y.floor());
     let [right, below] = [x - left, y - top];
@@ -242,7 +242,7 @@ fn cover(rgb: &mut [[f32; 3]], other: &Person, [width, height]: [usize; 2], rng:
     }
 }
 
-/// Lowers the resolution: means of squares of pixels, enlarged again between their centres.
+/// Lowers the resolution: averages squares of pixels, and interpolates between their centres.
 pub(in crate::networks) fn coarsen(
     rgb: &mut [[f32; 3]],
     [width, height]: [usize; 2],
@@ -282,7 +282,7 @@ pub(in crate::networks) fn coarsen(
     }
 }
 
-/// Changes contrast, brightness and colours, adds noise.
+/// Changes contrast, brightness and colours, and adds noise.
 ///
 /// * `grey`: share of pictures that lose their colours.
 pub(in crate::networks) fn recolour(rgb: &mut [[f32; 3]], grey: f32, rng: &mut Rng) {
@@ -300,7 +300,7 @@ pub(in crate::networks) fn recolour(rgb: &mut [[f32; 3]], grey: f32, rng: &mut R
             *colour = [colour.iter().sum::<f32>() / 3.0; 3];
         }
         for (value, tint) in colour.iter_mut().zip(tint) {
-            // Uniform noise of the deviation asked for.
+            // Uniform noise with the requested standard deviation.
             let noise = noise * 3.46 * (rng.f32() - 0.5);
             let changed = (*value - MEAN) * contrast + MEAN + brightness + tint + noise;
             *value = changed.clamp(0.0, 255.0);
@@ -369,14 +369,14 @@ fn sample(person: &Person, shape: &Shape, view: &View, rgb: &[[f32; 3]]) -> Netw
     }
 }
 
-/// The direction in the picture that is shown.
+/// The direction in the rotated and mirrored picture.
 fn front([x, y, towards]: [f32; 3], view: &View) -> [f32; 2] {
     let [cosine, sine] = view.turn;
     let x = cosine * x - sine * y;
     [if view.is_mirrored { -x } else { x }, towards]
 }
 
-/// The keypoints that are each other's mirror image, checked: a keypoint's mirror image has it as its own.
+/// Checks that `MIRROR` is its own inverse.
 const _: () = {
     let mut joint = 0;
     while joint < N_KEYPOINTS {
@@ -386,7 +386,7 @@ const _: () = {
 };
 
 impl Target {
-    /// Nothing is known of it.
+    /// An unknown keypoint.
     pub const UNKNOWN: Self = Self {
         at: [f32::NAN; 2],
         or: None,

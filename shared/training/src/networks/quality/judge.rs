@@ -6,22 +6,22 @@ use statistics::Sorted;
 use super::sample::Sample;
 use super::score::{area, rank_correlation};
 
-/// The quality of predictions.
+/// Measures of the quality of predictions, for each part.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Judgement {
-    /// How many samples.
+    /// Number of samples.
     pub n: usize,
-    /// Area under the ROC of "the error is larger than tau"; `None` where all samples are on one side.
+    /// Area under the ROC of "the error is larger than tau"; `None` if all samples are in the same class.
     pub area: Vec<Option<f64>>,
     /// Rank correlation of predicted and true error.
     pub rank_correlation: Vec<Option<f64>>,
-    /// Mean of the absolute difference, shares of the height that the tile shows.
+    /// Mean absolute difference of predicted and true error, as a share of the height that the tile shows.
     pub inaccuracy: Vec<f64>,
     /// Share of the samples whose error is larger than tau.
     pub beyond: Vec<f64>,
 }
 
-/// The errors of samples, shares of the height that their tiles show: the median of every part is its tau.
+/// The median error of every part, used as its tau. Errors are shares of the height that the tiles show.
 pub fn tau(samples: &[&Sample]) -> Vec<f32> {
     let of_part = |part: usize| -> Vec<f32> {
         let share = |sample: &&Sample| sample.errors_px[part] / sample.height_px;
@@ -33,11 +33,11 @@ pub fn tau(samples: &[&Sample]) -> Vec<f32> {
 }
 
 impl Judgement {
-    /// Judges predictions.
+    /// Evaluates predictions.
     ///
-    /// * `predicted`: `[sample][part]`, shares of the height that the tile shows.
+    /// * `predicted`: `[sample][part]`, as shares of the height that the tile shows.
     /// * `truth`: the samples.
-    /// * `tau`: the thresholds, the same shares.
+    /// * `tau`: the thresholds, as the same shares.
     ///
     /// # Panics
     ///

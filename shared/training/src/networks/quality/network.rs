@@ -12,9 +12,9 @@ pub const EVIDENCE: &str = "evidence";
 /// Name of the output, `[n, parts]`.
 pub const SIGMA: &str = "sigma";
 
-/// The places of the parts in [`viewquality::evidence()`]: tile heights from its centre.
+/// The positions of the parts in [`viewquality::evidence()`], in tile heights from the centre of the tile.
 ///
-/// * `tile`: its height and width.
+/// * `tile`: height and width of the tile.
 fn places([height, width]: [usize; 2]) -> Places {
     let columns =
         |name: &str| -> Vec<usize> { (0..N_PARTS).filter_map(|part| column(part, name)).collect() };
@@ -26,16 +26,16 @@ fn places([height, width]: [usize; 2]) -> Places {
     }
 }
 
-/// Numbers per part in the evidence.
+/// Number of values per part in the evidence.
 pub(crate) const PER_PART: usize = PART_NUMBERS.len() + N_TYPES;
 
-/// Column of a number of a part.
+/// Column of one of the values of a part.
 pub(crate) fn column(part: usize, name: &str) -> Option<usize> {
     let at = PART_NUMBERS.iter().position(|known| *known == name)?;
     Some(part * PER_PART + at)
 }
 
-/// Which network.
+/// Kinds of networks that predict errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -43,15 +43,15 @@ pub enum Kind {
     Evidence,
     /// A few separable convolutions, pooled around every part, and the evidence.
     Small,
-    /// The paper's: VGG-16 with another top, on the tile alone.
+    /// The paper's network: VGG-16 with another top, on the tile alone.
     Vgg16,
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds of networks.
     pub const ALL: [Self; 3] = [Self::Evidence, Self::Small, Self::Vgg16];
 
-    /// Its name in settings and files.
+    /// Name of the kind in settings and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Evidence => "evidence",
@@ -60,7 +60,7 @@ impl Kind {
         }
     }
 
-    /// Height and width of its tile, pixels; `None` if it uses none.
+    /// Height and width of the network's tile, in pixels; `None` if it uses no tile.
     pub fn tile(self) -> Option<[usize; 2]> {
         match self {
             Self::Evidence => None,
@@ -69,7 +69,7 @@ impl Kind {
         }
     }
 
-    /// Returns true if it uses the evidence.
+    /// Returns true if the network uses the evidence.
     pub fn sees_evidence(self) -> bool {
         self != Self::Vgg16
     }
@@ -78,13 +78,13 @@ impl Kind {
 /// The sizes of a network.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
-    /// Which one.
+    /// Kind of the network.
     pub kind: Kind,
-    /// Channels of the small network's first layer; the later ones have multiples of it.
+    /// Number of channels of the small network's first layer; later layers have multiples of this number.
     pub width: usize,
-    /// Values of the hidden dense layer.
+    /// Size of the hidden dense layer.
     pub hidden: usize,
-    /// Share of the values that are dropped while training.
+    /// Share of the values that are dropped during training.
     pub dropout: f32,
 }
 
@@ -121,7 +121,7 @@ impl Network for Shape {
     }
 }
 
-/// Standard deviation of the pooling around a part, cells of the map.
+/// Standard deviation of the pooling around a part, in cells of the map.
 const LOOK: f32 = 0.7;
 
 /// The shape of the small network's convolutions.
@@ -163,13 +163,13 @@ fn small<O: Ops>(ops: &mut O, shape: &Shape) -> O::Value {
     ops.join(&joined.iter().collect::<Vec<&O::Value>>())
 }
 
-/// A convolution and the positive part of it.
+/// A convolution and the positive part of its result.
 fn convolved<O: Ops>(ops: &mut O, map: &O::Value, name: &str, conv: Conv) -> O::Value {
     let map = ops.conv(map, name, conv);
     ops.relu(&map)
 }
 
-/// Channels of the convolutions of VGG-16, between the poolings (Simonyan & Zisserman 2015, table 1, D).
+/// Numbers of channels of the convolutions of VGG-16, between the poolings (Simonyan & Zisserman 2015, table 1, D).
 pub const VGG16: [&[usize]; 5] = [
     &[64, 64],
     &[128, 128],
@@ -193,7 +193,7 @@ fn vgg16<O: Ops>(ops: &mut O) -> O::Value {
     ops.flat(&map)
 }
 
-/// The paper's top (section 4.3): dense, `PReLU`, dropout, one value for every part.
+/// The paper's top (section 4.3): dense layer, `PReLU`, dropout, and one value for every part.
 fn top<O: Ops>(ops: &mut O, list: &O::Value, shape: &Shape) -> O::Value {
     let hidden = ops.dense(list, "hidden", shape.hidden);
     let hidden = ops.prelu(&hidden, "slope");

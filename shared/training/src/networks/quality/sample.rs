@@ -4,27 +4,27 @@ use serde::{Deserialize, Serialize};
 use skeleton::MIRROR;
 use viewquality::TileShape;
 
-/// Pixels beyond every border of a tile that a sample keeps, so that the tile can be moved.
+/// Width in pixels of the margin around a tile that a sample stores, so that the tile can be moved.
 pub const MARGIN: usize = 16;
 
 /// One person in one picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
-    /// The person or sequence it shows; a group is never split between training and validation.
+    /// The person or sequence that the sample shows. A group is never split between training and validation.
     pub group: String,
-    /// Its source, as text.
+    /// Origin of the sample, as text.
     pub source: String,
-    /// The tile with [`MARGIN`] pixels more on every side, `rows x cols x 3`, red, green and blue.
+    /// The tile with a margin of [`MARGIN`] pixels on every side, `rows x cols x 3`, in red, green and blue.
     pub picture: Vec<u8>,
     /// See [`viewquality::evidence()`].
     pub evidence: Vec<f32>,
-    /// Height of what the tile shows, pixels of the picture.
+    /// Height of the area that the tile shows, in pixels of the picture.
     pub height_px: f32,
-    /// Distance of every part's centre from the truth, pixels of the picture.
+    /// Distance of every part's centre from the truth, in pixels of the picture.
     pub errors_px: Vec<f32>,
 }
 
-/// Sides of the picture that a sample of such a tile keeps, height and width.
+/// Height and width of the picture that a sample with such a tile stores.
 pub fn picture_size(tile: TileShape) -> [usize; 2] {
     [tile.height, tile.width].map(|side| side + 2 * MARGIN)
 }
@@ -32,7 +32,7 @@ pub fn picture_size(tile: TileShape) -> [usize; 2] {
 /// Distance of every part from the truth.
 ///
 /// A single view cannot tell whether it sees the person from behind, and the model names parts by the side of the
-/// picture: the better of both readings counts (the pipeline decides over all views).
+/// picture. Therefore, the assignment of left and right with the smaller errors is used. The pipeline decides over all views.
 pub fn part_errors(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Vec<f64> {
     let errors = |of: &dyn Fn(usize) -> usize| -> Vec<f64> {
         let error = |(part, at): (usize, &[f64; 2])| {

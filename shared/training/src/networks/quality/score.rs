@@ -1,9 +1,9 @@
-//! Measures of predicted errors as classifiers: is the error of a part above its threshold?
+//! Measures of predicted errors as classifiers of errors above a threshold.
 
-/// Area under the ROC: the probability that a sample that is positive scores higher than one that is not; ties
+/// Area under the ROC: the probability that a positive sample scores higher than a negative one; ties
 /// count half.
 ///
-/// * Returns `None` if all are positive, or none is.
+/// * Returns `None` if all samples are positive or all are negative.
 pub fn area(scores: &[f32], positive: &[bool]) -> Option<f64> {
     let ranks = ranks(scores);
     let of_positive = ranks.iter().zip(positive).filter(|ranked| *ranked.1);
@@ -14,9 +14,9 @@ pub fn area(scores: &[f32], positive: &[bool]) -> Option<f64> {
     (n_positive > 0.0 && n_other > 0.0).then(|| above / (n_positive * n_other))
 }
 
-/// Spearman's rank correlation; tied numbers share the mean of their ranks.
+/// Spearman's rank correlation; tied values share the mean of their ranks.
 ///
-/// * Returns `None` if all numbers of one side are the same.
+/// * Returns `None` if all values of one list are the same.
 pub fn rank_correlation(a: &[f32], b: &[f32]) -> Option<f64> {
     let (a, b) = (ranks(a), ranks(b));
     let middle = f64::midpoint(a.len() as f64, 1.0);
@@ -28,7 +28,7 @@ pub fn rank_correlation(a: &[f32], b: &[f32]) -> Option<f64> {
     (size > 0.0).then(|| product(&a, &b) / size)
 }
 
-/// Ranks from 1, ties share their mean.
+/// Ranks from 1; ties share their mean.
 fn ranks(of: &[f32]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..of.len()).collect();
     order.sort_unstable_by(|a, b| of[*a].total_cmp(&of[*b]));

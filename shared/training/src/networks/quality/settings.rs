@@ -11,12 +11,12 @@ use crate::networks::settings::{SettingsError, check, count, from_zero};
 pub enum Loss {
     /// Half the squared length of the vector of differences, as in the paper.
     L2,
-    /// The same for small differences, growing linearly for those of more than 1 (Huber).
+    /// The same for small differences, but linear for differences above 1 (Huber).
     Robust,
 }
 
 impl Loss {
-    /// The loss of one difference.
+    /// Returns the loss of one difference.
     pub(super) fn cost(self, off: f32) -> f32 {
         match self {
             Self::L2 => 0.5 * off * off,
@@ -27,7 +27,7 @@ impl Loss {
         }
     }
 
-    /// Its change with the difference.
+    /// Returns the derivative of the loss with respect to the difference.
     pub(super) fn slope(self, off: f32) -> f32 {
         match self {
             Self::L2 => off,
@@ -42,7 +42,7 @@ impl Loss {
 pub enum Unit {
     /// The error as a share of the height that the tile shows.
     Relative,
-    /// The logarithm of it, see [`viewquality::Unit::LogRelative`].
+    /// The logarithm of the relative error, see [`viewquality::Unit::LogRelative`].
     LogRelative,
 }
 
@@ -55,43 +55,43 @@ impl From<Unit> for viewquality::Unit {
     }
 }
 
-/// How a network is trained; the defaults are those of the network that ships.
+/// Settings of the training of a network; the defaults are those of the built-in network.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Which network.
+    /// Kind of the network.
     pub network: Kind,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Unit of the output.
+    /// Unit of the network's output.
     pub unit: Unit,
-    /// Loss.
+    /// Loss of the network's output.
     pub loss: Loss,
-    /// Most passes over the samples.
+    /// Largest number of passes over the samples.
     pub epochs: u32,
-    /// Passes without improvement of the validation after which it ends.
+    /// Number of passes without improvement in validation after which the training ends.
     pub patience: u32,
-    /// Samples of one step.
+    /// Number of samples per step.
     pub batch: usize,
-    /// Initial learning rate; decreases to 0 as a cosine.
+    /// Initial learning rate; it decreases to 0 as a cosine.
     pub rate: f32,
-    /// Share of the last step that is made again.
+    /// Share of the last step that is added to each step.
     pub momentum: f32,
     /// Weight decay.
     pub decay: f32,
-    /// Gradients longer than this are shortened to it.
+    /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,
-    /// Share of the groups (subjects, images) for validation.
+    /// Share of the groups (subjects, images) used for validation.
     pub validation: f32,
-    /// Channels of the small network's first layer.
+    /// Number of channels of the small network's first layer.
     pub width: usize,
-    /// Values of the hidden layer.
+    /// Size of the hidden layer.
     pub hidden: usize,
-    /// Share of them that is dropped.
+    /// Share of the hidden layer's values that are dropped.
     pub dropout: f32,
-    /// VGG-16: passes in which only the top is trained.
+    /// For VGG-16, number of passes in which only the top is trained.
     pub frozen_epochs: u32,
-    /// VGG-16: blocks of convolutions, counted from the last, that are trained after these.
+    /// For VGG-16, number of blocks of convolutions that are trained after these passes, counted from the last.
     pub unfrozen_blocks: usize,
     /// Augmentation of the samples.
     pub vary: Vary,
@@ -101,19 +101,19 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {
-    /// Share that is mirrored, left and right exchanged.
+    /// Share of samples that are mirrored, with left and right exchanged.
     pub mirror: f32,
-    /// Most that the tile is moved, heights of the tile.
+    /// Largest shift of the tile, in heights of the tile.
     pub shift: f32,
-    /// Most that the tile is enlarged or reduced, as a share.
+    /// Largest enlargement or reduction of the tile, as a share.
     pub scale: f32,
-    /// Share that is blurred.
+    /// Share of samples that are blurred.
     pub blur: f32,
-    /// Largest deviation of the blur, pixels of the tile.
+    /// Largest standard deviation of the blur, in pixels of the tile.
     pub blur_px: f32,
-    /// Share that gets noise.
+    /// Share of samples with added noise.
     pub noise: f32,
-    /// Largest deviation of the noise, of colours from 0 to 1.
+    /// Largest standard deviation of the noise, for colours from 0 to 1.
     pub noise_level: f32,
 }
 
@@ -161,7 +161,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// The first that is not.
+    /// The first setting out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
         let vary = &self.vary;
         let numbers = [

@@ -1,4 +1,4 @@
-//! Samples as bytes.
+//! Conversion of samples to bytes and back.
 
 use serde::{Deserialize, Serialize};
 use skeleton::N_PARTS;
@@ -7,32 +7,32 @@ use viewquality::{EVIDENCE_VERSION, TileShape, n_evidence};
 use super::sample::{Sample, picture_size};
 use crate::networks::checkpoint::{StoreError, unwrap, wrap};
 
-/// Kind of a file of samples.
+/// Kind of a file with samples.
 const SAMPLES: [u8; 8] = *b"PLXTILES";
 
-/// Why samples cannot be read.
+/// Reason why samples cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SamplesError {
-    /// The bytes are no samples, or damaged.
+    /// The bytes are not samples, or are damaged.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A sample has other sizes than its header, or invalid numbers.
+    /// A sample's sizes do not match the header, or its numbers are invalid.
     #[error("sample {sample} ({file_says}) has other sizes, or values that are not finite")]
     Sample {
-        /// Which, from 1.
+        /// Number of the sample, from 1.
         sample: usize,
-        /// Its source.
+        /// Origin of the sample.
         file_says: String,
     },
-    /// The evidence is of another layout.
-    #[error("its evidence has layout {got}, this Parallax knows {EVIDENCE_VERSION}")]
+    /// The evidence has an unknown layout.
+    #[error("its evidence has layout {got}, but this Parallax supports layout {EVIDENCE_VERSION}")]
     Evidence {
-        /// The layout.
+        /// Version of the layout.
         got: u32,
     },
 }
 
-/// Samples of one shape of tile.
+/// Samples with tiles of one shape.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Samples {
     /// Height and width of the tile without its margin.
@@ -49,11 +49,11 @@ struct Payload {
 }
 
 impl Samples {
-    /// Makes the bytes of a file; [`Self::from_bytes`] gives the same samples.
+    /// Makes the bytes of a file; [`Self::from_bytes`] returns the same samples.
     ///
     /// # Errors
     ///
-    /// [`StoreError::Encode`], beyond 16 GiB.
+    /// [`StoreError::Encode`] if there are more than 16 GiB.
     pub fn to_bytes(&self) -> Result<Vec<u8>, StoreError> {
         let payload = Payload {
             tile: self.tile,
@@ -67,7 +67,7 @@ impl Samples {
     ///
     /// # Errors
     ///
-    /// [`SamplesError`]; every sample that is returned has the sizes that it should have, and finite numbers.
+    /// [`SamplesError`]. All returned samples have the expected sizes and finite numbers.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, SamplesError> {
         let Payload {
             tile,

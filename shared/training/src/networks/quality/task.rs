@@ -1,4 +1,4 @@
-//! The training of a network that predicts errors: passes over samples until the validation does not improve any more.
+//! The training of a network that predicts errors: passes over samples until the validation stops improving.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use crate::networks::order;
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
-/// How good the network is on the samples that are validated on.
+/// Results of the network on the validation samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Validated {
     /// Mean loss.
@@ -27,31 +27,31 @@ pub struct Validated {
     pub area: f64,
 }
 
-/// Why samples or weights do not fit a training.
+/// Reason why samples or weights do not match a training run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TaskError {
     /// There are no samples for training, or for validation.
     #[error(
-        "{learnt} samples to learn from and {validated} to validate on are too few: there must be several groups"
+        "{learnt} samples for training and {validated} for validation are too few: there must be several groups"
     )]
     TooFew {
-        /// To learn from.
+        /// Number of training samples.
         learnt: usize,
-        /// To validate on.
+        /// Number of validation samples.
         validated: usize,
     },
-    /// The samples are of another tile.
-    #[error("the samples have tiles of {} x {}, the network sees {} x {}", got[0], got[1], expected[0], expected[1])]
+    /// The samples have tiles of another size.
+    #[error("the samples have tiles of {} x {}, but the network takes {} x {}", got[0], got[1], expected[0], expected[1])]
     Tile {
-        /// Height and width.
+        /// Height and width in the samples.
         got: [usize; 2],
-        /// Height and width.
+        /// Height and width that the network takes.
         expected: [usize; 2],
     },
     /// The given weights belong to another network.
     #[error("weights for `{name}` are missing, or have another size")]
     Weights {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
     },
 }
@@ -71,9 +71,9 @@ pub struct QualityTask<'a> {
 }
 
 impl<'a> QualityTask<'a> {
-    /// Prepares a training.
+    /// Prepares a training run.
     ///
-    /// * `weights`: initial parameters by name; the others are random.
+    /// * `weights`: initial parameters by name; all others are random.
     ///
     /// # Errors
     ///
@@ -111,22 +111,22 @@ impl<'a> QualityTask<'a> {
         })
     }
 
-    /// Samples to learn from.
+    /// The training samples.
     pub fn learnt(&self) -> &[&'a Sample] {
         &self.learnt
     }
 
-    /// Samples to validate on.
+    /// The validation samples.
     pub fn validated(&self) -> &[&'a Sample] {
         &self.validated
     }
 
-    /// Steps of a pass over the samples.
+    /// Number of steps in a pass over the samples.
     fn steps_of_pass(&self) -> usize {
         self.learnt.len().div_ceil(self.settings.batch)
     }
 
-    /// Pass of a step, from 0, and the part of the pass that is done.
+    /// Number of a step's pass, from 0, and the finished share of that pass.
     fn progress(&self, nth: usize) -> (usize, f32) {
         let steps = self.steps_of_pass();
         (nth / steps, (nth % steps) as f32 / steps as f32)
@@ -140,7 +140,7 @@ impl<'a> QualityTask<'a> {
         plain(sample, self.tile, self.has_tile())
     }
 
-    /// The sample of a number, varied at random.
+    /// The randomly varied sample with a given number.
     fn sample(&self, number: usize) -> NetworkSample {
         let seed = self.settings.seed;
         let sample = self.learnt[order::shown(number, self.learnt.len(), seed)];
@@ -199,7 +199,7 @@ fn labels(settings: &Settings, height_px: f32, errors_px: &[f32]) -> Vec<f32> {
 
 impl Task for QualityTask<'_> {
     type Network = Shape;
-    /// `[n, parts]`
+    /// True outputs, `[n, parts]`.
     type Truth = Vec<f32>;
     type Cost = f32;
     type Score = Validated;
@@ -234,7 +234,7 @@ impl Task for QualityTask<'_> {
         }
     }
 
-    /// All but the first layers of VGG-16.
+    /// All parameters are trained, except in the first layers of VGG-16.
     fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool> {
         let (pass, _) = self.progress(nth);
         let first = first_learned(self.settings, pass);
@@ -245,7 +245,7 @@ impl Task for QualityTask<'_> {
             .collect()
     }
 
-    /// Its length rises over the first pass, then falls to 0 as a cosine.
+    /// The step length rises over the first pass, then falls to 0 as a cosine.
     fn step(&self, nth: usize) -> Step {
         let settings = self.settings;
         let (pass, within) = self.progress(nth);
@@ -323,7 +323,7 @@ impl Trainer<QualityTask<'_>> {
         self.task().judgement(&predicted, samples)
     }
 
-    /// The inputs of samples and what the best network predicts for them, in the network's unit.
+    /// The inputs made from samples, and the best network's predictions in its unit.
     pub fn predictions(&self, samples: &[&Sample]) -> Vec<(NetworkSample, Vec<f32>)> {
         let task = self.task();
         let predicted = task.predict(&|shown| self.find(shown), samples);
@@ -353,18 +353,18 @@ impl Trainer<QualityTask<'_>> {
     }
 }
 
-/// Returns true if a sample is validated on: by its group alone.
+/// Returns true if a sample is used for validation, which depends only on its group.
 fn is_validated(sample: &Sample, settings: &Settings) -> bool {
     let seed = settings.seed.to_le_bytes();
     let hash = formats::checksum::fnv1a_of(sample.group.bytes().chain(seed));
-    // The lowest bits of the hash are the worst.
+    // The lowest bits of the hash are the least random.
     (hash >> 40) as f32 / (1_u32 << 24) as f32 <= settings.validation
 }
 
 /// Statistics of the columns of the evidence.
 struct Columns {
     means: Vec<f32>,
-    /// More than 0.
+    /// Standard deviations, more than 0.
     deviations: Vec<f32>,
 }
 
@@ -405,7 +405,7 @@ fn stamp(settings: &Settings, samples: &Samples, weights: &[Parameter]) -> u64 {
     )
 }
 
-/// The parameters before the first step: the network predicts the mean of every part.
+/// The parameters before the first step, with which the network predicts the mean error of every part.
 fn begin(
     settings: &Settings,
     samples: &[&Sample],
@@ -445,7 +445,7 @@ fn begin(
     Ok(all)
 }
 
-/// The first parameter of VGG-16 that a pass learns.
+/// Name of the first parameter of VGG-16 that a pass trains.
 fn first_learned(settings: &Settings, pass: usize) -> Option<String> {
     if settings.network != Kind::Vgg16 {
         return None;

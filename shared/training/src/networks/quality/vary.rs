@@ -1,4 +1,4 @@
-//! Network inputs of samples, unchanged or augmented.
+//! Network inputs made from samples, unchanged or augmented.
 
 use fastrand::Rng;
 use skeleton::{MIRROR, N_PARTS};
@@ -12,22 +12,22 @@ use crate::networks::parameters::normal;
 /// The inputs and labels of one sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkSample {
-    /// Planes of the tile, `3 x height x width`, colours from 0 to 1 normalised.
+    /// Normalised colour planes of the tile, `3 x height x width`.
     pub tile: Vec<f32>,
     /// See [`viewquality::evidence()`].
     pub evidence: Vec<f32>,
-    /// Height of what the tile shows, pixels of the picture.
+    /// Height of the area that the tile shows, in pixels of the picture.
     pub height_px: f32,
-    /// Distance of every part from the truth, pixels of the picture.
+    /// Distance of every part from the truth, in pixels of the picture.
     pub errors_px: Vec<f32>,
 }
 
 /// The position of an augmented tile in its sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
-    /// Pixels of the sample's tile per pixel of this one.
+    /// Pixels of the sample's tile per pixel of the augmented tile.
     scale: f32,
-    /// Offset of its centre from the sample's, pixels of the sample's tile.
+    /// Offset of the augmented tile's centre from the sample's, in pixels of the sample's tile.
     shift: [f32; 2],
     mirrored: bool,
 }
@@ -38,9 +38,9 @@ const AS_IT_IS: Place = Place {
     mirrored: false,
 };
 
-/// A sample as it is.
+/// A sample without augmentation.
 ///
-/// * `with_tile`: whether the network uses tiles.
+/// * `with_tile`: true if the network uses tiles.
 pub fn plain(sample: &Sample, tile: TileShape, with_tile: bool) -> NetworkSample {
     NetworkSample {
         tile: if with_tile {
@@ -56,7 +56,7 @@ pub fn plain(sample: &Sample, tile: TileShape, with_tile: bool) -> NetworkSample
 
 /// A randomly augmented sample.
 ///
-/// * `unknown`: the values of unknown evidence (the means): types of a mirrored person, since
+/// * `unknown`: values for unknown evidence (the means). They replace the types of a mirrored person, since
 ///   the types of a part and of the part on the other side do not correspond.
 pub fn varied(
     sample: &Sample,
@@ -100,7 +100,7 @@ pub fn varied(
     }
 }
 
-/// The evidence of a moved tile.
+/// The evidence for a moved tile.
 fn moved(evidence: &[f32], tile: TileShape, place: Place, unknown: &[f32]) -> Vec<f32> {
     let mut moved = evidence.to_vec();
     if place.mirrored {
@@ -130,7 +130,7 @@ fn moved(evidence: &[f32], tile: TileShape, place: Place, unknown: &[f32]) -> Ve
     moved
 }
 
-/// The planes of a tile, colours from 0 to 1: bilinear between the pixels of the sample.
+/// The planes of a tile, with colours from 0 to 1, interpolated between the pixels of the sample.
 fn pixels(sample: &Sample, tile: TileShape, place: Place) -> Vec<f32> {
     let [rows, cols] = picture_size(tile);
     let area = tile.height * tile.width;
@@ -168,7 +168,7 @@ fn pixels(sample: &Sample, tile: TileShape, place: Place) -> Vec<f32> {
     planes
 }
 
-/// Blurs planes with a Gaussian, the border repeated.
+/// Blurs planes with a Gaussian; the border pixels are repeated.
 fn blur(planes: &mut [f32], tile: TileShape, deviation: f32) {
     if deviation < 0.1 {
         return;
@@ -193,7 +193,7 @@ fn blur(planes: &mut [f32], tile: TileShape, deviation: f32) {
     }
 }
 
-/// Normalises colours for the networks.
+/// Normalises colours as the networks need them.
 fn normalised(planes: &[f32], tile: TileShape) -> Vec<f32> {
     let Normalisation { mean, deviation } = Normalisation::IMAGENET;
     let area = tile.height * tile.width;

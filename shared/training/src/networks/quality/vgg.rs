@@ -1,7 +1,8 @@
-//! Weights of torchvision's VGG-16 out of a `.safetensors` file.
+//! Reads the weights of torchvision's VGG-16 from a `.safetensors` file.
 //!
-//! Eight bytes with the length of a header, the header as JSON (`{"features.0.weight": {"dtype": "F32", "shape": [64, 3, 3, 3],
-//! "data_offsets": [0, 6912]}, ...}`), and the numbers, little-endian. The top (`classifier`) is passed over: ours is another.
+//! The file has eight bytes with the length of a header, the header as JSON (`{"features.0.weight": {"dtype": "F32", "shape": [64, 3, 3,
+//! 3], "data_offsets": [0, 6912]}, ...}`), and the values, little-endian. The top (`classifier`) is not read, because our network has
+//! another.
 
 use std::collections::BTreeMap;
 
@@ -10,31 +11,31 @@ use serde::Deserialize;
 use super::network::VGG16;
 use crate::networks::parameters::{Parameter, Role};
 
-/// Why bytes are not the weights of VGG-16.
+/// Reason why bytes are not the weights of VGG-16.
 #[derive(Debug, thiserror::Error)]
 pub enum VggError {
-    /// The bytes end before what the header says.
+    /// The bytes end before the data that the header describes.
     #[error("it is truncated, or not a .safetensors file")]
     Truncated,
-    /// The header is not what it should be.
+    /// The header is invalid.
     #[error("its header cannot be read")]
     Header(#[from] serde_json::Error),
     /// A layer is missing.
     #[error("there is no `{name}`")]
     Missing {
-        /// Its name.
+        /// Name of the layer.
         name: String,
     },
-    /// A layer has another size, or other numbers.
+    /// A layer has another size or number type.
     #[error("`{name}` is {dtype} of {got:?}, expected F32 of {expected:?}")]
     Layer {
-        /// Its name.
+        /// Name of the layer.
         name: String,
-        /// Its kind of numbers.
+        /// Number type in the file.
         dtype: String,
-        /// Its sizes.
+        /// Dimensions in the file.
         got: Vec<usize>,
-        /// The expected sizes.
+        /// Expected dimensions.
         expected: Vec<usize>,
     },
 }
@@ -50,7 +51,7 @@ struct Entry {
 ///
 /// # Errors
 ///
-/// The bytes are not such a file, or one of another network.
+/// If the bytes are not such a file, or belong to another network.
 pub fn parse(bytes: &[u8]) -> Result<Vec<Parameter>, VggError> {
     let (length, rest) = bytes.split_first_chunk().ok_or(VggError::Truncated)?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok();
@@ -80,7 +81,7 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Parameter>, VggError> {
                 });
             }
             inputs = channels;
-            // A ReLU follows every convolution, and a pooling every block.
+            // A ReLU follows every convolution, and a pooling follows every block.
             at += 2;
         }
         at += 1;
@@ -108,7 +109,7 @@ fn numbers(data: &[u8], entry: Entry, name: &str, dims: &[usize]) -> Result<Vec<
 mod tests {
     use super::*;
 
-    /// A file of generated weights: every number of a layer is the layer's number.
+    /// A file with generated weights: every value of a layer is the layer's number.
     fn file(change: impl Fn(&mut String)) -> Vec<u8> {
         let numbers = [0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28];
         let channels: Vec<usize> = VGG16.concat();

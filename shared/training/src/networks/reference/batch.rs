@@ -5,14 +5,14 @@ use super::record::{At, Back, Record, by_sample};
 use crate::networks::lesson::Statistics;
 use crate::networks::parameters::EPSILON_OF_BATCH;
 
-/// How the maps of a batch are normalised.
+/// Values for normalising the maps of a batch.
 struct Normalisation {
     n: usize,
-    /// Cells of a channel.
+    /// Number of cells in a channel.
     cells: usize,
     /// Means of the channels.
     means: Vec<f32>,
-    /// Factors of the channels that give deviation 1.
+    /// For each channel, the factor that gives standard deviation 1.
     inverse: Vec<f32>,
 }
 
@@ -37,7 +37,7 @@ impl Normalisation {
         self.means.len() * self.cells
     }
 
-    /// The cells of a channel of a sample.
+    /// The range of cells of one channel of a sample.
     fn run(&self, sample: usize, channel: usize) -> core::ops::Range<usize> {
         let first = sample * self.size() + channel * self.cells;
         first..first + self.cells
@@ -92,7 +92,7 @@ impl Normalisation {
 }
 
 impl<'a> Record<'a> {
-    /// Normalises every channel over the batch; outside training by running statistics.
+    /// Normalises every channel over the batch, or by running statistics if the network is not being trained.
     pub(super) fn normalise(&mut self, map: At, name: &str) -> At {
         let [scale, shift, mean, variance] =
             self.parameters(name, ["scale", "shift", "mean", "variance"]);

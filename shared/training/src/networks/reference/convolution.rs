@@ -1,11 +1,11 @@
-//! Convolutions of the maps of a batch, and their gradients: samples become columns of patches, which matrices are multiplied with.
+//! Convolutions of the maps of a batch, and their gradients. Samples are unfolded into columns of patches and multiplied with matrices.
 
 use rayon::prelude::*;
 
 use super::matrix::{Matrix, add_product, add_to, dot, sum};
 use crate::networks::ops::{Conv, convolved};
 
-/// Groups of samples whose gradients are summed up side by side; the same whatever the number of threads.
+/// Number of groups of samples whose gradients are summed in parallel. It does not depend on the number of threads.
 const GROUPS: usize = 16;
 
 /// The sizes of a convolution.
@@ -25,11 +25,11 @@ pub(super) struct Sizes {
 pub(super) struct Gradients {
     pub(super) weights: Vec<f32>,
     pub(super) bias: Vec<f32>,
-    /// Gradient by the input; empty where it was not asked for.
+    /// Gradient of the input; empty if it was not requested.
     pub(super) map: Vec<f32>,
 }
 
-/// The outputs of a row that see the input through one column of the kernel, and the first input that they see.
+/// The outputs in a row that use the input through one column of the kernel, and the first input that they use.
 struct Seen {
     from: usize,
     to: usize,
@@ -60,7 +60,7 @@ impl Sizes {
         self.to[1] * self.to[2]
     }
 
-    /// Returns true if the columns of patches are the map itself.
+    /// Returns true if the columns of patches are identical to the map.
     fn is_pointwise(&self) -> bool {
         self.kernel == 1 && self.stride == 1
     }
@@ -69,7 +69,7 @@ impl Sizes {
         self.from[0] * self.kernel * self.kernel * self.cells_to()
     }
 
-    /// Along a side of inputs, and of outputs, for one place in the kernel.
+    /// The outputs along one side that use an input through one position in the kernel.
     fn seen(&self, [inputs, outputs]: [usize; 2], at: usize) -> Seen {
         let half = self.kernel / 2;
         let from = half.saturating_sub(at).div_ceil(self.stride);
@@ -81,8 +81,8 @@ impl Sizes {
         }
     }
 
-    /// Calls a function for every run of outputs in a row that sees inputs in a row: the first input within its channel, the first
-    /// output within its map, and how many.
+    /// Calls a function for every run of outputs in a row that use consecutive inputs. Its arguments are the first input within the
+    /// channel, the first output within the map, and the number of outputs.
     fn runs(&self, [down, across]: [usize; 2], mut run: impl FnMut(usize, usize, usize)) {
         let rows = self.seen([self.from[1], self.to[1]], down);
         let columns = self.seen([self.from[2], self.to[2]], across);
@@ -100,13 +100,13 @@ impl Sizes {
         }
     }
 
-    /// The numbers of every place in the kernel: down, across.
+    /// Row and column of every position in the kernel.
     fn places(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         let kernel = self.kernel;
         (0..kernel * kernel).map(move |at| [at / kernel, at % kernel])
     }
 
-    /// The patches of a sample: a row for every channel and place in the kernel, a column for every output.
+    /// The patches of a sample: a row for every channel and position in the kernel, a column for every output.
     fn unfold(&self, map: &[f32], columns: &mut [f32]) {
         let (cells, stride) = (self.cells_to(), self.stride);
         columns.fill(0.0);
@@ -128,7 +128,7 @@ impl Sizes {
         }
     }
 
-    /// Adds patches to the map that they were taken from.
+    /// Adds patches back to the map from which they were taken.
     fn fold(&self, columns: &[f32], map: &mut [f32]) {
         let (cells, stride) = (self.cells_to(), self.stride);
         let mut rows = columns.chunks_exact(cells);
@@ -172,7 +172,7 @@ impl Sizes {
         all
     }
 
-    /// The patches of a sample, in a buffer where they are not the map itself.
+    /// The patches of a sample. They are written to a buffer unless they are identical to the map.
     fn patches<'a>(&self, map: &'a [f32], columns: &'a mut Vec<f32>) -> &'a [f32] {
         if self.is_pointwise() {
             return map;
@@ -198,10 +198,10 @@ impl Sizes {
         }
     }
 
-    /// The gradients of a batch.
+    /// Returns the gradients of a batch.
     ///
-    /// * `gradient`: of the outputs.
-    /// * `is_map_wanted`: whether the gradient of the input is wanted.
+    /// * `gradient`: gradient of the outputs.
+    /// * `is_map_wanted`: true if the gradient of the input is requested.
     pub(super) fn backward(
         &self,
         [map, weights, gradient]: [&[f32]; 3],
@@ -232,7 +232,7 @@ impl Sizes {
         }
     }
 
-    /// The gradients of weights and bias by some samples; that of their input goes to `of_map`.
+    /// The gradients of weights and bias for some samples. The gradient of the input is written to `of_map`.
     fn of_group(&self, [map, weights, gradient]: [&[f32]; 3], of_map: &mut [f32]) -> [Vec<f32>; 2] {
         let mut of_weights = vec![0.0; weights.len()];
         let mut of_bias = vec![0.0; self.to[0]];

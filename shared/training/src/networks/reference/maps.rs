@@ -82,7 +82,7 @@ impl<'a> Record<'a> {
         let pooled = vec![dims[0], dims[1] / 2, dims[2] / 2];
         let (rows, columns, across) = (pooled[1], pooled[2], dims[2]);
         let size_of_pooled: usize = pooled.iter().product();
-        // The place of the largest of four, within its sample.
+        // Index of the largest of four values, within the sample.
         let largest = move |from: &[f32], at: usize| {
             let [channel, row, column] = [at / (rows * columns), at / columns % rows, at % columns];
             let first = (channel * dims[1] + 2 * row) * across + 2 * column;
@@ -172,7 +172,7 @@ impl<'a> Record<'a> {
             }
         });
         let dims = self.dims(maps).to_vec();
-        // The values are needed again on the way back.
+        // The backward pass needs the values again.
         let kept = if self.leads(maps) {
             values.clone()
         } else {
@@ -269,7 +269,7 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// The positive part of a map or list.
+    /// Replaces negative values of a map or list with 0.
     pub(super) fn positive(&mut self, value: At) -> At {
         let from = self.values(value);
         let values = each(from, from, |from, _| from.max(0.0));
@@ -294,7 +294,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The gradients of what standardised weights are made of.
+/// The gradients of the weights and gains behind standardised weights.
 struct OfStandardised {
     weights: Vec<f32>,
     gains: Vec<f32>,

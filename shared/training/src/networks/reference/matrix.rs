@@ -1,8 +1,8 @@
-//! Products of matrices, and sums in an order that no number of threads changes.
+//! Products of matrices, and sums in an order that does not depend on the number of threads.
 
 use nalgebra::{Dyn, MatrixView, MatrixViewMut};
 
-/// A matrix whose rows lie one after the other.
+/// A matrix stored row by row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Matrix<'a> {
     values: &'a [f32],
@@ -11,11 +11,11 @@ pub(super) struct Matrix<'a> {
     is_transposed: bool,
 }
 
-/// A view with any steps between rows and between columns.
+/// A view with any strides between rows and between columns.
 type View<'a> = MatrixView<'a, f32, Dyn, Dyn, Dyn, Dyn>;
 
 impl<'a> Matrix<'a> {
-    /// Values as rows of some length.
+    /// A matrix of the given values, with rows of the given length.
     pub(super) fn new(values: &'a [f32], columns: usize) -> Self {
         Self {
             values,
@@ -25,7 +25,7 @@ impl<'a> Matrix<'a> {
         }
     }
 
-    /// The same with rows and columns exchanged.
+    /// The transposed matrix.
     pub(super) fn transposed(self) -> Self {
         Self {
             is_transposed: !self.is_transposed,
@@ -44,13 +44,13 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// Largest side for which sums of products are computed here.
+/// Largest side for which products are computed here.
 ///
-/// nalgebra multiplies matrices with fewer than six rows or columns column by column, and counts wrong there where the numbers of a
-/// column do not lie side by side (0.35: it reads and writes beyond them). Larger ones go to `matrixmultiply`.
+/// nalgebra multiplies matrices with fewer than six rows or columns column by column. Its result is wrong if the values of a
+/// column are not contiguous (version 0.35 reads and writes outside the column). Larger matrices are multiplied by `matrixmultiply`.
 const SMALL: usize = 5;
 
-/// Adds the product of two matrices to a third, whose rows lie one after the other.
+/// Adds the product of two matrices to a third, which is stored row by row.
 pub(super) fn add_product(sum: &mut [f32], a: Matrix<'_>, b: Matrix<'_>) {
     let (view_of_a, view_of_b) = (a.view(), b.view());
     let (rows, inner, columns) = (view_of_a.nrows(), view_of_a.ncols(), view_of_b.ncols());
@@ -86,10 +86,10 @@ fn add_small_product(sum: &mut [f32], a: Matrix<'_>, b: Matrix<'_>) {
     }
 }
 
-/// Partial sums that are kept side by side, so that processors can add several numbers at once.
+/// Number of partial sums, so that processors can add several values at once.
 const LANES: usize = 16;
 
-/// The sum of a function of numbers and their neighbours in another list.
+/// The sum of a function of corresponding values in two lists.
 pub(super) fn sum_of(a: &[f32], b: &[f32], of: impl Fn(f32, f32) -> f32) -> f32 {
     let mut sums = [0.0; LANES];
     let (a, rest_of_a) = a.as_chunks::<LANES>();
@@ -108,7 +108,7 @@ pub(super) fn sum(values: &[f32]) -> f32 {
     sum_of(values, values, |value, _| value)
 }
 
-/// The sum of the products of numbers of two lists.
+/// The dot product of two lists.
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     sum_of(a, b, |a, b| a * b)
 }

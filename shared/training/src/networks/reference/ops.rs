@@ -1,4 +1,4 @@
-//! The operations of networks, recorded.
+//! The operations of networks, recorded for the backward pass.
 
 use super::record::{At, Record};
 use crate::networks::ops::{Conv, Ops, Places, Scaling};

@@ -1,4 +1,4 @@
-//! The record of what was computed, and the way back through it.
+//! The record of a computation, and the backward pass through it.
 
 use fastrand::Rng;
 use rayon::prelude::*;
@@ -8,37 +8,37 @@ use crate::networks::lesson::{Lesson, Running, Shown, Statistics};
 use crate::networks::ops::{Dims, Network};
 use crate::networks::parameters::Parameter;
 
-/// The number of a value in the record.
+/// Index of a value in the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct At(usize);
 
-/// Gives the gradients of what a value was computed from, from its own.
+/// Computes the gradients of the inputs of a value from the gradient of the value.
 pub(super) type Back<'a> = Box<dyn Fn(&Record<'a>, &[f32], &mut Gradients) + 'a>;
 
 struct Value<'a> {
-    /// Without the batch.
+    /// Dimensions without the batch.
     dims: Dims,
     values: Vec<f32>,
-    /// Nothing for values through which nothing is learned.
+    /// Backward pass; `None` for values that have no gradient.
     back: Option<Back<'a>>,
 }
 
-/// The values that were computed of a batch.
+/// The values computed for a batch.
 pub(super) struct Record<'a> {
     pub(super) n: usize,
     pub(super) parameters: &'a [Parameter],
-    /// Empty outside training.
+    /// For each parameter, true if it is trained; empty outside training.
     learned: &'a [bool],
-    /// Nothing outside training.
+    /// Random generator for training; `None` otherwise.
     pub(super) dice: Option<Rng>,
     inputs: Vec<(&'static str, Dims, &'a [f32])>,
     values: Vec<Value<'a>>,
-    /// Number of the next parameter.
+    /// Index of the next parameter.
     next: usize,
     pub(super) statistics: Vec<Statistics>,
 }
 
-/// Gradients on the way back.
+/// Gradients in the backward pass.
 #[derive(Debug)]
 pub(super) struct Gradients {
     of_values: Vec<Option<Vec<f32>>>,
@@ -82,7 +82,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// The same for training.
+    /// The same record, prepared for training.
     pub(super) fn learning(self, running: Running<'a>) -> Self {
         Self {
             learned: running.learned,
@@ -91,7 +91,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// Sizes and numbers of an input.
+    /// Dimensions and values of an input.
     pub(super) fn shown(&self, name: &str) -> (Dims, Vec<f32>) {
         let found = self.inputs.iter().find(|input| input.0 == name);
         found.map_or_else(Default::default, |(_, dims, values)| {
@@ -124,39 +124,39 @@ impl<'a> Record<'a> {
         &self.parameters[at].values
     }
 
-    /// Returns true if the gradient of one of some parameters is wanted.
+    /// Returns true if the gradient of at least one of the parameters is requested.
     pub(super) fn learns(&self, parameters: &[usize]) -> bool {
         let is_learned = |at: &usize| self.learned.get(*at).copied().unwrap_or(false);
         parameters.iter().any(is_learned)
     }
 
-    /// Returns true if something is learned through a value.
+    /// Returns true if a value leads back to a trained parameter.
     pub(super) fn leads(&self, At(at): At) -> bool {
         self.values[at].back.is_some()
     }
 
-    /// Sizes of a value, without the batch.
+    /// Dimensions of a value, without the batch.
     pub(super) fn dims(&self, At(at): At) -> &[usize] {
         &self.values[at].dims
     }
 
-    /// Channels and cells of a map.
+    /// Numbers of channels and cells of a map.
     pub(super) fn channels(&self, at: At) -> [usize; 2] {
         let dims = self.dims(at);
         [dims[0], dims[1..].iter().product()]
     }
 
-    /// Numbers of one sample of a value.
+    /// Number of values per sample.
     pub(super) fn size(&self, at: At) -> usize {
         self.dims(at).iter().product()
     }
 
-    /// The numbers of a value.
+    /// The numbers of a recorded value.
     pub(super) fn values(&self, At(at): At) -> &[f32] {
         &self.values[at].values
     }
 
-    /// A copy of the numbers of a value.
+    /// A copy of the numbers of a recorded value.
     pub(super) fn take(&self, at: At) -> Vec<f32> {
         self.values(at).to_vec()
     }
@@ -167,9 +167,9 @@ impl<'a> Record<'a> {
         At(self.values.len() - 1)
     }
 
-    /// Records a value that was computed from another one alone.
+    /// Records a value that was computed from one other value.
     ///
-    /// * `back`: the gradient of the other one, from that of the value.
+    /// * `back`: computes the gradient of the other value from that of the recorded value.
     pub(super) fn derived(
         &mut self,
         from: At,
@@ -184,7 +184,7 @@ impl<'a> Record<'a> {
         self.record(dims, values, back)
     }
 
-    /// The way back: from the gradients of outputs to those of parameters.
+    /// The backward pass: from the gradients of the outputs to those of the parameters.
     pub(super) fn backward(self, outputs: Vec<(At, Vec<f32>)>) -> Lesson {
         let mut all = Gradients {
             of_values: vec![None; self.values.len()],
@@ -206,10 +206,10 @@ impl<'a> Record<'a> {
     }
 }
 
-/// Computes numbers sample by sample.
+/// Computes values sample by sample.
 ///
-/// * `size`: numbers of a sample.
-/// * `compute`: writes those of the sample of a number; they are 0 before.
+/// * `size`: number of values per sample.
+/// * `compute`: writes the values of the sample with a given index; they are initially 0.
 pub(super) fn by_sample(
     n: usize,
     size: usize,
@@ -221,7 +221,7 @@ pub(super) fn by_sample(
     all
 }
 
-/// Computes a number from every pair of numbers of two lists.
+/// Computes a value from every pair of corresponding values in two lists.
 pub(super) fn each(a: &[f32], b: &[f32], compute: impl Fn(f32, f32) -> f32 + Sync) -> Vec<f32> {
     const AT_ONCE: usize = 1 << 14;
     let mut all = vec![0.0; a.len()];

@@ -1,4 +1,4 @@
-//! Every operation: its gradient is its change, and the file that is written gives the same values.
+//! Tests every operation: its gradient must match its change, and the written file must give the same values.
 
 use fastrand::Rng;
 
@@ -14,7 +14,7 @@ const COMPUTER: Computer = Computer {
     precision: Precision::F32,
 };
 
-/// A network of one operation between layers that learn.
+/// A network of one operation between trainable layers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum One {
     Convolution(Conv),
@@ -43,7 +43,7 @@ const CONV: Conv = Conv {
     scaling: Scaling::Plain,
 };
 
-/// All operations, and convolutions of all kinds.
+/// All operations, and all kinds of convolutions.
 fn all() -> Vec<One> {
     let mut all = vec![
         One::Relu,
@@ -167,7 +167,7 @@ fn shown(network: &One, n: usize) -> Shown {
     }
 }
 
-/// Parameters away from the values at the beginning, many of which are the same.
+/// Parameters that differ from the initial values, many of which are equal.
 fn parameters(network: &One) -> Vec<Parameter> {
     let mut dice = Rng::with_seed(5);
     let mut all = initial(network, 7);
@@ -184,7 +184,7 @@ fn parameters(network: &One) -> Vec<Parameter> {
     all
 }
 
-/// The cost of outputs: their sum with random factors.
+/// Cost and gradients, where the cost is the sum of the outputs with random factors.
 fn lesson(network: &One, parameters: &[Parameter], shown: &Shown) -> (f64, Lesson) {
     lesson_by(COMPUTER, network, (parameters, shown))
 }
@@ -226,7 +226,7 @@ fn the_gradient_of_every_operation_is_its_change() {
         for at in 0..parameters.len() {
             let is_fixed = parameters[at].role == Role::Fixed;
             let Some(gradient) = &gradients[at] else {
-                // Nothing is learned through a value that is fixed, and a list does not see the map.
+                // A fixed value has no gradient, and a list does not depend on the map.
                 let name = parameters[at].name.clone();
                 assert!(is_fixed || name != "last.weight", "{network:?}: {name}");
                 continue;
@@ -325,7 +325,7 @@ fn the_number_of_threads_changes_no_bit() {
     assert!(learned(1) == learned(5));
 }
 
-/// Sums in another order: what both give is near, not equal.
+/// `LibTorch` sums in another order, so that the results are close but not equal.
 #[cfg(feature = "libtorch")]
 #[test]
 fn both_backends_give_the_same_values_and_gradients() {

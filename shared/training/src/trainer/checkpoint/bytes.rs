@@ -1,6 +1,6 @@
-//! Checkpoints as bytes: a checked header and the state behind it.
+//! Checkpoints as bytes: a header with a checksum, then the state.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 0..8 | `PLXTRAIN` |
 //! | 8..12 | version, u32, little-endian: 1 |
@@ -18,25 +18,25 @@ const ENVELOPE: Envelope = Envelope {
     version: 1,
 };
 
-/// Most bytes of a payload: ten million examples are far from it.
+/// Largest size of a payload, in bytes: far more than ten million examples need.
 const MAX_BYTES: usize = 4 << 30;
 
-/// Why bytes are not a checkpoint, or could not be written.
+/// Reason why bytes are not a checkpoint or could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointBytesError {
-    /// Another kind or version of file, or a damaged one.
+    /// The file has another kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The checksum is right, but what it is of is no checkpoint.
+    /// The checksum is right, but the payload is not a checkpoint.
     #[error("the payload is not a checkpoint")]
     Payload(#[source] Box<bincode::error::DecodeError>),
-    /// Something follows the checkpoint in the payload.
+    /// The payload has bytes after the checkpoint.
     #[error("the payload has {left} bytes after the end of the checkpoint")]
     Left {
-        /// Bytes that follow.
+        /// Number of additional bytes.
         left: usize,
     },
-    /// Too large for the format.
+    /// The checkpoint is too large for the format.
     #[error("the checkpoint cannot be written")]
     Encode(#[source] Box<bincode::error::EncodeError>),
 }
@@ -46,25 +46,25 @@ const fn configuration() -> Configuration<LittleEndian, Varint, Limit<MAX_BYTES>
 }
 
 impl Checkpoint {
-    /// Makes the bytes of a file; [`Self::from_bytes`] gives the same checkpoint and stamp.
+    /// Makes the bytes of a file; [`Self::from_bytes`] returns the same checkpoint and stamp.
     ///
     /// * `stamp`: the caller's fingerprint of data outside the checkpoint, for example a hash of the images.
     ///
     /// # Errors
     ///
-    /// [`CheckpointBytesError::Encode`], beyond 4 GiB.
+    /// [`CheckpointBytesError::Encode`] if there are more than 4 GiB.
     pub fn to_bytes(&self, stamp: u64) -> Result<Vec<u8>, CheckpointBytesError> {
         let payload = bincode::serde::encode_to_vec((stamp, self), configuration());
         let payload = payload.map_err(|error| CheckpointBytesError::Encode(Box::new(error)))?;
         Ok(ENVELOPE.seal(&payload))
     }
 
-    /// Reads the bytes of a file: the checkpoint and the stamp. Whether they fit a training is checked when
-    /// it is resumed, see [`Trainer::resume`](crate::Trainer::resume).
+    /// Reads the checkpoint and the stamp from the bytes of a file. [`Trainer::resume`](crate::Trainer::resume) later checks whether
+    /// they match a training run.
     ///
     /// # Errors
     ///
-    /// [`CheckpointBytesError`]; truncated bytes and bytes with a changed one are always refused.
+    /// [`CheckpointBytesError`]; truncated bytes, and bytes with one change, are always refused.
     pub fn from_bytes(bytes: &[u8]) -> Result<(Self, u64), CheckpointBytesError> {
         let payload = ENVELOPE.open(bytes)?;
         let decoded = bincode::serde::decode_from_slice(payload, configuration());

@@ -1,9 +1,9 @@
-//! From the segments of a motion capture model to the 20 joint ends of `HumanEva`.
+//! Converts the segments of a motion capture model to the 20 joint ends of `HumanEva`.
 //!
-//! The files hold four points for each segment of Vicon's Plug-in-Gait model: its origin (`PELO`) and its
-//! axes: anterior (`PELA`, x), lateral (`PELL`, y) and proximal (`PELP`, z). The data set's toolbox
-//! (version 1.1) computes joints from them, with corrections: the pelvis lies 50 mm further back and the trunk
-//! leans back by half the width of the shoulders; the upper arms turn by half the offset of the shoulder; the head is
+//! The files contain four points for each segment of Vicon's Plug-in-Gait model: the origin (`PELO`) and one point on each
+//! axis: anterior (`PELA`, x), lateral (`PELL`, y) and proximal (`PELP`, z). The data set's toolbox
+//! (version 1.1) computes joints from these points, with corrections. The pelvis is moved 50 mm back, and the trunk
+//! leans back by half the width of the shoulders. The upper arms are rotated by half the offset of the shoulder. The head is
 //! 316.103 mm long. This module computes the same, but is not a translation of that code.
 
 use formats::c3d::C3d;
@@ -11,14 +11,14 @@ use geometry::rotation_from_matrix;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use statistics::score::Point;
 
-/// Length of the head, mm.
+/// Length of the head, in mm.
 const HEAD_MM: f64 = 316.103;
-/// How far the pelvis is moved along its anterior axis, mm.
+/// Shift of the pelvis along its anterior axis, in mm.
 const PELVIS_MM: f64 = -50.0;
-/// Half the size of a marker, mm.
+/// Half the size of a marker, in mm.
 const HALF_MARKER_MM: f64 = 7.0;
 
-/// The markers that must all be visible for a pose to be used; some have a second name.
+/// The markers that must all be visible in a pose; some have a second name.
 const MARKERS: [&[&str]; 39] = [
     &["RASI"],
     &["LASI"],
@@ -61,17 +61,17 @@ const MARKERS: [&[&str]; 39] = [
     &["RTOE"],
 ];
 
-/// The measures of a subject that the joints depend on, mm.
+/// The measures of a subject that the joints depend on, in mm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Measures {
-    /// Half the distance of the shoulder markers, less half a marker.
+    /// Half the distance between the shoulder markers, minus half a marker.
     pub(crate) half_shoulders: f64,
-    /// Offset of the left and of the right shoulder.
+    /// Offsets of the left and of the right shoulder.
     pub(crate) shoulder_offsets: [f64; 2],
 }
 
 impl Measures {
-    /// From the static trial and the text of the `.mp` file; `None` if either is incomplete.
+    /// Reads the measures from the static trial and the text of the `.mp` file; `None` if either is incomplete.
     pub(crate) fn new(still: &C3d, parameters: &str) -> Option<Self> {
         let [left, right] = ["LSHO", "RSHO"].map(|name| still.point(name));
         let (left, right) = (left?, right?);
@@ -93,7 +93,7 @@ impl Measures {
     }
 }
 
-/// A value of an `.mp` file, whose lines are `$Name = value`.
+/// A value in the text of an `.mp` file, whose lines are `$Name = value`.
 fn parameter(text: &str, name: &str) -> Option<f64> {
     let value = |line: &str| {
         let (key, value) = line.split_once('=')?;
@@ -116,7 +116,7 @@ impl<'a> Body<'a> {
     ///
     /// # Errors
     ///
-    /// The name of the first point that is missing.
+    /// The name of the first missing point.
     pub(crate) fn new(trial: &'a C3d, measures: Measures) -> Result<Self, String> {
         let marker = |names: &&[&str]| {
             let found = names.iter().find_map(|name| trial.point(name));
@@ -140,9 +140,9 @@ impl<'a> Body<'a> {
 
     /// The 20 joint ends of `skeleton::HUMANEVA20`, in the file's unit (mm), at a frame (from 1, fractional).
     ///
-    /// * Returns `None` outside of the trial, and where a marker was lost in either neighbouring frame.
+    /// * Returns `None` outside the trial, and if a marker is missing in either neighbouring frame.
     pub(crate) fn joints(&self, at: f64) -> Option<[Point; 20]> {
-        // False for NaN.
+        // This comparison is also false for NaN.
         if !(at >= 1.0 && at.ceil() <= self.trial.n_frames() as f64) {
             return None;
         }
@@ -169,7 +169,7 @@ impl<'a> Body<'a> {
         Some(joints)
     }
 
-    /// Upper and lower end.
+    /// Upper and lower end of the trunk.
     fn trunk(&self, pose: &Pose<'_>) -> Option<[Point; 2]> {
         let length = pose.length("TRXO", "PELO")?;
         let lean = (self.measures.half_shoulders / 2.0).atan2(length);
@@ -197,7 +197,7 @@ fn along(segment: &Isometry3<f64>, mm: f64) -> Point {
     (segment * Point3::new(0.0, 0.0, mm)).into()
 }
 
-/// Ends of the upper and of the lower arm; the z axes point towards the shoulder.
+/// Ends of the upper and of the lower arm. The z axes point towards the shoulder.
 ///
 /// * `names`: shoulder, segment and origin of the upper arm, segment and origin of the lower arm.
 fn arm(pose: &Pose<'_>, names: [&str; 5], offset: f64) -> Option<[Point; 4]> {
@@ -219,7 +219,7 @@ fn arm(pose: &Pose<'_>, names: [&str; 5], offset: f64) -> Option<[Point; 4]> {
     ])
 }
 
-/// Ends of the upper and of the lower leg; the z axes point towards the hip.
+/// Ends of the upper and of the lower leg. The z axes point towards the hip.
 ///
 /// * `names`: hip, segment and origin of the thigh, segment and origin of the shin.
 fn leg(pose: &Pose<'_>, names: [&str; 5]) -> Option<[Point; 4]> {
@@ -249,7 +249,7 @@ impl Pose<'_> {
         Some([low?, high?])
     }
 
-    /// Mean distance of two points over the two frames.
+    /// Mean distance between two points over the two frames.
     fn length(&self, from: &str, to: &str) -> Option<f64> {
         let (from, to) = (self.points(from)?, self.points(to)?);
         Some(f64::midpoint(
@@ -258,7 +258,7 @@ impl Pose<'_> {
         ))
     }
 
-    /// The axes of a segment at another origin, interpolated: the origin linearly, the rotation spherically.
+    /// The axes of a segment at another origin. The origin is interpolated linearly, the rotation spherically.
     fn segment(&self, axes: &str, origin: &str) -> Option<Isometry3<f64>> {
         let [o, x, y, z] = ["O", "A", "L", "P"].map(|name| self.points(&format!("{axes}{name}")));
         let (o, x, y, z) = (o?, x?, y?, z?);
@@ -277,7 +277,7 @@ impl Pose<'_> {
     }
 }
 
-/// A point of a frame; `None` for a lost one, which is marked or lies exactly at the origin.
+/// A point in a frame; `None` for a lost point, which is marked as lost or is exactly at the origin.
 fn seen(trial: &C3d, frame: usize, point: usize) -> Option<Vector3<f64>> {
     let position = trial.frame(frame)[point]?;
     (position != [0.0; 3]).then(|| position.into())

@@ -2,8 +2,8 @@
 
 use crate::datasets::sequences::SyncError;
 
-/// The content of an `.ofs` file: a frame of the camera, the frame of motion capture at the same time, and the
-/// number of frames of motion capture per frame of the camera. Frames count from 1.
+/// The content of an `.ofs` file: a camera frame, the motion capture frame at the same time, and the
+/// number of motion capture frames per camera frame. Frames are numbered from 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Offset {
     pub(crate) image: f64,
@@ -12,7 +12,7 @@ pub(crate) struct Offset {
 }
 
 impl Offset {
-    /// Three numbers, separated by blanks or lines; `None` if they are not.
+    /// Parses three numbers separated by blanks or line breaks; `None` if the text is anything else.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let numbers: Vec<f64> = text
             .split_whitespace()
@@ -32,21 +32,21 @@ impl Offset {
 
 /// The temporal alignment of the streams of a trial.
 ///
-/// Follows the toolbox of the data set (version 1.1): the first camera with an offset defines the time, the
-/// rates of all are averaged, and frame 1 is the first frame of the earliest camera.
+/// It follows the toolbox of the data set (version 1.1). The first camera with an offset defines the time, the
+/// rates of all cameras are averaged, and frame 1 is the first frame of the earliest camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sync {
-    /// Frame of motion capture (from 1, fractional) at frame 1 of the trial.
+    /// Motion capture frame (from 1, fractional) at frame 1 of the trial.
     pub motion_first: f64,
-    /// Frames of motion capture for each frame of the trial.
+    /// Motion capture frames per frame of the trial.
     pub motion_rate: f64,
-    /// Frame of every camera's footage (from 1) at frame 1 of the trial; `None` for one without an offset.
+    /// For every camera, the frame of its footage (from 1) at frame 1 of the trial; `None` without an offset.
     pub image_first: Vec<Option<u64>>,
 }
 
 impl Sync {
-    /// * `offsets`: of all cameras of the trial, in the toolbox's order (`C1` to `C3`, then `BW1` to `BW4`):
-    ///   those that are not evaluated count too.
+    /// * `offsets`: offsets of all cameras of the trial, in the toolbox's order (`C1` to `C3`, then `BW1` to `BW4`).
+    ///   The cameras that are not evaluated count too.
     pub(crate) fn new(offsets: &[Option<Offset>]) -> Result<Self, SyncError> {
         let known: Vec<&Offset> = offsets.iter().flatten().collect();
         let first = *known.first().ok_or(SyncError::Nothing)?;
@@ -80,7 +80,7 @@ impl Sync {
         })
     }
 
-    /// Frame of motion capture (from 1, fractional) at a frame of the trial (from 1).
+    /// Motion capture frame (from 1, fractional) at a frame of the trial (from 1).
     pub fn motion_at(&self, frame: u64) -> f64 {
         self.motion_first + (frame as f64 - 1.0) * self.motion_rate
     }
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn cameras_that_began_later_skip_fewer_frames() {
-        // At motion 101 the first camera is at frame 11, the second at 31: it began 20 frames earlier.
+        // At motion capture frame 101, the first camera is at frame 11 and the second at 31: it began 20 frames earlier.
         let got = Sync::new(&[11.0, 31.0].map(|value| Some(offset(value, 101.0, 2.0)))).unwrap();
         assert_eq!(got.image_first, [Some(1), Some(21)]);
         assert_eq!((got.motion_first, got.motion_rate), (81.0, 2.0));
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn motion_capture_that_began_later_moves_all_cameras() {
         let got = Sync::new(&[None, Some(offset(11.0, 5.0, 2.0))]).unwrap();
-        // Frame 11 goes with 5, so 9 goes with 1.
+        // Frame 11 corresponds to frame 5, so frame 9 corresponds to frame 1.
         assert_eq!(
             (got.motion_first, got.image_first),
             (1.0, vec![None, Some(9)])

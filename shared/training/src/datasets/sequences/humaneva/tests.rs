@@ -1,4 +1,4 @@
-//! A subject's folder in the layout of the data set.
+//! Tests with a subject's folder in the layout of the data set.
 
 use geometry::files::Format;
 use nalgebra::Isometry3;
@@ -17,7 +17,7 @@ fn the_paper_tests_on_4493_frames_of_each_camera() {
     }
 }
 
-/// S1 walks along x, 1 mm for each frame of motion capture; a marker is lost at frames 101 to 104.
+/// S1 walks along x by 1 mm per motion capture frame. One marker is lost at frames 101 to 104.
 fn subject(folder: &Path) -> PathBuf {
     let folder = folder.join("S1");
     for inside in ["Image_Data", "Calibration_Data", "Sync_Data", "Mocap_Data"] {
@@ -53,7 +53,7 @@ fn subject(folder: &Path) -> PathBuf {
 fn a_subject_is_read_with_synchronised_streams() {
     let dir = tempfile::tempdir().unwrap();
     subject(dir.path());
-    // The parent folder is that of the data set.
+    // The parent folder is the folder of the data set.
     let got = crate::datasets::sequences::read(dir.path(), &Options::default()).unwrap();
     let [walking] = &got[..] else {
         panic!("{} sequences", got.len())
@@ -63,17 +63,18 @@ fn a_subject_is_read_with_synchronised_streams() {
         ("S1 Walking", "HumanEva")
     );
     assert_eq!(walking.rig.cameras().len(), 3);
-    // At motion 100 the cameras are at 20, 30, 25: C1 began last. Motion 62 is frame 1 of the trial.
+    // At motion capture frame 100, the cameras are at frames 20, 30 and 25: C1 began last. Motion capture frame 62 is frame 1 of the
+    // trial.
     let first: Vec<u64> = walking.views.iter().map(|view| view.first).collect();
     assert_eq!(first, [0, 10, 5]);
     let numbers: Vec<u64> = walking.frames.iter().map(|frame| frame.number).collect();
     assert_eq!(&numbers[..3], &[6, 7, 8]);
-    // Motion 101 to 104 lie in 62 + 2 (f - 1) for f = 21 and 22.
+    // Motion capture frames 101 to 104 are used by 62 + 2 (f - 1) for f = 21 and 22.
     assert!(!numbers.contains(&21) && !numbers.contains(&22));
     assert_eq!(numbers.len(), 590 - 6 + 1 - 2);
     let frame = &walking.frames[0];
     assert_eq!(frame.index, 5);
-    // Motion 72: the pelvis is 50 mm behind 72 mm.
+    // At motion capture frame 72, the pelvis is 50 mm behind 72 mm.
     let pelvis = frame.joints[1].unwrap();
     assert!((pelvis[0] - 0.022).abs() < 1e-6, "{pelvis:?}");
 }

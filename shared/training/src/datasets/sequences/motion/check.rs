@@ -7,11 +7,11 @@ use statistics::Sorted;
 
 use super::{Motion, MotionError};
 
-/// Hips, knees and ankles among the joints of `skeleton::PARSE14`, left first.
+/// Hips, knees and ankles among the joints of `skeleton::PARSE14`, left leg first.
 const LEGS: [[usize; 3]; 2] = [[3, 4, 5], [2, 1, 0]];
 const HEAD: usize = 13;
 
-/// Plausible lengths of a leg, metres: from that of a small child to that of the tallest man with badly placed markers.
+/// Plausible lengths of a leg, in metres: from a small child to the tallest man with badly placed markers.
 const LEG_METRES: [f64; 2] = [0.3, 1.5];
 
 /// Refuses a motion that is impossible for a person.
@@ -29,15 +29,15 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     let leg = median(all().flat_map(|frame| LEGS.map(|leg| length(frame, leg))));
     if !(LEG_METRES[0]..=LEG_METRES[1]).contains(&leg) {
         return refuse(format!(
-            "a leg would be {leg:.3} m long: another unit? (unit = \"mm\" in a marker table)"
+            "a leg would be {leg:.3} m long: is the unit wrong? (unit = \"mm\" in a marker table)"
         ));
     }
     let head_above_foot = |frame: &[[f64; 3]; 14]| frame[HEAD][2] - frame[LEGS[0][2]][2];
     let head = median(all().map(head_above_foot));
-    // Tolerates lying; a head that is below the feet most of the time means a wrong axis.
+    // A person may be lying. A head that is below the feet most of the time means a wrong axis.
     if head < -0.3 * leg {
         return refuse(format!(
-            "the head would be {:.2} m below the feet: another axis points up? (up = \"y\" in a marker table)",
+            "the head would be {:.2} m below the feet: does another axis point up? (up = \"y\" in a marker table)",
             -head
         ));
     }
@@ -51,7 +51,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     Ok(())
 }
 
-/// How much the knees bend backward; negative if forward, 0 if they are straight.
+/// Measure of how far the knees bend backward: negative if they bend forward, 0 if they are straight.
 fn fold(frame: &[[f64; 3]; 14]) -> f64 {
     let joint = |i: usize| Vector3::from(frame[i]);
     let left = joint(LEGS[0][0]) - joint(LEGS[1][0]);

@@ -1,11 +1,11 @@
-//! Why a motion could not be read.
+//! Reasons why a motion could not be read.
 
 use std::path::PathBuf;
 
 use formats::c3d::C3dError;
 use formats::trc::TrcError;
 
-/// Why a motion could not be read.
+/// Reason why a motion could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum MotionError {
     /// A file cannot be read.
@@ -13,7 +13,7 @@ pub enum MotionError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file name ends in neither `.c3d` nor `.trc`.
@@ -22,31 +22,31 @@ pub enum MotionError {
         /// The file.
         path: PathBuf,
     },
-    /// Not a C3D file.
+    /// The file is not a C3D file.
     #[error("{}", .path.display())]
     C3d {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file's content.
         source: C3dError,
     },
-    /// Not a TRC file.
+    /// The file is not a TRC file.
     #[error("{}", .path.display())]
     Trc {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Error of the file's content.
         source: TrcError,
     },
-    /// A rate out of range.
+    /// The frame rate is out of range.
     #[error("{}: {rate_hz} frames a second", .path.display())]
     Rate {
         /// The file.
         path: PathBuf,
-        /// The rate in the file.
+        /// Frame rate in the file.
         rate_hz: f64,
     },
-    /// A unit that is not known.
+    /// The unit is unknown.
     #[error("{}: unit {unit:?} is not known; set it in the marker table: unit = \"mm\"", .path.display())]
     Unit {
         /// The file.
@@ -54,51 +54,51 @@ pub enum MotionError {
         /// The unit in the file.
         unit: String,
     },
-    /// Frames that the file does not have.
-    #[error("{}: frames {}-{} are not among its frames {}-{}", .path.display(), .asked[0], .asked[1], .has[0], .has[1])]
+    /// The file does not have the requested frames.
+    #[error("{}: frames {}-{} are not among the file's frames {}-{}", .path.display(), .asked[0], .asked[1], .has[0], .has[1])]
     Frames {
         /// The file.
         path: PathBuf,
-        /// First and last that were requested.
+        /// First and last requested frame.
         asked: [u32; 2],
-        /// First and last of the file.
+        /// First and last frame of the file.
         has: [u32; 2],
     },
-    /// An invalid marker table.
+    /// The marker table is invalid.
     #[error("{}: {what}", .path.display())]
     Table {
-        /// The file.
+        /// Path of the table.
         path: PathBuf,
         /// The fault.
         what: String,
     },
-    /// No preset has markers of these names.
+    /// No preset matches the names of the markers.
     #[error(
-        "{}: its markers are those of no preset ({}); name a marker table; it has {}",
+        "{}: its markers match no preset ({}): give a marker table; the markers are {}",
         .path.display(), super::PRESETS.join(", "), .markers.join(", ")
     )]
     NoPreset {
         /// The file.
         path: PathBuf,
-        /// Its markers.
+        /// Names of the markers in the file.
         markers: Vec<String>,
     },
     /// A marker of the table is missing.
-    #[error("{}: no marker {name:?}; it has {}", .path.display(), .markers.join(", "))]
+    #[error("{}: no marker {name:?}; the markers are {}", .path.display(), .markers.join(", "))]
     NoMarker {
         /// The file.
         path: PathBuf,
-        /// The marker.
+        /// Name of the missing marker.
         name: String,
-        /// The existing ones.
+        /// Names of the markers in the file.
         markers: Vec<String>,
     },
-    /// A joint that the table does not define.
+    /// The table does not define a joint.
     #[error("{}: the marker table does not define {joint:?}", .path.display())]
     NoJoint {
-        /// The motion.
+        /// Path of the motion file.
         path: PathBuf,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
     },
     /// A marker is missing for too long.
@@ -109,13 +109,13 @@ pub enum MotionError {
     Gap {
         /// The file.
         path: PathBuf,
-        /// The marker.
+        /// Name of the marker.
         marker: String,
-        /// First and last frame without it, numbered as in the file.
+        /// First and last frame without the marker, numbered as in the file.
         frames: [u32; 2],
-        /// Duration of the gap.
+        /// Duration of the gap, in seconds.
         seconds: f64,
-        /// The longest gap accepted.
+        /// Longest accepted gap, in seconds.
         max_gap_s: f64,
     },
     /// The motion is impossible for a person.

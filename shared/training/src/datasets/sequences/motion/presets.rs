@@ -1,4 +1,4 @@
-//! The marker tables that come with Parallax.
+//! The built-in marker tables.
 
 /// Names of the built-in tables, from `configs/markers`.
 pub const PRESETS: [&str; 4] = ["cmu", "pose2sim", "parallax", "optitrack36"];

@@ -11,7 +11,7 @@ use super::presets::preset;
 
 const TOES: [&str; 2] = ["right toes", "left toes"];
 
-/// Converts the markers of a file to joints: sums of markers with weights that add up to 1.
+/// Converts the markers of a file to joints, which are sums of markers with weights that add up to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MarkerTable {
     up: Axis,
@@ -19,13 +19,13 @@ pub struct MarkerTable {
     joints: BTreeMap<String, Vec<(String, f64)>>,
 }
 
-/// The content of a file.
+/// Content of a table's file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     /// The axis of the motion file that points up.
     up: Axis,
-    /// The unit of the motion file, if that in the file is missing or wrong.
+    /// The unit of the motion file, for files with a missing or wrong unit.
     #[serde(default)]
     unit: Option<String>,
     joints: BTreeMap<String, Markers>,
@@ -47,7 +47,7 @@ enum Markers {
 }
 
 impl MarkerTable {
-    /// One of [`PRESETS`](super::PRESETS).
+    /// Returns one of [`PRESETS`](super::PRESETS).
     pub fn preset(name: &str) -> Option<Self> {
         Self::parse(preset(name)?).ok()
     }
@@ -78,18 +78,18 @@ impl MarkerTable {
         let known = PARSE14.joints.iter().map(|joint| joint.name);
         let missing = known.clone().find(|joint| !file.joints.contains_key(*joint));
         if let Some(joint) = missing {
-            return Err(format!("nothing makes the joint {joint:?}"));
+            return Err(format!("no markers are given for the joint {joint:?}"));
         }
         let mut joints = BTreeMap::new();
         for (joint, markers) in file.joints {
             if !known.clone().chain(TOES).any(|known| known == joint) {
-                return Err(format!("{joint:?} is no joint"));
+                return Err(format!("{joint:?} is not a joint"));
             }
             let weights = weights(markers).map_err(|error| format!("{joint:?}: {error}"))?;
             joints.insert(joint, weights);
         }
         if joints.contains_key(TOES[0]) != joints.contains_key(TOES[1]) {
-            return Err("toes of one foot only".to_owned());
+            return Err("only one foot has toes".to_owned());
         }
         Ok(Self {
             up: file.up,
@@ -103,7 +103,7 @@ impl MarkerTable {
         self.joints.get(name).map(Vec::as_slice)
     }
 
-    /// The markers of all joints; one may occur several times.
+    /// The markers of all joints; the same marker may occur several times.
     pub(super) fn markers(&self) -> impl Iterator<Item = &str> {
         self.joints.values().flatten().map(|value| value.0.as_str())
     }
@@ -116,7 +116,7 @@ impl MarkerTable {
         self.unit_metres
     }
 
-    /// A point of the file with z up: axes are permuted cyclically, which does not mirror.
+    /// Rotates a point of the file to z up. The axes are permuted cyclically, so that nothing is mirrored.
     pub(super) fn upright(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self.up {
             Axis::X => [y, z, x],
@@ -141,7 +141,7 @@ fn weights(markers: Markers) -> Result<Vec<(String, f64)>, String> {
     Ok(weights)
 }
 
-/// Metres in a unit of that name.
+/// Length in metres of the unit with this name.
 pub(super) fn metres_per(unit: &str) -> Option<f64> {
     match unit.trim().to_ascii_lowercase().as_str() {
         "mm" => Some(0.001),

@@ -1,4 +1,4 @@
-//! Motion files are read back as written, or refused with the cause.
+//! Tests that motion files are read back as written, or refused with the cause.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -9,7 +9,7 @@ use testkit::c3d::{Processor, Trial as Written};
 
 use super::*;
 
-/// A person that moves up and down with bent knees: joints of PARSE14 in metres, z up, and toes.
+/// A person moving up and down with bent knees: joints of PARSE14 in metres, z up, and toes.
 fn posture(frame: usize) -> [[f64; 3]; 16] {
     let down = 0.05 * (frame as f64 * 0.3).sin();
     let z = |value: f64| value - down;
@@ -33,7 +33,7 @@ fn posture(frame: usize) -> [[f64; 3]; 16] {
     ]
 }
 
-/// The markers of the preset `parallax`, or of `pose2sim` with toes.
+/// Names of the markers of the preset `parallax`, or of `pose2sim` with toes.
 fn names(with_toes: bool) -> Vec<String> {
     let names: Vec<&str> = if with_toes {
         vec![
@@ -62,7 +62,7 @@ fn names(with_toes: bool) -> Vec<String> {
     names.into_iter().map(|name| name.replace(' ', "_")).collect()
 }
 
-/// A TRC file, y up, without the frames and markers for which `missing` is true.
+/// A TRC file, y up, without the frames and markers for which `missing` returns true.
 fn trc(n: usize, with_toes: bool, missing: impl Fn(usize, usize) -> bool) -> String {
     let names = names(with_toes);
     let mut text = format!(
@@ -75,7 +75,7 @@ fn trc(n: usize, with_toes: bool, missing: impl Fn(usize, usize) -> bool) -> Str
         write!(text, "{}\t{}", frame + 1, frame as f64 / 50.0).unwrap();
         let all = posture(frame);
         for marker in 0..names.len() {
-            // Both toes of a foot lie in one place.
+            // Both toes of a foot have the same position.
             let [x, y, z] = all[if marker < 16 { marker } else { marker - 2 }];
             if missing(frame, marker) {
                 text.push_str("\t\t\t");
@@ -109,7 +109,7 @@ fn read_by(
     read_motion(&file, table.as_ref(), options)
 }
 
-/// The message without the folder.
+/// Returns the error message without the folder.
 fn refused(got: Result<Motion, MotionError>) -> String {
     let text = got.unwrap_err().to_string();
     text.split_once("a.").map_or(text.clone(), |parts| parts.1.to_owned())
@@ -153,7 +153,7 @@ fn joints_of_a_trc_file_are_read_with_z_up() {
     assert_near(&left, &posture(7)[15], 1e-12);
 }
 
-/// A C3D file of a person without toes, in a unit.
+/// A C3D file of a person without toes, in the given unit.
 fn c3d(unit: &str, per_metre: f64) -> Vec<u8> {
     let frame = |frame: usize| {
         let points = posture(frame).into_iter().take(14);
@@ -201,7 +201,7 @@ fn joints_of_a_c3d_file_are_read_in_every_unit() {
 
 #[test]
 fn short_gaps_are_interpolated_and_long_ones_are_refused_with_their_frames() {
-    // A quarter of a second of 50 frames is 12 frames.
+    // At 50 frames per second, a quarter of a second is 12 frames.
     let gap =
         |from: usize, to: usize| move |frame, marker| marker == 1 && (from..=to).contains(&frame);
     let got = read(
@@ -239,11 +239,11 @@ fn impossible_motion_is_refused_with_a_likely_cause() {
     let options = MotionOptions::default();
     let by = |table: &str| refused(read_by("a.c3d", c3d("mm", 1000.0), Some(table), &options));
     let got = by(&own_table("unit = \"m\""));
-    assert!(got.contains("another unit?"), "{got}");
+    assert!(got.contains("is the unit wrong?"), "{got}");
     let sides = own_table("").replace("[\"left", "[\"L").replace("[\"right", "[\"left");
     let got = by(&sides.replace("[\"L", "[\"right"));
     assert!(got.contains("left and right are exchanged"), "{got}");
-    // The same upside down.
+    // The same motion upside down.
     let text = trc(20, false, |_, _| false);
     let upside_down: String = text
         .lines()
@@ -269,7 +269,7 @@ fn files_that_cannot_be_used_are_refused() {
     assert_eq!(got, "txt: expected a file whose name ends in .c3d or .trc");
     let got = refused(read("a.trc", text.replace("neck", "collar"), &options));
     assert!(
-        got.contains("those of no preset") && got.contains("collar"),
+        got.contains("match no preset") && got.contains("collar"),
         "{got}"
     );
     let got = refused(read("a.trc", text.replace("\n50\t", "\n0\t"), &options));
@@ -281,7 +281,7 @@ fn files_that_cannot_be_used_are_refused() {
         ..options
     };
     let got = refused(read("a.trc", &text, &beyond));
-    assert_eq!(got, "trc: frames 5-21 are not among its frames 1-20");
+    assert_eq!(got, "trc: frames 5-21 are not among the file's frames 1-20");
     let table = own_table("").replace("[\"neck\"]", "[\"C7\"]");
     let got = refused(read_by("a.trc", &text, Some(&table), &options));
     assert!(got.contains("no marker \"C7\""), "{got}");
@@ -301,15 +301,15 @@ fn invalid_tables_are_refused() {
         |from: &str, to: &str| MarkerTable::parse(&own_table("").replace(from, to)).unwrap_err();
     assert_eq!(
         refused("\"neck\" =", "# "),
-        "nothing makes the joint \"neck\""
+        "no markers are given for the joint \"neck\""
     );
     assert!(
-        refused("\"neck\" =", "\"nose\" = [\"n\"]\n\"neck\" =").contains("\"nose\" is no joint")
+        refused("\"neck\" =", "\"nose\" = [\"n\"]\n\"neck\" =").contains("\"nose\" is not a joint")
     );
     let got = refused("[\"neck\"]", "{ a = 0.5, b = 0.6 }");
     assert_eq!(got, "\"neck\": the weights add up to 1.1, not to 1");
     assert!(refused("[\"neck\"]", "[]").contains("not to 1"));
-    assert!(refused("\"neck\" =", "\"left toes\" = [\"t\"]\n\"neck\" =").contains("one foot only"));
+    assert!(refused("\"neck\" =", "\"left toes\" = [\"t\"]\n\"neck\" =").contains("only one foot"));
     assert!(refused("up = \"z\"", "up = \"w\"").contains("unknown variant"));
 }
 

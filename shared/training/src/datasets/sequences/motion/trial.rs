@@ -14,14 +14,14 @@ pub(super) struct Trial {
     unit: String,
     /// Number of the first frame in the file.
     pub(super) first: u32,
-    /// Names of the markers; empty for unnamed ones.
+    /// Names of the markers; empty if a marker has no name.
     pub(super) names: Vec<String>,
-    /// `[frame][marker]`; `None` where it was not seen.
+    /// Positions of the markers, `[frame][marker]`; `None` if the marker was not seen.
     pub(super) frames: Vec<Vec<Option<[f64; 3]>>>,
 }
 
 impl Trial {
-    /// Reads a file; its format follows from the extension.
+    /// Reads a file. The extension determines the format.
     pub(super) fn read(path: &Path) -> Result<Self, MotionError> {
         let bytes = std::fs::read(path).map_err(|source| MotionError::Io {
             path: path.to_owned(),
@@ -49,7 +49,7 @@ impl Trial {
             path: path.to_owned(),
             source,
         })?;
-        // Many programs write a marker that was not visible at exactly the origin.
+        // Many programs write a marker that was not visible as a point exactly at the origin.
         let seen = |marker: &Option<[f64; 3]>| marker.filter(|point| *point != [0.0; 3]);
         let names = trial.labels().iter();
         let without_subject = |label: &String| match label.rsplit_once(':') {
@@ -59,7 +59,7 @@ impl Trial {
         Ok(Self {
             rate_hz: trial.rate_hz(),
             unit: match trial.units().trim() {
-                // The unit of the format's examples.
+                // The unit used in the format's examples.
                 "" => "mm".to_owned(),
                 unit => unit.to_owned(),
             },
@@ -112,7 +112,7 @@ impl Trial {
         Ok(self)
     }
 
-    /// Metres per unit of the file.
+    /// Length of the file's unit in metres.
     pub(super) fn metres_per_unit(&self, path: &Path) -> Result<f64, MotionError> {
         super::table::metres_per(&self.unit).ok_or_else(|| MotionError::Unit {
             path: path.to_owned(),

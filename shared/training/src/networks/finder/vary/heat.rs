@@ -1,17 +1,17 @@
-//! Boxes as the heat and the sides that the network should give.
+//! Conversion of boxes to the heat and the sides that the network should give.
 
 use super::{Around, STRIDE};
 
-/// Deviation of the heat around the middle of a box, shares of its width and height.
+/// Standard deviation of the heat around the middle of a box, as a share of its width and height.
 const SPREAD: f32 = 0.08;
-/// The least deviation, cells.
+/// Least standard deviation, in cells.
 const LEAST_SPREAD: f32 = 0.7;
 /// Least heat of a cell that belongs to a box.
 const BOXED: f32 = 0.4;
-/// The part of a box, about its middle, in which nothing is asked where the person does not count.
+/// Central part of the box of an ignored person in which cells do not count.
 const UNASKED: f32 = 0.7;
 
-/// Heat, and sides, of every cell: see [`Truth`](crate::networks::finder::Truth).
+/// Heat and sides of every cell; see [`Truth`](crate::networks::finder::Truth).
 pub(super) fn heat(people: &[Around], n: usize) -> (Vec<f32>, Vec<f32>) {
     let mut heat = vec![0.0_f32; n * n];
     let mut sides = vec![0.0; 4 * n * n];
@@ -68,7 +68,7 @@ pub(super) fn heat(people: &[Around], n: usize) -> (Vec<f32>, Vec<f32>) {
     (heat, sides)
 }
 
-/// The cells within three deviations of a middle.
+/// The range of cells within three standard deviations of a middle.
 fn around(middle: f32, spread: f32, n: usize) -> core::ops::Range<usize> {
     let reach = 3.0 * spread;
     let low = (middle - reach).max(0.0) as usize;

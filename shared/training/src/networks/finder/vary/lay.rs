@@ -1,17 +1,17 @@
-//! How pictures are laid over each other at random.
+//! Random placement of pictures over each other.
 
 use super::layer::{Layer, boxes};
 use super::{Around, Picture, Rng, Shape, Vary};
 use crate::networks::parameters::normal;
 
-/// Width by height of the pictures of cameras.
+/// Aspect ratios of camera pictures: width divided by height.
 const ASPECTS: [f32; 6] = [4.0 / 3.0, 16.0 / 9.0, 1.0, 3.0 / 4.0, 9.0 / 16.0, 4.0 / 3.0];
-/// Pixels of the sample for one of a picture, at most.
+/// Largest enlargement: pixels of the sample per pixel of a picture.
 const MOST_ENLARGED: f32 = 3.0;
-/// Share of pasted people who stand close to a person.
+/// Share of pasted people who are placed close to another person.
 const CLOSE: f32 = 0.5;
 
-/// A picture, and pastes over it.
+/// A picture, and pictures pasted over it.
 pub(super) fn layers<'a>(
     picture: &'a Picture,
     others: &'a [Picture],
@@ -38,19 +38,19 @@ pub(super) fn layers<'a>(
     layers
 }
 
-/// The limits of a sample whose picture fills a frame from the top-left corner on.
+/// The limits of a sample whose picture fills a frame at the top-left corner.
 fn window(frame: [f32; 2]) -> [f32; 4] {
     [-0.5, -0.5, frame[0] - 0.5, frame[1] - 0.5]
 }
 
-/// A height in the sample, by chance: small ones as often as large ones.
+/// A random height in the sample, uniform in its logarithm.
 fn height(frame: [f32; 2], most: f32, vary: &Vary, rng: &mut Rng) -> f32 {
     let [low, high] =
         [vary.least_height, vary.most_height.min(most)].map(|share| share.max(1e-3).ln());
     frame[1] * (low + (high - low).max(0.0) * rng.f32()).exp()
 }
 
-/// Somebody by chance.
+/// A random person of a picture.
 fn somebody(picture: &Picture, rng: &mut Rng) -> Option<Around> {
     let people = picture.people.iter().filter(|person| person.counts);
     let people: Vec<&Around> = people.collect();
@@ -58,7 +58,7 @@ fn somebody(picture: &Picture, rng: &mut Rng) -> Option<Around> {
     people.get(nth).map(|person| **person)
 }
 
-/// A layer that shows a point of the picture at a point of the sample, and as much of the picture as lies in the limits.
+/// A layer that puts a point of the picture at a point of the sample. It shows all of the picture that is within the limits.
 fn layer<'a>(
     picture: &'a Picture,
     [at, to]: [[f32; 2]; 2],
@@ -85,7 +85,7 @@ fn layer<'a>(
     layer
 }
 
-/// A part of a picture that fills the frame.
+/// A random part of a picture that fills the frame.
 fn cover<'a>(picture: &'a Picture, frame: [f32; 2], rng: &mut Rng) -> Layer<'a> {
     let size = picture.size.map(|side| side as f32);
     let step = (size[0] / frame[0]).min(size[1] / frame[1]) / (1.0 + 0.6 * rng.f32());
@@ -97,7 +97,7 @@ fn cover<'a>(picture: &'a Picture, frame: [f32; 2], rng: &mut Rng) -> Layer<'a> 
     layer(picture, [at, to], (step, window(frame)), rng)
 }
 
-/// A picture with a person as high as chance wants.
+/// A picture scaled to a random height of one person.
 fn scaled<'a>(picture: &'a Picture, frame: [f32; 2], vary: &Vary, rng: &mut Rng) -> Layer<'a> {
     let Some(person) = somebody(picture, rng) else {
         return cover(picture, frame, rng);
@@ -110,9 +110,9 @@ fn scaled<'a>(picture: &'a Picture, frame: [f32; 2], vary: &Vary, rng: &mut Rng)
     layer(picture, [at, to], (step, window(frame)), rng)
 }
 
-/// A part of a picture, with a person or without.
+/// A part of a picture, with or without a person.
 ///
-/// * `beside`: who is in the sample already.
+/// * `beside`: people already in the sample.
 fn pasted<'a>(
     picture: &'a Picture,
     (frame, beside): ([f32; 2], &[Around]),

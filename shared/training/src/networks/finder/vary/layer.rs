@@ -1,28 +1,28 @@
-//! Pictures laid over each other.
+//! Pictures placed over each other.
 
 use super::{Around, FILL, Picture};
 
-/// Share of a person that has to be seen so that the network should find it.
+/// Least visible share of a person whom the network should find.
 const SEEN: f32 = 0.3;
-/// Share of a person that is not seen at all.
+/// Share of a person below which the person counts as invisible.
 const UNSEEN: f32 = 0.04;
-/// Least height of a person, pixels of the input.
+/// Least height of a person, in pixels of the input.
 const LEAST_PX: f32 = 14.0;
-/// Most pixels, across and down, whose mean a pixel of the input is.
+/// Largest number of pixels, across and down, that are averaged for a pixel of the input.
 const MOST_MEAN: usize = 16;
 
-/// How a picture is laid into the sample.
+/// A picture and its placement in the sample.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layer<'a> {
     pub(super) picture: &'a Picture,
     /// The point of the picture at the first pixel of the sample.
     pub(super) from: [f32; 2],
-    /// Pixels of the picture for one of the sample.
+    /// Pixels of the picture per pixel of the sample.
     pub(super) step: f32,
     pub(super) is_mirrored: bool,
-    /// The part of the sample that shows it: left, top, right, bottom.
+    /// The part of the sample that shows the picture: left, top, right, bottom.
     pub(super) window: [f32; 4],
-    /// Set where the corners of the window show what lies below.
+    /// True if the corners of the window are left out, so that they show the layer below.
     pub(super) is_round: bool,
 }
 
@@ -42,7 +42,7 @@ impl Layer<'_> {
         ]
     }
 
-    /// A box of the picture in the sample.
+    /// Converts a box of the picture to the sample.
     pub(super) fn in_sample(&self, around: &Around) -> Around {
         let [left, top, right, bottom] = around.outline;
         let x = |at: f32| (at - self.from[0]) / self.across();
@@ -59,7 +59,7 @@ impl Layer<'_> {
         }
     }
 
-    /// Returns whether a pixel of the sample shows it.
+    /// Returns true if a pixel of the sample shows this picture.
     fn shows(&self, [x, y]: [f32; 2]) -> bool {
         let [left, top, right, bottom] = self.window;
         let place = |at: f32, low: f32, high: f32| (2.0 * at - low - high) / (high - low);
@@ -83,7 +83,7 @@ impl Layer<'_> {
         }
     }
 
-    /// The colour at a point: bilinear, or a mean where the picture is reduced.
+    /// The colour at a point: bilinear, or a mean if the picture is reduced.
     fn colour(&self, [x, y]: [f32; 2]) -> [f32; 3] {
         let Picture { size, rgb, .. } = self.picture;
         let last = size.map(|side| side as f32 - 1.0);
@@ -121,7 +121,7 @@ impl Layer<'_> {
     }
 }
 
-/// The sample, the last layer on top: row by row, 0 to 255.
+/// The pixels of the sample with the last layer on top: row by row, 0 to 255.
 pub(super) fn painted(layers: &[Layer<'_>], side: usize) -> Vec<[f32; 3]> {
     let mut rgb = vec![[FILL; 3]; side * side];
     for layer in layers {
@@ -130,7 +130,7 @@ pub(super) fn painted(layers: &[Layer<'_>], side: usize) -> Vec<[f32; 3]> {
     rgb
 }
 
-/// The boxes of all people who are visible at least in part, pixels of the sample.
+/// The boxes of all people who are at least partly visible, in pixels of the sample.
 pub(super) fn boxes(layers: &[Layer<'_>]) -> Vec<Around> {
     let mut all = Vec::new();
     for (nth, layer) in layers.iter().enumerate() {

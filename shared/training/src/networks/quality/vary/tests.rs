@@ -1,4 +1,4 @@
-//! Augmented samples stay consistent with the picture.
+//! Tests that augmented samples stay consistent with the picture.
 
 use viewquality::n_evidence;
 
@@ -9,7 +9,7 @@ const TILE: TileShape = TileShape {
     width: 24,
 };
 
-/// A sample in which every part is a bright dot at its position in the evidence, and its error is its number.
+/// A sample in which every part is a bright dot at its position in the evidence. The error of a part is its number.
 fn sample() -> Sample {
     let [rows, cols] = picture_size(TILE);
     let mut sample = Sample {

@@ -1,11 +1,11 @@
-//! Properties of the joints, on a person made of segments.
+//! Properties of the joints of a person made of segments.
 
 use proptest::prelude::*;
 use testkit::c3d::{Processor, Trial, write};
 
 use super::*;
 
-/// A person of straight limbs (mm), z up, x forwards, y to the left: segments with their origins and proximal ends.
+/// A person with straight limbs, in mm (z up, x forwards, y to the left): segments with their origins and proximal ends.
 const STANDING: [(&str, [f64; 3]); 13] = [
     ("PEL", [0.0, 0.0, 1000.0]),
     ("TRX", [0.0, 0.0, 1450.0]),
@@ -22,7 +22,7 @@ const STANDING: [(&str, [f64; 3]); 13] = [
     ("RTI", [0.0, -100.0, 90.0]),
 ];
 
-/// A trial with all points that are needed; the person stands at another place in every frame.
+/// A trial with all points that are needed. The person has another position in every frame.
 pub(crate) fn person(places: &[Isometry3<f64>]) -> Trial {
     let mut labels = Vec::new();
     let mut points = Vec::new();
@@ -150,7 +150,7 @@ fn measures_come_from_the_static_trial_and_the_subjects_file() {
     let text = "$HeadOffset = 3\n$LShoulderOffset = 50.5\n$RShoulderOffset = 48\n";
     let got = Measures::new(&still, text).unwrap();
     assert_eq!(got.shoulder_offsets, [50.5, 48.0]);
-    // The shoulder markers of this person: 400 mm apart across, 7 mm in height.
+    // Distance of this person's shoulder markers: 400 mm across and 7 mm in height.
     let apart = (400.0_f64 * 400.0 + 49.0).sqrt();
     assert!((got.half_shoulders - (apart / 2.0 - 7.0)).abs() < 0.01);
     assert_eq!(Measures::new(&still, "$LShoulderOffset = 50"), None);
