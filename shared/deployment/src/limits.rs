@@ -1,9 +1,9 @@
-//! Sees that every number of a deployment file is in its range, and names those that are doubtful.
+//! Checks that every number of a deployment file is in its range, and reports doubtful numbers.
 
 use crate::complaint::{Complaint, between, demand, whole};
 use crate::{Deployment, Runtime, capture, paper};
 
-/// Checks every number against the least and the most that it can mean.
+/// Checks every number against the range of its key.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     if let Some([x, y, z]) = it.up {
         let length = (x * x + y * y + z * z).sqrt();
@@ -60,9 +60,9 @@ fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
 }
 
 impl Deployment {
-    /// Returns doubts about settings that are possible but hardly meant: each with its number and a remedy to try.
+    /// Returns warnings about settings that are allowed but probably not intended, each with its value and a suggestion.
     ///
-    /// * `n_cores`: of the machine, where that is known.
+    /// * `n_cores`: number of cores of the machine, if known.
     pub fn doubts(&self, n_cores: Option<usize>) -> Vec<String> {
         let mut doubts = Vec::new();
         let is_lossless = self.capture.mode.is_lossless();
