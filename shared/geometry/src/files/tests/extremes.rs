@@ -1,16 +1,16 @@
-//! Impossible and implausible values of every number of a calibration are refused or reported.
+//! Tests that impossible and implausible values of every number of a calibration are refused or reported.
 
 use std::error::Error as _;
 
 use super::*;
 use crate::testing::ring;
 
-/// The result of making and checking a rig.
+/// Result of creating and checking a rig.
 #[derive(Debug, PartialEq)]
 enum Outcome {
     /// The rig is refused.
     Refused,
-    /// The rig is made; the severity of the worst finding.
+    /// The rig is created; the value is the severity of the worst finding.
     Checked(Option<Severity>),
 }
 
@@ -19,7 +19,7 @@ const WARNING: Outcome = Outcome::Checked(Some(Severity::Warning));
 const NOTE: Outcome = Outcome::Checked(Some(Severity::Note));
 const FINE: Outcome = Outcome::Checked(None);
 
-/// Makes and checks a rig; with the text of the error or of the findings.
+/// Creates and checks a rig. Returns the outcome with the text of the error or of the findings.
 fn outcome(cameras: Vec<Camera>) -> (Outcome, String) {
     match Rig::new(cameras, Some(z_up()), "") {
         Err(error) => {
@@ -134,7 +134,7 @@ fn impossible_numbers_of_a_camera_are_refused_or_reported() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The outcome of three cameras that are all changed.
+/// Returns the outcome for three cameras that are all changed.
 fn outcome_of_all(change: impl Fn(&mut Camera)) -> (Outcome, String) {
     let mut cameras = ring(3, LensModel::Pinhole);
     cameras.iter_mut().for_each(change);
@@ -174,7 +174,7 @@ fn cameras_at_one_place_are_an_error() {
 
 #[test]
 fn cameras_that_all_look_away_are_an_error() {
-    // Half a turn about the vertical axis: every camera looks out of the ring.
+    // After half a turn about the vertical axis, every camera looks out of the ring.
     let turn = nalgebra::Isometry3::rotation(Vector3::y() * core::f64::consts::PI);
     let (outcome, text) =
         outcome_of_all(|camera| camera.camera_from_world = turn * camera.camera_from_world);
