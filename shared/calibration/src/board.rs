@@ -3,7 +3,7 @@
 //! | step | where |
 //! |---|---|
 //! | choose frames that cover the pictures, distances and tilts | `choose` |
-//! | find the intrinsics of every camera separately (Zhang, *A flexible new technique for camera calibration*, 2000) | `intrinsics`, `pose` |
+//! | find the intrinsics of each camera alone (Zhang, *A flexible new technique for camera calibration*, 2000) | `intrinsics`, `pose` |
 //! | find the relative poses of cameras that saw the board together, then all poses along the strongest pairs | `graph` |
 //! | run all steps, in this order | `rig` |
 //! | adjust everything at once, without wrong corners | `adjust`, `problem`, `outcome` |
