@@ -15,16 +15,14 @@ pub struct Camera {
     /// Name of the camera in the rig.
     pub name: String,
     /// Source of the pictures: a video, an image, a folder or pattern of images, a camera (`/dev/video0`, `rtsp://...`), a scene
-    /// (`synth://...`),
-    /// or a camera of a recording (`run.mcap#left`).
+    /// (`synth://...`), or a camera of a recording (`run.mcap#left`).
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
     /// Keypoints from another program, instead of footage or in addition to it: a folder with one JSON file per frame, or a single JSON
     /// file.
     pub keypoints: Option<PathBuf>,
     /// Names of the keypoints: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16`, `lsp-14`, `coco-wholebody-133`,
-    /// `halpe-136` or
-    /// `body-135`; by default, as the file says, or according to the number of keypoints.
+    /// `halpe-136` or `body-135`; by default, as the file says, or according to the number of keypoints.
     pub keypoint_names: Option<String>,
     /// Network for this camera, instead of `network.file`.
     pub network: Option<PathBuf>,

@@ -76,8 +76,7 @@ pub struct Deployment {
     /// File with the calibration of the cameras.
     pub rig: PathBuf,
     /// Unit of length in the calibration, instead of the unit of its format: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or the side of a square
-    /// such as
-    /// `"30mm"`.
+    /// such as `"30mm"`.
     pub unit: Option<String>,
     /// Up direction (opposite to gravity) in the world of the calibration, `[x, y, z]`; by default, from the calibration file or found in
     /// the pictures.

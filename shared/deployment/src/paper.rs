@@ -50,8 +50,8 @@ pub struct Config {
     pub consistency: Option<Consistency>,
     /// Part-type tables of pairs of cameras, each `{ views = [a, b], files = [a wrt b, b wrt a] }`.
     pub compatibility: Vec<Compatibility>,
-    /// Source of the expected errors of the parts: a network (ONNX, or `"shipped"`), or `{ table = FILE, subject, action, views,
-    /// frame_offset, frame_step }`.
+    /// Source of the expected errors of the parts: a network (ONNX, or `"shipped"`), or
+    /// `{ table = FILE, subject, action, views, frame_offset, frame_step }`.
     pub errors: Option<Errors>,
     /// Expected error above which a part is switched off: `none`, `learned`, the name of a data set, a list with a value in pixels for each
     /// part, or `{ file = FILE }`.

@@ -234,8 +234,7 @@ impl Topology {
     }
 
     /// Returns true if networks or keypoints find the people. In this case, `fuse` sends the identities of people, and `triangulate` reads
-    /// the
-    /// evidence.
+    /// the evidence.
     pub fn has_maps(&self) -> bool {
         self.has_maps
     }

@@ -1,10 +1,8 @@
 //! Readers and writers of file formats, independent of the other crates of the workspace: C3D, TRC, MATLAB level 5, and the checked header
-//! of
-//! Parallax's own binary files.
+//! of Parallax's own binary files.
 //!
 //! The crate has its own readers although libraries exist. Those for MATLAB files panic on damaged files, and those for C3D refuse files of
-//! old
-//! laboratories that have all the data needed.
+//! old laboratories that have all the data needed.
 #![forbid(unsafe_code)]
 
 pub mod c3d;

@@ -129,8 +129,7 @@ impl Framing {
     }
 
     /// Returns the map from an output pixel (u, v) to the source: `m[0][0] u + m[0][1] v + m[0][2]` is the column, and `m[1]` gives the
-    /// row.
-    /// Both are counted from the centre of the top-left pixel.
+    /// row. Both are counted from the centre of the top-left pixel.
     pub fn source_from_output(&self) -> [[f64; 3]; 2] {
         self.source_from_output
     }

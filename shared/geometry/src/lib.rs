@@ -4,8 +4,7 @@
 //! `camera_from_world`. The centre of the top-left pixel is (0, 0).
 //!
 //! A *pixel* is a point of the recorded, distorted image. An *ideal pixel* is the position of the same ray in a pinhole camera with the
-//! same
-//! focal lengths and principal point.
+//! same focal lengths and principal point.
 //!
 //! The crate uses no clock and no threads. Only [`files::read`], [`files::read_many`] and [`files::write`] do input or output.
 #![forbid(unsafe_code)]

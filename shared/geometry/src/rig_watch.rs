@@ -35,17 +35,14 @@ const MAX_DEGREES: f64 = 1.5;
 /// Tracks the residuals of the same points in all cameras, with and without each camera.
 ///
 /// With four or more cameras, the rays of every two other cameras are triangulated, and the point is projected into the camera. The
-/// residual
-/// is the offset of the camera's own observation from this projection. Medians reduce it: over the points of a frame, in x and in y, and
-/// then over the last frames of each group of three cameras, as a vector whose length is taken. Errors of detections change direction, but
-/// the offset of a moved camera does not. The residual of a camera is the median over all groups that contain it. A single wrong camera
-/// only affects these groups.
+/// residual is the offset of the camera's own observation from this projection. Medians reduce it: over the points of a frame, in x and in
+/// y, and then over the last frames of each group of three cameras, as a vector whose length is taken. Errors of detections change
+/// direction, but the offset of a moved camera does not. The residual of a camera is the median over all groups that contain it. A single
+/// wrong camera only affects these groups.
 ///
 /// With three cameras, the epipolar distance to the ray of one other camera is used instead, without its direction, because the two
-/// remaining
-/// cameras may agree by chance. This hardly detects a camera that is rotated along its epipolar lines. With two cameras, it is impossible
-/// to
-/// decide which one is wrong.
+/// remaining cameras may agree by chance. This hardly detects a camera that is rotated along its epipolar lines. With two cameras, it is
+/// impossible to decide which one is wrong.
 ///
 /// This is not a calibration: it detects that a camera was moved, but not its new pose.
 #[derive(Debug, Clone)]
@@ -170,8 +167,7 @@ impl RigWatch {
     /// Returns the cameras whose poses differ from the calibration.
     ///
     /// Cameras are found one at a time: the first is the one without which the others agree best. A wrong camera affects the residuals of
-    /// the
-    /// others, so a second one is searched for among the remaining cameras only. At least four must remain.
+    /// the others, so a second one is searched for among the remaining cameras only. At least four must remain.
     pub fn suspects(&self) -> Vec<Suspect> {
         let mut left_out = Vec::new();
         let mut found = Vec::new();

@@ -50,8 +50,7 @@ pub struct SearchSize {
     /// Width and height of the frame, in pixels.
     pub frame_size: [u32; 2],
     /// Height of a person of [`PERSON_METRES`] in the calibrated image, in pixels: the median over the space that the camera shares with
-    /// others.
-    /// It is `None` for a camera that shares no space.
+    /// others. It is `None` for a camera that shares no space.
     pub person_px: Option<f64>,
     /// Scale that would be chosen without the limit on time; larger than `scale` if the limit applies.
     pub wanted: f64,
@@ -82,10 +81,9 @@ pub struct SearchSizes {
 /// Chooses the sizes at which frames are searched.
 ///
 /// The target is a height of [`AIM_PX`] for a person of [`PERSON_METRES`] who stands in the space that the cameras share. If one scale
-/// gives a
-/// height within [`GOOD_PX`] in every camera, it is used for all; otherwise each camera has its own scale. No frame is larger than the
-/// calibrated image, or has more than [`MOST_PIXELS`]. If no two cameras share a space, the largest frame within this limit is used. The
-/// sizes depend on the cameras only, not on the footage.
+/// gives a height within [`GOOD_PX`] in every camera, it is used for all; otherwise each camera has its own scale. No frame is larger than
+/// the calibrated image, or has more than [`MOST_PIXELS`]. If no two cameras share a space, the largest frame within this limit is used.
+/// The sizes depend on the cameras only, not on the footage.
 pub fn search_sizes(rig: &Rig) -> SearchSizes {
     let found = heights(rig);
     let sizes = rig.cameras().iter().map(|camera| camera.intrinsics.size);

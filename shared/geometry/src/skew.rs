@@ -1,12 +1,10 @@
 //! Correction for pictures that were not taken at the instant of their frame.
 //!
 //! The *skew* of a picture is the time from the instant of its frame to the picture, in seconds; it is negative if the picture is earlier.
-//! There
-//! are two corrections: a point is moved to the instant by its own velocity ([`Tracks`], [`moved`]), or its standard deviation is increased
-//! by the distance that it may have moved ([`widened_px`]). The test `clock` of the crate `pipeline` measures both. Moving the points is
-//! far
-//! better. It works best if the standard deviation is increased for points without a known velocity, and for points moved beyond the
-//! observed interval.
+//! There are two corrections: a point is moved to the instant by its own velocity ([`Tracks`], [`moved`]), or its standard deviation is
+//! increased by the distance that it may have moved ([`widened_px`]). The test `clock` of the crate `pipeline` measures both. Moving the
+//! points is far better. It works best if the standard deviation is increased for points without a known velocity, and for points moved
+//! beyond the observed interval.
 
 use std::collections::VecDeque;
 
@@ -43,8 +41,7 @@ pub struct Velocity {
 
 impl Velocity {
     /// Returns the movement of the point in a time, in pixels. Returns `None` for a time longer than that over which the velocity was
-    /// measured,
-    /// because nobody moves evenly for so long.
+    /// measured, because nobody moves evenly for so long.
     pub fn shift(&self, seconds: f64) -> Option<Vector2<f64>> {
         (seconds.abs() <= self.gap_s).then(|| self.px_per_s * seconds)
     }
@@ -104,8 +101,7 @@ fn between((from_s, from): (f64, Point2<f64>), (to_s, to): (f64, Point2<f64>)) -
 /// Returns the position of a point at the instant of its frame, in pixels, and the standard deviation to add to its own.
 ///
 /// A moved point is as accurate as an observed one while the instant is between the two pictures that give its velocity. At a time `s`
-/// after
-/// the later picture (negative for before), `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
+/// after the later picture (negative for before), `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
 ///
 /// * `velocity`: result of [`Tracks::velocity`]. A point without a velocity, or with a skew that is too long for it, keeps its position and
 ///   gets a larger standard deviation.

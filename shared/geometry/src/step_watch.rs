@@ -27,8 +27,7 @@ const LONGEST_GAP_S: f64 = 0.35;
 /// Maximum speed of a point, in longer sides of the person per second; a faster point is taken for a different one.
 const MOST_SPEED: f64 = 9.0;
 /// Maximum distance of a point from the epipolar line, relative to the longer side of the person in the picture. A point further away is
-/// taken
-/// for a different one.
+/// taken for a different one.
 const MOST_MISS: f64 = 0.2;
 
 /// Estimates how much later each camera took its pictures than their times state.
@@ -36,14 +35,11 @@ const MOST_MISS: f64 = 0.2;
 /// If camera B is late by `d`, a point that moves at `u` (pixels per second) is seen `u d` ahead. The epipolar residual is then `e = g d`
 /// with `g = n . u`, where `n` is the normal of the epipolar line. With the true motion, the velocities in both pictures give the same `g`,
 /// but their errors are independent. The estimate `d = sum(e g) / sum(g_a g_b)` is therefore not biased towards zero, and a person who
-/// stands
-/// does not affect it.
+/// stands does not affect it.
 ///
 /// The means over the points of a frame, and over the frames of a point, are subtracted. The offset from a moved camera is nearly the same
-/// for
-/// the whole person, and for some seconds for each point, while limbs move to and fro. The offsets of all pairs of views give the offsets
-/// of
-/// the views, relative to their median. The result is the mean of the last estimates, weighted by their certainty.
+/// for the whole person, and for some seconds for each point, while limbs move to and fro. The offsets of all pairs of views give the
+/// offsets of the views, relative to their median. The result is the mean of the last estimates, weighted by their certainty.
 ///
 /// This is not a synchronisation. Offsets beyond 40 ms come out too large (60 ms as 69), because limbs do not move evenly for so long.
 #[derive(Debug, Clone)]

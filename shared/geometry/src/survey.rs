@@ -21,8 +21,7 @@ pub struct Survey {
     /// The space that all cameras see.
     pub shared: Option<Shared>,
     /// Expected error of a point at the focus, in millimetres. It assumes an error of one pixel (standard deviation, in x and y) in every
-    /// view
-    /// that sees the point, and is the root of the summed variances along the three axes.
+    /// view that sees the point, and is the root of the summed variances along the three axes.
     pub error_mm: Option<f64>,
 }
 

@@ -146,12 +146,10 @@ impl Triangulated {
 
 /// Triangulates one point: linearly on undistorted rays, then by minimising the reprojection error.
 ///
-/// The refinement (Levenberg & Marquardt) minimises `Σ ρ(‖e‖²) / σ²` over the distorted pixel errors `e` with the Cauchy loss
-/// `ρ(s) = c² ln(1 + s / c²)`, c = `loss_px`. The width of the loss shrinks from the worst initial error down to c, so that a single
-/// outlier
-/// does not determine the minimum. If the error of a view exceeds `max_reprojection_px`, every view is left out in turn, and the subset
-/// with
-/// the smallest worst error is kept. This repeats down to `min_views`.
+/// The refinement (Levenberg & Marquardt) minimises `Σ ρ(‖e‖²) / σ²` over the distorted pixel errors `e` with the Cauchy loss `ρ(s) = c²
+/// ln(1 + s / c²)`, c = `loss_px`. The width of the loss shrinks from the worst initial error down to c, so that a single outlier does not
+/// determine the minimum. If the error of a view exceeds `max_reprojection_px`, every view is left out in turn, and the subset with the
+/// smallest worst error is kept. This repeats down to `min_views`.
 ///
 /// The covariance is the inverse of the normal matrix `Σ ρ' Jᵀ J / σ²`; it is as accurate as the given `sigma_px`. The result depends
 /// only on the arguments and their order. The function does not allocate. An observation beyond the valid range of its camera's lens is not

@@ -26,8 +26,7 @@ impl Marker {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Points in metres; the index of a point is its number. For a chessboard or `ChArUco` board, these are the inner corners row by row
-    /// from
-    /// the upper left. For a grid, they are the four corners of each marker, clockwise.
+    /// from the upper left. For a grid, they are the four corners of each marker, clockwise.
     pub points: Vec<Point2<f64>>,
     /// The markers, by number.
     pub markers: Vec<Marker>,

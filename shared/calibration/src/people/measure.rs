@@ -18,8 +18,7 @@ pub(crate) const CELLS: usize = 8;
 /// Returns the expected errors from the residuals, by camera and joint.
 ///
 /// Each joint has one error relative to the size of the person, estimated from all cameras together. With separate errors for each camera,
-/// a
-/// single camera could dominate the result.
+/// a single camera could dominate the result.
 ///
 /// * `sizes_px`: size of the person in each camera.
 pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {

@@ -45,8 +45,7 @@ impl Chain {
     }
 
     /// Returns the likely usefulness of the chain: its duration, weighted by size and score. An object that a network takes for a person,
-    /// such as
-    /// a chair, may be seen for as long as a person, but is small or has a low score.
+    /// such as a chair, may be seen for as long as a person, but is small or has a low score.
     fn worth(&self) -> f64 {
         let of = |track: &Track| (track.span()[1] - track.span()[0]) * track.size() * track.score();
         self.tracks.iter().map(of).sum()
@@ -81,8 +80,7 @@ impl Chain {
     /// Returns the speed of a joint, from its positions one picture before and one after.
     ///
     /// The slope of the line that gives the position is not suitable. Between two pictures, its errors are those of the position as well.
-    /// An
-    /// adjustment would then move clocks until both errors cancel, half a picture away from the truth.
+    /// An adjustment would then move clocks until both errors cancel, half a picture away from the truth.
     fn speed(&self, track: &Track, joint: usize, time_s: f64) -> Vector2<f64> {
         let at = |time_s: f64| Some(Vector2::from(track.place(joint, time_s)?.at));
         let ends = [-1.0, 1.0].map(|sign| at(time_s + sign * self.interval_s));

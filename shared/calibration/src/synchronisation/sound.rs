@@ -62,8 +62,7 @@ pub struct SoundSettings {
 /// Estimates the clocks from sounds.
 ///
 /// In the [`Outcome`], residuals are NaN, and `n` is the number of beginnings of sounds that a camera shares with others. Costs are one
-/// minus
-/// the cosine between the beginnings of two cameras.
+/// minus the cosine between the beginnings of two cameras.
 ///
 /// * `sounds`: recordings of the cameras, in order.
 ///
@@ -185,8 +184,7 @@ impl Study<'_> {
     }
 
     /// Returns the offsets that best fit the pairs with a clear offset of their own; `None` for a camera that these pairs do not connect
-    /// with
-    /// the reference.
+    /// with the reference.
     fn offsets(&self, pairs: &[Pair]) -> Vec<Option<f64>> {
         let n = self.heard.len();
         let sure: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_sure()).collect();

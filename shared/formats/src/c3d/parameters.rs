@@ -32,8 +32,7 @@ impl<'a> Parameters<'a> {
     /// Reads the section that begins at byte `section`.
     ///
     /// A link that points outside the section is ignored, because the length of an entry also follows from its content. Samples of c3d.org
-    /// have
-    /// a link with exchanged bytes.
+    /// have a link with exchanged bytes.
     pub(crate) fn read(bytes: Bytes<'a>, section: usize) -> Result<Self, C3dError> {
         const WHAT: &str = "a parameter";
         let mut parameters = Self {

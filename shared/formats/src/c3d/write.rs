@@ -74,8 +74,7 @@ pub struct Marker {
 /// # Errors
 ///
 /// Fails if writing to `out` fails, if the names do not fit into the format, or if the number of frames or points differs from the
-/// announced
-/// one.
+/// announced one.
 pub fn write(
     out: &mut impl Write,
     heading: &Heading<'_>,

@@ -50,8 +50,7 @@ impl fmt::Display for Heading<'_> {
 }
 
 /// Returns one row with its line break. The three cells of a missing marker are `NaN`, not empty: `OpenSim` (4.6) drops an empty cell after
-/// the
-/// last tab of a line, and then refuses the row.
+/// the last tab of a line, and then refuses the row.
 ///
 /// * `number`: number of the row, from 1.
 /// * `markers`: positions in the file's unit.

@@ -142,8 +142,7 @@ impl Cameras {
     }
 
     /// Begins a term with the observation of a point by a camera: (image - seen) / sigma, with its derivatives with respect to the
-    /// parameters of
-    /// the camera.
+    /// parameters of the camera.
     ///
     /// * `seen`: position in pixels of the recorded picture; `sigma_px`: standard deviation along each axis.
     /// * Returns the derivative with respect to the point. The caller converts it to the coordinates of its local block.

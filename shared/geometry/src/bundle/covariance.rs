@@ -62,9 +62,8 @@ pub fn covariance<P: Problem>(problem: &P) -> Result<Covariance, Undetermined> {
 ///
 /// Each cluster is left out in turn (jackknife), by one Newton step from the minimum; Cameron, Gelbach & Miller, Review of Economics and
 /// Statistics 90, 2008, call this CR3. The errors of priors are assumed to be as stated. The length of a step is computed from the
-/// curvature of
-/// the losses, not from their weights. With m clusters, a standard deviation is known to a relative accuracy of about 1 / √(2 (m - 1)). If
-/// residuals are about as large as the width of a loss, the deviations come out too small by a third.
+/// curvature of the losses, not from their weights. With m clusters, a standard deviation is known to a relative accuracy of about 1 / √(2
+/// (m - 1)). If residuals are about as large as the width of a loss, the deviations come out too small by a third.
 ///
 /// * `cluster_of`: cluster of every local block, counted from 0.
 /// * Returns `None` if there are fewer than two clusters, or if the parameters are not determined without one of the clusters.

@@ -63,8 +63,7 @@ impl Report {
     }
 
     /// Returns the variance of a residual, if the standard deviations of all terms are correct relative to each other: cost divided by
-    /// degrees of
-    /// freedom. It is 1 if the standard deviations are correct.
+    /// degrees of freedom. It is 1 if the standard deviations are correct.
     pub fn variance(&self) -> f64 {
         let freedom = self.n_residuals.saturating_sub(self.n_unknowns).max(1);
         self.cost_after / freedom as f64

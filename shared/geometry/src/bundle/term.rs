@@ -27,8 +27,7 @@ impl Loss {
     }
 
     /// Returns the mean second derivative of half the cost along each of `n_residuals` residuals. It determines how far a small change
-    /// moves the
-    /// minimum. The weight overstates this for large residuals.
+    /// moves the minimum. The weight overstates this for large residuals.
     pub fn curvature(self, s: f64, n_residuals: usize) -> f64 {
         let weight = self.of(s).1;
         let by_s = match self {

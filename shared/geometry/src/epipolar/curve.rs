@@ -10,8 +10,7 @@ const SCAN: usize = 512;
 /// Returns the curve in the recorded image of B that contains the point seen at a pixel of A.
 ///
 /// The curve follows the viewing ray of A from its camera to infinity, as distorted by the lens of B and clipped to the image of B. It is
-/// meant
-/// for drawing; distances are better measured on ideal pixels ([`super::epipolar_line`]).
+/// meant for drawing; distances are better measured on ideal pixels ([`super::epipolar_line`]).
 ///
 /// * `point_in_a`: pixel of the recorded image of A.
 /// * Returns `n` pixels in order along the ray. The list is empty if no part of the ray is in the image of B, or if `n` < 2.
@@ -61,8 +60,8 @@ fn visible_line(a: &Camera, b: &Camera, point: &Point2<f64>) -> Option<(Point2<f
         return None;
     }
     let direction = b.camera_from_world.rotation * ray.direction.into_inner();
-    // A point of the ray is `origin + d direction`, d in [0, ∞). As s goes from 0 to 1, the homogeneous point
-    // (1 - s) origin + s direction covers all of its images.
+    // A point of the ray is `origin + d direction`, d in [0, ∞). As s goes from 0 to 1, the homogeneous point (1 - s) origin + s direction
+    // covers all of its images.
     let at = |s: f64| origin * (1.0 - s) + direction * s;
     let (z0, z1) = (origin.z, direction.z);
     let crossing = z0 / (z0 - z1);

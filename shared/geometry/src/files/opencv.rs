@@ -2,12 +2,11 @@
 //!
 //! A file with one camera has `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`, `R` (matrix or Rodrigues) and `T`.
 //! The calibration program of `OpenCV` and ROS's `camera_info` leave out `R` and `T`; the camera then has a lens but no pose. Fisheye
-//! lenses
-//! have `fisheye_model: 1` (`OpenCV`'s program) or `distortion_model: equidistant` (ROS).
+//! lenses have `fisheye_model: 1` (`OpenCV`'s program) or `distortion_model: equidistant` (ROS).
 //!
 //! A file with several cameras has the form of `EasyMocap`: a list `names`, and for each name `K_n`, `dist_n`, `Rot_n` (or `R_n`,
-//! Rodrigues)
-//! and `T_n`. The sizes are `W_n` and `H_n`. `EasyMocap` itself may leave them out, and [`ReadOptions::size`] must then give them.
+//! Rodrigues) and `T_n`. The sizes are `W_n` and `H_n`. `EasyMocap` itself may leave them out, and [`ReadOptions::size`] must then give
+//! them.
 //!
 //! Lengths are in metres, unless [`ReadOptions::unit`] gives another unit.
 

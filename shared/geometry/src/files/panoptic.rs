@@ -8,10 +8,8 @@
 //! ```
 //!
 //! `R` and `t` take a point of the world to the camera, as in `OpenCV`. The world's y points down, so that up is -y. `t` may be a column or
-//! a
-//! plain list. A file of the data set has 31 HD cameras, 480 VGA cameras and 10 Kinects. All of them are read as cameras, and a deployment
-//! names
-//! those that it uses.
+//! a plain list. A file of the data set has 31 HD cameras, 480 VGA cameras and 10 Kinects. All of them are read as cameras, and a
+//! deployment names those that it uses.
 
 use nalgebra::{UnitVector3, Vector3};
 use serde::Deserialize;

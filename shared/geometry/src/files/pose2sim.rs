@@ -1,12 +1,9 @@
 //! Camera tables in TOML, as written by Pose2Sim, anipose, Caliscope and `FreeMoCap`.
 //!
 //! A table with a `matrix` is a camera, at the top level (`[cam_01]`) or under `cameras` (`[cameras.0]`, Caliscope, named `cam_0` if it has
-//! no
-//! `name`). The order of the file is kept. `rotation` is a Rodrigues vector or a 3x3 matrix, world to camera. `translation` is in metres
-//! for
-//! Pose2Sim and Caliscope, but in the unit of the board (usually millimetres) for anipose and `FreeMoCap`; set [`ReadOptions::unit`] for
-//! these.
-//! The files do not state the up direction, which is z for Pose2Sim.
+//! no `name`). The order of the file is kept. `rotation` is a Rodrigues vector or a 3x3 matrix, world to camera. `translation` is in metres
+//! for Pose2Sim and Caliscope, but in the unit of the board (usually millimetres) for anipose and `FreeMoCap`; set [`ReadOptions::unit`]
+//! for these. The files do not state the up direction, which is z for Pose2Sim.
 
 use toml::{Table, Value};
 
@@ -23,8 +20,7 @@ pub(super) fn is_pose2sim(text: &str) -> bool {
 /// Reads a camera file.
 ///
 /// Tables with `ignore = true` are not cameras. Cameras without rotation and translation, as Caliscope writes those that it could not
-/// place, are
-/// left out.
+/// place, are left out.
 ///
 /// # Errors
 ///

@@ -28,11 +28,9 @@ const IMPOSSIBLE_DEGREES: f64 = 5.0;
 /// Computes, frame by frame, the angular residual of the rays with the footage of two cameras exchanged.
 ///
 /// For every point, the rays of all views are intersected in the least-squares sense. The residual is the angle between a ray and the
-/// direction
-/// to that point; the residual of a frame is the median over views and points. Every pair of cameras is tried. Two cameras were exchanged
-/// if
-/// exchanging them lowers the residual from far above the usual detection error to the usual value. Any view may have left and right
-/// exchanged.
+/// direction to that point; the residual of a frame is the median over views and points. Every pair of cameras is tried. Two cameras were
+/// exchanged if exchanging them lowers the residual from far above the usual detection error to the usual value. Any view may have left and
+/// right exchanged.
 #[derive(Debug, Clone)]
 pub struct SwapWatch {
     framings: Vec<Framing>,
@@ -87,8 +85,7 @@ impl SwapWatch {
     /// Adds the observations of one frame.
     ///
     /// * `points_px`: one entry per view, `None` without a detection. All views list the same points of the world in the same order, in
-    ///   pixels of
-    ///   the frame.
+    ///   pixels of the frame.
     pub fn note(&mut self, points_px: &[Option<Vec<[f64; 2]>>]) {
         let n_views = points_px.iter().flatten().count();
         if self.configured.len() >= MAX_FRAMES
@@ -129,12 +126,10 @@ impl SwapWatch {
     }
 
     /// Returns evidence that the observations contradict the rig: exchanged footage, the rig of other footage, unsynchronised views, or
-    /// wrong
-    /// detections in every view.
+    /// wrong detections in every view.
     ///
     /// An impossible residual is reported from the first frame on. An exchange that is not clear enough for [`Self::swap`] is also
-    /// reported. The
-    /// reason is that frames rotated upright for another camera show tilted people, and the detections in them fit no camera.
+    /// reported. The reason is that frames rotated upright for another camera show tilted people, and the detections in them fit no camera.
     pub fn contradiction(&self) -> Option<Contradiction> {
         let least = if self.configured.len() >= MIN_FRAMES {
             CONTRADICTION_DEGREES

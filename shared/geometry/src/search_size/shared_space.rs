@@ -17,8 +17,7 @@ const MAX_SHARE_PARTIAL: f64 = 4.0;
 /// Minimum height of a person, relative to the same side.
 const MIN_SHARE: f64 = 0.0625;
 /// Parts of space in order of preference. The first part that is shared by as many cameras as any other is used. People are near the point
-/// at
-/// which cameras are aimed; the space that parallel cameras share has no end.
+/// at which cameras are aimed; the space that parallel cameras share has no end.
 const BOUNDS: [Bound; 4] = [
     Bound::NearFocus,
     Bound::MinShare(0.25),

@@ -123,8 +123,7 @@ impl Block {
     }
 
     /// Returns the offset of every camera; `None` for a camera without enough movement. Returns no list at all if no camera has enough
-    /// movement,
-    /// or if some cameras cannot be compared with the others.
+    /// movement, or if some cameras cannot be compared with the others.
     pub(super) fn estimates(&self) -> Option<Vec<Option<Estimate>>> {
         let slopes = self.pairs.iter().filter_map(|pair| Some((pair.views, pair.slope()?)));
         let slopes: Vec<([usize; 2], Slope)> = slopes.collect();
@@ -222,8 +221,7 @@ impl Pair {
     }
 
     /// Returns the slope of the residuals over the velocities, without the part that is constant for a point over all frames. Returns
-    /// `None`
-    /// without enough movement.
+    /// `None` without enough movement.
     fn slope(&self) -> Option<Slope> {
         let mut rest = self.all;
         let mut n_points = 0.0;

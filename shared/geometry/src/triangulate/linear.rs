@@ -10,10 +10,8 @@ use super::{
 /// Solves `(x r₃ - r₁) · X = t₁ - x t₃` and the same for y, over all views together, for a finite point.
 ///
 /// This is the direct linear transform with the point's last coordinate set to 1 (Hartley & Sturm 1997, "Linear-LS"), so that the result
-/// does
-/// not depend on the origin of the world. The second round divides every equation by the depth and multiplies it by f / σ, to get pixels
-/// instead
-/// of metres. The point may be behind a camera; the refinement refuses that.
+/// does not depend on the origin of the world. The second round divides every equation by the depth and multiplies it by f / σ, to get
+/// pixels instead of metres. The point may be behind a camera; the refinement refuses that.
 pub(super) fn triangulate(
     views: &Views<'_>,
     used: Subset,

@@ -20,8 +20,7 @@ const LEAST_GAIN: f64 = 0.08;
 /// Largest median residual, in expected errors.
 const MOST_RESIDUAL: f64 = 3.0;
 /// A pair has a clear offset if the gain of its second best is below the first value, relative to its best. It agrees with the common
-/// offset
-/// if the gain there reaches the second value.
+/// offset if the gain there reaches the second value.
 const SURE_PAIR: [f64; 2] = [0.6, 0.5];
 /// Largest difference between offsets of parts of the footage, in seconds and in standard errors.
 const MOST_APART: [f64; 2] = [0.02, 4.0];
