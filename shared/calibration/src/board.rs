@@ -241,7 +241,7 @@ pub enum BoardError {
     },
     /// No initial focal length was found for a camera.
     #[error(
-        "camera {camera:?}: no focal length makes a board of what it saw: is the board the right one?"
+        "camera {camera:?}: no focal length fits the board that it saw: is the description of the board correct?"
     )]
     NoStart {
         /// Name of the camera.
@@ -249,7 +249,7 @@ pub enum BoardError {
     },
     /// The cameras form groups that never saw the board together.
     #[error(
-        "no board connects these groups of cameras: {}; show it to a camera of each at the same time",
+        "no board connects these groups of cameras: {}; show it to cameras of different groups at the same time",
         .groups.iter().map(|group| group.join(", ")).collect::<Vec<_>>().join(" | ")
     )]
     Apart {
@@ -257,6 +257,6 @@ pub enum BoardError {
         groups: Vec<Vec<String>>,
     },
     /// The adjustment produced numbers that are not finite.
-    #[error("the adjustment of all cameras did not end at finite numbers")]
+    #[error("the adjustment of all cameras gave numbers that are not finite")]
     NotFinite,
 }

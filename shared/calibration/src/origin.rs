@@ -26,7 +26,7 @@ pub enum OriginError {
     },
     /// The rays to a point do not meet.
     #[error(
-        "point {point}: its rays miss one another by {rms_px:.1} px: is it the same point in all cameras?"
+        "point {point}: its rays miss each other by {rms_px:.1} px: is it the same point in all cameras?"
     )]
     Apart {
         /// Number of the point, counted from 1.
@@ -43,14 +43,14 @@ pub enum OriginError {
         source: TriangulateError,
     },
     /// The three points are on a line.
-    #[error("the three points lie on a line, or two of them are the same")]
+    #[error("the three points are on a line, or two of them are the same")]
     OnALine,
     /// No camera sees the board.
     #[error("no camera sees enough of the board")]
     NoBoard,
     /// The cameras see the board in different places.
     #[error(
-        "the cameras disagree about the board by {rms_px:.1} px: does it lie still, is it the board of the calibration?"
+        "the cameras disagree about the board by {rms_px:.1} px: does it lie still, and is it the right board?"
     )]
     BoardApart {
         /// Root mean square of the residuals, in pixels.

@@ -20,7 +20,7 @@ pub struct ClockKeys {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClocksError {
     /// The file is not valid TOML.
-    #[error("the file is not TOML any more")]
+    #[error("the file is no longer valid TOML")]
     Syntax,
     /// The file has no camera of that name.
     #[error("the file has no [[camera]] named {name:?}")]

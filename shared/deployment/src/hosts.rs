@@ -116,7 +116,7 @@ pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
         it.hosts.len() >= 2,
         "host",
         "given once",
-        "two or more, or none: with one machine there are no hosts",
+        "two or more, or none: a single machine needs no host",
     )?;
     names(it)?;
     views(it)?;
@@ -200,7 +200,7 @@ fn address(host: &Host) -> Result<(), Complaint> {
             !host.fuses,
             "host.address",
             &format!("left out of host {:?}, which fuses", host.name),
-            "where it listens: \"192.168.1.5:7447\"",
+            "the address on which it listens: \"192.168.1.5:7447\"",
         );
     };
     let parts = address.rsplit_once(':');
@@ -223,13 +223,13 @@ fn real_time(it: &Deployment) -> Result<(), Complaint> {
         it.capture.mode == Mode::Realtime,
         "capture.mode",
         "not \"realtime\"",
-        "\"realtime\" where there are hosts: frames of several machines belong together by their times",
+        "\"realtime\" if there are hosts, because frames of several machines are matched by their times",
     )?;
     demand(
         it.capture.frame_rate_hz.is_some(),
         "capture.frame_rate_hz",
         "left out",
-        "frames per second of all cameras, where there are hosts",
+        "frames per second of all cameras, if there are hosts",
     )?;
     let has_clocks = it.cameras.iter().any(|camera| camera.offset_ms.is_some());
     demand(
@@ -252,7 +252,7 @@ fn keys(it: &Deployment) -> Result<(), Complaint> {
         it.link.insecure || it.link.keys.is_some(),
         "link.keys",
         "left out",
-        "the folder that `parallax hosts keys` makes; or link.insecure = true, which lets anybody on the network look on",
+        "the folder that `parallax hosts keys` makes; or link.insecure = true, which lets anyone on the network see the pictures",
     )?;
     demand(
         !(it.link.insecure && it.link.keys.is_some()),

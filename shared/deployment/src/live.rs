@@ -34,7 +34,7 @@ pub(crate) fn settle(
         !it.has_clocks(),
         "camera.offset_ms",
         "given, or `drift_ppm`, for footage",
-        &format!("neither: camera {name:?} is live, and footage beside it begins with the run"),
+        &format!("neither: camera {name:?} is live, and all footage in the same run begins with the run"),
     )?;
     let mode = given.get("capture").and_then(|section| section.get("mode"));
     demand(
@@ -42,14 +42,14 @@ pub(crate) fn settle(
         "capture.mode",
         &mode.map_or_else(String::new, ToString::to_string),
         &format!(
-            "\"realtime\", or nothing: camera {name:?} is live, and does not wait, so that a run of it is never lossless"
+            "\"realtime\", or nothing: camera {name:?} is live and does not wait, so a run with it is never lossless"
         ),
     )?;
     demand(
         it.capture.start_frame == 0,
         "capture.start_frame",
         &it.capture.start_frame.to_string(),
-        &format!("0: camera {name:?} is live, and has no frames of the past"),
+        &format!("0: camera {name:?} is live, so earlier frames do not exist"),
     )?;
     it.capture.mode = Mode::Realtime;
     Ok(())
@@ -62,7 +62,7 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         camera.fault.is_empty(),
         "camera.fault",
         &of,
-        "none: faults on purpose are for footage",
+        "none: simulated faults are for footage only",
     )?;
     demand(
         camera.keypoints.is_none(),
@@ -83,7 +83,7 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
             "given, or `drift_ppm`, for the live camera {:?}",
             camera.name
         ),
-        "neither: they are for footage; a live camera tells its times",
+        "neither: they are for footage only; a live camera reports its times",
     )?;
     let sides = camera.size.unwrap_or([1, 1]);
     demand(

@@ -13,7 +13,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
             unit.parse::<geometry::files::Unit>().is_ok(),
             "unit",
             &format!("{unit:?}"),
-            "\"m\", \"cm\", \"mm\", \"ft\", \"in\", or a length such as \"30mm\", the squares of the board",
+            "\"m\", \"cm\", \"mm\", \"ft\", \"in\", or a length such as \"30mm\" (the side of a square of the board)",
         )?;
     }
     for (key, path) in [("rig", &it.rig), ("output", &it.output)] {
@@ -98,7 +98,7 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         !camera.source.is_empty() || camera.keypoints.is_some(),
         "camera.source",
         &format!("left out of camera {:?}", camera.name),
-        "its footage: every [[camera]] needs that, or `keypoints` that another program found in it",
+        "footage: every [[camera]] needs a `source`, or `keypoints` from another program",
     )?;
     is_path("camera.source", &camera.source)?;
     if let Some(capture::Rotate::Degrees(degrees)) = camera.rotate {
@@ -200,7 +200,7 @@ fn paper(deployment: &Deployment) -> Result<(), Complaint> {
         !needs_file || config.consistency.is_some(),
         "paper.tau",
         "\"learned\"",
-        "thresholds, or `paper.consistency` to name the file that has them",
+        "thresholds, or a file of thresholds in `paper.consistency`",
     )?;
     let tables = config.compatibility.iter();
     let tables = tables.map(|tables| ("paper.compatibility", &tables.views));
@@ -268,7 +268,7 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         config.energy == paper::Energy::Paper,
         "paper.energy",
         "\"released\"",
-        "\"paper\", the only one that all views at once have",
+        "\"paper\": `paper.views = \"all\"` works with no other energy",
     )?;
     demand(
         config.pairs.is_empty(),
@@ -280,7 +280,7 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         config.combine == paper::Combine::Mean,
         "paper.combine",
         "\"consensus\"",
-        "\"mean\": where `paper.views` is \"all\", there is nothing to combine",
+        "\"mean\": if `paper.views` is \"all\", there is nothing to combine",
     )
 }
 

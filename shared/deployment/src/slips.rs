@@ -5,7 +5,7 @@ pub(super) fn other_file(text: &str) -> Option<&'static str> {
     let begins =
         |head: &str| text.lines().any(|line| line.trim_end() == head || line.starts_with(head));
     if begins("format = \"parallax-rig\"") {
-        return Some("this is a rig file: name the deployment file, whose `rig` it is");
+        return Some("this is a rig file: give the deployment file whose `rig` names it");
     }
     // Sections of Pose2Sim's Config.toml.
     let sections = [
@@ -38,7 +38,7 @@ pub(super) fn of_line(line: &str) -> Option<&'static str> {
 }
 
 /// Message for a path with control characters, which a backslash produces in double quotes.
-pub(super) const ESCAPE: &str = "a backslash in \"...\" begins a special character: write / in its place, as in \"C:/videos/a.mp4\", or put the \
+pub(super) const ESCAPE: &str = "a backslash in \"...\" begins a special character: write / instead, as in \"C:/videos/a.mp4\", or put the \
     path in single quotes, 'C:\\videos\\a.mp4'";
 
 #[cfg(test)]

@@ -213,7 +213,7 @@ impl Folder {
     fn in_the_way(&self, name: &OsStr) -> io::Error {
         let text = match self.kind(name) {
             Ok(kind) => format!(
-                "{} of {} lies there, and is not written to: remove it, or name another folder",
+                "{} of {} already exists and is not overwritten: remove it, or choose another folder",
                 kind.name(),
                 user(kind.owner)
             ),

@@ -92,7 +92,7 @@ pub enum Unit {
 /// Error for a text that is not a unit of length.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{text:?} is no unit: expected m, cm, mm, ft, in, or a length such as 30mm, the squares of the board"
+    "{text:?} is not a unit: expected m, cm, mm, ft, in, or a length such as 30mm (the side of a square of the board)"
 )]
 pub struct UnitError {
     /// The text that was given.

@@ -28,7 +28,7 @@ pub enum FramingError {
         calibrated: [u32; 2],
     },
     /// The source, moved by its offset, extends beyond the calibrated image.
-    #[error("a source of {}x{} px at offset ({}, {}) leaves the {}x{} px for which the camera is calibrated", .source_size[0], .source_size[1], .offset_px[0], .offset_px[1], .calibrated[0], .calibrated[1])]
+    #[error("a source of {}x{} px at offset ({}, {}) extends beyond the {}x{} px for which the camera is calibrated", .source_size[0], .source_size[1], .offset_px[0], .offset_px[1], .calibrated[0], .calibrated[1])]
     SourceOffset {
         /// Width and height of the source's frames.
         source_size: [u32; 2],

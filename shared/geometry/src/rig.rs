@@ -93,7 +93,7 @@ pub enum RigError {
     },
     /// A lens coefficient is larger than that of any real lens.
     #[error(
-        "camera {camera:?}: lens coefficient {value:e} exceeds {limit:e}: is the order that of the format?"
+        "camera {camera:?}: lens coefficient {value:e} exceeds {limit:e}: do the coefficients have the order of the format?"
     )]
     LensCoefficient {
         /// Name of the camera.
@@ -105,7 +105,7 @@ pub enum RigError {
     },
     /// A camera is further from the origin than any place on Earth is from its centre.
     #[error(
-        "camera {camera:?}: it stands {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
+        "camera {camera:?}: it is {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
     )]
     Place {
         /// Name of the camera.
@@ -254,7 +254,7 @@ impl Rig {
         if let Some(LeftOut { why, .. }) =
             self.left_out.iter().find(|left_out| left_out.camera == name)
         {
-            return format!("no place of camera {name:?}: {why}");
+            return format!("camera {name:?} has no pose: {why}");
         }
         let names: Vec<&str> = self.cameras.iter().map(|camera| &*camera.name).collect();
         format!("no camera {name:?}; it has {}", names.join(", "))

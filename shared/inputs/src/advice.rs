@@ -34,7 +34,7 @@ pub fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<T>, Fai
     if others.is_empty() {
         return Err(failure);
     }
-    Err(failure.with_another_hint(format!("other cameras fail, too: {}", others.join("; "))))
+    Err(failure.with_another_hint(format!("other cameras also fail: {}", others.join("; "))))
 }
 
 /// Returns a hint for a calibration that cannot be used; `None` if the error message suffices.
@@ -47,11 +47,11 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
             ));
         }
         RigFileError::Read { path, .. } if path.is_dir() => {
-            return Some("a rig is one file: name it, not the folder that it lies in".to_owned());
+            return Some("a rig is one file: give the file, not its folder".to_owned());
         }
         RigFileError::Read { .. } | RigFileError::NoFiles => {
             return Some(
-                "a rig file says where the cameras stand; `parallax calib convert` makes one of other programs' calibrations"
+                "a rig file has the poses of the cameras; `parallax calib convert` makes one from the calibration of another program"
                     .to_owned(),
             );
         }

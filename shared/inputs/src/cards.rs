@@ -140,6 +140,6 @@ pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'stati
         path.display(),
         failure::wording::in_one_line(error)
     );
-    let hint = "docs/networks.md says what the keys of a card mean";
+    let hint = "docs/networks.md explains the keys of a card";
     Failure::new(ExitKind::Input, message).with_hint(hint)
 }

@@ -51,7 +51,7 @@ impl Joints {
         );
         let failure = Failure::new(ExitKind::Input, message);
         Err(failure.with_hint(
-            "`parallax-lab train joints` makes such a file; \"none\" takes the centres of parts",
+            "`parallax-lab train joints` makes such a file; \"none\" uses the centres of parts",
         ))
     }
 

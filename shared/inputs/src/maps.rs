@@ -29,7 +29,7 @@ pub fn pose_network(
     let network = open_network((file, None), &library)?;
     match network.run_by() {
         RunBy::OnnxRuntime(place @ Place::ProcessorForCuda(_)) => {
-            tracing::warn!(network = %file.display(), "ONNX Runtime runs it on {place}");
+            tracing::warn!(network = %file.display(), "ONNX Runtime runs the network on {place}");
         }
         by => tracing::info!(network = %file.display(), "run by {by}"),
     }

@@ -116,17 +116,17 @@ impl Doubt {
             Self::FewInstants { n, least } => format!(
                 "two cameras see a person together at {n} instants, fewer than {least}"
             ),
-            Self::NoPair => "no two cameras see enough of one person at the same time, from different sides, to say where they stand"
+            Self::NoPair => "no two cameras see enough of one person at the same time, from different sides, to determine their relative pose"
                 .to_owned(),
             Self::Unplaced { camera, cost: None } => format!(
-                "{} sees too little of what two others see at the same time: nothing connects it with them",
+                "{} shares too few joints with two other cameras at the same time, so its pose cannot be found",
                 name(camera)
             ),
             Self::Unplaced {
                 camera,
                 cost: Some(cost),
             } => format!(
-                "{} fits the others nowhere (mean cost {cost:.1}): its intrinsics, its clock or its people may be wrong",
+                "{} does not fit the other cameras in any pose (mean cost {cost:.1}): its intrinsics, its clock or its people may be wrong",
                 name(camera)
             ),
             Self::Fit {
@@ -134,17 +134,17 @@ impl Doubt {
                 share,
                 limit,
             } => format!(
-                "the joints of {} are {:.1} % of a person's size from where the rig says, more than {:.1} %",
+                "the joints of {} are {:.1} % of a person's size away from the rig's prediction, more than {:.1} %",
                 name(camera),
                 100.0 * share,
                 100.0 * limit
             ),
             Self::NotConverged { iterations } => {
-                format!("the adjustment did not come to an end in {iterations} steps")
+                format!("the adjustment did not converge in {iterations} steps")
             }
             Self::Undetermined { what } => what.clone(),
             Self::Uncertain { camera, sd, limits } => format!(
-                "{} is known to {:.2} degrees and {:.1} % of its distance only (at most {} and {})",
+                "{} is known to only {:.2} degrees and {:.1} % of its distance (at most {} and {})",
                 name(camera),
                 sd[0],
                 100.0 * sd[1],
@@ -153,7 +153,7 @@ impl Doubt {
             ),
             Self::Halves { camera, by, limits } => format!(
                 "two halves of the recording disagree about {} by {:.2} degrees and {:.1} % of its distance (at most {} and {}): \
-                 too little of the volume was walked through, or a camera moved",
+                 people walked through too little of the volume, or a camera moved",
                 name(camera),
                 by[0],
                 100.0 * by[1],
@@ -166,7 +166,7 @@ impl Doubt {
                 100.0 * spread,
                 100.0 * limit
             ),
-            Self::NoBody => "too few joints are seen to tell how large a person is, and which way is up".to_owned(),
+            Self::NoBody => "too few joints are seen to determine the size of the person and the up direction".to_owned(),
         }
     }
 }

@@ -183,12 +183,12 @@ impl fmt::Display for Worded<'_> {
                 least_s,
             } => write!(
                 f,
-                "{}: someone is followed for {seen_s:.1} s, at least {least_s:.1} s are needed",
+                "{}: a person is followed for {seen_s:.1} s, but at least {least_s:.1} s are needed",
                 name(camera)
             ),
             Doubt::Unconnected { camera, n, least } => write!(
                 f,
-                "{}: {n} joints are seen together with other cameras at these offsets, at least {least} are needed",
+                "{}: {n} joints are shared with other cameras at these offsets, but at least {least} are needed",
                 name(camera)
             ),
             Doubt::Ambiguous {
@@ -203,7 +203,7 @@ impl fmt::Display for Worded<'_> {
                 write!(
                     f,
                     "{}: ambiguous: {:+.0} ms away is {:.0} % as good (at most {:.0} % is accepted), the difference is {t:.1} standard \
-                     errors (at least {least_t:.0}); movement that repeats itself, or too little of it",
+                     errors (at least {least_t:.0}); the movement repeats itself, or there is too little of it",
                     named.join(", "),
                     1e3 * *away_s,
                     100.0 * ratio,
@@ -246,7 +246,7 @@ impl Worded<'_> {
                 least,
             } => write!(
                 f,
-                "{}: the best offset costs {:.0} % less than the others do, at least {:.0} % is needed: too little movement, or the \
+                "{}: the best offset costs {:.0} % less than the mean of all, but at least {:.0} % is needed: too little movement, or the \
                  calibration does not fit",
                 name(camera),
                 100.0 * gain,
@@ -258,8 +258,8 @@ impl Worded<'_> {
                 most,
             } => write!(
                 f,
-                "{}: joints are {percent:.1} % of a person's size off what the other cameras say (median; at most {most:.1} %): cameras \
-                 exchanged, moved, or not of one scene",
+                "{}: joints are {percent:.1} % of a person's size away from the prediction of the other cameras (median; at most {most:.1} %): \
+                 cameras were exchanged or moved, or show different scenes",
                 name(camera)
             ),
             _ => self.contradiction(f),
@@ -290,7 +290,7 @@ impl Worded<'_> {
                 most,
             } => write!(
                 f,
-                "{}: its clock would run {:+.2} % off, at most {:.0} % is accepted: is the frame rate right?",
+                "{}: its clock would be {:+.2} % off, but at most {:.0} % is accepted: is the frame rate right?",
                 name(camera),
                 100.0 * drift,
                 100.0 * most
@@ -301,7 +301,7 @@ impl Worded<'_> {
                 most_s,
             } => write!(
                 f,
-                "{}: parts of the footage give offsets {:.0} ms apart, at most {:.0} ms is accepted: frames missing, or another speed",
+                "{}: parts of the footage give offsets {:.0} ms apart, at most {:.0} ms is accepted: frames are missing, or the speed changed",
                 name(camera),
                 1e3 * *away_s,
                 1e3 * *most_s
@@ -316,7 +316,7 @@ impl Worded<'_> {
         match self.doubt {
             Doubt::Quiet { camera, n, least } => write!(
                 f,
-                "{}: {n} sounds begin in its recording, at least {least} are needed: clap a few times, unevenly",
+                "{}: {n} sounds begin in its recording, but at least {least} are needed: clap a few times, unevenly",
                 name(camera)
             ),
             Doubt::Unheard {
@@ -330,7 +330,7 @@ impl Worded<'_> {
             } => write!(
                 f,
                 "{} and {}: {n} sounds begin together at the best offset (at least {least}), with a cosine of {cosine:.2} (at least \
-                 {least_cosine:.1}); another offset is {:.0} % as good (at most {:.0} %): not of one room, outside the search, or a beat",
+                 {least_cosine:.1}); another offset is {:.0} % as good (at most {:.0} %): different rooms, an offset outside the search, or a regular beat",
                 name(a),
                 name(b),
                 100.0 * ratio,

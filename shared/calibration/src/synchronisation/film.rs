@@ -51,7 +51,7 @@ pub enum FilmError {
     },
     /// The times of a camera are not ascending.
     #[error(
-        "camera {camera}: picture {shot} is of {time_s} s, which is not after the one before it"
+        "camera {camera}: picture {shot} has the time {time_s} s, which is not after the previous picture"
     )]
     Times {
         /// Index of the camera, from 0.
@@ -62,7 +62,7 @@ pub enum FilmError {
         time_s: f64,
     },
     /// The search window is out of range.
-    #[error("a window of {window_s} s, expected 0.1 to 60")]
+    #[error("the window is {window_s} s, expected 0.1 to 60")]
     Window {
         /// The window, in seconds.
         window_s: f64,

@@ -166,12 +166,12 @@ impl fmt::Display for Finding {
             Self::UpUnknown => {
                 write!(
                     f,
-                    "the rig does not say which way is up: it has to be found"
+                    "the rig has no up direction, so it must be found"
                 )
             }
             Self::UpsideDown { camera, degrees } => write!(
                 f,
-                "{camera} would have to be turned by {degrees:.0} degrees to be upright: is up right?"
+                "{camera} would have to be rotated by {degrees:.0} degrees to be upright: is the up direction correct?"
             ),
             Self::LooksElsewhere { camera } => write!(
                 f,
@@ -179,7 +179,7 @@ impl fmt::Display for Finding {
             ),
             Self::NothingShared { n_cameras } => write!(
                 f,
-                "no place in space is seen by two of the {n_cameras} cameras: are the poses world to camera?"
+                "no two of the {n_cameras} cameras see a common place: are the poses world to camera?"
             ),
         }
     }
@@ -196,15 +196,15 @@ impl Finding {
                 let metres = Metres(*metres);
                 write!(
                     f,
-                    "{a} and {b} are {metres} m apart: is the unit right? `unit` is m, cm, mm, ft, in, or the squares of the board such as 30mm"
+                    "{a} and {b} are {metres} m apart: is the unit right? `unit` is m, cm, mm, ft, in, or the side of a square of the board such as 30mm"
                 )
             }
             Self::OnePlace { n_cameras, metres } => write!(
                 f,
-                "the {n_cameras} cameras are at one place (at most {:.1} mm apart), so that nothing can be located in space",
+                "the {n_cameras} cameras are in one place (at most {:.1} mm apart), so that nothing can be located in space",
                 1000.0 * metres
             ),
-            Self::SamePose { cameras: [a, b] } => write!(f, "{a} and {b} have one pose"),
+            Self::SamePose { cameras: [a, b] } => write!(f, "{a} and {b} have the same pose"),
             Self::FarAway { camera, metres } => write!(
                 f,
                 "{camera} is {} m from the origin of the world: is the unit right?",
@@ -226,11 +226,11 @@ impl Finding {
             ),
             Self::Aspect { camera, ratio } => write!(
                 f,
-                "{camera}: fy / fx is {ratio:.3}, of pixels that are squares it is 1"
+                "{camera}: fy / fx is {ratio:.3}, but 1 for square pixels"
             ),
             Self::FieldOfView { camera, degrees } => write!(
                 f,
-                "{camera}: the field of view is {degrees:.1} degrees: is the image size that of the calibration?"
+                "{camera}: the field of view is {degrees:.1} degrees: is the image size the same as in the calibration?"
             ),
             Self::LensRange { camera, share } if *share == 0.0 => write!(
                 f,

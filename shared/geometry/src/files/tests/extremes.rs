@@ -152,7 +152,7 @@ fn a_rig_in_another_unit_is_an_error_with_its_distances() {
     let (outcome, text) =
         outcome_of_all(|camera| camera.camera_from_world.translation.vector /= 1000.0);
     assert_eq!(outcome, ERROR, "{text}");
-    assert!(text.contains("at one place"), "{text}");
+    assert!(text.contains("in one place"), "{text}");
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn cameras_at_one_place_are_an_error() {
     let (outcome, text) = outcome((0..3).map(turn).collect());
     assert_eq!(outcome, ERROR, "{text}");
     assert!(
-        text.contains("3 cameras are at one place (at most 0.0 mm apart)"),
+        text.contains("3 cameras are in one place (at most 0.0 mm apart)"),
         "{text}"
     );
 }
@@ -180,7 +180,7 @@ fn cameras_that_all_look_away_are_an_error() {
         outcome_of_all(|camera| camera.camera_from_world = turn * camera.camera_from_world);
     assert_eq!(outcome, ERROR, "{text}");
     assert!(
-        text.contains("no place in space is seen by two of the 3 cameras"),
+        text.contains("no two of the 3 cameras see a common place"),
         "{text}"
     );
 }
