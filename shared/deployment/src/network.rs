@@ -16,8 +16,8 @@ pub struct Config {
     pub file: PathBuf,
     /// Detector that finds people: `"shipped"`, or an ONNX file with its card in its metadata or beside it. It gives boxes to the network.
     pub detector: PathBuf,
-    /// Search for people in every n-th frame; by default, twice a second, or eight times a second while people are near each other or
-    /// someone has just come or gone.
+    /// Search for people in every n-th frame; by default, twice a second. While people are near each other, or someone has just come or
+    /// gone, the default is eight times a second.
     pub find_every: Option<u64>,
     /// Minimum heat of a visible person, 0 to 1, as the mean over the joints.
     pub least_heat: f64,

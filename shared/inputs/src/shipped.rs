@@ -119,7 +119,7 @@ impl Shipped {
             Self::Detector => ["network.detector", "train finder"],
         };
         format!(
-            "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\": the one that is built in"
+            "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\" for the built-in one"
         )
     }
 }

@@ -314,7 +314,7 @@ impl Problem for Adjustment {
         }
         let bone = self.bones.iter().position(|bone| *bone == Some(parameter));
         bone.map_or_else(
-            || "what a joint errs by all the time".to_owned(),
+            || "the constant error of a joint".to_owned(),
             |bone| format!("length of the {}", BONES[bone].name),
         )
     }

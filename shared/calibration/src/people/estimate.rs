@@ -38,7 +38,7 @@ pub enum PeopleError {
         films: usize,
     },
     /// There are fewer joints than a body has, or the number of sides differs from that of joints.
-    #[error("{joints} joints with {sides} sides: at least {least} are needed, each with its side", least = N_JOINTS)]
+    #[error("{joints} joints with {sides} sides: at least {least} joints are needed, each with its side", least = N_JOINTS)]
     Joints {
         /// Number of joints.
         joints: usize,
@@ -46,7 +46,7 @@ pub enum PeopleError {
         sides: usize,
     },
     /// A length is not a positive number.
-    #[error("a length of {metres} m cannot be used")]
+    #[error("the length {metres} m is not a positive number")]
     Length {
         /// The length, in metres.
         metres: f64,

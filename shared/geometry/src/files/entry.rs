@@ -7,7 +7,7 @@ use crate::rig::LeftOut;
 use crate::{Camera, Intrinsics, Rig};
 
 /// Reason why a camera with a lens is left out.
-const NO_PLACE: &str = "its file has a lens and no place";
+const NO_PLACE: &str = "its file has a lens but no pose";
 
 /// A camera of a file.
 pub(super) enum Entry {

@@ -125,7 +125,7 @@ pub enum ParseError {
     #[error(
         "camera {camera:?}: {why}{}",
         if *.has_lens {
-            ": `parallax calibrate board` with `--known` and this file, or `parallax calibrate people`, finds where the cameras stand"
+            ": `parallax calibrate board` with `--known` and this file, or `parallax calibrate people`, finds the poses of the cameras"
         } else {
             ""
         }

@@ -53,7 +53,7 @@ fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Entry, ParseError
     if ["false", "0"].contains(&&*calibrated.trim().to_ascii_lowercase()) {
         return Ok(Entry::name(
             name,
-            "its file says that it was not calibrated",
+            "its file says that the camera was not calibrated",
         ));
     }
     let child = |tag: &str| {
@@ -70,7 +70,7 @@ fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Entry, ParseError
     };
     turned.zero_if_present(
         "viewrotation",
-        "a turned view is not supported: it must be 0",
+        "a rotated view is not supported: it must be 0",
     )?;
     let intrinsics = intrinsics(&child("intrinsic")?, &child("fov_video")?)?;
     let camera_from_world = pose(

@@ -69,7 +69,7 @@ fn exactly<const N: usize>(field: &str, list: &[f64]) -> Result<[f64; N], ParseE
             expected: match N {
                 2 => "2 numbers",
                 3 => "3 numbers",
-                _ => "another count of numbers",
+                _ => "a different number of values",
             },
             found: format!("{} numbers", list.len()),
         });

@@ -59,7 +59,7 @@ fn a_lens_without_a_place_serves_where_the_lens_is_enough() {
         assert_eq!(*rig.cameras()[0].intrinsics.lens.model(), lens, "{name}");
         assert_eq!(rig.left_out().len(), 1);
         assert!(
-            why.contains("a lens and no place") && why.contains("calibrate board"),
+            why.contains("a lens but no pose") && why.contains("calibrate board"),
             "{why}"
         );
         // The same is true for Parallax's own format.
@@ -103,7 +103,7 @@ distortions = [0.0, 0.0, 0.0, 0.0]\n{place}\n"
         assert_eq!(rig.left_out()[0].camera, "cam_1");
         let notes: Vec<String> = check(&rig).iter().map(ToString::to_string).collect();
         assert!(notes[0].contains("cam_1 is left out"), "{notes:?}");
-        assert!(rig.lacks("cam_1").contains("a lens and no place"));
+        assert!(rig.lacks("cam_1").contains("a lens but no pose"));
         assert!(rig.lacks("cam_9").contains("it has cam_0"));
         let both = pose2sim::parse(&text, &LENSES).unwrap();
         assert_eq!(both.cameras().len(), 2);
