@@ -34,7 +34,9 @@ pub(crate) fn settle(
         !it.has_clocks(),
         "camera.offset_ms",
         "given, or `drift_ppm`, for footage",
-        &format!("neither: camera {name:?} is live, and all footage in the same run begins with the run"),
+        &format!(
+            "neither: camera {name:?} is live, and all footage in the same run begins with the run"
+        ),
     )?;
     let mode = given.get("capture").and_then(|section| section.get("mode"));
     demand(

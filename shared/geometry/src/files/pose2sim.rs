@@ -77,10 +77,7 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Ent
         }
     };
     if !fields.has("matrix") {
-        return Ok(Entry::name(
-            &name,
-            "its file has neither a lens nor a pose",
-        ));
+        return Ok(Entry::name(&name, "its file has neither a lens nor a pose"));
     }
     let [width, height] = fields.array::<2>("size")?;
     let size_field = fields.field("size");

@@ -164,10 +164,7 @@ impl fmt::Display for Finding {
             | Self::LensStrength { .. } => self.fmt_intrinsics(f),
             Self::LeftOut { camera, why } => write!(f, "{camera} is left out: {why}"),
             Self::UpUnknown => {
-                write!(
-                    f,
-                    "the rig has no up direction, so it must be found"
-                )
+                write!(f, "the rig has no up direction, so it must be found")
             }
             Self::UpsideDown { camera, degrees } => write!(
                 f,
