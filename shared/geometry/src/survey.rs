@@ -20,8 +20,8 @@ pub struct Survey {
     pub focus: Option<Point3<f64>>,
     /// The space that all cameras see.
     pub shared: Option<Shared>,
-    /// Expected error of a point at the focus, in millimetres. It assumes an error of one pixel (standard deviation, in x and y) in every
-    /// view that sees the point, and is the root of the summed variances along the three axes.
+    /// Expected error of a point at the focus, in millimetres: the root of the summed variances along the three axes. Every view that sees
+    /// the point is assumed to have an error of one pixel (standard deviation, in x and y).
     pub error_mm: Option<f64>,
 }
 
