@@ -1,26 +1,26 @@
-//! One rig laid upon another one.
+//! Alignment of one rig with another.
 
 use geometry::Camera;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Takes points of one world to another: `scale * rotation * point + translation`.
+/// Maps points of one world to another: `scale * rotation * point + translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {
-    /// The turn.
+    /// Rotation from the first world to the second.
     pub rotation: UnitQuaternion<f64>,
-    /// Amount by which lengths grow.
+    /// Factor by which lengths are multiplied.
     pub scale: f64,
-    /// Added last, units of the target.
+    /// Translation, applied last, in units of the target world.
     pub translation: Vector3<f64>,
 }
 
 impl Similarity {
-    /// The point in the other world.
+    /// Returns a point in the target world.
     pub fn point(&self, point: &Point3<f64>) -> Point3<f64> {
         Point3::from(self.rotation * (self.scale * point.coords) + self.translation)
     }
 
-    /// The camera in the other world.
+    /// Returns a camera in the target world.
     pub fn camera(&self, camera: &Camera) -> Camera {
         let centre = self.point(&camera.centre_in_world());
         let rotation = camera.camera_from_world.rotation * self.rotation.inverse();
@@ -32,18 +32,20 @@ impl Similarity {
     }
 }
 
-/// Amount by which two rigs differ in a camera.
+/// Difference between two rigs in one camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
     /// Angle between the two rotations, radians.
     pub turn: f64,
-    /// Distance of the two centres, units of the second rig.
+    /// Distance between the two centres, in units of the second rig.
     pub way: f64,
 }
 
-/// Lays the first rig upon the second: the turn that all cameras want in the mean, then scale (if asked for) and place by the centres.
+/// Returns the similarity that aligns the first rig with the second. Its rotation is the mean over all cameras; the scale (if
+/// `with_scale`) and the translation follow from the camera centres.
 ///
-/// Well defined for two cameras, too. Rigs have the same cameras in the same order. `None` if there is no camera.
+/// The result is also well defined for two cameras. Both rigs must have the same cameras in the same order. Returns `None` if there
+/// is no camera.
 pub fn aligned(from: &[Camera], to: &[Camera], with_scale: bool) -> Option<Similarity> {
     let n = from.len().min(to.len()) as f64;
     let mut sum = Matrix3::zeros();
@@ -79,7 +81,7 @@ pub fn aligned(from: &[Camera], to: &[Camera], with_scale: bool) -> Option<Simil
     })
 }
 
-/// How far every camera of the first rig is from the second, after it was laid upon it.
+/// Returns the difference between the rigs in every camera, after the first rig was aligned with the second.
 pub fn differences(from: &[Camera], to: &[Camera], with_scale: bool) -> Vec<Difference> {
     let Some(similarity) = aligned(from, to, with_scale) else {
         return Vec::new();

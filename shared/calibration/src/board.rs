@@ -1,15 +1,15 @@
-//! Cameras calibrated from a board that is moved around: intrinsics, and how they stand to one another.
+//! Calibration of cameras from a board that is moved around: their intrinsics and their poses relative to each other.
 //!
 //! | step | where |
 //! |---|---|
-//! | frames that cover the pictures, distances and tilts | `choose` |
-//! | the intrinsics of every camera separately (Zhang, *A flexible new technique for camera calibration*, 2000) | `intrinsics`, `pose` |
-//! | how pairs stand that saw the board together, and all along the strongest pairs | `graph` |
-//! | all of it, in this order | `rig` |
-//! | everything adjusted at once, wrong corners left out | `adjust`, `problem`, `outcome` |
-//! | how much a board that moves tells where cameras are out of step | `certainty` |
-//! | a board that lies still before a rig | `still` |
-//! | what is known how well, and what forbids to trust it | `verdict` |
+//! | choose frames that cover the pictures, distances and tilts | `choose` |
+//! | find the intrinsics of each camera alone (Zhang, *A flexible new technique for camera calibration*, 2000) | `intrinsics`, `pose` |
+//! | find the relative poses of cameras that saw the board together, then all poses along the strongest pairs | `graph` |
+//! | run all steps, in this order | `rig` |
+//! | adjust everything at once, without wrong corners | `adjust`, `problem`, `outcome` |
+//! | weigh a moving board if the cameras are not synchronised | `certainty` |
+//! | find the pose of a board that does not move | `still` |
+//! | state the uncertainty of the result, and reasons not to trust it | `verdict` |
 
 mod adjust;
 mod certainty;
@@ -35,26 +35,26 @@ pub use rig::calibrate;
 pub use still::standing_board;
 pub use verdict::Doubt;
 
-/// The fewest corners of a board that count as a sight of it.
+/// Minimum number of visible corners for a picture of the board to be used.
 pub const LEAST_CORNERS: usize = 6;
-/// The fewest sights of a board that intrinsics are found from.
+/// Minimum number of pictures of the board from which intrinsics are found.
 pub const LEAST_BOARDS: usize = 3;
 
 /// A board in one picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
-    /// The camera, an index.
+    /// Index of the camera.
     pub camera: usize,
-    /// The frame: pictures of one frame were taken at the same time.
+    /// Index of the frame. Pictures of one frame were taken at the same time.
     pub frame: usize,
-    /// The number of each corner, and where it is in the picture, pixels.
+    /// Number of each corner and its position in the picture, in pixels.
     pub points: Vec<(usize, Point2<f64>)>,
-    /// Where each corner is on the board, metres.
+    /// Position of each corner on the board, in metres.
     pub on_board: Vec<Point2<f64>>,
 }
 
 impl Sight {
-    /// Takes corners by their numbers and leaves out those that the board does not have.
+    /// Creates a sight from numbered corners, without corners that the board does not have.
     pub fn new(
         camera: usize,
         frame: usize,
@@ -77,14 +77,14 @@ impl Sight {
         each.map(|(on_board, (_, at))| (*on_board, *at)).collect()
     }
 
-    /// The same with other numbers.
+    /// Returns the same sight with different corner numbers.
     fn renumbered(&self, numbers: &[usize], board: &[Point2<f64>]) -> Self {
         let points = self.points.iter().map(|(id, at)| (numbers[*id], *at));
         Self::new(self.camera, self.frame, points, board)
     }
 }
 
-/// Parameters of a lens that are estimated.
+/// Lens parameters that are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LensKind {
     /// Pinhole with k1, k2, k3, p1, p2.
@@ -96,13 +96,13 @@ pub enum LensKind {
     Fisheye,
 }
 
-/// The loss of corners, in standard deviations.
+/// Loss function of corners, in standard deviations.
 struct CornerLoss;
 
 impl CornerLoss {
-    /// Where wrong corners may still be among them.
+    /// Loss while wrong corners may still be included.
     const ROBUST: Loss = Loss::Cauchy(2.0);
-    /// Where they are not.
+    /// Loss after wrong corners were left out.
     const FINAL: Loss = Loss::Huber(4.0);
 }
 
@@ -111,73 +111,73 @@ impl CornerLoss {
 pub struct Task {
     /// Names of the cameras.
     pub names: Vec<String>,
-    /// Width and height of their pictures.
+    /// Width and height of each camera's pictures, in pixels.
     pub sizes: Vec<[u32; 2]>,
-    /// Intrinsics that are known, and kept.
+    /// Known intrinsics of each camera, which are kept.
     pub known: Vec<Option<Intrinsics>>,
-    /// Lens parameters that are estimated for the other cameras.
+    /// Lens parameters to estimate for cameras without known intrinsics.
     pub lens: LensKind,
-    /// The points of the board by their numbers, metres.
+    /// Points of the board by number, in metres.
     pub board: Vec<Point2<f64>>,
-    /// Turns by which the board looks the same: the numbers that points then have.
+    /// Rotations after which the board looks the same; each is given as the numbers that the points then have.
     pub look_alikes: Vec<Vec<usize>>,
-    /// Where the board was seen.
+    /// All pictures in which the board was seen.
     pub sights: Vec<Sight>,
-    /// True if the poses of the cameras are wanted, not only the intrinsics of each.
+    /// True if the poses of the cameras are estimated in addition to their intrinsics.
     pub wants_rig: bool,
-    /// The most frames that are used.
+    /// Maximum number of frames to use.
     pub most_frames: usize,
 }
 
 /// A corner and its residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
-    /// The frame.
+    /// Index of the frame.
     pub frame: usize,
-    /// The number of the corner.
+    /// Number of the corner.
     pub id: usize,
-    /// Where it was seen, pixels.
+    /// Position where the corner was seen, in pixels.
     pub at: Point2<f64>,
-    /// Where it would be by what was found, less where it was seen, pixels.
+    /// Predicted position minus seen position, in pixels.
     pub off: Vector2<f64>,
-    /// True if it was left out as wrong.
+    /// True if the corner was left out as wrong.
     pub is_wrong: bool,
 }
 
-/// A quantity and how well it is known.
+/// An estimated quantity and its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Known {
     /// Name of the quantity, such as `focal length`.
     pub name: String,
-    /// The number: pixels, metres in the world, degrees, or a coefficient.
+    /// Value of the quantity: pixels, metres in the world, degrees, or a coefficient.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the value.
     pub sd: f64,
 }
 
-/// Result for a camera.
+/// Calibration result for one camera.
 #[derive(Debug, Clone)]
 pub struct CameraOutcome {
-    /// The camera; in a world of its own where no rig was wanted.
+    /// The calibrated camera. If no rig was requested, it has a world of its own.
     pub camera: Camera,
-    /// True if its intrinsics were given.
+    /// True if the intrinsics were given.
     pub is_known: bool,
-    /// Boards that were seen, and those that were used.
+    /// Number of boards that were seen, and number of boards that were used.
     pub n_boards: [usize; 2],
-    /// Every corner that was used, and those left out.
+    /// Residuals of all corners, including those that were left out.
     pub residuals: Vec<Residual>,
-    /// Root mean square of the residuals (length, pixels) of what was used.
+    /// Root mean square length of the residuals of the corners that were used, in pixels.
     pub rms_px: f64,
-    /// The same with the corners that were left out.
+    /// Root mean square length of all residuals, including the corners that were left out, in pixels.
     pub rms_of_all_px: f64,
-    /// The share of the picture that the corners cover.
+    /// Fraction of the picture that the corners cover.
     pub coverage: f64,
-    /// Every free number, with its standard deviation.
+    /// Every free parameter, with its standard deviation.
     pub numbers: Vec<Known>,
 }
 
 impl CameraOutcome {
-    /// The share of corners that were left out.
+    /// Returns the fraction of corners that were left out.
     pub fn wrong_share(&self) -> f64 {
         let wrong = self.residuals.iter().filter(|residual| residual.is_wrong).count();
         wrong as f64 / self.residuals.len().max(1) as f64
@@ -187,43 +187,43 @@ impl CameraOutcome {
 /// A pair of cameras that saw the board together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Together {
-    /// The cameras.
+    /// Indices of the two cameras.
     pub cameras: [usize; 2],
-    /// Frames in which both saw it.
+    /// Number of frames in which both cameras saw the board.
     pub n: usize,
-    /// Those that agree about how the cameras stand to one another.
+    /// Number of these frames that agree about the relative pose of the cameras.
     pub n_agree: usize,
 }
 
-/// How all cameras together do not fit as each alone does: pictures of one frame were not taken at the same time.
+/// Evidence that pictures of one frame were not taken at the same time: all cameras together do not fit as well as each one alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutOfStep {
-    /// Residuals of each camera alone, pixels.
+    /// Root mean square of the residuals of each camera alone, in pixels.
     pub alone_px: f64,
-    /// Residuals of all cameras together, with free lenses, pixels.
+    /// Root mean square of the residuals of all cameras together, with free lenses, in pixels.
     pub together_px: f64,
-    /// The largest change of a focal length from one to the other, as a share of it.
+    /// Largest change of a focal length between the two adjustments, as a fraction.
     pub bent: f64,
 }
 
-/// A calibration.
+/// Result of a calibration.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// The cameras.
+    /// Results for the cameras.
     pub cameras: Vec<CameraOutcome>,
-    /// Pairs that saw the board together.
+    /// Pairs of cameras that saw the board together.
     pub pairs: Vec<Together>,
-    /// The board in the world, by frame.
+    /// Pose of the board in the world, by frame.
     pub boards: Vec<(usize, Isometry3<f64>)>,
     /// Standard deviation of a corner along each axis, pixels.
     pub sigma_px: f64,
-    /// Where pictures of one frame were not taken at the same time.
+    /// Evidence that pictures of one frame were not taken at the same time, if there is any.
     pub out_of_step: Option<OutOfStep>,
-    /// Reasons not to trust it.
+    /// Reasons not to trust the calibration.
     pub doubts: Vec<Doubt>,
 }
 
-/// Why there is no calibration.
+/// Reason why no calibration was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoardError {
     /// A camera did not see the board often enough.
@@ -232,31 +232,31 @@ pub enum BoardError {
         corners = LEAST_CORNERS
     )]
     TooFewBoards {
-        /// Its name.
+        /// Name of the camera.
         camera: String,
-        /// Pictures with the board.
+        /// Number of pictures with the board.
         n: usize,
-        /// How many are needed.
+        /// Number of pictures that are needed.
         least: usize,
     },
-    /// No start was found for a camera.
+    /// No initial focal length was found for a camera.
     #[error(
-        "camera {camera:?}: no focal length makes a board of what it saw: is the board the right one?"
+        "camera {camera:?}: no focal length fits the board that it saw: is the description of the board correct?"
     )]
     NoStart {
-        /// Its name.
+        /// Name of the camera.
         camera: String,
     },
-    /// Cameras that are not connected by boards seen together.
+    /// The cameras form groups that never saw the board together.
     #[error(
-        "no board connects these groups of cameras: {}; show it to a camera of each at the same time",
+        "no board connects these groups of cameras: {}; show it to cameras of different groups at the same time",
         .groups.iter().map(|group| group.join(", ")).collect::<Vec<_>>().join(" | ")
     )]
     Apart {
-        /// The groups, by name.
+        /// Names of the cameras in each group.
         groups: Vec<Vec<String>>,
     },
-    /// Numbers that are not finite came out.
-    #[error("the adjustment of all cameras did not end at finite numbers")]
+    /// The adjustment produced numbers that are not finite.
+    #[error("the adjustment of all cameras gave numbers that are not finite")]
     NotFinite,
 }

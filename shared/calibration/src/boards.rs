@@ -1,16 +1,17 @@
-//! Boards to calibrate cameras with: what is on them, how they are printed, where they are in a picture.
+//! Calibration boards: their patterns, their printing, and their detection in pictures.
 //!
 //! | step | where |
 //! |---|---|
 //! | a board in one line of text, its points and markers in metres | `board`, `layout` |
-//! | the same as a drawing, SVG, PDF or pixels | `drawing`, `svg`, `pdf` |
-//! | dark quadrilaterals, markers read from them | `picture`, `threshold`, `quads`, `marker` |
-//! | the layout that several markers agree on, and every corner that follows from it | `fit`, `grow` |
+//! | a board as a drawing, SVG, PDF or pixels | `drawing`, `svg`, `pdf` |
+//! | dark quadrilaterals, and the markers in them | `picture`, `threshold`, `quads`, `marker` |
+//! | the layout that several markers agree on, and all corners that follow from it | `fit`, `grow` |
 //! | chessboards without markers | `chess` |
-//! | a corner to a fraction of a pixel | `corner` |
+//! | corners with sub-pixel precision | `corner` |
 //!
-//! The frame of a board: metres, origin at its upper left corner as printed, x to the right, y down, z away from who
-//! looks at it. Pixels as everywhere: the centre of the upper left one is (0, 0). Pure: no clock, file or thread.
+//! The coordinate system of a board is in metres. Its origin is the upper left corner as printed; x points right, y points down, and z
+//! points away from the viewer. Pixel coordinates are as everywhere: the centre of the upper left pixel is (0, 0). This module uses no
+//! clock, file or thread.
 
 mod board;
 mod layout;

@@ -1,13 +1,13 @@
-//! Cameras calibrated from what they see.
+//! Calibration of cameras from what they see.
 //!
-//! Everything that is found is found by one adjustment of all unknowns at once, [`geometry::bundle`]; what is here makes a start
-//! for it, says what the terms are, and judges what came out. Pure: no clock, file or thread.
+//! Each calibration is one adjustment of all unknowns at once, by [`geometry::bundle`]. This crate finds the initial values, defines
+//! the terms of the adjustment, and judges the result. It uses no clock, file or thread.
 //!
 //! | from | module |
 //! |---|---|
 //! | a board that is moved around | [`board`] |
 //! | people walking about | [`people`] |
-//! | a rig that is there, and people | [`refine`] |
+//! | an existing rig, and people | [`refine`] |
 //! | a board on the floor, or three points | [`origin`]: floor and axes |
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Where the origin of the world is, and which way is up: from a board on the floor, from three points, from people who stand.
+//! Origin and up direction of the world: from a board on the floor, from three points, or from people who stand.
 //!
 //! The new world has z up and z = 0 on the floor.
 
@@ -10,67 +10,68 @@ use nalgebra::{
 use crate::board::{Sight, standing_board};
 use crate::people::Floor;
 
-/// Three points whose triangle is flatter than this (sine of its angle at the origin) do not determine the floor.
+/// Minimum sine of the angle at the origin of three points. A flatter triangle does not determine the floor.
 const FLATTEST: f64 = 0.05;
 
-/// Why there is no new origin.
+/// Reason why no new origin was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OriginError {
-    /// A point that was not seen by two cameras.
+    /// A point was seen by fewer than two cameras.
     #[error("point {point} is given in {views} cameras, at least 2 are needed")]
     TooFewViews {
-        /// Which point, from 1.
+        /// Number of the point, counted from 1.
         point: usize,
-        /// Cameras.
+        /// Number of cameras that saw the point.
         views: usize,
     },
-    /// A point whose rays do not meet.
+    /// The rays to a point do not meet.
     #[error(
-        "point {point}: its rays miss one another by {rms_px:.1} px: is it the same point in all cameras?"
+        "point {point}: its rays miss each other by {rms_px:.1} px: is it the same point in all cameras?"
     )]
     Apart {
-        /// Which point, from 1.
+        /// Number of the point, counted from 1.
         point: usize,
-        /// Root mean square of its residuals, pixels.
+        /// Root mean square of the point's residuals, in pixels.
         rms_px: f64,
     },
-    /// A point that cannot be triangulated.
+    /// A point cannot be triangulated.
     #[error("point {point}")]
     Point {
-        /// Which point, from 1.
+        /// Number of the point, counted from 1.
         point: usize,
-        /// Why.
+        /// Reason why the triangulation failed.
         source: TriangulateError,
     },
-    /// Three points on a line.
-    #[error("the three points lie on a line, or two of them are the same")]
+    /// The three points are on a line.
+    #[error("the three points are on a line, or two of them are the same")]
     OnALine,
     /// No camera sees the board.
     #[error("no camera sees enough of the board")]
     NoBoard,
-    /// The board does not lie where all cameras see it.
+    /// The cameras see the board in different places.
     #[error(
-        "the cameras disagree about the board by {rms_px:.1} px: does it lie still, is it the board of the calibration?"
+        "the cameras disagree about the board by {rms_px:.1} px: does it lie still, and is it the right board?"
     )]
     BoardApart {
-        /// Root mean square of the residuals, pixels.
+        /// Root mean square of the residuals, in pixels.
         rms_px: f64,
     },
-    /// Cameras that are none in the new world.
+    /// The cameras are not valid in the new world.
     #[error("the rig in the new world")]
     Rig(#[from] RigError),
 }
 
-/// A pixel of a camera, by the camera's index.
+/// Index of a camera, and a pixel in its picture.
 pub type Click = (usize, Point2<f64>);
 
-/// The largest residual of a clicked point, and of a board, pixels.
+/// Largest residual of a clicked point, and of a board, in pixels.
 const CLICK_PX: f64 = 15.0;
 const BOARD_PX: f64 = 5.0;
 
-/// The new world by three points on the floor: the origin, one along x, and any other. Cameras are above the floor.
+/// Finds the new world from three points on the floor: the origin, a point on the x axis, and any other point. The cameras must be
+/// above the floor.
 ///
-/// * `clicks`: for each point where cameras see it.
+/// * `clicks`: the pixels of each point in the cameras that see it.
 /// * Returns `new_from_old`.
 ///
 /// # Errors
@@ -119,8 +120,8 @@ fn place(rig: &Rig, clicks: &[Click], point: usize) -> Result<Point3<f64>, Origi
     Ok(found.in_world)
 }
 
-/// The new world by a board that lies on the floor, its print up: the origin in its upper left corner, x along its rows, y
-/// against its columns.
+/// Finds the new world from a board that lies on the floor with its print up. The origin is the upper left corner of the board. The x
+/// axis points along its rows; the y axis points against its columns.
 ///
 /// # Errors
 ///
@@ -140,7 +141,8 @@ pub fn from_board(
     Ok(frame(world_from_board * Point3::origin(), along, up))
 }
 
-/// The new world by the floor that people stood on: the origin in the middle of where they did, x nearest to that of the old world.
+/// Finds the new world from the floor that people stood on. The origin is the centre of their positions, and the x axis is as near as
+/// possible to that of the old world.
 pub fn from_floor(floor: &Floor) -> Isometry3<f64> {
     let along = match floor.up.x.abs() {
         x if x < 0.9 => Vector3::x(),
@@ -149,7 +151,7 @@ pub fn from_floor(floor: &Floor) -> Isometry3<f64> {
     frame(floor.middle, along, floor.up.into_inner())
 }
 
-/// `new_from_old` of a world with this origin, x nearest to `along`, z along `up`.
+/// Returns `new_from_old` for a world with this origin, with x as near as possible to `along` and z along `up`.
 fn frame(origin: Point3<f64>, along: Vector3<f64>, up: Vector3<f64>) -> Isometry3<f64> {
     let z = up.scale(1.0 / up.norm());
     let flat = along - z * z.dot(&along);
@@ -166,7 +168,7 @@ fn mean_centre(rig: &Rig) -> Point3<f64> {
     Point3::from(sum / cameras.len() as f64)
 }
 
-/// The rig in the new world, z up.
+/// Returns the rig in the new world, with z up.
 ///
 /// # Errors
 ///
@@ -219,7 +221,7 @@ mod tests {
         Rig::new(cameras, None, "given").unwrap()
     }
 
-    /// The rig in another world, and what brings it back.
+    /// Returns a rig in its own world, and the same rig in a different world.
     fn moved() -> (Rig, Rig) {
         let truth = rig();
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.1, 0.7));

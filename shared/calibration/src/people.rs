@@ -1,12 +1,16 @@
-//! Where cameras stand, from people walking about.
+//! Poses of cameras, estimated from people walking about.
 //!
-//! The joints that two cameras see at one instant give the relative pose of both (essential matrix by eight points within
-//! RANSAC, robust refinement from several starts); other cameras are put where they see the joints that are known then
-//! (resection); and all cameras, joints, lengths of bones and time offsets are adjusted together. Pictures have no scale: the
-//! scale is that of a person's height, of one distance, or of the rig that was given. The vertical and the floor are those of
-//! the feet that stand. One person is enough; the one that the cameras see longest is used.
+//! The estimate has three steps:
 //!
-//! The honest check is that two halves of the recording, each separately from the beginning, give the same rig.
+//! - The joints that two cameras see at one instant give the relative pose of both. It is found by the eight-point essential matrix
+//!   with RANSAC, and refined robustly from several starts.
+//! - Each other camera is placed from the joints that are then known (resection).
+//! - All cameras, joints, bone lengths and time offsets are adjusted together.
+//!
+//! Pictures have no scale. The scale comes from a person's height, from one known distance, or from a given rig. The vertical and the
+//! floor come from feet that stand. One person is enough; the person whom the cameras see longest is used.
+//!
+//! To check the result, two halves of the recording are calibrated independently. They must give the same rig.
 
 pub(crate) mod adjust;
 pub(crate) mod begin;
@@ -46,30 +50,31 @@ use geometry::Camera;
 pub struct Settings {
     /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
     pub n_joints: usize,
-    /// The mirror of each joint on the other side of the body.
+    /// For each joint, the index of its mirror on the other side of the body.
     pub sides: Vec<usize>,
-    /// True if left and right are those of the picture in some camera, so that cameras may contradict each other.
+    /// True if some camera labels left and right as they appear in the picture, so that cameras may contradict each other.
     pub as_seen: bool,
-    /// Offset added to the times of each camera to have common ones, as far as it is known, seconds.
+    /// Known offset to add to the times of each camera to get common times, in seconds.
     pub offsets_s: Vec<f64>,
-    /// How far these may be wrong, seconds: offsets are searched within. A few frames are found without.
+    /// Largest possible error of these offsets, in seconds; offsets are searched within this range. Errors of a few frames are found
+    /// even if it is 0.
     pub window_s: f64,
     /// Source of the scale.
     pub scale: Scale,
-    /// True if focal lengths are estimated, too: less certain.
+    /// True if focal lengths are estimated as well, which is less certain.
     pub focal: bool,
-    /// The most instants that are looked at.
+    /// Maximum number of instants to use.
     pub most_instants: usize,
-    /// For the samples of RANSAC: the same number gives the same answer.
+    /// Seed for the samples of RANSAC; the same seed gives the same result.
     pub seed: u64,
 }
 
-/// Films of the cameras, and the cameras in the same order. Only their intrinsics count, except for [`Scale::Rig`],
-/// which uses the poses.
+/// Films of the cameras, and the cameras in the same order. Only the intrinsics of the cameras are used, except with [`Scale::Rig`],
+/// which also uses their poses.
 #[derive(Debug, Clone, Copy)]
 pub struct Recording<'a> {
     /// The cameras.
     pub cameras: &'a [Camera],
-    /// Film of each camera, by its own clock.
+    /// Film of each camera, with times of the camera's own clock.
     pub films: &'a [Film],
 }

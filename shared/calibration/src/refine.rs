@@ -1,9 +1,9 @@
-//! An existing rig made better by a recording, or put right after a camera was moved.
+//! Refinement of an existing rig from a recording, or repair of a rig after a camera was moved.
 //!
-//! The given rig is trusted to within stated deviations; a camera that was moved breaks away from them (the belief in a
-//! camera's pose has a loss that saturates). Only cameras that the joints determine better than that move; the others
-//! are held. The new rig is judged on blocks of the recording that it was not fitted to: each camera's joints against
-//! where the other cameras see them.
+//! The given rig is trusted to within stated deviations. The prior on a camera's pose has a loss that saturates, so a moved camera can
+//! break away from it. Only cameras whose poses the joints determine better than the prior are changed; the other cameras are held. The new
+//! rig is judged on blocks of the recording that it was not fitted to. There, each camera's joints are compared with the positions that
+//! the other cameras predict.
 
 mod held_out;
 
@@ -25,10 +25,10 @@ use crate::people::solve::{Solved, rounds};
 use crate::people::{Doubt, PeopleError, Recording, Skeletons};
 use held_out::{Blocks, chosen};
 
-/// A camera moves where its deviation is less than this share of what was believed.
+/// A camera is changed if its standard deviation is below this fraction of the prior's.
 const TOLD: f64 = 0.8;
-/// A camera was moved where the joints fit by this share better without its pose, and this many times more than without
-/// that of another camera.
+/// A camera counts as moved if freeing its pose improves the fit of the joints by the first value, as a fraction. The gain must also exceed
+/// that of any other camera by the second value, as a factor.
 const SUSPECT: [f64; 2] = [0.15, 1.5];
 
 /// Settings of a refinement.
@@ -36,34 +36,35 @@ const SUSPECT: [f64; 2] = [0.15, 1.5];
 pub struct Settings {
     /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
     pub n_joints: usize,
-    /// The mirror of each joint on the other side of the body.
+    /// For each joint, the index of its mirror on the other side of the body.
     pub sides: Vec<usize>,
-    /// Offset added to the times of each camera to have common ones, seconds.
+    /// Offset to add to the times of each camera to get common times, in seconds.
     pub offsets_s: Vec<f64>,
-    /// Standard deviation of these, seconds.
+    /// Standard deviation of the offsets, in seconds.
     pub offset_sd_s: f64,
-    /// Standard deviations of the poses that are given: degrees, metres.
+    /// Standard deviations of the given poses, in degrees and metres.
     pub pose_sd: [f64; 2],
-    /// True if focal lengths move, too.
+    /// True if focal lengths are refined as well.
     pub focal: bool,
-    /// The most instants that are looked at.
+    /// Maximum number of instants to use.
     pub most_instants: usize,
 }
 
-/// Change of a camera.
+/// Change of one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// Amount by which it has moved: degrees, metres.
+    /// Distance by which the camera has moved, in degrees and metres.
     pub moved: [f64; 2],
-    /// Standard deviation of its pose now: degrees, metres.
+    /// Standard deviation of the new pose, in degrees and metres.
     pub sd: [f64; 2],
-    /// True if the joints determine its pose; if not, it is held.
+    /// True if the joints determine the pose of the camera; otherwise it is held.
     pub is_told: bool,
-    /// Median residual of the rig fitted to everything, pixels.
+    /// Median residual of the rig fitted to the whole recording, in pixels.
     pub residual_px: f64,
-    /// Median distance of its joints from where the others see them, held out, pixels: before and after.
+    /// Median distance of the camera's joints from the positions that the other cameras predict, on held-out blocks, in pixels: before and
+    /// after.
     pub held_out_px: [f64; 2],
-    /// Offset added to its times to have common ones, seconds.
+    /// Offset to add to the camera's times to get common times, in seconds.
     pub offset_s: f64,
 }
 
@@ -72,31 +73,31 @@ pub struct Change {
 pub struct Outcome {
     /// The new rig.
     pub cameras: Vec<Camera>,
-    /// One for each camera; none where nothing could be done.
+    /// Changes of the cameras; empty if nothing could be done.
     pub changes: Vec<Change>,
-    /// Median distance over all cameras, held out, pixels: before and after.
+    /// Median distance over all cameras on held-out blocks, in pixels: before and after.
     pub held_out_px: [f64; 2],
-    /// Mean gain of a block over its standard error: more than 2 is hardly chance.
+    /// Mean gain of a block divided by its standard error; a value above 2 is unlikely to be chance.
     pub certainty: f64,
-    /// Blocks that were held out, and how many of them became better.
+    /// Number of held-out blocks, and number of these that improved.
     pub blocks: [usize; 2],
     /// True if the new rig is better.
     pub is_better: bool,
-    /// Every reason not to believe either.
+    /// Every reason to trust neither the given rig nor the new one.
     pub doubts: Vec<Doubt>,
-    /// Instants that were looked at.
+    /// Number of instants that were used.
     pub n_instants: usize,
-    /// These, seconds on the common clock.
+    /// Times of these instants, in seconds on the common clock.
     pub times_s: Vec<f64>,
-    /// The skeletons of the new rig, metres: by instant and joint.
+    /// Skeletons by instant and joint, in the new rig, in metres.
     pub skeletons: Skeletons,
 }
 
-/// Makes a rig better.
+/// Refines a rig.
 ///
 /// # Errors
 ///
-/// [`PeopleError`]: what cannot be looked at. If too little can be determined, the result is an [`Outcome`] with doubts.
+/// [`PeopleError`] if the recording cannot be used at all. If it determines too little, the result is an [`Outcome`] with doubts.
 pub fn refine(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
     let Recording { cameras, films } = *recording;
     if cameras.len() < 2 || cameras.len() != films.len() {
@@ -165,7 +166,7 @@ fn nothing(cameras: &[Camera]) -> Outcome {
     }
 }
 
-/// The rig of everything, after what was said of it by what each half was not fitted to.
+/// Returns the rig fitted to everything, after it was judged on the data that each half was not fitted to.
 fn better(
     study: &Study<'_>,
     choices: &[Choice],
@@ -207,16 +208,17 @@ fn better(
     Ok(all)
 }
 
-/// Which cameras move.
+/// The cameras that may change.
 #[derive(Debug, Clone)]
 struct Moving {
-    /// A camera that was moved: nothing is assumed about its pose.
+    /// Index of a camera that was moved; it has no prior on its pose.
     suspect: Option<usize>,
-    /// True for each camera whose pose the joints determine; the poses of the others are held.
+    /// True for each camera whose pose the joints determine; the poses of the other cameras are held.
     told: Vec<bool>,
 }
 
-/// The camera that was moved, if one was: where it alone is free, the joints fit so much better than with any other one.
+/// Returns the camera that was moved, if any. Freeing this camera alone improves the fit of the joints much more than freeing any other
+/// camera does.
 fn suspect(
     study: &Study<'_>,
     choices: &[Choice],
@@ -253,7 +255,7 @@ fn suspect(
     Ok(is_one.then_some(best.1))
 }
 
-/// The rig that fits best together with the given rig; cameras that the joints do not determine are kept.
+/// Returns the rig that fits best together with the given rig. Cameras that the joints do not determine are kept.
 fn fitted(
     study: &Study<'_>,
     choices: &[Choice],
@@ -286,10 +288,11 @@ fn fitted(
     rounds(study, cameras, choices.to_vec(), &beliefs)
 }
 
-/// Standard deviation of every camera's pose: degrees, metres; none where nothing is known.
+/// Returns the standard deviation of every camera's pose, in degrees and metres. It is 0 for a camera that is held, and infinite if nothing
+/// is known.
 fn deviations(all: &Solved) -> Vec<[f64; 2]> {
     let inflation = all.report.variance().sqrt().max(1.0);
-    // The joints count for less, and the beliefs as they are.
+    // Strengthening the priors has the same effect as weakening the joints.
     let known = covariance(&all.problem.believing(inflation)).ok();
     let cameras = all.problem.cameras();
     let of = |camera: usize| {
@@ -307,14 +310,14 @@ fn deviations(all: &Solved) -> Vec<[f64; 2]> {
     (0..cameras.cameras().len()).map(of).collect()
 }
 
-/// Finds the cameras that the joints determine better than the given rig.
+/// Finds the cameras that the joints determine better than the given rig does.
 fn told(all: &Solved, settings: &Settings) -> Vec<bool> {
     let each = deviations(all).into_iter();
     each.map(|sd| sd[0] < TOLD * settings.pose_sd[0] || sd[1] < TOLD * settings.pose_sd[1])
         .collect()
 }
 
-/// The rigs of both halves beside one another.
+/// Compares the rigs of both halves and adds doubts if they disagree.
 fn disagreement(rigs: &[Vec<Camera>], all: &Solved, settings: &Settings, outcome: &mut Outcome) {
     let [one, other] = rigs else { return };
     let skeletons = all.skeletons(settings.n_joints);
@@ -328,7 +331,7 @@ fn disagreement(rigs: &[Vec<Camera>], all: &Solved, settings: &Settings, outcome
         let distance = nalgebra::distance(&a.centre_in_world(), &middle);
         let by = [apart.turn.to_degrees(), apart.way / distance];
         let limits = MOST_HALVES;
-        // NaN is not less.
+        // The comparison is negated so that NaN counts as too large.
         if !(by[0] < limits[0] && by[1] < limits[1]) {
             outcome.doubts.push(Doubt::Halves { camera, by, limits });
         }

@@ -1,22 +1,25 @@
-//! Offset and drift of the clocks of cameras, from the movement of people that they see, or from the sounds that they hear.
+//! Offset and drift of the clocks of cameras, from the movement of people that they see, or from the sounds that they record.
 //!
-//! A joint that two cameras see at one instant fulfils their epipolar constraint; at two instants it does not, because the
-//! person moves. The offset between two clocks is where the constraint holds best.
+//! A joint that two cameras see at the same instant satisfies their epipolar constraint. At different instants it does not, because the
+//! person moves. The offset between two clocks is the one at which the constraint is satisfied best.
 //!
-//! Reading order: [`Film`] (what a camera saw, by its own clock), [`estimate`] (the whole), [`Outcome`] (what came out, and
-//! every [`Doubt`] that forbids to use it).
+//! Suggested reading order:
+//!
+//! - [`Film`]: the people that a camera saw, by its own clock.
+//! - [`estimate`]: the whole estimation.
+//! - [`Outcome`]: the result, with every [`Doubt`] that forbids using it.
 //!
 //! | step | module |
 //! |---|---|
-//! | people linked from frame to frame, outliers left out, positions smoothed | `track` |
-//! | cost of a pair of cameras over its offset, by full search | `curve` |
-//! | the offsets of all cameras that agree best, and the second best | `search` |
-//! | offsets and drifts to fractions of a frame, with standard errors | `refine` |
-//! | why an answer is not to be trusted | `doubt` |
-//! | all of this from sounds ([`estimate_by_sound`]) | `sound` |
+//! | link people from frame to frame, leave out outliers, smooth positions | `track` |
+//! | find the cost of every offset between a pair of cameras, by full search | `curve` |
+//! | find the offsets of all cameras that agree best, and the second best | `search` |
+//! | refine offsets and drifts to fractions of a frame, with standard errors | `refine` |
+//! | find reasons not to trust the result | `doubt` |
+//! | estimate offsets and drifts from sounds ([`estimate_by_sound`]) | `sound` |
 //!
-//! Times are seconds, places pixels of the recorded picture. A camera's time `t` by its own clock is
-//! `t + offset + drift * t` on the common clock, which is that of the reference camera. Pure: no clock, file or thread.
+//! Times are in seconds, and positions are in pixels of the recorded picture. A time `t` on a camera's own clock is
+//! `t + offset + drift * t` on the common clock, which is the clock of the reference camera. This module uses no clock, file or thread.
 
 mod curve;
 mod doubt;

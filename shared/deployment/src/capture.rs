@@ -8,92 +8,95 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::fault::{Fault, FaultError, FaultKind, Faults};
 
-/// Where the pictures of one camera come from.
+/// Source of one camera's pictures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
     /// Name of the camera in the rig.
     pub name: String,
-    /// A video, an image, a folder or pattern of images, a camera (`/dev/video0`, `rtsp://...`), a scene (`synth://...`), or a camera of a recording
-    /// (`run.mcap#left`).
+    /// Source of the pictures: a video, an image, a folder or pattern of images, a camera (`/dev/video0`, `rtsp://...`), a scene
+    /// (`synth://...`), or a camera of a recording (`run.mcap#left`).
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
-    /// Keypoints from another program, in place of footage or beside it: a folder with a JSON file for every frame, or one JSON file.
+    /// Keypoints from another program, instead of footage or in addition to it: a folder with one JSON file per frame, or a single JSON
+    /// file.
     pub keypoints: Option<PathBuf>,
-    /// Names of the keypoints: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16`, `lsp-14`, `coco-wholebody-133`, `halpe-136` or
-    /// `body-135`; by default by their number, or as the file says.
+    /// Names of the keypoints: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16`, `lsp-14`, `coco-wholebody-133`,
+    /// `halpe-136` or `body-135`; by default, as the file says, or according to the number of keypoints.
     pub keypoint_names: Option<String>,
-    /// Network of this camera, in place of `network.file`.
+    /// Network for this camera, instead of `network.file`.
     pub network: Option<PathBuf>,
-    /// Place of the source's top-left pixel in the calibrated image, `[x, y]` pixels, for a cropped source.
+    /// Position of the source's top-left pixel in the calibrated image, `[x, y]` in pixels, for a cropped source.
     pub source_offset_px: Option<[u32; 2]>,
-    /// Clockwise turn of the pictures, degrees (`0`, `90`, `180`, `270`), or `"tag"`, as the file says; by default to match the calibration.
+    /// Clockwise rotation of the pictures in degrees (`0`, `90`, `180`, `270`), or `"tag"` to use the rotation stored in the file; by
+    /// default, chosen to match the calibration.
     pub rotate: Option<Rotate>,
-    /// Numbered pictures: the number of frame 0, and the step from frame to frame; by default from the numbers of all cameras.
+    /// For numbered pictures: the number of frame 0, and the step between frames; by default, from the numbers of all cameras.
     pub numbers: Option<[u64; 2]>,
-    /// Time to add to the times of the footage, milliseconds, so that all cameras share one clock (`parallax sync estimate`).
+    /// Time to add to the times of the footage, in milliseconds, so that all cameras share one clock (`parallax sync estimate`).
     pub offset_ms: Option<f64>,
-    /// Excess length of a second of the camera's clock, millionths (`parallax sync estimate`).
+    /// Amount by which a second of the camera's clock is too long, in millionths (`parallax sync estimate`).
     pub drift_ppm: Option<f64>,
-    /// Format of a video device's pictures, such as `MJPG` or `YUYV`; by default the first supported one.
+    /// Pixel format of a video device, such as `MJPG` or `YUYV`; by default, the first supported one.
     pub format: Option<String>,
-    /// Size of a live camera's pictures, `[width, height]` pixels; by default as the camera is set.
+    /// Picture size of a live camera, `[width, height]` in pixels; by default, the camera's current setting.
     pub size: Option<[u32; 2]>,
-    /// Pictures per second of a live camera; by default as the camera is set.
+    /// Frame rate of a live camera, in pictures per second; by default, the camera's current setting.
     pub frame_rate_hz: Option<f64>,
-    /// Controls of a video device to set before the run, by the names that `parallax cameras` lists.
+    /// Controls of a video device to set before the run, with the names that `parallax cameras` lists.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub controls: BTreeMap<String, i64>,
-    /// Transport of the packets of an RTSP camera; by default as camera and reader agree.
+    /// Transport protocol of an RTSP camera; by default, camera and reader negotiate it.
     pub transport: Option<Transport>,
-    /// Clock for the times of an RTSP camera's pictures: its own (`camera`, the default), or this machine's at their `arrival`.
+    /// Clock that gives the times of an RTSP camera's pictures: the camera's own (`camera`, the default), or this machine's when they
+    /// arrive (`arrival`).
     pub clock: Option<CameraClock>,
-    /// Time from the instants of the frames to the pictures of the footage, milliseconds, negative for earlier pictures.
+    /// Time from the instant of a frame to its picture in the footage, in milliseconds; negative if the picture is earlier.
     pub skew_ms: Option<f64>,
-    /// Fault on purpose, for a test, such as `freeze@30+20`.
+    /// Simulated fault for a test, such as `freeze@30+20`.
     #[serde(default, skip_serializing_if = "Faults::is_empty")]
     #[schemars(with = "String")]
     pub fault: Faults,
 }
 
-/// How the pictures of footage are turned.
+/// Rotation of the footage's pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
     expecting = "expected 0, 90, 180 or 270 degrees to the right, or \"tag\""
 )]
 pub enum Rotate {
-    /// By so many degrees to the right.
+    /// Clockwise rotation, in degrees.
     Degrees(u16),
-    /// As the file asks.
+    /// Rotation stored in the file.
     Tag(Tag),
 }
 
-/// The word `tag`.
+/// The value `tag`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Tag {
-    /// As the file asks.
+    /// Rotation stored in the file.
     Tag,
 }
 
-/// How the packets of an RTSP camera travel.
+/// Transport protocol of an RTSP camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Transport {
-    /// None is lost, but one that is late delays the others.
+    /// No packet is lost, but a late packet delays those after it.
     Tcp,
-    /// Those that are late are lost.
+    /// Late packets are lost.
     Udp,
 }
 
-/// By which clock an RTSP camera has taken its pictures.
+/// Clock that gives the times of an RTSP camera's pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CameraClock {
-    /// Its own, where it tells and can be right.
+    /// The camera's own clock, if the camera reports it and it is plausible.
     Camera,
-    /// That of this machine when they come.
+    /// This machine's clock when the picture arrives.
     Arrival,
 }
 
@@ -101,12 +104,12 @@ pub enum CameraClock {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
-    /// As fast as frames are taken, and nothing is dropped: senders wait for their receivers.
+    /// Frames are read as fast as they are processed. Nothing is dropped: senders wait for their receivers.
     #[default]
     Lossless,
-    /// The same at the frame rate of the footage.
+    /// Like `Lossless`, but no faster than the frame rate of the footage.
     Paced,
-    /// At the frame rate, and the latest message wins: what was not read in time is dropped and counted.
+    /// Frames are read at the frame rate, and the latest message wins: messages not read in time are dropped and counted.
     Realtime,
 }
 
@@ -116,7 +119,7 @@ impl Mode {
         self != Self::Realtime
     }
 
-    /// How fast recorded frames are handed out.
+    /// Returns the pace at which recorded frames are published.
     pub fn pace(self) -> Pace {
         match self {
             Self::Lossless => Pace::Fast,
@@ -125,37 +128,39 @@ impl Mode {
     }
 }
 
-/// How fast recorded frames are handed out.
+/// Pace at which recorded frames are published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// As fast as they can be read and taken.
+    /// As fast as they can be read and processed.
     Fast,
     /// At the frame rate of the footage.
     Realtime,
 }
 
-/// How pixels get into the pipeline.
+/// How pixels enter the pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Capture")]
 pub struct Config {
-    /// `lossless`, nothing is dropped; `paced`, the same at the frame rate; `realtime`, the latest frame wins (always with live cameras).
+    /// Behaviour of a stage that is too slow: `lossless` drops nothing; `paced` does the same at the frame rate; `realtime` keeps only the
+    /// latest frame (always used with live cameras).
     pub mode: Mode,
-    /// Size of the frames in the pipeline, `[width, height]` pixels, in place of `scale`.
+    /// Size of the frames in the pipeline, `[width, height]` in pixels, instead of `scale`.
     pub size: Option<[usize; 2]>,
-    /// Size of the frames as a share of the camera's image; without it and `size`, people become about 200 pixels high.
+    /// Size of the frames relative to the camera's image; if neither `scale` nor `size` is set, frames are scaled so that people are about
+    /// 200 pixels high.
     pub scale: Option<f64>,
-    /// Turn frames until the world's up points up.
+    /// Rotate frames so that the world's up direction points up.
     pub upright: bool,
-    /// Frames per second of images, of a video without a rate, and of live cameras together.
+    /// Frames per second of images, of a video without a rate, and of all live cameras together.
     pub frame_rate_hz: Option<f64>,
-    /// First frame to use, from 0.
+    /// First frame to use, counted from 0.
     pub start_frame: u64,
     /// Use every n-th frame.
     pub frame_step: u64,
-    /// Most frames to use; by default all, or with live cameras until the run is stopped.
+    /// Maximum number of frames to use; by default, all frames, or with live cameras, until the run is stopped.
     pub n_frames: Option<u64>,
-    /// Number of repetitions of a picture, bit for bit, after which a camera counts as frozen; 0: never.
+    /// Number of identical repetitions of a picture after which a camera counts as frozen; 0 means never.
     pub frozen_after: u32,
 }
 

@@ -1,42 +1,42 @@
-//! Writes the clocks of cameras into the text of a deployment file, and leaves everything else as it is.
+//! Writes the clocks of cameras into the text of a deployment file, and leaves everything else unchanged.
 
 use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-/// The clock of a camera, as its keys have it.
+/// Clock of a camera, with the values of its keys in a deployment file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClockKeys {
-    /// The camera.
+    /// Name of the camera.
     pub name: String,
-    /// `offset_ms`.
+    /// Value of the key `offset_ms`.
     pub offset_ms: f64,
-    /// `drift_ppm`; without it the key is taken out of use by a 0 if the file has it.
+    /// Value of the key `drift_ppm`; if it is `None` and the file has the key, the key is set to 0.
     pub drift_ppm: Option<f64>,
 }
 
-/// Why the clocks cannot be written.
+/// Reason why the clocks cannot be written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ClocksError {
-    /// It is no TOML.
-    #[error("the file is not TOML any more")]
+    /// The file is not valid TOML.
+    #[error("the file is no longer valid TOML")]
     Syntax,
-    /// It has no such camera.
+    /// The file has no camera of that name.
     #[error("the file has no [[camera]] named {name:?}")]
     NoCamera {
-        /// The name.
+        /// Name of the missing camera.
         name: String,
     },
-    /// The text is written in a way that is not understood; nothing is lost, for the file was not touched.
+    /// The camera entries have a form that cannot be edited safely. The file was not changed.
     #[error("the [[camera]] entries are written in a form that cannot be edited safely")]
     Form,
 }
 
-/// A change: what is replaced, and by what.
+/// A change: the range to replace, and its new text.
 type Edit = (Range<usize>, String);
 
-/// The text of a deployment file with the clocks of its cameras.
+/// Returns the text of a deployment file with the given clocks of its cameras.
 ///
 /// # Errors
 ///
@@ -69,7 +69,7 @@ pub fn with_clocks(text: &str, clocks: &[ClockKeys]) -> Result<String, ClocksErr
     }
 }
 
-/// A value that is text, and where it stands.
+/// Returns the text value of a key and its position, if the value is text.
 fn text_of<'a>(table: &'a DeTable<'_>, key: &str) -> Option<(Range<usize>, &'a str)> {
     let (_, value) = table.iter().find(|entry| entry.0.get_ref() == key)?;
     match value.get_ref() {
@@ -109,7 +109,7 @@ fn edits_of(text: &str, table: &DeTable<'_>, clock: &ClockKeys) -> Vec<Edit> {
     edits
 }
 
-/// A number as TOML has it, with a point.
+/// Returns a number as TOML writes it, with a decimal point.
 fn number(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0');
@@ -125,7 +125,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Returns true if the changed text says the same but for the clocks.
+/// Returns true if the changed text differs from the original in the clocks only.
 fn is_as_meant(text: &str, changed: &str, clocks: &[ClockKeys]) -> bool {
     let read = |text: &str| text.parse::<Table>().ok();
     let (Some(mut before), Some(mut after)) = (read(text), read(changed)) else {
@@ -180,7 +180,7 @@ mod tests {
             )
             .replace("= 7 #", "= 0.0 #");
         assert_eq!(changed, expected);
-        // Again: the same.
+        // Writing the same clocks again changes nothing.
         assert_eq!(with_clocks(&changed, &clocks).unwrap(), changed);
         let without = with_clocks(&changed, &[clock("a", 1.0, None)]).unwrap();
         assert!(

@@ -1,4 +1,4 @@
-//! Complaints about the value of a key, and the kinds of value that are asked for.
+//! Complaints about the value of a key, and checks for common kinds of values.
 
 use core::fmt::Display;
 
@@ -10,14 +10,14 @@ use crate::ranges::range;
 pub struct Complaint {
     /// The key, with its section.
     pub key: String,
-    /// Its value.
+    /// The value that was given.
     pub got: String,
     /// Description of the values that are accepted.
     pub expected: String,
 }
 
 impl Complaint {
-    /// The same with its place: file and line, or the option of the command line.
+    /// Returns the error at a place: a file and line, or the option of the command line.
     pub fn at(self, place: String) -> ConfigError {
         ConfigError::Value {
             place,
@@ -28,7 +28,7 @@ impl Complaint {
     }
 }
 
-/// A complaint about a key unless something holds.
+/// Returns a complaint about a key unless a condition is met.
 pub(super) fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Result<(), Complaint> {
     if holds {
         return Ok(());
@@ -40,7 +40,7 @@ pub(super) fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Resul
     })
 }
 
-/// A number above 0.
+/// Checks that a number is above 0.
 pub(super) fn positive(key: &str, got: f64) -> Result<(), Complaint> {
     demand(
         got.is_finite() && got > 0.0,
@@ -50,7 +50,7 @@ pub(super) fn positive(key: &str, got: f64) -> Result<(), Complaint> {
     )
 }
 
-/// A number of at least 0.
+/// Checks that a number is at least 0.
 pub(super) fn not_negative(key: &str, got: f64) -> Result<(), Complaint> {
     demand(
         got.is_finite() && got >= 0.0,
@@ -60,14 +60,14 @@ pub(super) fn not_negative(key: &str, got: f64) -> Result<(), Complaint> {
     )
 }
 
-/// A number from the least to the most of its key.
+/// Checks that a number is in the range of its key.
 pub(super) fn between(key: &str, got: f64) -> Result<(), Complaint> {
     in_range(key, got, &got.to_string())
 }
 
-/// A whole number from the least to the most of its key.
+/// Checks that a whole number is in the range of its key.
 pub(super) fn whole<T: TryInto<i64> + Display + Copy>(key: &str, got: T) -> Result<(), Complaint> {
-    // What does not fit is larger than anything that is allowed.
+    // A number that does not fit into an `i64` is above every allowed maximum.
     let value = got.try_into().unwrap_or(i64::MAX);
     in_range(key, value as f64, &got.to_string())
 }

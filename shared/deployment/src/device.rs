@@ -1,19 +1,19 @@
-//! Where frames are searched.
+//! Hardware on which frames are searched.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where frames are searched.
+/// Hardware on which frames are searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Device {
-    /// On a graphics card where there is one that can do it, else on the processor.
+    /// A graphics card if a suitable one is present, otherwise the processor.
     #[default]
     Auto,
-    /// On the processor.
+    /// The processor.
     Cpu,
-    /// On a graphics card; the run fails where none can do it.
+    /// A graphics card; the run fails if no suitable one is present.
     Gpu,
-    /// By a program that plays a graphics card: for tests.
+    /// A program that emulates a graphics card, for tests.
     Software,
 }

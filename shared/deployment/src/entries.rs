@@ -1,23 +1,23 @@
-//! Every key of a deployment with its value, and who said it.
+//! Every key of a deployment with its value and the origin of the value.
 
 use toml::{Table, Value};
 
 use crate::{Key, Loaded, keys};
 
-/// Who said a value.
+/// Origin of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Origin {
-    /// Nobody.
+    /// The value is the default.
     Default,
-    /// The deployment file.
+    /// The value is from the deployment file.
     File,
-    /// `--set` or another option.
+    /// The value is from `--set` or another option.
     CommandLine,
 }
 
 impl Origin {
-    /// In words.
+    /// Returns the origin in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Default => "default",
@@ -27,21 +27,21 @@ impl Origin {
     }
 }
 
-/// One key.
+/// A key of a deployment with its value.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Entry {
-    /// With its section.
+    /// Name of the key, with its section.
     pub key: String,
-    /// As TOML; `None` if it is not set and has no default.
+    /// Value as TOML; `None` if the key is not set and has no default.
     pub value: Option<Value>,
-    /// Who said it.
+    /// Origin of the value.
     pub origin: Origin,
     /// Meaning of the key.
     pub meaning: String,
 }
 
 impl Entry {
-    /// Changes every text in its value.
+    /// Applies `change` to every text in the value.
     pub fn change_texts(&mut self, change: impl Fn(&str) -> String + Copy) {
         if let Some(value) = &mut self.value {
             change_texts(value, change);
@@ -59,11 +59,11 @@ fn change_texts(value: &mut Value, change: impl Fn(&str) -> String + Copy) {
 }
 
 impl Loaded {
-    /// Every key with its value, in order.
+    /// Returns every key with its value, in order.
     ///
     /// # Errors
     ///
-    /// A value that TOML cannot hold, such as a whole number beyond 64 bits with sign.
+    /// Fails if TOML cannot represent a value, such as a whole number beyond the range of a signed 64-bit integer.
     pub fn entries(&self) -> Result<Vec<Entry>, toml::ser::Error> {
         let table = Table::try_from(&self.deployment)?;
         let entry = |key: Key| Entry {

@@ -1,19 +1,19 @@
-//! Why a deployment file was refused: always with the place, and with what would do.
+//! Errors in a deployment file, each with its place and with the values that are accepted.
 
-/// Why a deployment file was refused.
+/// Reason why a deployment file was refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// A key that nothing reads, most often a slip.
+    /// An unknown key, most often a typing error.
     #[error("{place}: unknown key `{key}`, {hint}")]
     UnknownKey {
         /// File and line, or the option of the command line.
         place: String,
-        /// The key.
+        /// Name of the key.
         key: String,
-        /// The nearest known key, or all that are known there.
+        /// The nearest known key, or all keys that are known in the same section.
         hint: String,
     },
-    /// Not TOML, or a value of another kind than its key asks for.
+    /// The text is not TOML, or a value has the wrong type for its key.
     #[error("{place}: {message}")]
     Malformed {
         /// File and line, or the option of the command line.
@@ -28,7 +28,7 @@ pub enum ConfigError {
         place: String,
         /// The key, with its section.
         key: String,
-        /// Its value.
+        /// The value that was given.
         got: String,
         /// Description of the values that are accepted.
         expected: String,
@@ -36,12 +36,12 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// Explains what the TOML reader said.
+    /// Converts a message of the TOML reader into an error.
     ///
-    /// Serde says `unknown field`, the name, then what it knows, each in backticks; of its other words see
+    /// Serde writes `unknown field`, the name, then the known names, each in backticks. For its other messages, see
     /// [`failure::wording::in_words`].
     ///
-    /// * `key`: of the value that is wrong, with its section, where it is known.
+    /// * `key`: the key of the wrong value, with its section, if known.
     pub(super) fn explain(place: String, message: &str, key: Option<&str>) -> Self {
         let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         if let Some((key, known)) = names.split_first()
@@ -71,7 +71,7 @@ impl ConfigError {
     }
 }
 
-/// The most common slip of a file that has one camera too many for its brackets.
+/// Returns a hint for the most common mistake: `[camera]` with single brackets.
 fn of_cameras(key: &str) -> &'static str {
     if key == "camera" {
         "; every camera begins with [[camera]], in double brackets"
@@ -80,7 +80,7 @@ fn of_cameras(key: &str) -> &'static str {
     }
 }
 
-/// Describes the keys that a deployment or a camera needs at least.
+/// Describes the keys that every deployment or camera needs.
 fn of_what_is_missing(key: &str) -> &'static str {
     match key {
         "rig" | "output" | "camera" | "name" => {
@@ -90,7 +90,7 @@ fn of_what_is_missing(key: &str) -> &'static str {
     }
 }
 
-/// The nearest known name, or all of them if none is near.
+/// Returns the nearest known name, or all known names if none is near.
 fn hint(key: &str, known: &[&str]) -> String {
     let nearest = known
         .iter()

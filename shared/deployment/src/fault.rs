@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 /// A kind of simulated fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The camera is gone.
+    /// The camera is disconnected.
     Unplug,
-    /// The picture does not change any more.
+    /// The picture no longer changes.
     Freeze,
-    /// Every frame has the time of the last one before the fault.
+    /// Every frame has the time of the last frame before the fault.
     Repeat,
     /// The clock goes backwards.
     Back,
@@ -20,11 +20,11 @@ pub enum FaultKind {
     Jump,
     /// Every second frame is left out.
     Slow,
-    /// Pictures have another size.
+    /// Pictures have a different size.
     Size,
     /// Pictures cannot be decoded.
     Damage,
-    /// The process is stuck in a computation, and does not react to anything.
+    /// The process is stuck in a computation and does not respond.
     Spin,
 }
 
@@ -41,7 +41,7 @@ impl FaultKind {
         (Self::Spin, "spin"),
     ];
 
-    /// Its name in settings.
+    /// Returns the name of the fault in settings.
     pub fn name(self) -> &'static str {
         let found = Self::ALL.iter().find(|(kind, _)| *kind == self);
         found.map_or("", |(_, name)| name)
@@ -51,11 +51,11 @@ impl FaultKind {
 /// A fault during a range of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fault {
-    /// The kind.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// The first frame, counted from 0 in the footage.
+    /// First frame of the fault, counted from 0 in the footage.
     pub from: u64,
-    /// How many frames of the footage.
+    /// Number of frames of the footage.
     pub count: u64,
 }
 
@@ -66,11 +66,11 @@ pub struct Fault {
     FaultKind::ALL.map(|fault_kind| fault_kind.1).join(", ")
 )]
 pub struct FaultError {
-    /// The text.
+    /// The text that could not be read.
     pub text: String,
 }
 
-/// Faults of one camera, written `freeze@30+20, unplug@80+10`: the kind, the first frame and the number of frames.
+/// Faults of one camera, written `freeze@30+20, unplug@80+10`. Each has a kind, a first frame and a number of frames.
 ///
 /// ```
 /// let faults: deployment::capture::Faults = "freeze@30+20".parse()?;
@@ -88,13 +88,13 @@ impl Faults {
         self.0.is_empty()
     }
 
-    /// The fault of a frame of the footage; the first in the list if there are several.
+    /// Returns the fault of a frame of the footage; the first in the list if there are several.
     pub fn at(&self, frame: u64) -> Option<Fault> {
         let is_now = |fault: &&Fault| frame >= fault.from && frame - fault.from < fault.count;
         self.0.iter().find(is_now).copied()
     }
 
-    /// The faults of one epoch of the process. [`FaultKind::Spin`] happens in epoch 0 only, because a restarted process may
+    /// Returns the faults for one epoch of the process. [`FaultKind::Spin`] happens in epoch 0 only, because a restarted process may
     /// begin with the same frame.
     #[must_use]
     pub fn of_epoch(&self, epoch: u32) -> Self {

@@ -1,17 +1,17 @@
-//! The names of a struct's fields, in the order of its source: JSON schemas sort them.
+//! Names of a struct's fields in source order; JSON schemas sort them.
 
 use serde::de::{Deserialize, Deserializer, Error as _, Visitor, value::Error};
 use serde::forward_to_deserialize_any;
 
-/// The keys that a section has, as its `Deserialize` lists them; aliases among them.
+/// Returns the keys of a section, as its `Deserialize` lists them, including aliases.
 pub(crate) fn fields_of<'de, T: Deserialize<'de>>() -> &'static [&'static str] {
     let mut fields: &[&str] = &[];
-    // It always fails: it has no values to give.
+    // Deserialization always fails, because `Ask` has no values.
     let _no_value = T::deserialize(Ask(&mut fields)).is_err();
     fields
 }
 
-/// A deserializer that only notes what it is asked for.
+/// A deserializer that only records the field names that are requested from it.
 struct Ask<'a>(&'a mut &'static [&'static str]);
 
 impl<'de> Deserializer<'de> for Ask<'_> {

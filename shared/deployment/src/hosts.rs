@@ -1,4 +1,4 @@
-//! `[[host]]` and section `[link]` of a deployment file: which views run on which machine, and what crosses between them.
+//! `[[host]]` and section `[link]` of a deployment file: the machine that each view runs on, and the data sent between machines.
 
 use std::path::{Path, PathBuf};
 
@@ -13,26 +13,26 @@ use crate::{Deployment, Views};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Host {
-    /// Name of the host, for `--host` and reports; without `--host` a machine takes the host with its name.
+    /// Name of the host, for `--host` and reports; without `--host`, a machine is the host whose name equals its own.
     pub name: String,
-    /// Cameras that are connected to the host, by name.
+    /// Names of the cameras that are connected to the host.
     #[serde(default)]
     pub views: Vec<String>,
-    /// Fuse the views on this host; exactly one does.
+    /// Fuse the views on this host; exactly one host does so.
     #[serde(default)]
     pub fuses: bool,
-    /// Address on which the fusing host listens: `"192.168.1.5:7447"`, or a name with a port.
+    /// Address on which the fusing host listens, such as `"192.168.1.5:7447"`, or a name with a port.
     pub address: Option<String>,
 }
 
-/// Data that cross from a host with cameras to the one that fuses.
+/// Data sent from a host with cameras to the fusing host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Carry {
-    /// Frames at search size as JPEG; poses are found on the host that fuses.
+    /// Frames at search size, as JPEG; the fusing host finds the poses.
     #[default]
     Frames,
-    /// Poses of single views. With a network, the maxima of its maps cross with them, and the views are solved in space as those of one
+    /// Poses of single views. With a network, the maxima of its maps are sent too, and the views are solved in space as on a single
     /// machine. Views of filters take no part in the search over several views, only in the triangulation.
     Poses,
 }
@@ -41,13 +41,13 @@ pub enum Carry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Link {
-    /// Data sent to the fusing host: `frames` as JPEG, or `poses` found at the camera, which is less data.
+    /// Data sent to the fusing host: `frames` as JPEG, or `poses` found at the camera, which need less bandwidth.
     pub carry: Carry,
-    /// Quality of the JPEG, 1 to 100.
+    /// Quality of the JPEG images, 1 to 100.
     pub jpeg_quality: u8,
-    /// Folder with `ca.pem`, and `HOST.pem` and `HOST.key` of this host, as `parallax hosts keys` makes them.
+    /// Folder with `ca.pem`, and with `HOST.pem` and `HOST.key` of this host, as written by `parallax hosts keys`.
     pub keys: Option<PathBuf>,
-    /// Connect without keys; anybody on the network can then read the pictures and send others.
+    /// Connect without keys; anyone on the network can then read the pictures and send false ones.
     pub insecure: bool,
 }
 
@@ -63,7 +63,7 @@ impl Default for Link {
 }
 
 impl Link {
-    /// Takes a relative path as relative to `base`.
+    /// Resolves relative paths against `base`.
     pub(crate) fn resolve(&mut self, base: &Path) {
         if let Some(keys) = &mut self.keys {
             *keys = base.join(&keys);
@@ -72,41 +72,41 @@ impl Link {
 }
 
 impl Deployment {
-    /// The host of that name.
+    /// Returns the host of a name.
     pub fn host(&self, name: &str) -> Option<&Host> {
         self.hosts.iter().find(|host| host.name == name)
     }
 
-    /// The host that fuses.
+    /// Returns the host that fuses the views.
     pub fn fusing_host(&self) -> Option<&Host> {
         self.hosts.iter().find(|host| host.fuses)
     }
 
-    /// The views of a host, ascending.
+    /// Returns the views of a host in ascending order.
     pub fn views_of(&self, host: &Host) -> Vec<usize> {
         let cameras = self.cameras.iter().enumerate();
         let own = cameras.filter(|(_, camera)| host.views.contains(&camera.name));
         own.map(|camera| camera.0).collect()
     }
 
-    /// The host that a view belongs to.
+    /// Returns the host that a view belongs to.
     pub fn host_of(&self, view: usize) -> Option<&Host> {
         let name = &self.cameras.get(view)?.name;
         self.hosts.iter().find(|host| host.views.contains(name))
     }
 
-    /// Returns true if the maps of networks cross between hosts with the poses, as Gaussians.
+    /// Returns true if hosts send the maps of networks, as Gaussians, together with the poses.
     pub fn maps_cross(&self) -> bool {
         self.link.carry == Carry::Poses && self.has_maps()
     }
 
-    /// The name of the part of a deployment that runs on a host: its processes share memory under it.
+    /// Returns the name of the part of a deployment that runs on a host. Its processes share memory under this name.
     pub fn name_on(&self, host: &Host) -> String {
         format!("{}.{}", self.name, host.name)
     }
 }
 
-/// Checks the hosts of a deployment; without any, only the numbers of the link.
+/// Checks the hosts of a deployment. Without hosts, checks only the numbers of the link.
 pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
     whole("link.jpeg_quality", it.link.jpeg_quality)?;
     if it.hosts.is_empty() {
@@ -116,7 +116,7 @@ pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
         it.hosts.len() >= 2,
         "host",
         "given once",
-        "two or more, or none: with one machine there are no hosts",
+        "two or more, or none: a single machine needs no host",
     )?;
     names(it)?;
     views(it)?;
@@ -162,7 +162,7 @@ fn names(it: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// Every view on exactly one host.
+/// Checks that every view is on exactly one host.
 fn views(it: &Deployment) -> Result<(), Complaint> {
     for host in &it.hosts {
         for view in &host.views {
@@ -193,14 +193,14 @@ fn views(it: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// Where the host that fuses listens: a name or number, and a port.
+/// Checks the address on which the fusing host listens: a name or number, and a port.
 fn address(host: &Host) -> Result<(), Complaint> {
     let Some(address) = &host.address else {
         return demand(
             !host.fuses,
             "host.address",
             &format!("left out of host {:?}, which fuses", host.name),
-            "where it listens: \"192.168.1.5:7447\"",
+            "the address on which it listens: \"192.168.1.5:7447\"",
         );
     };
     let parts = address.rsplit_once(':');
@@ -217,19 +217,19 @@ fn address(host: &Host) -> Result<(), Complaint> {
     )
 }
 
-/// Hosts do not wait for one another.
+/// Checks that the mode is real time, because hosts do not wait for each other.
 fn real_time(it: &Deployment) -> Result<(), Complaint> {
     demand(
         it.capture.mode == Mode::Realtime,
         "capture.mode",
         "not \"realtime\"",
-        "\"realtime\" where there are hosts: frames of several machines belong together by their times",
+        "\"realtime\" if there are hosts, because frames of several machines are matched by their times",
     )?;
     demand(
         it.capture.frame_rate_hz.is_some(),
         "capture.frame_rate_hz",
         "left out",
-        "frames per second of all cameras, where there are hosts",
+        "frames per second of all cameras, if there are hosts",
     )?;
     let has_clocks = it.cameras.iter().any(|camera| camera.offset_ms.is_some());
     demand(
@@ -252,7 +252,7 @@ fn keys(it: &Deployment) -> Result<(), Complaint> {
         it.link.insecure || it.link.keys.is_some(),
         "link.keys",
         "left out",
-        "the folder that `parallax hosts keys` makes; or link.insecure = true, which lets anybody on the network look on",
+        "the folder that `parallax hosts keys` makes; or link.insecure = true, which lets anyone on the network see the pictures",
     )?;
     demand(
         !(it.link.insecure && it.link.keys.is_some()),

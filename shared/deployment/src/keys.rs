@@ -4,7 +4,7 @@ use crate::fields::fields_of;
 use crate::schema::{Key, Shapes, schema};
 use crate::{Deployment, Runtime, Supervision, capture, hosts, network, paper, person, results};
 
-/// A section, and its keys in order.
+/// Name of a section, and its keys in order.
 type Section = (&'static str, fn() -> &'static [&'static str]);
 
 const SECTIONS: [Section; 8] = [
@@ -18,7 +18,7 @@ const SECTIONS: [Section; 8] = [
     ("runtime", fields_of::<Runtime>),
 ];
 
-/// Every key of a deployment file, in the order of the structs that read it. A `[[camera]]` is one key.
+/// Returns every key of a deployment file, in the order of the structs that read it. A `[[camera]]` is one key.
 pub fn keys() -> Vec<Key> {
     let schema = Shapes(schema());
     let top = fields_of::<Deployment>().iter();
@@ -34,14 +34,14 @@ pub fn keys() -> Vec<Key> {
     keys
 }
 
-/// The keys of a `[[camera]]`, without their section.
+/// Returns the keys of a `[[camera]]`, without their section.
 pub(crate) fn camera_keys() -> Vec<Key> {
     let schema = Shapes(schema());
     let fields = fields_of::<capture::Camera>().iter();
     fields.map(|field| schema.key("", "camera", field)).collect()
 }
 
-/// The keys of a `[[host]]`, without their section.
+/// Returns the keys of a `[[host]]`, without their section.
 pub(crate) fn host_keys() -> Vec<Key> {
     let schema = Shapes(schema());
     let fields = fields_of::<hosts::Host>().iter();

@@ -1,9 +1,12 @@
 //! The deployment: the file that a user writes, and the processes and topics that follow from it.
 //!
-//! Reading order: [`Deployment`] and its sections (the keys, their meanings and defaults), [`Loaded`] (from text and
-//! `--set` options to a deployment that was checked), [`Topology`] (which processes run, and who sends to whom).
+//! Suggested reading order:
 //!
-//! Pure: texts in, values out. What only the machine can tell is asked of a [`Machine`].
+//! - [`Deployment`] and its sections: the keys, their meanings and defaults.
+//! - [`Loaded`]: from text and `--set` options to a checked deployment.
+//! - [`Topology`]: the processes, and the topics between them.
+//!
+//! This crate does no input or output. It queries the machine through a [`Machine`].
 #![forbid(unsafe_code)]
 
 pub mod capture;
@@ -68,35 +71,37 @@ pub use topology::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Deployment {
-    /// Name of the deployment, under which its processes share memory.
+    /// Name of the deployment; its processes share memory under this name.
     pub name: String,
-    /// Calibration of the cameras.
+    /// File with the calibration of the cameras.
     pub rig: PathBuf,
-    /// Unit of the lengths in the calibration, in place of its format's: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or the side of a square such as
-    /// `"30mm"`.
+    /// Unit of length in the calibration, instead of the unit of its format: `"m"`, `"cm"`, `"mm"`, `"ft"`, `"in"`, or the side of a square
+    /// such as `"30mm"`.
     pub unit: Option<String>,
-    /// Direction against gravity in the world of the calibration, `[x, y, z]`; by default that of the file, or found in the pictures.
+    /// Up direction (opposite to gravity) in the world of the calibration, `[x, y, z]`; by default, from the calibration file or found in
+    /// the pictures.
     pub up: Option<[f64; 3]>,
-    /// How skeletons are found: by a `network`, or by the filters and the energy of the `paper`.
+    /// Method for finding skeletons: a `network`, or the filters and the energy of the `paper`.
     #[serde(default)]
     pub method: Method,
-    /// Where frames are searched: on the processor (`cpu`), on a graphics card (`gpu`), or on a graphics card where one can do it (`auto`).
+    /// Hardware on which frames are searched: the processor (`cpu`), a graphics card (`gpu`), or a graphics card if a suitable one is
+    /// present (`auto`).
     #[serde(default)]
     pub device: Device,
     /// Folder for the results.
     pub output: PathBuf,
-    /// Origin of the footage, shown if a file is missing.
+    /// Origin of the footage, as a hint to show if a file is missing.
     pub data: Option<String>,
-    /// The cameras, each a `[[camera]]`, in the order of the views.
+    /// The cameras, one `[[camera]]` each, in the order of the views.
     #[serde(rename = "camera")]
     pub cameras: Vec<capture::Camera>,
-    /// The machines, each a `[[host]]`, if there are several.
+    /// The machines, one `[[host]]` each, if there are several.
     #[serde(rename = "host", default, skip_serializing_if = "Vec::is_empty")]
     pub hosts: Vec<hosts::Host>,
-    /// How pixels get in.
+    /// How pixels enter the pipeline.
     #[serde(default)]
     pub capture: capture::Config,
-    /// The followed person, and the joints.
+    /// The person to follow, and the joints.
     #[serde(default)]
     pub person: person::Config,
     /// Keys of the network's method.
@@ -105,7 +110,7 @@ pub struct Deployment {
     /// Keys of the paper's method.
     #[serde(default)]
     pub paper: paper::Config,
-    /// The files of a run.
+    /// The files that a run writes.
     #[serde(default)]
     pub results: results::Config,
     /// The connection between hosts.
@@ -119,19 +124,19 @@ pub struct Deployment {
     pub runtime: Runtime,
 }
 
-/// Section `[supervise]`: how long to wait, and how often to try again.
+/// Section `[supervise]`: deadlines and numbers of restarts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Supervision {
-    /// How long a stage waits for a late view, milliseconds; by default 10000, or 200 in realtime.
+    /// Time that a stage waits for a late view, in milliseconds; by default 10000, or 200 in `realtime` mode.
     pub deadline_ms: Option<u64>,
-    /// How long a process may stand still before it is killed, seconds; by default 120, or 10 in realtime.
+    /// Time that a process may hang before it is killed, in seconds; by default 120, or 10 in `realtime` mode.
     pub hang_limit_s: Option<u64>,
-    /// Heartbeats, one every 150 ms, that a process may miss before it is killed.
+    /// Number of heartbeats, sent every 150 ms, that a process may miss before it is killed.
     pub missed_beats: u32,
-    /// Restarts of one process within a minute before the supervisor gives up.
+    /// Maximum number of restarts of one process within a minute before the supervisor gives up.
     pub max_restarts: u32,
-    /// Limit for the 99th percentile of the time from capture to result, milliseconds; above it the run fails.
+    /// Limit for the 99th percentile of the time from capture to result, in milliseconds; the run fails if it is exceeded.
     pub latency_budget_ms: Option<f64>,
 }
 
@@ -148,12 +153,13 @@ impl Default for Supervision {
 }
 
 impl Deployment {
-    /// Returns true if the method is the network's, which works on maps of the joints.
+    /// Returns true if the network's method is used, which works on maps of the joints.
     pub fn has_maps(&self) -> bool {
         self.method == Method::Network
     }
 
-    /// The network of a camera: its own, or that of all; none if it has keypoints, and by the paper's method.
+    /// Returns the network of a camera: its own, or the one for all cameras. Returns `None` if the camera has keypoints or the
+    /// paper's method is used.
     pub fn pose_network(&self, camera: usize) -> Option<&Path> {
         let camera = &self.cameras[camera];
         let network = camera.network.as_ref().unwrap_or(&self.network.file);
@@ -161,7 +167,7 @@ impl Deployment {
         has_one.then_some(network.as_path())
     }
 
-    /// The networks of all cameras, each once.
+    /// Returns the networks of all cameras, without duplicates.
     pub fn pose_networks(&self) -> Vec<&Path> {
         let mut networks: Vec<&Path> = Vec::new();
         for network in (0..self.cameras.len()).filter_map(|camera| self.pose_network(camera)) {
@@ -178,12 +184,12 @@ impl Deployment {
         errors.is_some_and(|errors| errors.network().is_some())
     }
 
-    /// Returns true if there are processes that send expected errors.
+    /// Returns true if any process sends expected errors.
     pub fn has_quality(&self) -> bool {
         self.paper.errors.is_some()
     }
 
-    /// How long a stage waits for a view that is late, milliseconds.
+    /// Returns the time that a stage waits for a late view, in milliseconds.
     pub fn deadline_ms(&self) -> u64 {
         self.supervise.deadline_ms.unwrap_or(match self.capture.mode {
             capture::Mode::Lossless | capture::Mode::Paced => 10_000,
@@ -191,7 +197,7 @@ impl Deployment {
         })
     }
 
-    /// How long the main loop of a process may stand still before it is killed, seconds.
+    /// Returns the time that the main loop of a process may hang before the process is killed, in seconds.
     pub fn hang_limit_s(&self) -> u64 {
         self.supervise.hang_limit_s.unwrap_or(match self.capture.mode {
             capture::Mode::Lossless | capture::Mode::Paced => 120,
@@ -199,7 +205,7 @@ impl Deployment {
         })
     }
 
-    /// Takes every relative path as relative to `base`.
+    /// Resolves every relative path against `base`.
     fn resolve(&mut self, base: &Path, machine: &dyn Machine) {
         for path in [&mut self.rig, &mut self.output] {
             *path = base.join(&path);

@@ -1,9 +1,9 @@
-//! Sees that every number of a deployment file is in its range, and names those that are doubtful.
+//! Checks that every number of a deployment file is in its range, and reports doubtful numbers.
 
 use crate::complaint::{Complaint, between, demand, whole};
 use crate::{Deployment, Runtime, capture, paper};
 
-/// Checks every number against the least and the most that it can mean.
+/// Checks every number against the range of its key.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     if let Some([x, y, z]) = it.up {
         let length = (x * x + y * y + z * z).sqrt();
@@ -60,9 +60,9 @@ fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
 }
 
 impl Deployment {
-    /// Returns doubts about settings that are possible but hardly meant: each with its number and a remedy to try.
+    /// Returns warnings about settings that are allowed but probably not intended, each with its value and a suggestion.
     ///
-    /// * `n_cores`: of the machine, where that is known.
+    /// * `n_cores`: number of cores of the machine, if known.
     pub fn doubts(&self, n_cores: Option<usize>) -> Vec<String> {
         let mut doubts = Vec::new();
         let is_lossless = self.capture.mode.is_lossless();
@@ -70,7 +70,7 @@ impl Deployment {
         if is_lossless && deadline_ms < 1000 {
             doubts.push(format!(
                 "`supervise.deadline_ms` is {deadline_ms}, and `capture.mode` \"lossless\": a view whose frame takes \
-                 longer has no part in the result; 10000 is usual"
+                 longer is left out of the result; 10000 is usual"
             ));
         }
         let hang_limit_s = self.hang_limit_s();
@@ -86,14 +86,14 @@ impl Deployment {
             .filter(|frame_rate_hz| !(1.0..=1000.0).contains(frame_rate_hz))
         {
             doubts.push(format!(
-                "`capture.frame_rate_hz` is {rate} frames per second: cameras have 1 to 1000"
+                "`capture.frame_rate_hz` is {rate} frames per second, but cameras usually have 1 to 1000"
             ));
         }
         let threads = self.runtime.threads;
         let cores = n_cores.unwrap_or(usize::MAX);
         if threads > cores.saturating_mul(4) {
             doubts.push(format!(
-                "`runtime.threads` is {threads} in every pose process, of a machine of {cores} cores"
+                "`runtime.threads` is {threads} in every pose process, on a machine with {cores} cores"
             ));
         }
         doubts.extend(self.runtime.doubts());
@@ -106,7 +106,7 @@ impl Runtime {
         let high = self.priority.iter().filter(|priority| *priority.1 == 99);
         let said = high.map(|(name, _)| {
             format!(
-                "`runtime.priority` of {name} is 99, above that of the system's own threads: up to 98 leaves those in charge"
+                "`runtime.priority` of {name} is 99, above that of the system's own threads; use at most 98"
             )
         });
         said.collect()

@@ -1,12 +1,12 @@
-//! Lists that are longer than what they are taken for.
+//! Lists with more values than their key takes.
 
 use toml::{Table, Value};
 
 use crate::{Complaint, Deployment};
 
-/// Sees that no list is longer than what was taken of it: readers of TOML pass over what is too much.
+/// Checks that no list has more values than were read. The TOML reader ignores surplus values.
 ///
-/// * `said`: all that `deployment` was read from.
+/// * `said`: the table that `deployment` was read from.
 pub(super) fn fits(deployment: &Deployment, said: &Table) -> Result<(), Complaint> {
     let Ok(taken) = Table::try_from(deployment) else {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Rules of a deployment with live cameras: nothing waits, and nothing is read again.
+//! Rules of a deployment with live cameras: nothing waits, and no picture can be read twice.
 
 use toml::Table;
 
@@ -6,13 +6,13 @@ use crate::capture::{Camera, Mode};
 use crate::complaint::demand;
 use crate::{Complaint, Deployment, Machine};
 
-/// Makes a deployment with a live camera one in real time, and checks the keys that only live cameras have.
+/// Switches a deployment with a live camera to real time, and checks the keys that only live cameras have.
 ///
-/// * `given`: what the user says.
+/// * `given`: settings that the user gave.
 ///
 /// # Errors
 ///
-/// The user asks for what a live camera cannot do, or gives keys of live cameras to footage.
+/// Fails if the settings need something that a live camera cannot do, or if a camera with footage has keys of live cameras.
 pub(crate) fn settle(
     it: &mut Deployment,
     given: &Table,
@@ -34,7 +34,9 @@ pub(crate) fn settle(
         !it.has_clocks(),
         "camera.offset_ms",
         "given, or `drift_ppm`, for footage",
-        &format!("neither: camera {name:?} is live, and footage beside it begins with the run"),
+        &format!(
+            "neither: camera {name:?} is live, and all footage in the same run begins with the run"
+        ),
     )?;
     let mode = given.get("capture").and_then(|section| section.get("mode"));
     demand(
@@ -42,14 +44,14 @@ pub(crate) fn settle(
         "capture.mode",
         &mode.map_or_else(String::new, ToString::to_string),
         &format!(
-            "\"realtime\", or nothing: camera {name:?} is live, and does not wait, so that a run of it is never lossless"
+            "\"realtime\", or nothing: camera {name:?} is live and does not wait, so a run with it is never lossless"
         ),
     )?;
     demand(
         it.capture.start_frame == 0,
         "capture.start_frame",
         &it.capture.start_frame.to_string(),
-        &format!("0: camera {name:?} is live, and has no frames of the past"),
+        &format!("0: camera {name:?} is live, so earlier frames do not exist"),
     )?;
     it.capture.mode = Mode::Realtime;
     Ok(())
@@ -62,7 +64,7 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         camera.fault.is_empty(),
         "camera.fault",
         &of,
-        "none: faults on purpose are for footage",
+        "none: simulated faults are for footage only",
     )?;
     demand(
         camera.keypoints.is_none(),
@@ -83,7 +85,7 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
             "given, or `drift_ppm`, for the live camera {:?}",
             camera.name
         ),
-        "neither: they are for footage; a live camera tells its times",
+        "neither: they are for footage only; a live camera reports its times",
     )?;
     let sides = camera.size.unwrap_or([1, 1]);
     demand(
@@ -103,7 +105,7 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
     keys_of_kind(camera)
 }
 
-/// Refuses keys of a live camera that are for another kind.
+/// Refuses keys of a live camera that belong to a different kind of camera.
 fn keys_of_kind(camera: &Camera) -> Result<(), Complaint> {
     let is_device = camera.source.starts_with("/dev/") || camera.source.starts_with("v4l2:");
     demand(
@@ -128,7 +130,7 @@ fn keys_of_kind(camera: &Camera) -> Result<(), Complaint> {
     )
 }
 
-/// Refuses keys that mean nothing for footage.
+/// Refuses keys that have no meaning for footage.
 fn no_keys_of_live(camera: &Camera) -> Result<(), Complaint> {
     let keys = [
         ("camera.format", camera.format.is_some()),
@@ -156,7 +158,7 @@ mod tests {
     use super::*;
     use crate::{ConfigError, Loaded};
 
-    /// A machine on which what begins with `/dev/` or `rtsp:` is live.
+    /// A machine on which every source that begins with `/dev/` or `rtsp:` is live.
     struct Room;
 
     impl Machine for Room {
@@ -173,6 +175,8 @@ mod tests {
         }
     }
 
+    /// Reads a deployment with a live camera and a camera with footage.
+    ///
     /// * `top`: sections; `camera`: more keys of the live camera; `other`: more keys of the footage.
     fn read([top, camera, other]: [&str; 3]) -> Result<Deployment, ConfigError> {
         let text = format!(

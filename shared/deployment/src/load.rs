@@ -1,4 +1,4 @@
-//! From a file and the options of the command line to a deployment.
+//! Loading of a deployment from a file and the options of the command line.
 
 use std::path::Path;
 
@@ -11,22 +11,22 @@ use crate::{Complaint, ConfigError, Deployment, Machine, live, method, rules};
 /// A deployment, and the origin of every value.
 #[derive(Debug)]
 pub struct Loaded {
-    /// The deployment, paths resolved, defaults filled in.
+    /// The deployment, with resolved paths and with defaults.
     pub deployment: Deployment,
-    /// Content of the file, as it stands there.
+    /// Content of the file, without changes.
     pub in_file: Table,
-    /// Settings of the command line.
+    /// Settings from the command line.
     pub on_command_line: Table,
 }
 
 impl Loaded {
-    /// Reads the text of a deployment file; `set` are `key=value` pairs that replace what it says.
+    /// Reads the text of a deployment file; `set` has `key=value` pairs that replace its values.
     ///
-    /// * `file`: where the text comes from. Relative paths are relative to it, wherever they are given.
+    /// * `file`: file that contains the text. All relative paths are relative to it, including those in `set`.
     ///
     /// # Errors
     ///
-    /// [`ConfigError`], the first that is found.
+    /// The first [`ConfigError`] found.
     pub fn parse(
         text: &str,
         file: &Path,
@@ -35,7 +35,7 @@ impl Loaded {
     ) -> Result<Self, ConfigError> {
         let malformed = |error: &toml::de::Error| malformed(file, text, error);
         let in_file: Result<Table, _> = toml::from_str(text);
-        // The complaints of the structs tell more than those of a table: they go first.
+        // Errors from the structs say more than errors from a table, so the structs are read first.
         let mut deployment: Deployment = toml::from_str(text).map_err(|error| malformed(&error))?;
         let in_file = in_file.map_err(|error| malformed(&error))?;
         let on_command_line = overrides(set)?;
@@ -72,15 +72,15 @@ impl Loaded {
 }
 
 impl Loaded {
-    /// A deployment that was read before, with other values.
+    /// Returns a loaded deployment with other values.
     ///
-    /// * `refused`: says what may not be replaced, by its dotted key, and why.
+    /// * `refused`: returns the reason if the value of a dotted key may not be replaced.
     ///
     /// Relative paths in `set` are relative to the working folder.
     ///
     /// # Errors
     ///
-    /// [`ConfigError`], the first that is found.
+    /// The first [`ConfigError`] found.
     pub fn again(
         deployment: &Deployment,
         set: &[String],
@@ -117,11 +117,11 @@ impl Loaded {
     }
 }
 
-/// Text that stands for a file when only the defaults are asked for.
+/// Text used instead of a file when only the defaults are needed.
 const NO_FILE: &str = "name = \"\"\nrig = \"\"\noutput = \"\"\ncamera = []\n";
 
 impl Loaded {
-    /// The defaults alone; the keys that have none are empty.
+    /// Returns the defaults alone; keys without a default are empty.
     ///
     /// # Errors
     ///
@@ -142,7 +142,7 @@ impl Loaded {
 
 /// Returns the options `--set section.key=value` as a table.
 ///
-/// A value that is not TOML is taken as text, so that `--set paper.energy=released` needs no quotes.
+/// A value that is not TOML is read as text, so that `--set paper.energy=released` needs no quotes.
 fn overrides(set: &[String]) -> Result<Table, ConfigError> {
     let mut table = Table::new();
     for argument in set {
@@ -168,7 +168,7 @@ fn overrides(set: &[String]) -> Result<Table, ConfigError> {
     Ok(table)
 }
 
-/// Puts what `over` says in the place of what `table` says, key by key.
+/// Replaces values of `table` by those of `over`, key by key.
 fn merge(table: &mut Table, over: Table) {
     for (key, value) in over {
         match (table.get_mut(&key), value) {

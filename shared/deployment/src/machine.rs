@@ -1,23 +1,23 @@
-//! Questions to the machine, so that this crate need not touch it.
+//! Queries to the machine, so that this crate does not access it directly.
 
 use std::path::{Path, PathBuf};
 
-/// Answers of the machine that a deployment is loaded on.
+/// The machine that a deployment is loaded on.
 pub trait Machine {
-    /// The folder of a file, absolute where the working folder is known.
+    /// Returns the folder of a file, as an absolute path if the working folder is known.
     fn folder_of(&self, file: &Path) -> PathBuf;
 
-    /// Footage as it is named in a file of the folder `base`, its path resolved. A name that is no file stays as it
-    /// is: the run refuses it.
+    /// Returns the source of footage with its path resolved against `base`, the folder of the file that names it. A name that is
+    /// not a file is returned unchanged; the run refuses it later.
     fn footage(&self, named: &str, base: &Path) -> String;
 
-    /// Returns true if footage is a live camera.
+    /// Returns true if a source is a live camera.
     ///
-    /// * `named`: as [`Self::footage`] returned it.
+    /// * `named`: the source, as returned by [`Self::footage`].
     fn is_live(&self, named: &str) -> bool;
 }
 
-/// A machine that has everything, and on which all footage is files: for tests, and for tools that only look at a file.
+/// A machine that treats all footage as files, for tests and for tools that only inspect a deployment file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AnyMachine;
 

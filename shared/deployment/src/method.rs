@@ -1,4 +1,4 @@
-//! The method by which skeletons are found, and the keys that belong to one method alone.
+//! The method for finding skeletons, and the keys that belong to one method alone.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,11 +6,11 @@ use toml::{Table, Value};
 
 use crate::{Deployment, paper};
 
-/// How skeletons are found.
+/// Method for finding skeletons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Maps of the joints by a network, or keypoints of other programs; solved in space over all views.
+    /// Maps of the joints from a network, or keypoints from other programs, solved in space over all views.
     #[default]
     Network,
     /// Filters and the paper's energy between views.
@@ -18,7 +18,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Its word in a deployment file, and the name of its section.
+    /// Returns the name of the method in a deployment file, which is also the name of its section.
     pub fn name(self) -> &'static str {
         match self {
             Self::Network => "network",
@@ -26,7 +26,7 @@ impl Method {
         }
     }
 
-    /// The other method.
+    /// Returns the other method.
     #[must_use]
     pub fn other(self) -> Self {
         match self {
@@ -41,22 +41,22 @@ impl Method {
     }
 }
 
-/// Most cameras that the paper's method solves at once.
+/// Maximum number of cameras that the paper's method solves at once.
 pub(crate) const MOST_AT_ONCE: usize = 8;
 
-/// Unit in which the views of a frame are solved.
+/// Group of views of a frame that are solved together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Views {
-    /// Pairs, whose poses are then combined: the paper's method.
+    /// Pairs of views, whose poses are then combined: the paper's method.
     Pairs,
-    /// All at once, every view supported by all others: the paper's method.
+    /// All views at once, each supported by all others: the paper's method.
     All,
-    /// All at once, in space: the network's method.
+    /// All views at once, in space: the network's method.
     Space,
 }
 
 impl Deployment {
-    /// Returns the unit in which the views of a frame are solved.
+    /// Returns the group of views of a frame that are solved together.
     pub fn views(&self) -> Views {
         match (self.method, self.paper.views) {
             (Method::Network, _) => Views::Space,
@@ -65,7 +65,7 @@ impl Deployment {
         }
     }
 
-    /// Most fusion processes that have something to do: all views at once are one piece of work.
+    /// Returns the maximum number of fusion processes that have work to do. If all views are solved at once, there is only one task.
     pub(crate) fn most_workers(&self) -> usize {
         match self.views() {
             Views::Pairs => self.paper.workers,
@@ -74,17 +74,17 @@ impl Deployment {
     }
 }
 
-/// A key of the other method.
+/// A key that belongs to the method that is not used.
 pub(crate) struct Stranger {
-    /// The key, with its section.
+    /// Name of the key, with its section.
     pub(crate) key: String,
-    /// The word to change, and why.
+    /// The change to make, and the reason.
     pub(crate) message: String,
 }
 
-/// A key of the other method; none if there is none.
+/// Returns a key that belongs to the method that is not used, if one is given.
 ///
-/// * `given`: what the user says.
+/// * `given`: settings that the user gave.
 pub(crate) fn stranger(method: Method, given: &Table) -> Option<Stranger> {
     let key = stray_key(method, given)?;
     let other = method.other().name();

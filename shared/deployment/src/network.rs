@@ -1,4 +1,4 @@
-//! Section `[network]` of a deployment file: the keys that only the network's method has.
+//! Section `[network]` of a deployment file: the keys of the network's method.
 
 use std::path::{Path, PathBuf};
 
@@ -7,24 +7,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::shipped::{SHIPPED, relative_to};
 
-/// The network that finds the joints of people, and where it looks.
+/// The network that finds the joints of people, and the detector that finds the people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Network")]
 pub struct Config {
-    /// The network that finds joints: an ONNX file with its card beside it (`.toml` for `.onnx`) or in its metadata, or `"shipped"`.
+    /// Network that finds joints: `"shipped"`, or an ONNX file with its card in its metadata or beside it (`.toml` for `.onnx`).
     pub file: PathBuf,
-    /// The detector of people, which finds boxes for the network: an ONNX file with its card beside it or in its metadata, or `"shipped"`.
+    /// Detector that finds people: `"shipped"`, or an ONNX file with its card in its metadata or beside it. It gives boxes to the network.
     pub detector: PathBuf,
-    /// Search for people in every n-th frame; by default twice a second, and eight times while several people are near each other or one of them came or went.
+    /// Search for people in every n-th frame; by default, twice a second. While people are near each other, or someone has just come or
+    /// gone, the default is eight times a second.
     pub find_every: Option<u64>,
-    /// Least mean heat of the joints of a visible person, 0 to 1.
+    /// Minimum heat of a visible person, 0 to 1, as the mean over the joints.
     pub least_heat: f64,
-    /// Most people in a view, and in a frame.
+    /// Maximum number of people in a view, and in a frame.
     pub people: usize,
-    /// Use the mean with the mirror image of every person, which is more exact and takes twice the time.
+    /// Average the results of each person's picture and its mirror image; more exact, but takes twice the time.
     pub mirror: bool,
-    /// The library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector in place of the built-in runtime.
+    /// Library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector instead of the built-in runtime.
     pub onnx_runtime: Option<PathBuf>,
 }
 
@@ -43,7 +44,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Takes every relative path as relative to `base`.
+    /// Resolves every relative path against `base`.
     pub(crate) fn resolve(&mut self, base: &Path) {
         self.file = relative_to(&self.file, base);
         self.detector = relative_to(&self.detector, base);

@@ -1,4 +1,4 @@
-//! Section `[paper]` of a deployment file: the keys that only the paper's method has.
+//! Section `[paper]` of a deployment file: the keys of the paper's method.
 
 mod consistency;
 mod errors;
@@ -14,51 +14,55 @@ use crate::shipped::{SHIPPED, is_none, relative_to};
 pub use consistency::{Consistency, RigConsistency};
 pub use errors::{ErrorTable, Errors};
 
-/// How long a frame waits for expected errors in real time.
+/// Time that a frame waits for expected errors in real time.
 pub const ERRORS_DEADLINE: Duration = Duration::from_millis(50);
-/// Age of the last expected errors of a view up to which they stand in for those of a frame; else its parts count.
+/// Maximum age at which a view's last expected errors may replace those of a frame. Beyond this age, no part is switched off.
 pub const ERRORS_MAX_AGE: Duration = Duration::from_millis(500);
 
-/// Filters that find people in every view, and the energy that ties the views together.
+/// Filters that find people in every view, and the energy that links the views.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Paper")]
 pub struct Config {
-    /// The trained model of a person; by default the one that ships.
+    /// Trained model of a person; by default, the shipped one.
     pub model: Option<PathBuf>,
-    /// Search of a view: `full`, everywhere in every frame; `tracked`, near the last pose, faster and approximate.
+    /// How a view is searched: `full`, everywhere in every frame; `tracked`, near the last pose, which is faster but approximate.
     pub search: Search,
-    /// Most distinct candidates of a view for fusion.
+    /// Maximum number of distinct candidates of a view for fusion.
     pub candidates: usize,
-    /// The network that sees in which direction a person faces: a file of `parallax-lab train orientation`, `"shipped"` or `"none"`.
+    /// Network that estimates the direction in which a person faces: a file from `parallax-lab train orientation`, `"shipped"` or `"none"`.
     pub orientation: PathBuf,
-    /// Views that are solved together: `pairs`, whose poses are combined, as published; or `all`, 8 at most.
+    /// Views that are solved together: `pairs`, whose poses are then combined, as published; or `all`, for at most 8 views.
     pub views: Views,
-    /// Pairs of cameras to fuse, by name; all if empty.
+    /// Names of the pairs of cameras to fuse; if empty, all pairs.
     pub pairs: Vec<[String; 2]>,
-    /// Most fusion processes for the pairs of views.
+    /// Maximum number of fusion processes for the pairs of views.
     pub workers: usize,
     /// How the poses of a view's pairs are combined: `mean`, as published, or `consensus`, the pose that most views support.
     pub combine: Combine,
-    /// The energy that ties two views together: the `paper`'s, or that of the authors' `released` program.
+    /// Energy that links two views: that of the `paper`, or that of the authors' `released` program.
     pub energy: Energy,
-    /// Weight of the geometric term; by default as learned, or 0.002 per squared cell (`paper`) or 0.07 (`released`).
+    /// Weight of the geometric term; by default, as learned, or else 0.002 per squared cell (`paper`) or 0.07 (`released`).
     pub alpha: Option<f64>,
-    /// Weight of the part-type term; by default as learned, or 0.03.
+    /// Weight of the part-type term; by default, as learned, or else 0.03.
     pub beta: Option<f64>,
-    /// Result of `parallax-lab train consistency`: a file, `"shipped"`, or `{ file = FILE, rig = NAME }` with the tables of a named rig.
+    /// Result of `parallax-lab train consistency`: a file, `"shipped"`, or `{ file = FILE, rig = NAME }` to use the tables of a named rig.
     pub consistency: Option<Consistency>,
     /// Part-type tables of pairs of cameras, each `{ views = [a, b], files = [a wrt b, b wrt a] }`.
     pub compatibility: Vec<Compatibility>,
-    /// Expected errors of the parts: a network (ONNX, or `"shipped"`), or `{ table = FILE, subject, action, views, frame_offset, frame_step }`.
+    /// Source of the expected errors of the parts: a network (ONNX, or `"shipped"`), or
+    /// `{ table = FILE, subject, action, views, frame_offset, frame_step }`.
     pub errors: Option<Errors>,
-    /// Expected error above which a part is switched off: `none`, `learned`, the name of a data set, pixels of each part, or `{ file = FILE }`.
+    /// Expected error above which a part is switched off: `none`, `learned`, the name of a data set, a list with a value in pixels for each
+    /// part, or `{ file = FILE }`.
     pub tau: Tau,
-    /// View whose expected error switches a part off: `either`, as published, the `support`, or the support if it is the `worse`.
+    /// View whose expected error switches a part off: `either` view, as published; the `support`; or the support if it is the `worse` of
+    /// the two.
     pub switch: Switch,
-    /// Decide for every view whether it sees the person from behind.
+    /// Decide for every view whether the person is seen from behind.
     pub facing: bool,
-    /// Places of joints among the parts: a file of `parallax-lab train joints`, `"shipped"`, or `"none"` for the centres of parts.
+    /// Positions of joints relative to the parts: a file from `parallax-lab train joints`, `"shipped"`, or `"none"` for the centres of
+    /// parts.
     pub joint_map: PathBuf,
     /// Treat the model as a human body: bones keep their lengths, and impossible joints are left out.
     pub bodies: bool,
@@ -91,7 +95,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Takes every relative path as relative to `base`.
+    /// Resolves every relative path against `base`.
     pub fn resolve(&mut self, base: &Path) {
         let consistency = self.consistency.as_mut().map(Consistency::file_mut);
         for file in self.model.as_mut().into_iter().chain(consistency) {
@@ -120,56 +124,56 @@ impl Config {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Search {
-    /// Every frame on all levels and everywhere, as published.
+    /// Every frame is searched everywhere and on all levels, as published.
     #[default]
     Full,
-    /// Near the best pose of the last frame, and in full now and then: faster, and approximate.
+    /// Frames are searched near the best pose of the last frame, and in full now and then: faster, but approximate.
     Tracked,
 }
 
-/// Views that the paper's method solves at once.
+/// Views that the paper's method solves together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Views {
-    /// Pairs, whose poses are then combined, as published.
+    /// Pairs of views, whose poses are then combined, as published.
     #[default]
     Pairs,
-    /// All views, each supported by all others.
+    /// All views at once, each supported by all others.
     All,
 }
 
-/// How a view's pose is made of those of its pairs.
+/// How the poses of a view's pairs are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Combine {
-    /// Their mean, as published.
+    /// The mean of the poses, as published.
     #[default]
     Mean,
-    /// Part by part the answers that all views can mean together.
+    /// For each part, the positions that agree across all views.
     Consensus,
 }
 
-/// Which energy ties two views together.
+/// Energy that links two views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Energy {
-    /// The paper's.
+    /// The energy of the paper.
     #[default]
     Paper,
-    /// The energy that the authors' program computes.
+    /// The energy of the authors' released program.
     Released,
 }
 
-/// Whose expected error switches a part off.
+/// View whose expected error switches a part off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Switch {
-    /// That of either view, as in the paper.
+    /// Either view, as in the paper.
     #[default]
     Either,
-    /// That of the view that supports the other.
+    /// The view that supports the other.
     Support,
-    /// The same, where it is also the worse of the two.
+    /// The supporting view, if its expected error is also the larger of the two.
     Worse,
 }
 
@@ -181,11 +185,11 @@ pub enum Switch {
                  one number per part, or { file = \"...\" }"
 )]
 pub enum Tau {
-    /// Thresholds that are known by name.
+    /// Thresholds with a known name.
     Named(TauName),
-    /// Pixels of the footage, one per part.
+    /// One threshold per part, in pixels of the footage.
     Given(Vec<f32>),
-    /// The same from a file.
+    /// Thresholds in a file.
     File(TauFile),
 }
 
@@ -193,36 +197,36 @@ pub enum Tau {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TauFile {
-    /// Numbers separated by white space or commas, pixels of the footage; `#` begins a comment.
+    /// File of numbers separated by white space or commas, in pixels of the footage; `#` begins a comment.
     pub file: PathBuf,
 }
 
-/// Thresholds that are known by name.
+/// Thresholds with a known name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum TauName {
     /// No part is ever switched off.
     #[serde(rename = "none")]
     None,
-    /// Those of the file `consistency`, in tenths of the person's size.
+    /// Thresholds from the file `consistency`, in tenths of the person's size.
     #[serde(rename = "learned")]
     Learned,
-    /// Those of the authors' program for `HumanEva`: median training error plus inaccuracy.
+    /// Thresholds of the authors' program for `HumanEva`: median training error plus inaccuracy.
     #[serde(rename = "humaneva")]
     HumanEva,
-    /// The paper's rule for `HumanEva`: the median training error alone.
+    /// Thresholds of the paper for `HumanEva`: the median training error alone.
     #[serde(rename = "humaneva-median")]
     HumanEvaMedian,
-    /// Those of the authors' program for UMPM.
+    /// Thresholds of the authors' program for UMPM.
     #[serde(rename = "umpm")]
     Umpm,
-    /// The paper's rule for UMPM.
+    /// Thresholds of the paper for UMPM: the median training error alone.
     #[serde(rename = "umpm-median")]
     UmpmMedian,
 }
 
 impl Tau {
-    /// The thresholds that the deployment gives itself, one per part, pixels of the footage; none where they are known
-    /// by name or are in a file.
+    /// Returns the thresholds listed in the deployment itself, one per part, in pixels of the footage. The slice is empty if the
+    /// thresholds are known by name or are in a file.
     pub fn given(&self) -> &[f32] {
         match self {
             Self::Given(px) => px,
@@ -235,9 +239,8 @@ impl Tau {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Compatibility {
-    /// The two cameras, by name.
+    /// Names of the two cameras.
     pub views: [String; 2],
-    /// `[first with respect to second, second with respect to first]`: rows are the types of the
-    /// first-named view of each.
+    /// `[first with respect to second, second with respect to first]`. The rows of each table are the types of the view named first.
     pub files: [PathBuf; 2],
 }

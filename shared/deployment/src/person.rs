@@ -3,14 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The person whose skeleton comes out, and the joints that it has.
+/// The person to follow, and the joints of the resulting skeleton.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Person")]
 pub struct Config {
-    /// Which of several people comes first: `last`, the one of the frame before; `largest` or `clearest`, chosen anew in every frame.
+    /// Which of several people comes first: `last`, the one followed in the previous frame; `largest` or `clearest`, chosen anew in every
+    /// frame.
     pub follow: Follow,
-    /// The set of joints: `parse14`, `umpm15` or `humaneva20`.
+    /// Set of joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,
 }
 
@@ -27,17 +28,17 @@ impl Default for Config {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Follow {
-    /// The one nearest to where the person was in the frame before.
+    /// The person nearest to the position in the previous frame.
     #[default]
     Last,
-    /// The largest in the pictures.
+    /// The person who is largest in the pictures.
     Largest,
-    /// The one that most views see most clearly.
+    /// The person whom most views see clearly.
     Clearest,
 }
 
 impl Follow {
-    /// The word of the deployment file.
+    /// Returns the name of the value in a deployment file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Last => "last",

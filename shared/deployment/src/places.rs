@@ -1,4 +1,4 @@
-//! Where a key of a deployment file stands, and which key a complaint of the TOML reader is about.
+//! Position of a key in a deployment file, and the key that an error of the TOML reader refers to.
 
 use std::ops::Range;
 use std::path::Path;
@@ -7,7 +7,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::{ConfigError, slips};
 
-/// `file:line` of a span; the file alone where there is none.
+/// Returns `file:line` of a span; the file alone if there is no span.
 pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
     let Some(before) = span.and_then(|span| text.get(..span.start)) else {
         return file.display().to_string();
@@ -16,7 +16,7 @@ pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> Stri
     format!("{}:{line}", file.display())
 }
 
-/// Where a dotted key stands in `text`; where its section does if the key itself is not there.
+/// Returns the position of a dotted key in `text`; that of its section if the key itself is missing.
 pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
     let document = DeTable::parse(text).ok()?;
     let mut table = document.into_inner();
@@ -32,7 +32,7 @@ pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
     found
 }
 
-/// Returns the error of a text of a file, with its line and its key.
+/// Returns the error for the text of a file, with its line and its key.
 pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> ConfigError {
     let place = place(file, text, error.span());
     let at = error.span();
@@ -45,7 +45,7 @@ pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> Con
         return ConfigError::Malformed { place, message };
     }
     let key = match &at {
-        // The document cannot be read then: the slice is the key itself.
+        // The document cannot be parsed in this case; the slice is the key itself.
         Some(span) if error.message().starts_with("duplicate key") => {
             text.get(span.clone()).map(str::to_owned)
         }
@@ -55,19 +55,20 @@ pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> Con
     ConfigError::explain(place, error.message(), key.as_deref())
 }
 
-/// Returns the error of an option `--set`, with its key.
+/// Returns the error for a `--set` option, with its key.
 pub(super) fn of_set(error: &toml::de::Error) -> ConfigError {
     let said = error.to_string();
     let key = said.split("in `").nth(1).and_then(|part| part.split('`').next());
     ConfigError::explain("--set".to_owned(), error.message(), key)
 }
 
-/// The dotted key whose value holds a span.
+/// Returns the dotted key whose value contains a span.
 fn key_at(text: &str, span: &Range<usize>) -> Option<String> {
     within(DeTable::parse(text).ok()?.get_ref(), span)
 }
 
-/// The same in a table; what stands further in goes first, for the span of a table is that of its head alone.
+/// Returns the dotted key in a table whose value contains a span. Inner values are searched first, because the span of a table covers
+/// only its head.
 fn within(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
     table.iter().find_map(|(name, value)| {
         let inner = match value.get_ref() {

@@ -1,22 +1,22 @@
-//! The least and the most of every number of a deployment file.
+//! Range of every number of a deployment file.
 
 use messages::{MAX_CANDIDATES, MAX_VIEWS};
 
-/// Most cores of a machine that Linux numbers.
+/// Maximum number of cores that Linux supports on a machine.
 pub const MAX_CORES: usize = 1024;
 
-/// One hour, and one day, milliseconds.
+/// One hour, and one day, in milliseconds.
 const HOUR_MS: f64 = 3_600_000.0;
 const DAY_MS: f64 = 24.0 * HOUR_MS;
-/// A day, seconds.
+/// One day, in seconds.
 const DAY_S: f64 = 86_400.0;
-/// The most frames of any footage: a thousand years of video.
+/// Maximum number of frames of any footage: a thousand years of video.
 const MOST_FRAMES: f64 = 1e12;
 
-/// The key of a number, of a list of numbers or of a table of such, with the least and the most that it can be; of
-/// `camera` the length of the list.
+/// Keys with their minimum and maximum. The value of a key is a number, a list of numbers or a table of numbers; for `camera`, the
+/// range is that of the list's length.
 ///
-/// Whole numbers are among them: all of these are exact.
+/// The ranges of whole numbers are also given as `f64`, which represents all of them exactly.
 pub(crate) const RANGES: [(&str, f64, f64); 26] = [
     ("capture.size", 1.0, 16_384.0),
     ("capture.scale", 0.001, 8.0),
@@ -46,7 +46,7 @@ pub(crate) const RANGES: [(&str, f64, f64); 26] = [
     ("camera", 1.0, MAX_VIEWS as f64),
 ];
 
-/// The least and the most of a key; of one without a row, none.
+/// Returns the minimum and maximum of a key; infinite if the key has no row.
 pub(crate) fn range(key: &str) -> [f64; 2] {
     let row = RANGES.iter().find(|range| range.0 == key);
     row.map_or([f64::NEG_INFINITY, f64::INFINITY], |&(_, least, most)| {

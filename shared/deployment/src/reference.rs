@@ -17,7 +17,7 @@ schema for editors. `[network]` has the keys of `method = \"network\"`, `[paper]
 is refused.
 ";
 
-/// Every key with what it takes, its default and its meaning.
+/// Returns every key with its accepted values, its default and its meaning.
 ///
 /// # Errors
 ///
@@ -69,7 +69,7 @@ fn row(text: &mut String, name: &str, key: &Key, default: Option<String>) {
     let _infallible = writeln!(text, "| `{name}` | {takes} | {default} | {meaning} |");
 }
 
-/// The value that a key has where nothing gives it one.
+/// Returns the default value of a key as text.
 fn default(entry: &Entry) -> Option<String> {
     let required = Table::from_iter([
         ("name".to_owned(), Value::from("")),
@@ -79,7 +79,7 @@ fn default(entry: &Entry) -> Option<String> {
     ]);
     let value = entry.value.as_ref()?;
     let text = match *value {
-        // Single precision, as it was written.
+        // A number in single precision is printed as it was written.
         Value::Float(it) if f64::from(it as f32) == it => (it as f32).to_string(),
         _ => value.to_string(),
     };

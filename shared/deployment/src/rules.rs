@@ -1,11 +1,11 @@
-//! Conditions that a deployment must meet before anything is started.
+//! Conditions that a deployment must meet before anything starts.
 
 use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::method::MOST_AT_ONCE;
 use crate::topology::{process_name, services};
 use crate::{Deployment, Views, capture, hosts, limits, network, paper, slips};
 
-/// Checks the values that the types alone do not.
+/// Checks the values that the types alone do not check.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     name(&it.name)?;
     if let Some(unit) = &it.unit {
@@ -13,7 +13,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
             unit.parse::<geometry::files::Unit>().is_ok(),
             "unit",
             &format!("{unit:?}"),
-            "\"m\", \"cm\", \"mm\", \"ft\", \"in\", or a length such as \"30mm\", the squares of the board",
+            "\"m\", \"cm\", \"mm\", \"ft\", \"in\", or a length such as \"30mm\" (the side of a square of the board)",
         )?;
     }
     for (key, path) in [("rig", &it.rig), ("output", &it.output)] {
@@ -82,7 +82,7 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// A path without what a backslash makes in double quotes.
+/// Checks that a path has no control characters, which a backslash produces in double quotes.
 fn is_path(key: &str, path: &str) -> Result<(), Complaint> {
     demand(
         !path.chars().any(char::is_control),
@@ -98,7 +98,7 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         !camera.source.is_empty() || camera.keypoints.is_some(),
         "camera.source",
         &format!("left out of camera {:?}", camera.name),
-        "its footage: every [[camera]] needs that, or `keypoints` that another program found in it",
+        "footage: every [[camera]] needs a `source`, or `keypoints` from another program",
     )?;
     is_path("camera.source", &camera.source)?;
     if let Some(capture::Rotate::Degrees(degrees)) = camera.rotate {
@@ -164,7 +164,7 @@ fn network(config: &network::Config) -> Result<(), Complaint> {
     whole("network.people", config.people)
 }
 
-/// A camera has a network of its own, or keypoints.
+/// Checks that a camera does not have both a network of its own and keypoints.
 fn eyes(camera: &capture::Camera) -> Result<(), Complaint> {
     demand(
         camera.network.is_none() || camera.keypoints.is_none(),
@@ -174,11 +174,11 @@ fn eyes(camera: &capture::Camera) -> Result<(), Complaint> {
     )
 }
 
-/// Checks the numbers of the energy between views, which an evaluation reads from a file of its own, too.
+/// Checks the numbers of the energy between views. An evaluation also reads them from a file of its own.
 ///
 /// # Errors
 ///
-/// The first number that is not allowed.
+/// Returns a complaint about the first number that is not allowed.
 pub fn energy_numbers(config: &paper::Config) -> Result<(), Complaint> {
     whole("paper.workers", config.workers)?;
     not_negative("paper.alpha", config.alpha.unwrap_or(0.0))?;
@@ -200,7 +200,7 @@ fn paper(deployment: &Deployment) -> Result<(), Complaint> {
         !needs_file || config.consistency.is_some(),
         "paper.tau",
         "\"learned\"",
-        "thresholds, or `paper.consistency` to name the file that has them",
+        "thresholds, or a file of thresholds in `paper.consistency`",
     )?;
     let tables = config.compatibility.iter();
     let tables = tables.map(|tables| ("paper.compatibility", &tables.views));
@@ -251,7 +251,7 @@ fn errors(deployment: &Deployment) -> Result<(), Complaint> {
     )
 }
 
-/// Refuses what has no meaning where all views are solved at once.
+/// Refuses settings that have no meaning if all views are solved at once.
 fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
     let config = &deployment.paper;
     if deployment.views() != Views::All {
@@ -268,7 +268,7 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         config.energy == paper::Energy::Paper,
         "paper.energy",
         "\"released\"",
-        "\"paper\", the only one that all views at once have",
+        "\"paper\": `paper.views = \"all\"` works with no other energy",
     )?;
     demand(
         config.pairs.is_empty(),
@@ -280,7 +280,7 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         config.combine == paper::Combine::Mean,
         "paper.combine",
         "\"consensus\"",
-        "\"mean\": where `paper.views` is \"all\", there is nothing to combine",
+        "\"mean\": if `paper.views` is \"all\", there is nothing to combine",
     )
 }
 
@@ -305,7 +305,7 @@ fn runtime(deployment: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// Checks that a name is that of a service, or of a process of the deployment.
+/// Checks that a name is that of a service or of a process of the deployment.
 fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Complaint> {
     let services = services(deployment);
     let is_one = services.iter().any(|&(service, n)| {

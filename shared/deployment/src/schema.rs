@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::Deployment;
 use crate::ranges::RANGES;
 
-/// The JSON schema (draft 2020-12) of a deployment file, made from the structs that read it.
+/// Returns the JSON schema (draft 2020-12) of a deployment file, generated from the structs that read it.
 pub fn schema() -> Value {
     let generator = SchemaSettings::draft2020_12().into_generator();
     let mut schema = generator.into_root_schema_for::<Deployment>();
@@ -25,7 +25,7 @@ pub fn schema() -> Value {
     schema
 }
 
-/// Where the schema speaks of the numbers of a key, as JSON pointers.
+/// Returns JSON pointers to the numbers of a key in the schema.
 fn numbers_of(schema: &Value, key: &str) -> Option<Vec<String>> {
     let mut at = String::new();
     for name in key.split('.') {
@@ -57,13 +57,13 @@ fn numbers_of(schema: &Value, key: &str) -> Option<Vec<String>> {
     Some(found)
 }
 
-/// A pointer to what a reference refers to; anything else is itself.
+/// Returns a pointer to the target of a reference; any other pointer is returned unchanged.
 fn resolved(schema: &Value, at: String) -> Option<String> {
     let reference = schema.pointer(&at)?["$ref"].as_str();
     Some(reference.map_or(at, |reference| reference.trim_start_matches('#').to_owned()))
 }
 
-/// A whole number without a point.
+/// Returns a number; a whole number has no decimal point.
 fn as_written(number: f64) -> Value {
     if number.fract() == 0.0 {
         Value::from(number as i64)
@@ -75,22 +75,22 @@ fn as_written(number: f64) -> Value {
 /// A key of a deployment file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
-    /// Its name with its section: `paper.workers`.
+    /// Name of the key with its section, such as `paper.workers`.
     pub name: String,
-    /// Meaning of the key: the documentation of its field.
+    /// Meaning of the key, from the documentation of its field.
     pub meaning: String,
-    /// Values that it takes, as TOML: `whole number`, `"paper" or "released"`.
+    /// Accepted values, as TOML, such as `whole number` or `"paper" or "released"`.
     pub takes: String,
 }
 
-/// A JSON schema, asked about its keys.
+/// A JSON schema that returns the keys of its sections.
 pub(crate) struct Shapes(pub Value);
 
 impl Shapes {
-    /// One key of a section.
+    /// Returns one key of a section.
     ///
-    /// * `prefix`: goes before its name.
-    /// * `section`: its section; empty at the top.
+    /// * `prefix`: text to put before the name of the key.
+    /// * `section`: section of the key; empty for top-level keys.
     pub(crate) fn key(&self, prefix: &str, section: &str, name: &str) -> Key {
         let of = if section.is_empty() {
             &self.0
@@ -121,7 +121,7 @@ impl Shapes {
         &self.0["$defs"][name]
     }
 
-    /// Returns the values that a schema takes, in words.
+    /// Returns the values that a schema accepts, in words.
     fn takes(&self, schema: &Value) -> String {
         let schema = self.resolved(schema);
         for choice in ["anyOf", "oneOf"] {
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(required, ["camera", "name", "output", "rig"]);
     }
 
-    /// Numbers that their type or their meaning bounds, and no range.
+    /// Numbers that are bounded by their type or their meaning, not by a range.
     const WITHOUT_RANGE: [&str; 3] = ["up", "capture.frozen_after", "results.overlay_every"];
 
     #[test]

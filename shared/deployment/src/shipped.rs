@@ -1,24 +1,24 @@
-//! The words that stand for a file which is built into Parallax, and for no file.
+//! Reserved names for a file that is built into Parallax, and for no file.
 
 use std::path::{Path, PathBuf};
 
-/// The word that stands for a file that ships, where a file can be named; `./shipped` is a file of that name.
+/// Reserved name for the built-in file. Use `./shipped` for a file with this name.
 pub const SHIPPED: &str = "shipped";
 
-/// Returns true if a name is that of a file that ships.
+/// Returns true if the name means the built-in file.
 pub fn is_shipped(file: &Path) -> bool {
     file == Path::new(SHIPPED)
 }
 
-/// The word that stands for no file, where there is one without it; `./none` is a file of that name.
+/// Reserved name for no file. Use `./none` for a file with this name.
 pub const NONE: &str = "none";
 
-/// Returns true if a name stands for no file.
+/// Returns true if the name means no file.
 pub fn is_none(file: &Path) -> bool {
     file == Path::new(NONE)
 }
 
-/// A name with relative paths taken as relative to `base`.
+/// Resolves a relative path against `base`; reserved names are returned unchanged.
 pub fn relative_to(file: &Path, base: &Path) -> PathBuf {
     if is_shipped(file) {
         return file.to_owned();

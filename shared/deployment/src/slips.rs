@@ -1,11 +1,11 @@
-//! Texts that TOML reads otherwise than meant, and files of other programs in the place of a deployment.
+//! Texts that TOML reads differently from what the user meant, and files of other programs given as a deployment.
 
-/// Returns the message for a whole text that is not a deployment; `None` where it may be one.
+/// Returns the message for a text that is not a deployment; `None` if it may be one.
 pub(super) fn other_file(text: &str) -> Option<&'static str> {
     let begins =
         |head: &str| text.lines().any(|line| line.trim_end() == head || line.starts_with(head));
     if begins("format = \"parallax-rig\"") {
-        return Some("this is a rig file: name the deployment file, whose `rig` it is");
+        return Some("this is a rig file: give the deployment file whose `rig` names it");
     }
     // Sections of Pose2Sim's Config.toml.
     let sections = [
@@ -24,7 +24,7 @@ pub(super) fn other_file(text: &str) -> Option<&'static str> {
     )
 }
 
-/// Returns the message for a line that the reader refuses; `None` where the mistake is not a usual one.
+/// Returns the message for a line that the reader refuses; `None` if the mistake is not a common one.
 pub(super) fn of_line(line: &str) -> Option<&'static str> {
     let value = line.split_once('=').map_or(line, |parts| parts.1).trim();
     if value.starts_with('"') && value.contains('\\') {
@@ -37,8 +37,8 @@ pub(super) fn of_line(line: &str) -> Option<&'static str> {
     has_no_commas.then_some("the numbers of a list need commas between them: [0, 0, 1]")
 }
 
-/// Message for a path with characters that a backslash has made.
-pub(super) const ESCAPE: &str = "a backslash in \"...\" begins a special character: write / in its place, as in \"C:/videos/a.mp4\", or put the \
+/// Message for a path with control characters, which a backslash produces in double quotes.
+pub(super) const ESCAPE: &str = "a backslash in \"...\" begins a special character: write / instead, as in \"C:/videos/a.mp4\", or put the \
     path in single quotes, 'C:\\videos\\a.mp4'";
 
 #[cfg(test)]

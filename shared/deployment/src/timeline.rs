@@ -1,24 +1,24 @@
-//! Which frame of a camera's footage belongs to each common instant.
+//! Assignment of a camera's frames to common instants.
 
 use serde::{Deserialize, Serialize};
 
 use crate::Deployment;
 
-/// The clock of one camera's footage, and its frames.
+/// Clock and frame rate of one camera's footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OwnClock {
-    /// Frames per second, by its own clock.
+    /// Frames per second, by the camera's own clock.
     pub rate_hz: f64,
-    /// Offset that is added to its times at its first frame, seconds.
+    /// Offset to add to the camera's time at its first frame, in seconds.
     pub offset_s: f64,
-    /// Amount by which a second of it is too long, as a share.
+    /// Amount by which a second of the camera's clock is too long, as a fraction.
     pub drift: f64,
 }
 
-/// Which frame of a camera's footage belongs to each common instant: the nearest one.
+/// Assignment of a camera's frames to common instants: each instant has the nearest frame.
 ///
-/// Instants are counted from 0; instant 0 is where the footage that begins last has its first frame. They are as far apart as the
-/// frames of the slowest camera.
+/// Instants are counted from 0. Instant 0 is the time of the first frame of the footage that begins last. The interval between instants is
+/// that between the frames of the slowest camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Timeline {
@@ -26,14 +26,14 @@ pub struct Timeline {
     rate_hz: f64,
     /// Instants per second.
     instants_hz: f64,
-    /// The camera's own time of instant 0, seconds.
+    /// Time of instant 0 by the camera's own clock, in seconds.
     first_s: f64,
-    /// Seconds of the camera in one of the common clock.
+    /// Seconds of the camera's clock per second of the common clock.
     pace: f64,
 }
 
 impl Timeline {
-    /// The timelines of all cameras.
+    /// Returns the timelines of all cameras.
     pub fn all(clocks: &[OwnClock]) -> Vec<Self> {
         let begin = clocks.iter().map(|clock| clock.offset_s);
         let begin = begin.fold(f64::NEG_INFINITY, f64::max);
@@ -48,24 +48,24 @@ impl Timeline {
         clocks.iter().map(of_camera).collect()
     }
 
-    /// Instants per second.
+    /// Returns the number of instants per second.
     pub fn instants_hz(&self) -> f64 {
         self.instants_hz
     }
 
-    /// The frame of the footage that is nearest to an instant.
+    /// Returns the frame of the footage that is nearest to an instant.
     pub fn frame(&self, instant: u64) -> u64 {
-        // A frame before the first cannot be: instant 0 is at the first frame or after it.
+        // The frame is never negative, because instant 0 is at the first frame or after it.
         (self.own_s(instant) * self.rate_hz).round().max(0.0) as u64
     }
 
-    /// How long after the instant that frame was taken, nanoseconds; negative for before.
+    /// Returns the time from the instant to its nearest frame, in nanoseconds; negative if the frame is earlier.
     pub fn rest_nanos(&self, instant: u64) -> i64 {
         let taken_s = self.frame(instant) as f64 / self.rate_hz;
         ((taken_s - self.own_s(instant)) / self.pace * 1e9).round() as i64
     }
 
-    /// How many instants footage of so many frames has.
+    /// Returns the number of instants in footage with a given number of frames.
     pub fn n_instants(&self, n_frames: u64) -> u64 {
         let end_s = n_frames as f64 / self.rate_hz - self.first_s;
         let mut n = (end_s / self.pace * self.instants_hz).ceil().max(0.0) as u64;
@@ -84,7 +84,7 @@ impl Timeline {
 }
 
 impl Deployment {
-    /// Returns true if the footage of a camera has an offset or a drift, so that frames are brought to common instants.
+    /// Returns true if the footage of any camera has an offset or a drift, so that frames must be assigned to common instants.
     pub fn has_clocks(&self) -> bool {
         let mut cameras = self.cameras.iter();
         cameras.any(|camera| {
@@ -92,9 +92,9 @@ impl Deployment {
         })
     }
 
-    /// The clock of a camera's footage.
+    /// Returns the clock of a camera's footage.
     ///
-    /// * `rate_hz`: its frames per second.
+    /// * `rate_hz`: frames per second of the footage.
     pub fn clock(&self, camera: usize, rate_hz: f64) -> OwnClock {
         let it = &self.cameras[camera];
         OwnClock {
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_camera_that_was_started_first_leaves_out_its_beginning() {
-        // The second camera was started 0.34 s after the first: ten frames and a fifth.
+        // The second camera started 0.34 s after the first: 10.2 frames.
         let all = Timeline::all(&[clock(30.0, 0.0, 0.0), clock(30.0, 0.34, 0.0)]);
         let [first, second] = [all[0], all[1]];
         assert_eq!((second.frame(0), second.rest_nanos(0)), (0, 0));

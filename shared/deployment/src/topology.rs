@@ -1,6 +1,6 @@
-//! The processes of a deployment, who sends to whom, and how much room topics have.
+//! The processes of a deployment, the topics between them, and the capacity of the topics.
 //!
-//! One place counts: a topic has as many receivers as there are processes that list it among their inputs.
+//! The receivers of a topic are counted in one place only: all processes that list the topic among their inputs.
 
 mod hosts;
 mod rooms;
@@ -16,24 +16,24 @@ use crate::{Deployment, Views};
 
 pub use rooms::{Content, Room, ViewSize};
 
-/// A stage of the pipeline, in the order in which a frame passes them.
+/// A stage of the pipeline, in the order in which frames pass through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
-    /// Footage to frames.
+    /// Reads footage and publishes frames.
     Capture,
-    /// Frames to single-view poses and their evidence.
+    /// Finds poses of single views in frames, with their evidence.
     Pose,
-    /// Expected errors.
+    /// Predicts expected errors.
     Quality,
-    /// Pairs of views to their poses.
+    /// Finds the poses of pairs of views.
     Fuse,
-    /// Joints in space.
+    /// Finds the joints in space.
     Triangulate,
 }
 
 impl Stage {
-    /// All of them, in order.
+    /// All stages, in order.
     pub const ALL: [Self; 5] = [
         Self::Capture,
         Self::Pose,
@@ -42,7 +42,7 @@ impl Stage {
         Self::Triangulate,
     ];
 
-    /// The service.
+    /// Returns the name of the stage's service.
     pub fn name(self) -> &'static str {
         match self {
             Self::Capture => "capture",
@@ -53,21 +53,21 @@ impl Stage {
         }
     }
 
-    /// The stage of that name.
+    /// Returns the stage of a name.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 
-/// The process that writes the results.
+/// Name of the process that writes the results.
 const RESULTS: &str = "results";
-/// The process that records every message.
+/// Name of the process that records every message.
 const RECORD: &str = "record";
-/// The process that carries messages between hosts.
+/// Name of the process that carries messages between hosts.
 const BRIDGE: &str = "bridge";
 
-/// The services whose processes a deployment file may give cores and a priority, each with the largest number of
-/// processes, which are numbered. The recording process is not among them: no file says whether it runs.
+/// Returns the services whose processes a deployment file may assign to cores and give a priority, each with its maximum number
+/// of numbered processes. The recording process is not included, because no file says whether it runs.
 pub(crate) fn services(deployment: &Deployment) -> Vec<(&'static str, usize)> {
     let n_views = deployment.cameras.len();
     let of_stage = |stage: Stage| match stage {
@@ -79,23 +79,23 @@ pub(crate) fn services(deployment: &Deployment) -> Vec<(&'static str, usize)> {
     stages.into_iter().chain([(RESULTS, 0)]).collect()
 }
 
-/// The name of a process in its deployment: `pose-1`, or `results` where there is one of its service alone.
+/// Returns the name of a process in its deployment: `pose-1`, or `results` if its service has one process only.
 pub(crate) fn process_name(service: &str, index: Option<usize>) -> String {
     index.map_or(service.to_owned(), |index| format!("{service}-{index}"))
 }
 
-/// The file that every message of a run is recorded in.
+/// Settings of the file that every message of a run is recorded in.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecordingPlan {
-    /// Its name, absolute.
+    /// Absolute path of the file.
     pub file: PathBuf,
     /// True if the pixels of frames are left out.
     pub without_pixels: bool,
     /// True if evidence is left out.
     pub without_evidence: bool,
-    /// Bytes that may wait to be written, in millions.
+    /// Maximum size of the messages that wait to be written, in millions of bytes.
     pub queue_mb: u64,
-    /// Views whose live cameras' pictures are kept as they came, ascending.
+    /// Views, in ascending order, whose live cameras' pictures are recorded in their original form.
     #[serde(default)]
     pub pictures: Vec<usize>,
     /// True if the messages for Foxglove are left out.
@@ -103,44 +103,44 @@ pub struct RecordingPlan {
     pub without_foxglove: bool,
 }
 
-/// A recording that stands in for the first stages of a run.
+/// A recording that replaces the first stages of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Replay {
-    /// Its name, absolute.
+    /// Absolute path of the recording.
     pub file: PathBuf,
-    /// The first stage that runs for real.
+    /// First stage that runs instead of being replayed.
     pub from: Stage,
-    /// How many times as fast as it was recorded; as fast as can be without it.
+    /// Speed of the replay relative to the recording; `None` for as fast as possible.
     pub speed: Option<f64>,
 }
 
-/// Reaction of the run to the loss of a process.
+/// Reaction of the run if a process is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The run fails.
     Essential,
-    /// The others of its service go on without it.
+    /// The other processes of its service continue without it.
     Redundant,
-    /// Nothing that the results need is lost.
+    /// The run continues; the results do not need the process.
     Optional,
 }
 
 /// One process of a deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Process {
-    /// Its name in the deployment: `pose-1`.
+    /// Name of the process in the deployment, such as `pose-1`.
     pub name: String,
-    /// Service that it runs: a stage, `results`, `record` or `bridge`.
+    /// Service that the process runs: a stage, `results`, `record` or `bridge`.
     pub service: &'static str,
-    /// The view or the worker, where there is one process for each.
+    /// Index of the view or worker, if the service has one process for each.
     pub index: Option<usize>,
-    /// Reaction of the run when it is lost.
+    /// Reaction of the run if the process is lost.
     pub role: Role,
-    /// True if it does not run, and its messages of a recording are sent in its place.
+    /// True if the process does not run, and its messages come from a recording.
     pub is_replayed: bool,
-    /// Topics that it subscribes to.
+    /// Topics that the process subscribes to.
     pub inputs: Vec<String>,
-    /// Topics that it publishes.
+    /// Topics that the process publishes.
     pub outputs: Vec<String>,
 }
 
@@ -151,15 +151,15 @@ pub struct Topology {
     pairs: Vec<[usize; 2]>,
     n_workers: usize,
     n_views: usize,
-    /// True if people are found by networks or keypoints, and solved in space.
+    /// True if networks or keypoints find the people, who are then solved in space.
     has_maps: bool,
 }
 
 impl Topology {
-    /// The processes of a deployment.
+    /// Returns the processes of a deployment.
     ///
-    /// * `recording`: the file that its messages are recorded in.
-    /// * `replay`: the recording that stands in for its first stages.
+    /// * `recording`: the file that records the messages.
+    /// * `replay`: the recording that replaces the first stages.
     pub fn new(
         deployment: &Deployment,
         recording: Option<&RecordingPlan>,
@@ -196,62 +196,65 @@ impl Topology {
         topology
     }
 
-    /// The processes in the order in which they start: receivers before senders.
+    /// Returns the processes in starting order: receivers before senders.
     pub fn processes(&self) -> &[Process] {
         &self.processes
     }
 
-    /// The process of that name.
+    /// Returns the process of a name.
     pub fn process(&self, name: &str) -> Option<&Process> {
         self.processes.iter().find(|process| process.name == name)
     }
 
-    /// The processes that send to another: each publishes a topic that it subscribes to.
+    /// Returns the processes that publish a topic to which the receiver subscribes.
     pub fn senders_to<'a>(&'a self, receiver: &'a Process) -> impl Iterator<Item = &'a Process> {
         let sends =
             |process: &&Process| process.outputs.iter().any(|out| receiver.inputs.contains(out));
         self.processes.iter().filter(sends)
     }
 
-    /// How many processes subscribe to a topic.
+    /// Returns the number of processes that subscribe to a topic.
     pub fn receivers_of(&self, topic: &str) -> usize {
         self.count(|process| process.inputs.iter().any(|input| input == topic))
     }
 
-    /// Processes that take everything that leaves the pipeline: `results`, and `record` if there is one.
+    /// Returns the number of processes that receive all output of the pipeline: `results`, and `record` if there is one.
     pub fn n_recorders(&self) -> usize {
         self.count(|process| [RESULTS, RECORD].contains(&process.service))
     }
 
-    /// Views, and so processes of every service that has one for each view.
+    /// Returns the number of views. Services with one process per view have as many processes.
     pub fn n_views(&self) -> usize {
         self.n_views
     }
 
-    /// Fusion processes.
+    /// Returns the number of fusion processes.
     pub fn n_workers(&self) -> usize {
         self.n_workers
     }
 
-    /// Returns true if people are found by networks or keypoints: `fuse` sends who is who, and `triangulate` reads the evidence.
+    /// Returns true if networks or keypoints find the people. In this case, `fuse` sends the identities of people, and `triangulate` reads
+    /// the evidence.
     pub fn has_maps(&self) -> bool {
         self.has_maps
     }
 
-    /// Pairs of views, ascending. Where all views are solved at once: every view but the first with the one before it,
-    /// as many as there are messages, and together all views.
+    /// Returns the pairs of views in ascending order.
+    ///
+    /// If all views are solved at once, each view but the first is paired with the one before it. There are then as many pairs as messages,
+    /// and together they contain all views.
     pub fn pairs(&self) -> &[[usize; 2]] {
         &self.pairs
     }
 
-    /// The pairs of a worker, each with its index among [`Topology::pairs`].
+    /// Returns the pairs of a worker, each with its index in [`Topology::pairs`].
     pub fn pairs_of(&self, worker: usize) -> Vec<(usize, [usize; 2])> {
         let indexed = self.pairs.iter().copied().enumerate();
         let step = self.n_workers.max(1);
         indexed.skip(worker).step_by(step).collect()
     }
 
-    /// Workers that read the evidence of a view.
+    /// Returns the number of workers that read the evidence of a view.
     pub fn workers_on(&self, view: usize) -> usize {
         (0..self.n_workers).filter(|&worker| self.reads(worker, view)).count()
     }
@@ -261,7 +264,7 @@ impl Topology {
         pairs.iter().any(|(_, pair)| pair.contains(&view))
     }
 
-    /// Topics of the fusion processes, by process.
+    /// Returns the topics that the fusion processes publish, in the order of the processes.
     pub fn fused(&self) -> Vec<String> {
         if self.has_maps {
             return vec![topic::people()];
@@ -280,12 +283,12 @@ struct Builder<'a> {
     has_quality: bool,
     has_network: bool,
     with_evidence: bool,
-    /// Views whose pictures are recorded as they came.
+    /// Views whose pictures are recorded in their original form.
     pictures: &'a [usize],
 }
 
 impl Builder<'_> {
-    /// All processes, none of them replayed.
+    /// Returns all processes, with none of them replayed.
     fn processes(&self, is_recorded: bool) -> Vec<Process> {
         let views = || 0..self.topology.n_views;
         let mut processes = Vec::new();
@@ -335,7 +338,7 @@ impl Builder<'_> {
         process(service, Some(view), Role::Redundant, vec![], outputs)
     }
 
-    /// All topics but evidence.
+    /// Returns all topics except evidence.
     fn everything(&self) -> Vec<String> {
         let mut inputs = Vec::new();
         for view in 0..self.topology.n_views {
@@ -408,7 +411,7 @@ fn process(
     }
 }
 
-/// The pairs of views that are fused, ascending.
+/// Returns the pairs of views that are fused, in ascending order.
 fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
     let n_views = deployment.cameras.len();
     if deployment.views() != Views::Pairs {
@@ -426,7 +429,7 @@ fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
     pairs
 }
 
-/// The two cameras, ascending.
+/// Returns the indices of two cameras in ascending order.
 fn indices(deployment: &Deployment, names: &[String; 2]) -> Option<[usize; 2]> {
     let index = |name: &String| deployment.cameras.iter().position(|camera| camera.name == *name);
     let [first, second] = [index(&names[0])?, index(&names[1])?];

@@ -1,5 +1,5 @@
-//! A folder that is written to. Everything in it is opened beneath its descriptor, and no link in it is followed: other
-//! users who may write there cannot redirect a file.
+//! A folder that files are written to. All its files are opened relative to the folder's descriptor, and no link in it is followed. Other
+//! users with write access therefore cannot redirect a file.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -15,9 +15,9 @@ use rustix::process::geteuid;
 
 use crate::user;
 
-/// Every user may write.
+/// Mode bit: every user may write.
 const OTHERS: u32 = 0o002;
-/// Only the owner of a file removes it.
+/// Mode bit: only the owner of a file may remove it.
 const STICKY: u32 = 0o1000;
 
 /// An open folder.
@@ -28,11 +28,11 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Opens a folder. Links in `path` are followed: the user has named it.
+    /// Opens a folder. Links in `path` are followed, because the user named it.
     ///
     /// # Errors
     ///
-    /// Those of the operating system.
+    /// Returns errors of the operating system.
     pub fn open(path: &Path) -> io::Result<Self> {
         let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC;
         let descriptor = openat(CWD, path, flags, Mode::empty())?;
@@ -40,21 +40,21 @@ impl Folder {
         Ok(Self { descriptor, path })
     }
 
-    /// Opens a folder, and makes it if it does not exist.
+    /// Opens a folder, and creates it if it does not exist.
     ///
     /// # Errors
     ///
-    /// Those of the operating system.
+    /// Returns errors of the operating system.
     pub fn create(path: &Path) -> io::Result<Self> {
         fs::create_dir_all(path)?;
         Self::open(path)
     }
 
-    /// Opens a folder in this one, and makes it if it does not exist.
+    /// Opens a folder inside this one, and creates it if it does not exist.
     ///
     /// # Errors
     ///
-    /// Those of the operating system; something other than a folder lies there, a link too.
+    /// Returns errors of the operating system, and fails if the name belongs to something other than a folder, including a link.
     pub fn inner(&self, name: &str) -> io::Result<Self> {
         let mode = Mode::RWXU | Mode::RWXG | Mode::RWXO;
         match mkdirat(&self.descriptor, name, mode) {
@@ -72,17 +72,17 @@ impl Folder {
         }
     }
 
-    /// The path by which it was opened.
+    /// Returns the path by which the folder was opened.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Why what is written here may be changed by another user: `belongs to user mallory (4001)`, or
+    /// Returns the reason why another user may change the folder's files, if there is one: `belongs to user mallory (4001)`, or
     /// `may be written to by every user`.
     ///
     /// # Errors
     ///
-    /// Those of the operating system.
+    /// Returns errors of the operating system.
     pub fn risk(&self) -> io::Result<Option<String>> {
         let found = rustix::fs::fstat(&self.descriptor)?;
         let own = geteuid().as_raw();
@@ -93,52 +93,52 @@ impl Folder {
         Ok(is_open.then(|| "may be written to by every user".to_owned()))
     }
 
-    /// Makes a file anew; what a killed process left under that name is removed.
+    /// Creates a file. A file of the same name that a killed process left is removed.
     ///
     /// # Errors
     ///
-    /// Those of the operating system; something other than a file lies there, a link too.
+    /// Returns errors of the operating system, and fails if the name belongs to something other than a file, including a link.
     pub fn begin(&self, name: &str) -> io::Result<File> {
         self.begin_named(OsStr::new(name))
     }
 
-    /// Opens an own file for appending and reading; makes it if it does not exist.
+    /// Opens a file of this user for appending and reading, and creates it if it does not exist.
     ///
     /// # Errors
     ///
-    /// Those of the operating system; something other than a file of this user lies there, a link too.
+    /// Returns errors of the operating system, and fails if the name belongs to something other than a file of this user, including a link.
     pub fn resume(&self, name: &str) -> io::Result<File> {
         self.own(name, OFlags::CREATE | OFlags::APPEND)
     }
 
-    /// Opens an own file for writing and reading, from its start; makes it if it does not exist.
+    /// Opens a file of this user for writing and reading from its start, and creates it if it does not exist.
     ///
     /// # Errors
     ///
-    /// Those of [`resume`](Self::resume).
+    /// Fails like [`resume`](Self::resume).
     pub fn reopen(&self, name: &str) -> io::Result<File> {
         self.own(name, OFlags::CREATE)
     }
 
-    /// Renames a file or a folder in this folder; what has the new name is replaced.
+    /// Renames a file or a folder in this folder. An existing file with the new name is replaced.
     ///
     /// # Errors
     ///
-    /// Those of the operating system.
+    /// Returns errors of the operating system.
     pub fn rename(&self, from: &str, to: &str) -> io::Result<()> {
         Ok(renameat(&self.descriptor, from, &self.descriptor, to)?)
     }
 
-    /// Removes a file, or the link of that name.
+    /// Removes a file, or a link of that name.
     ///
     /// # Errors
     ///
-    /// Those of the operating system.
+    /// Returns errors of the operating system.
     pub fn remove(&self, name: &str) -> io::Result<()> {
         self.remove_named(OsStr::new(name))
     }
 
-    /// Writes a file beside its place, and renames it into it.
+    /// Writes a temporary file in the same folder, then renames it to the final name.
     pub(crate) fn replace<T>(
         &self,
         name: &OsStr,
@@ -157,7 +157,7 @@ impl Folder {
         };
         let placed = written();
         if placed.is_err() {
-            // The error that is reported came first; one of the removal could add nothing to it.
+            // The first error is reported; an error of the removal would add nothing to it.
             drop(self.remove_named(&beside));
         }
         placed
@@ -193,7 +193,7 @@ impl Folder {
             opened => File::from(opened?),
         };
         let found = file.metadata()?;
-        // A second name may be that of a file elsewhere.
+        // A file with a second name (hard link) may belong elsewhere.
         if !found.is_file() || found.uid() != geteuid().as_raw() || found.nlink() > 1 {
             return Err(self.in_the_way(name));
         }
@@ -209,11 +209,11 @@ impl Folder {
         })
     }
 
-    /// The error for a name that is taken by something that must not be written to.
+    /// Returns the error for a name that belongs to something that must not be written to.
     fn in_the_way(&self, name: &OsStr) -> io::Error {
         let text = match self.kind(name) {
             Ok(kind) => format!(
-                "{} of {} lies there, and is not written to: remove it, or name another folder",
+                "{} of {} already exists and is not overwritten: remove it, or choose another folder",
                 kind.name(),
                 user(kind.owner)
             ),
@@ -223,7 +223,7 @@ impl Folder {
     }
 }
 
-/// Kind of file under a name.
+/// The kind of file that has a name.
 struct Kind {
     mode: u32,
     owner: u32,
@@ -251,7 +251,7 @@ impl Kind {
     }
 }
 
-/// Name under which a file grows that is renamed to `name`.
+/// Returns the name of the temporary file that is later renamed to `name`.
 pub(crate) fn beside(name: &OsStr) -> OsString {
     let mut hidden = OsString::from(".");
     hidden.push(name);
@@ -266,7 +266,7 @@ mod tests {
 
     use super::*;
 
-    /// A folder with a secret beside it.
+    /// Returns a folder with a secret file next to it.
     fn room() -> (tempfile::TempDir, Folder, PathBuf) {
         let base = tempfile::tempdir().unwrap();
         let secret = base.path().join("secret");

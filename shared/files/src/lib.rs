@@ -1,4 +1,4 @@
-//! Reads and writes the files of a user: regular files only, whole or not there, and never through another user's link.
+//! Reading and writing of a user's files: regular files only, always complete or absent, and never through another user's link.
 #![forbid(unsafe_code)]
 
 mod folder;

@@ -1,4 +1,4 @@
-//! Reads regular files. A pipe would block, and a device such as `/dev/zero` never ends.
+//! Reading of regular files. A pipe would block, and a device such as `/dev/zero` never ends.
 
 use std::fs::{File, FileType};
 use std::io::{self, ErrorKind, Read as _};
@@ -7,24 +7,24 @@ use std::path::Path;
 
 use rustix::fs::{Mode, OFlags};
 
-/// Largest file of settings or of a calibration, bytes.
+/// Maximum size of a settings file or a calibration, in bytes.
 pub const SETTINGS: u64 = 64 << 20;
-/// Largest picture file, bytes.
+/// Maximum size of a picture file, in bytes.
 pub const PICTURE: u64 = 512 << 20;
-/// Largest file of a model or a network, bytes: the format ONNX has no larger ones.
+/// Maximum size of a model or network file, in bytes; ONNX files cannot be larger.
 pub const MODEL: u64 = 2 << 30;
-/// Largest file of results that is read at once, bytes.
+/// Maximum size of a file of results that is read at once, in bytes.
 pub const RESULTS: u64 = 4 << 30;
 
 /// Opens a regular file for reading; follows links.
 ///
 /// # Errors
 ///
-/// Those of the operating system; `InvalidInput` if it is a folder, a pipe, a socket, or a device. Never blocks.
+/// Returns errors of the operating system, and `InvalidInput` for a folder, a pipe, a socket, or a device. The function never blocks.
 pub fn open(path: &Path) -> io::Result<File> {
     let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
     let file = match rustix::fs::open(path, flags, Mode::empty()) {
-        // A socket, or a device that no driver serves.
+        // The file is a socket, or a device without a driver.
         Err(rustix::io::Errno::NXIO) => return Err(not_regular("a socket or a device")),
         opened => File::from(opened?),
     };
@@ -35,11 +35,11 @@ pub fn open(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Reads a regular file, of which at most `most` bytes are accepted.
+/// Reads a regular file of at most `most` bytes.
 ///
 /// # Errors
 ///
-/// Those of [`open`]; `FileTooLarge` if there are more bytes.
+/// Fails like [`open`], and with `FileTooLarge` if there are more bytes.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let bytes = file.metadata()?.len();
@@ -56,11 +56,11 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     Ok(content)
 }
 
-/// As [`read`], for text.
+/// Works like [`read`], for text.
 ///
 /// # Errors
 ///
-/// Those of [`read`]; `InvalidData` if it is not UTF-8.
+/// Fails like [`read`], and with `InvalidData` if the file is not UTF-8.
 pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
     let text = String::from_utf8(read(path, most)?);
     text.map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
@@ -71,7 +71,7 @@ fn not_regular(what: &str) -> io::Error {
     io::Error::new(ErrorKind::InvalidInput, text)
 }
 
-/// Name of a kind of file.
+/// Returns the name of a kind of file.
 fn name(kind: FileType) -> &'static str {
     if kind.is_dir() {
         "a folder"
@@ -127,7 +127,7 @@ mod tests {
         let error = read(&path, 10).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::FileTooLarge);
         assert!(error.to_string().contains("11 bytes"), "{error}");
-        // It says that it is empty, and is not.
+        // This file reports a size of 0, but has content.
         assert!(!read_text(Path::new("/proc/self/stat"), 1 << 20).unwrap().is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! Files that are whole or not there: written beside their place and renamed into it.
+//! Files that are always complete or absent: written under a temporary name, then renamed.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -7,36 +7,35 @@ use std::path::{Path, PathBuf};
 
 use crate::Folder;
 
-/// Writes a file in one step, on the disk when this returns: who reads `path` sees the old content or the new one,
-/// also after a loss of power.
+/// Writes a file in one step. The data is on the disk when this function returns. A reader of `path` sees either the old content or the new
+/// content, even after a loss of power.
 ///
-/// It is written beside its place as `.name.<process id>.part`, flushed to the disk, and renamed. A killed process
-/// leaves that file at most. Permissions are those of a new file, whatever the old one had. No link is followed but in
-/// the path of the folder.
+/// The data is written to `.name.<process id>.part` in the same folder, flushed to the disk, and renamed. If the process is killed, at most
+/// this temporary file remains. The permissions are those of a new file, regardless of the old ones. Links are followed only in the path of
+/// the folder.
 ///
 /// # Errors
 ///
-/// Those of the operating system; the old content stays, and nothing is left beside it.
+/// Returns errors of the operating system. The old content is then kept, and the temporary file is removed.
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     replace_by(path, |out| io::Write::write_all(out, bytes))
 }
 
-/// As [`replace`], but the operating system writes to the disk when it likes: for files of which there are many, and
-/// that can be made again.
+/// Works like [`replace`], but does not wait for the data to reach the disk. It is for large numbers of files that can be created again.
 ///
 /// # Errors
 ///
-/// Those of [`replace`].
+/// Fails like [`replace`].
 pub fn replace_unsynced(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let (folder, name) = split(path)?;
     folder.replace(name, |_| Ok(()), |out| io::Write::write_all(out, bytes))
 }
 
-/// As [`replace`], for what is written bit by bit: the writer's own result is handed on.
+/// Works like [`replace`], for data that is written piece by piece. Returns the result of `write`.
 ///
 /// # Errors
 ///
-/// Those of [`replace`] and of `write`.
+/// Fails like [`replace`], or if `write` fails.
 pub fn replace_by<T>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>,
@@ -45,12 +44,12 @@ pub fn replace_by<T>(
     folder.replace(name, File::sync_all, write)
 }
 
-/// Where a file or folder is written before it is renamed into its place: `.name.<process id>.part` beside it.
+/// Returns the temporary path `.name.<process id>.part` in the same folder, under which a file or folder is written before it is renamed.
 pub fn beside(path: &Path) -> PathBuf {
     path.with_file_name(crate::folder::beside(path.file_name().unwrap_or_default()))
 }
 
-/// The open folder of a file, and the name of the file in it.
+/// Opens the folder of a file, and returns it with the name of the file in it.
 fn split(path: &Path) -> io::Result<(Folder, &OsStr)> {
     let name = path.file_name().ok_or_else(|| {
         let text = "does not end with the name of a file";

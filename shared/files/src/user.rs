@@ -2,7 +2,7 @@
 
 use std::fs;
 
-/// Name and number of a user, `user nobody (65534)`, or the number alone where the system has no name for it.
+/// Returns the name and number of a user, such as `user nobody (65534)`, or the number alone if the system has no name for it.
 pub fn user(uid: u32) -> String {
     let users = fs::read_to_string("/etc/passwd").unwrap_or_default();
     let name = users.lines().find_map(|line| {

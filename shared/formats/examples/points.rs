@@ -1,4 +1,4 @@
-//! Prints what a C3D file holds, and its first frame: `cargo run --example points -- FILE`.
+//! Prints the header of a C3D file and its first frame: `cargo run --example points -- FILE`.
 #![expect(clippy::print_stdout, reason = "it is what the example is for")]
 
 use std::error::Error;

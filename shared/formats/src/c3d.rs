@@ -1,10 +1,9 @@
-//! Points over time from C3D files, in all six encodings: Intel, DEC and MIPS numbers, as integers or reals; and to files
-//! ([`write()`]), as Intel reals.
+//! Reading of points over time from C3D files in all six encodings (Intel, DEC and MIPS numbers, as integers or reals), and writing of
+//! files as Intel reals ([`write()`]).
 //!
-//! A reader of its own because published ones refuse many files of old laboratories (a missing
-//! `POINT:UNITS` or `ANALOG:RATE`, an offset written as a real) that have all the data needed. Analog
-//! samples are skipped. Memory is allocated only for data that is in the file, never for a declared
-//! count. The format is described in *The C3D File Format* (c3d.org).
+//! This crate has its own reader because published ones refuse many files of old laboratories that have all the data needed. Such files may
+//! lack `POINT:UNITS` or `ANALOG:RATE`, or store an offset as a real. Analog samples are skipped. Memory is allocated only for data that is
+//! in the file, never for a declared count. The format is described in *The C3D File Format* (c3d.org).
 //!
 //! ```
 //! let file = include_bytes!("../examples/walk.c3d");
@@ -46,16 +45,16 @@ pub struct C3d {
     labels: Vec<String>,
     n_frames: usize,
     n_points: usize,
-    /// `[frame][point]`.
+    /// Points, as `[frame][point]`.
     points: Vec<Option<[f64; 3]>>,
 }
 
 impl C3d {
-    /// Reads the bytes of a file.
+    /// Parses the bytes of a file.
     ///
     /// # Errors
     ///
-    /// [`C3dError`]. The memory used is at most some tens of bytes per byte of the file.
+    /// [`C3dError`] if the file is not valid. Parsing uses at most some tens of bytes of memory per byte of the file.
     pub fn parse(file: &[u8]) -> Result<Self, C3dError> {
         let (bytes, section) = Bytes::of_file(file)?;
         let parameters = Parameters::read(bytes, section)?;
@@ -73,17 +72,17 @@ impl C3d {
         })
     }
 
-    /// Frames per second of the points; 0 if the file does not have it.
+    /// Returns the frames per second of the points; 0 if the file does not state it.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Unit of the positions as in the file: `mm`, `m`; empty if the file does not have it.
+    /// Returns the unit of the positions as in the file, such as `mm` or `m`; empty if the file does not state it.
     pub fn units(&self) -> &str {
         &self.units
     }
 
-    /// Metres per unit of the positions; millimetres if the file has no unit, `None` for an unknown unit.
+    /// Returns the metres per unit of the positions; millimetres are assumed if the file has no unit. Returns `None` for an unknown unit.
     pub fn metres_per_unit(&self) -> Option<f64> {
         match self.units.to_ascii_lowercase().as_str() {
             "" | "mm" => Some(0.001),
@@ -95,27 +94,27 @@ impl C3d {
         }
     }
 
-    /// Number of the first frame in the file (from 1).
+    /// Returns the number of the first frame in the file, counted from 1.
     pub fn first_frame(&self) -> u32 {
         self.first_frame
     }
 
-    /// Number of frames.
+    /// Returns the number of frames.
     pub fn n_frames(&self) -> usize {
         self.n_frames
     }
 
-    /// Number of points in every frame.
+    /// Returns the number of points in every frame.
     pub fn n_points(&self) -> usize {
         self.n_points
     }
 
-    /// Names of the points; may be fewer than there are points.
+    /// Returns the names of the points; there may be fewer names than points.
     pub fn labels(&self) -> &[String] {
         &self.labels
     }
 
-    /// Index of a point by its full name, or by its name without the subject (`LFWT` of `S1:LFWT`).
+    /// Returns the index of a point by its full name, or by its name without the subject (`LFWT` for `S1:LFWT`).
     pub fn point(&self, name: &str) -> Option<usize> {
         let is_named = |label: &String| {
             let own = label.rsplit_once(':').map_or(label.as_str(), |parts| parts.1);
@@ -124,19 +123,18 @@ impl C3d {
         self.labels.iter().position(is_named)
     }
 
-    /// The points of a frame (from 0) in the file's own unit and frame of reference; `None` where a
-    /// point was not visible.
+    /// Returns the points of a frame (from 0) in the file's own unit and frame of reference; `None` for a point that was not visible.
     ///
     /// # Panics
     ///
-    /// If there is no such frame.
+    /// Panics if there is no such frame.
     pub fn frame(&self, frame: usize) -> &[Option<[f64; 3]>] {
         assert!(frame < self.n_frames, "frame {frame} of {}", self.n_frames);
         &self.points[frame * self.n_points..(frame + 1) * self.n_points]
     }
 }
 
-/// `POINT:LABELS`, then `LABELS2` and so on: one parameter holds 255 names at most.
+/// Returns the names from `POINT:LABELS`, then `LABELS2` and so on, because one parameter has at most 255 names.
 fn labels(parameters: &Parameters<'_>, most: usize) -> Vec<String> {
     let mut labels = parameters.texts("POINT", "LABELS", most);
     let mut n = 2;

@@ -1,5 +1,4 @@
-//! Checksums of bytes, and the checked header in front of the payload of Parallax's own binary files. Pure: bytes in,
-//! bytes out.
+//! Checksums of bytes, and the checked header before the payload of Parallax's own binary files. This module does no input or output.
 
 mod envelope;
 mod fnv;

@@ -1,7 +1,8 @@
-//! Layouts of files, read and written without any other crate of the workspace: C3D, TRC, MATLAB's level 5, and the checked header of our own binary ones.
+//! Readers and writers of file formats, independent of the other crates of the workspace: C3D, TRC, MATLAB level 5, and the checked header
+//! of Parallax's own binary files.
 //!
-//! Own readers where libraries exist: those of MATLAB's files panic on damaged ones, and those of C3D refuse old laboratories'
-//! files that hold all that is needed.
+//! The crate has its own readers although libraries exist. Those for MATLAB files panic on damaged files, and those for C3D refuse files of
+//! old laboratories that have all the data needed.
 #![forbid(unsafe_code)]
 
 pub mod c3d;

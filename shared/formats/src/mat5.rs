@@ -1,7 +1,7 @@
-//! Reader of MATLAB level 5 files: numbers, structs and cells, compressed or not, as models and annotations need them.
+//! Reader of MATLAB level 5 files: numbers, structs and cells, compressed or not, as needed for models and annotations.
 //!
-//! A reader of its own because published ones panic on damaged files. Memory is never allocated for a
-//! declared count: every array is a view of bytes of the file.
+//! This crate has its own reader because published ones panic on damaged files. Memory is never allocated for a declared count: every array
+//! borrows bytes of the file.
 //!
 //! ```
 //! let file = include_bytes!("../examples/points.mat");
@@ -24,7 +24,7 @@ use flate2::read::ZlibDecoder;
 
 pub use error::ContainerError;
 
-/// A value in a file; arrays are views of its bytes.
+/// A value in a file; arrays borrow the file's bytes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value<'a> {
     /// Real numbers, column-major.
@@ -33,7 +33,7 @@ pub enum Value<'a> {
     Structs(Structs<'a>),
     /// An array of values of any kind.
     Cell(Vec<Self>),
-    /// Something that is not read: text, sparse or complex numbers, objects.
+    /// A value that is not supported: text, sparse or complex numbers, or objects.
     Other,
 }
 
@@ -49,24 +49,24 @@ pub struct Numbers<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Structs<'a> {
     fields: Vec<String>,
-    /// `[element][field]`.
+    /// Values, as `[element][field]`.
     elements: Vec<Vec<Value<'a>>>,
 }
 
 impl Structs<'_> {
-    /// Number of elements.
+    /// Returns the number of elements.
     pub fn len(&self) -> usize {
         self.elements.len()
     }
 
-    /// Returns true if there is no element.
+    /// Returns true if there are no elements.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
 }
 
 impl<'a> Structs<'a> {
-    /// A field of an element (from 0); `None` if the element or the field does not exist.
+    /// Returns a field of an element (from 0); `None` if the element or the field does not exist.
     pub fn get(&self, element: usize, field: &str) -> Option<&Value<'a>> {
         let field = self.fields.iter().position(|name| name == field)?;
         self.elements.get(element)?.get(field)
@@ -74,17 +74,17 @@ impl<'a> Structs<'a> {
 }
 
 impl Numbers<'_> {
-    /// Sizes, rows first; at least two.
+    /// Returns the sizes, rows first; there are at least two.
     pub fn sizes(&self) -> &[usize] {
         &self.sizes
     }
 
-    /// Number of values, the product of the sizes.
+    /// Returns the number of values, which is the product of the sizes.
     pub fn n_values(&self) -> usize {
         self.sizes.iter().product()
     }
 
-    /// The values, column-major.
+    /// Returns the values, column-major.
     pub fn values(&self) -> Vec<f64> {
         match self.storage {
             MI_INT8 => self.each(|[byte]: [u8; 1]| f64::from(byte as i8)),
@@ -105,11 +105,11 @@ impl Numbers<'_> {
     }
 }
 
-/// The bytes of all variables, decompressed.
+/// Returns the bytes of each variable, decompressed.
 ///
 /// # Errors
 ///
-/// [`ContainerError`]
+/// [`ContainerError`] if the file is not valid.
 pub fn variables(file: &[u8]) -> Result<Vec<Vec<u8>>, ContainerError> {
     if file.starts_with(b"MATLAB 7.3") {
         return Err(ContainerError::Version73);
@@ -144,13 +144,13 @@ pub fn variables(file: &[u8]) -> Result<Vec<Vec<u8>>, ContainerError> {
     Ok(variables)
 }
 
-/// Reads a variable: its name and its value.
+/// Reads the name and the value of a variable.
 ///
 /// * `bytes`: one of [`variables`].
 ///
 /// # Errors
 ///
-/// [`ContainerError`]
+/// [`ContainerError`] if the variable is not valid.
 pub fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerError> {
     let mut budget = MAX_VALUES;
     let (kind, data) = Bytes(bytes).element("a variable")?;
@@ -159,7 +159,7 @@ pub fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerError> {
 }
 
 const HEADER_BYTES: usize = 128;
-/// More than the largest model that is accepted, at 4 bytes per weight.
+/// This is more than the largest accepted model needs, at 4 bytes per weight.
 const MAX_BYTES: usize = 64 << 20;
 const MAX_VALUES: usize = 1 << 20;
 const MAX_DEPTH: usize = 8;
@@ -361,7 +361,7 @@ fn expect_type(
     }
 }
 
-/// The bytes that are left to read.
+/// Bytes that remain to be read.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
@@ -380,7 +380,7 @@ impl<'a> Bytes<'a> {
         Ok(bytes.first_chunk().map_or(0, |&first_chunk| u32::from_le_bytes(first_chunk)))
     }
 
-    /// The next element: its type and its bytes; skips the padding.
+    /// Reads the next element, and returns its type and its bytes; skips the padding.
     fn element(&mut self, what: &'static str) -> Result<(u32, &'a [u8]), ContainerError> {
         let tag = self.word(what)?;
         let small = (tag >> 16) as usize;

@@ -1,5 +1,5 @@
-//! TRC files (`OpenSim` markers), read and written: five header lines, then a row a frame, tab separated. Pure: text in,
-//! text out.
+//! Reading and writing of TRC files (`OpenSim` markers): five header lines, then one tab-separated row per frame. This module does no input
+//! or output.
 
 mod read;
 mod write;

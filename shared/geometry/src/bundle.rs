@@ -1,20 +1,19 @@
-//! One sparse bundle adjustment, for boards, for people, and for rigs that are made better.
+//! Sparse bundle adjustment, for boards, for people, and for the refinement of rigs.
 //!
-//! The unknowns are an arrow: a few *shared* parameters (cameras, time offsets, lengths of bones), and many *local* blocks
-//! (a point, the pose of a board, all joints of one frame), each of a dimension of its own, that know nothing of one another.
-//! Every [`Term`] touches one local block and a few shared parameters. The local blocks are eliminated one by one (Schur
-//! complement), so that the time grows with their number and not with its cube.
+//! The unknowns are a few *shared* parameters (cameras, time offsets, bone lengths) and many independent *local* blocks (a point, the
+//! pose of a board, all joints of one frame), each with a dimension of its own. Every [`Term`] depends on one local block and a few shared
+//! parameters. The local blocks are eliminated one by one (Schur complement), so that the time grows linearly with their number.
 //!
 //! | what | where |
 //! |---|---|
-//! | what a problem has to say of itself | [`Problem`], [`Term`], [`Loss`] |
-//! | the cameras of a problem, with poses, focal lengths, centres and lenses that are free or held | [`Cameras`], [`Free`] |
-//! | the least cost, by Levenberg and Marquardt's method | [`solve`], [`Settings`], [`Report`] |
-//! | how well the shared parameters are known, and which are not | [`covariance`], [`clustered`], [`Undetermined`] |
-//! | derivatives beside numeric ones, for tests | [`derivative_error`] |
+//! | definition of a problem | [`Problem`], [`Term`], [`Loss`] |
+//! | cameras of a problem, with free or held poses, focal lengths, centres and lenses | [`Cameras`], [`Free`] |
+//! | minimisation of the cost, by the Levenberg-Marquardt method | [`solve`], [`Settings`], [`Report`] |
+//! | uncertainty of the shared parameters, and parameters that are not determined | [`covariance`], [`clustered`], [`Undetermined`] |
+//! | comparison of derivatives with numeric ones, for tests | [`derivative_error`] |
 //!
-//! A parameter that is held (the gauge: the first camera, say) is no parameter: it is left out. Scale is held by a term
-//! without a local block ([`Problem::priors`]). Pure; the same input gives the same bits.
+//! Values that are held, such as the pose of the first camera (the gauge), are not parameters. A term without a local block fixes the scale
+//! ([`Problem::priors`]). The functions are pure: the same input gives the same result, bit for bit.
 
 mod cameras;
 mod covariance;
@@ -32,7 +31,7 @@ pub use derivatives::derivative_error;
 pub use solve::{Report, Settings, Stopped, solve};
 pub use term::{Loss, Term};
 
-/// A step of all unknowns, in the coordinates that the problem chose.
+/// A step of all unknowns, in coordinates defined by the problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Step of the shared parameters.
@@ -41,28 +40,28 @@ pub struct Step {
     pub locals: Vec<Vec<f64>>,
 }
 
-/// A sum of terms over shared parameters and local blocks, with the present value of all of them.
+/// A sum of terms over shared parameters and local blocks, with the current values of all unknowns.
 ///
-/// The problem keeps its own values (rotations, points, lengths); the solver knows steps alone, and terms.
+/// The problem stores its own values (rotations, points, lengths). The solver only handles steps and terms.
 pub trait Problem: Sized {
-    /// Number of shared parameters.
+    /// Returns the number of shared parameters.
     fn n_shared(&self) -> usize;
 
-    /// The name of a shared parameter, for people to read.
+    /// Returns a readable name for a shared parameter.
     fn name(&self, parameter: usize) -> String;
 
-    /// The dimension of every local block.
+    /// Returns the dimension of every local block.
     fn locals(&self) -> Vec<usize>;
 
-    /// Hands over every term of a local block, with residuals and derivatives at the present values.
+    /// Passes every term of a local block to `take`, with residuals and derivatives at the current values.
     ///
-    /// The number of terms and their order do not depend on the values.
+    /// The number of terms and their order must not depend on the values.
     fn terms_of(&self, local: usize, take: &mut dyn FnMut(&Term));
 
-    /// Hands over the terms without a local block: what is known of the shared parameters beforehand.
+    /// Passes the terms without a local block to `take`: the priors on shared parameters.
     fn priors(&self, take: &mut dyn FnMut(&Term));
 
-    /// The problem with all values moved by a step.
+    /// Returns the problem with all values moved by a step.
     #[must_use]
     fn moved(&self, step: &Step) -> Self;
 }

@@ -1,4 +1,4 @@
-//! One calibrated camera: from a point in the world to a pixel, and from a pixel to a ray.
+//! A calibrated camera, which maps points of the world to pixels, and pixels to rays.
 
 use nalgebra::{
     Isometry3, Matrix2, Matrix2x3, Matrix3, Matrix3x4, Point2, Point3, UnitVector3, Vector2,
@@ -7,7 +7,7 @@ use nalgebra::{
 
 use crate::Lens;
 
-/// Points nearer to the plane of the camera than this (metres, along its axis) have no image.
+/// Minimum distance of a point from the camera plane, in metres along the axis. Nearer points have no image.
 const NEAREST: f64 = 1e-9;
 
 /// The intrinsic parameters of a camera: focal lengths, principal point, image size and lens.
@@ -28,12 +28,12 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// The calibration matrix K, which maps normalised coordinates to pixels.
+    /// Returns the calibration matrix K, which maps normalised coordinates to pixels.
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
     }
 
-    /// The pixel of a normalised point.
+    /// Returns the pixel of a normalised point.
     pub fn pixel(&self, normalised: &Point2<f64>) -> Point2<f64> {
         Point2::new(
             self.fx * normalised.x + self.cx,
@@ -41,7 +41,7 @@ impl Intrinsics {
         )
     }
 
-    /// The normalised point of a pixel: inverse of [`pixel`](Self::pixel).
+    /// Returns the normalised point of a pixel; the inverse of [`pixel`](Self::pixel).
     pub fn normalised(&self, pixel: &Point2<f64>) -> Point2<f64> {
         Point2::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy)
     }
@@ -50,9 +50,9 @@ impl Intrinsics {
 /// A half-line in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it begins: the centre of a camera, in metres.
+    /// Start of the ray: the centre of a camera, in metres.
     pub origin: Point3<f64>,
-    /// Its direction.
+    /// Direction of the ray.
     pub direction: UnitVector3<f64>,
 }
 
@@ -63,14 +63,14 @@ pub struct Camera {
     pub name: String,
     /// Focal lengths, principal point, image size and lens.
     pub intrinsics: Intrinsics,
-    /// Takes a point of the world (metres) to the camera's frame: x right, y down, z forward.
+    /// Transformation from the world (metres) to the camera's coordinates: x right, y down, z forward.
     pub camera_from_world: Isometry3<f64>,
 }
 
 impl Camera {
-    /// The pixel in which a point of the world is seen, distortion included.
+    /// Returns the pixel at which a point of the world is seen, including distortion.
     ///
-    /// `None` behind the camera and outside the valid range of the lens; the pixel may lie outside the image.
+    /// Returns `None` for points behind the camera or outside the valid range of the lens. The pixel may be outside the image.
     pub fn project(&self, in_world: &Point3<f64>) -> Option<Point2<f64>> {
         let in_camera = self.camera_from_world * in_world;
         let normalised = normalise(&in_camera)?;
@@ -78,7 +78,7 @@ impl Camera {
         finite(self.intrinsics.pixel(&distorted))
     }
 
-    /// [`project`](Self::project) with the derivative of the pixel by the point of the world.
+    /// Works like [`project`](Self::project), and also returns the derivative of the pixel with respect to the point.
     pub fn project_with_jacobian(
         &self,
         in_world: &Point3<f64>,
@@ -101,23 +101,23 @@ impl Camera {
         Some((finite(self.intrinsics.pixel(&distorted))?, jacobian))
     }
 
-    /// The direction of a pixel as the undistorted normalised point (x / z, y / z).
+    /// Returns the direction of a pixel as the undistorted normalised point (x / z, y / z).
     ///
-    /// `None` where the lens model cannot be inverted.
+    /// Returns `None` if the lens model cannot be inverted.
     pub fn undistort(&self, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         self.intrinsics.lens.undistort(&self.intrinsics.normalised(pixel))
     }
 
-    /// The ideal pixel of a pixel: where the same ray falls without distortion.
+    /// Returns the ideal pixel of a pixel: the position at which the same ray is seen without distortion.
     ///
-    /// `None` where the lens model cannot be inverted.
+    /// Returns `None` if the lens model cannot be inverted.
     pub fn undistorted_px(&self, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         self.undistort(pixel).map(|normalised| self.intrinsics.pixel(&normalised))
     }
 
-    /// The pixel of an ideal pixel: inverse of [`undistorted_px`](Self::undistorted_px).
+    /// Returns the pixel of an ideal pixel; the inverse of [`undistorted_px`](Self::undistorted_px).
     ///
-    /// `None` outside the valid range of the lens.
+    /// Returns `None` outside the valid range of the lens.
     pub fn distort_px(&self, ideal: &Point2<f64>) -> Option<Point2<f64>> {
         let normalised = self.intrinsics.normalised(ideal);
         self.intrinsics
@@ -126,20 +126,20 @@ impl Camera {
             .map(|distorted| self.intrinsics.pixel(&distorted))
     }
 
-    /// Where the camera stands, in metres.
+    /// Returns the position of the camera, in metres.
     pub fn centre_in_world(&self) -> Point3<f64> {
         let inverse = self.camera_from_world.rotation.inverse();
         Point3::from(inverse * -self.camera_from_world.translation.vector)
     }
 
-    /// The direction in which the camera looks, in the world.
+    /// Returns the direction in which the camera looks, in the world.
     pub fn axis_in_world(&self) -> UnitVector3<f64> {
         self.camera_from_world.rotation.inverse() * Vector3::z_axis()
     }
 
-    /// The ray of the world that falls on a pixel.
+    /// Returns the ray in the world that is seen at a pixel.
     ///
-    /// `None` where the lens model cannot be inverted.
+    /// Returns `None` if the lens model cannot be inverted.
     pub fn ray(&self, pixel: &Point2<f64>) -> Option<Ray> {
         let normalised = self.undistort(pixel)?;
         let in_camera = UnitVector3::new_normalize(normalised.coords.push(1.0));
@@ -150,7 +150,7 @@ impl Camera {
         })
     }
 
-    /// The 3x4 projection K \[R | t\] onto ideal pixels.
+    /// Returns the 3x4 projection K \[R | t\] to ideal pixels.
     pub fn image_from_world(&self) -> Matrix3x4<f64> {
         let transform = self.camera_from_world.to_matrix();
         self.intrinsics.matrix() * transform.fixed_rows::<3>(0)

@@ -1,4 +1,4 @@
-//! The epipolar geometry of two views: fundamental matrices, epipolar lines and curves.
+//! Epipolar geometry of two views: fundamental matrices, epipolar lines and curves.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 
@@ -8,14 +8,14 @@ mod curve;
 
 pub use curve::epipolar_curve;
 
-/// Cameras nearer to each other than this, in metres, stand in one place.
+/// Distance below which two cameras count as being in the same place, in metres.
 const SAME_PLACE: f64 = 1e-9;
 
-/// The fundamental matrix that takes an ideal pixel of A to its line in the ideal pixels of B.
+/// Returns the fundamental matrix, which takes an ideal pixel of A to its line in the ideal pixels of B.
 ///
-/// `F = K_b⁻ᵀ [t]ₓ R K_a⁻¹` with `R`, `t` = B from A (Hartley & Zisserman, 2nd ed., §9.2), scaled to
-/// a Frobenius norm of 1. It is the zero matrix if both cameras stand in one place (to a nanometre):
-/// then there is no epipolar constraint, and [`epipolar_line`] returns `None`.
+/// `F = K_b⁻ᵀ [t]ₓ R K_a⁻¹` with `R`, `t` = B from A (Hartley & Zisserman, 2nd ed., §9.2), scaled to a Frobenius norm of 1. It is the
+/// zero matrix if both cameras are in the same place (to a nanometre). There is then no epipolar constraint, and [`epipolar_line`]
+/// returns `None`.
 pub fn fundamental(a: &Camera, b: &Camera) -> Matrix3<f64> {
     let b_from_a = b.camera_from_world * a.camera_from_world.inverse();
     if b_from_a.translation.vector.norm() < SAME_PLACE {
@@ -42,23 +42,23 @@ fn inverse_calibration(camera: &Camera) -> Matrix3<f64> {
     )
 }
 
-/// The epipolar line `F x` of a point, with a normal of length 1: `l · (u, v, 1)` is a distance in pixels.
+/// Returns the epipolar line `F x` of a point, with a normal of length 1, so that `l · (u, v, 1)` is a distance in pixels.
 ///
-/// `None` if the point is the epipole, or F is zero.
+/// Returns `None` if the point is the epipole, or F is zero.
 pub fn epipolar_line(fundamental: &Matrix3<f64>, point: &Point2<f64>) -> Option<Vector3<f64>> {
     let line = fundamental * point.to_homogeneous();
     let length = line.x.hypot(line.y);
     (length > 0.0 && length.is_finite()).then(|| line / length)
 }
 
-/// The distance of a point from a line of [`epipolar_line`], in pixels, never negative.
+/// Returns the distance of a point from a line of [`epipolar_line`], in pixels; never negative.
 pub fn point_line_distance(line: &Vector3<f64>, point: &Point2<f64>) -> f64 {
     line.dot(&point.to_homogeneous()).abs()
 }
 
-/// How far two ideal pixels are from each other's epipolar lines: `[in A, in B]`, in pixels.
+/// Returns the distances of two ideal pixels from each other's epipolar lines: `[in A, in B]`, in pixels.
 ///
-/// `fundamental` takes points of A to lines in B. `None` if one of the points is an epipole.
+/// `fundamental` takes points of A to lines in B. Returns `None` if one of the points is an epipole.
 pub fn symmetric_distance(
     fundamental: &Matrix3<f64>,
     in_a: &Point2<f64>,

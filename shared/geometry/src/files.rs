@@ -1,8 +1,7 @@
-//! Calibration files: read and write rigs in the formats of other programs and in our own.
+//! Calibration files: reading and writing of rigs in the formats of other programs and in Parallax's own format.
 //!
-//! Every format has a module with `parse`, on text, so that no file is needed to test it; the
-//! functions here do the reading and writing. The internal form is always metres, world-to-camera,
-//! pixels from the centre of the top-left one.
+//! Every format has a module with `parse`, which works on text, so that tests need no file. The functions of this module read and write
+//! the files. The internal form always has metres, world-to-camera poses, and pixels counted from the centre of the top-left pixel.
 
 use std::path::{Path, PathBuf};
 
@@ -33,17 +32,17 @@ pub use error::{ParseError, RigFileError, UnwritableRig};
 #[cfg(test)]
 mod tests;
 
-/// The largest calibration file that is read, in bytes.
+/// Maximum size of a calibration file, in bytes.
 const LARGEST_FILE: u64 = 16 << 20;
 
-/// A kind of calibration file.
+/// Format of a calibration file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Our own TOML: [`own`].
+    /// Parallax's own TOML: [`own`].
     Own,
     /// TOML of Pose2Sim, anipose, Caliscope and `FreeMoCap`: [`pose2sim`].
     Pose2Sim,
-    /// The same in millimetres, as anipose and `FreeMoCap` have it; read as [`Pose2Sim`](Self::Pose2Sim).
+    /// The same in millimetres, as written for anipose and `FreeMoCap`; reading treats it as [`Pose2Sim`](Self::Pose2Sim).
     Anipose,
     /// XML of Qualisys: [`qualisys`].
     Qualisys,
@@ -58,7 +57,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Its name in messages.
+    /// Returns the name of the format for messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Own => "Parallax rig",
@@ -73,7 +72,7 @@ impl Format {
     }
 }
 
-/// The unit of lengths in a file.
+/// Unit of lengths in a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unit {
     /// Metres.
@@ -86,17 +85,17 @@ pub enum Unit {
     Feet,
     /// Inches.
     Inches,
-    /// So many metres: the squares of a calibration board.
+    /// The given number of metres, such as the side of a square of the calibration board.
     Length(f64),
 }
 
-/// Why a text is no unit of lengths.
+/// Error for a text that is not a unit of length.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{text:?} is no unit: expected m, cm, mm, ft, in, or a length such as 30mm, the squares of the board"
+    "{text:?} is not a unit: expected m, cm, mm, ft, in, or a length such as 30mm (the side of a square of the board)"
 )]
 pub struct UnitError {
-    /// The text.
+    /// The text that was given.
     pub text: String,
 }
 
@@ -130,7 +129,7 @@ impl core::str::FromStr for Unit {
 }
 
 impl Unit {
-    /// How many units make a metre.
+    /// Returns the number of units in a metre.
     pub fn per_metre(self) -> f64 {
         match self {
             Self::Metres => 1.0,
@@ -146,13 +145,13 @@ impl Unit {
 /// Values that a file may leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadOptions {
-    /// Unit of lengths, where it is not the usual one of the format.
+    /// Unit of lengths, if it is not the usual one of the format.
     pub unit: Option<Unit>,
-    /// Direction against gravity, where the file does not state it.
+    /// Up direction (opposite to gravity), if the file does not state it.
     pub up: Option<UnitVector3<f64>>,
-    /// Image size, where the file does not state it.
+    /// Image size, if the file does not state it.
     pub size: Option<[u32; 2]>,
-    /// True if a camera without a place is read too, with its lens alone; it stands at the origin.
+    /// True to include cameras for which the file has a lens but no pose; their pose is that of a camera at the origin.
     pub lenses_suffice: bool,
 }
 
@@ -160,19 +159,19 @@ pub struct ReadOptions {
 ///
 /// # Errors
 ///
-/// See [`RigFileError`]; each names the file, and its source the field.
+/// Fails with a [`RigFileError`], which names the file; its source names the field.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Rig, RigFileError> {
     read_many(&[path], options)
 }
 
-/// Reads several files as one rig: one file for each camera, or the pair of `EasyMocap`.
+/// Reads several files as one rig: one file for each camera, or the pair of files of `EasyMocap`.
 ///
-/// The cameras keep the order of the files. A file of one camera that does not name it is named by
-/// its stem: `C1.cal` is camera `C1`.
+/// The cameras have the order of the files. If a file with one camera does not name it, the camera is named after the file's
+/// stem: `C1.cal` is camera `C1`.
 ///
 /// # Errors
 ///
-/// As [`read`]; also where the formats differ, or two cameras have one name.
+/// Fails like [`read`], and also if the formats differ or two cameras have the same name.
 pub fn read_many(paths: &[&Path], options: &ReadOptions) -> Result<Rig, RigFileError> {
     let mut documents = Vec::new();
     for path in paths {
@@ -202,13 +201,12 @@ pub fn read_many(paths: &[&Path], options: &ReadOptions) -> Result<Rig, RigFileE
 
 /// Writes a rig.
 ///
-/// `HumanEva` and UMPM files hold one camera each: `path` is then a folder that exists, and the files are
-/// named after the cameras. The formats of Qualisys and Panoptic are only read.
+/// A `HumanEva` or UMPM file has one camera. For these formats, `path` is an existing folder, and the files are named after the cameras.
+/// The formats of Qualisys and Panoptic can only be read.
 ///
 /// # Errors
 ///
-/// [`RigFileError::Unwritable`] where the format cannot describe the rig, [`RigFileError::Write`]
-/// where the file cannot be written.
+/// [`RigFileError::Unwritable`] if the format cannot describe the rig, [`RigFileError::Write`] if the file cannot be written.
 pub fn write(path: &Path, format: Format, rig: &Rig) -> Result<(), RigFileError> {
     let unwritable = |source| RigFileError::Unwritable {
         path: path.to_path_buf(),

@@ -1,23 +1,22 @@
-//! From the frame that a source delivers to the frame that the pipeline sees.
+//! Mapping from the frames of a source to the frames of the pipeline.
 
 use nalgebra::{Matrix2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 
 use crate::{Camera, Lens, Rig};
 
-/// The widest and highest output, in pixels.
+/// Maximum width and height of the output, in pixels.
 const LARGEST: f64 = 32768.0;
 
-/// How large the output is to be.
+/// Size of the output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutSize {
-    /// Exactly this width and height, in pixels. The whole calibrated image fits in, centred, in its
-    /// own aspect; the rest is padding.
+    /// An exact width and height, in pixels. The whole calibrated image is fitted in the centre with its aspect ratio; the rest is padding.
     Exact([u32; 2]),
-    /// The calibrated size times this factor, rounded to whole pixels (which crops or pads less than a pixel).
+    /// A factor on the calibrated size. The result is rounded to whole pixels, which crops or pads less than a pixel.
     Scale(f64),
 }
 
-/// Why a source cannot be framed for a camera.
+/// Reason why a source cannot be framed for a camera.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FramingError {
     /// The source does not have the size for which the camera was calibrated.
@@ -28,8 +27,8 @@ pub enum FramingError {
         /// Width and height of the calibrated image.
         calibrated: [u32; 2],
     },
-    /// The source, moved by its offset, does not lie inside the calibrated image.
-    #[error("a source of {}x{} px at offset ({}, {}) leaves the {}x{} px for which the camera is calibrated", .source_size[0], .source_size[1], .offset_px[0], .offset_px[1], .calibrated[0], .calibrated[1])]
+    /// The source, moved by its offset, extends beyond the calibrated image.
+    #[error("a source of {}x{} px at offset ({}, {}) extends beyond the {}x{} px for which the camera is calibrated", .source_size[0], .source_size[1], .offset_px[0], .offset_px[1], .calibrated[0], .calibrated[1])]
     SourceOffset {
         /// Width and height of the source's frames.
         source_size: [u32; 2],
@@ -38,29 +37,28 @@ pub enum FramingError {
         /// Width and height of the calibrated image.
         calibrated: [u32; 2],
     },
-    /// An output without pixels, or with far too many.
+    /// The output would have no pixels, or far too many.
     #[error("an output of {width} x {height} px is not between 1 and {LARGEST} px")]
     OutSize {
-        /// Width asked for, before rounding.
+        /// Requested width, before rounding.
         width: f64,
-        /// Height asked for, before rounding.
+        /// Requested height, before rounding.
         height: f64,
     },
-    /// The roll is not a number.
+    /// The roll is not a finite number.
     #[error("roll of {roll} rad is not a finite number")]
     Roll {
-        /// The angle.
+        /// Roll angle, in radians.
         roll: f64,
     },
 }
 
-/// How a source's frame becomes the pipeline's frame: rotation, resize, crop and pad.
+/// Mapping from a source's frame to the pipeline's frame: rotation, resizing, cropping and padding.
 ///
-/// Without roll the calibrated image is scaled uniformly: pixel edges fall on pixel edges, so
-/// `u_out = (u + 0.5) s - 0.5` where the sizes divide. With roll the image also turns about its
-/// principal point, and differing focal lengths become one: `f_out = s √(fx fy)`. Either way
-/// [`camera`](Self::camera) sees the world exactly as the warped picture shows it, lens included;
-/// pixels whose source lies outside of it are for the caller to fill.
+/// Without roll, the calibrated image is scaled uniformly. Pixel edges are mapped to pixel edges, so `u_out = (u + 0.5) s - 0.5` if the
+/// sizes divide. With roll, the image also rotates about its principal point, and different focal lengths become equal:
+/// `f_out = s √(fx fy)`. In both cases, [`camera`](Self::camera) describes the warped picture exactly, including the lens. The caller
+/// must fill output pixels that are outside the source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Framing {
     camera: Camera,
@@ -69,16 +67,16 @@ pub struct Framing {
 }
 
 impl Framing {
-    /// Plans the frame.
+    /// Computes the mapping.
     ///
     /// * `source_size`: width and height of the source's frames, in pixels.
-    /// * `source_offset_px`: the calibrated pixel of the source's top-left pixel, for a source that
-    ///   lacks rows or columns of the calibrated image. `None`: the sizes must be equal.
-    /// * `roll`: turns the picture by this angle, radians, clockwise as seen; see [`upright_roll`].
+    /// * `source_offset_px`: calibrated pixel of the source's top-left pixel, for a source that lacks rows or columns of the calibrated
+    ///   image. If it is `None`, the sizes must be equal.
+    /// * `roll`: angle by which the picture is rotated clockwise, in radians; see [`upright_roll`].
     ///
     /// # Errors
     ///
-    /// One [`FramingError`] for each argument. A source of another size is an error; no offset is guessed.
+    /// A [`FramingError`] if an argument is invalid. A source of a different size is an error; no offset is guessed.
     pub fn new(
         camera: &Camera,
         source_size: [u32; 2],
@@ -102,7 +100,7 @@ impl Framing {
         if roll == 0.0 {
             focal = Vector2::new(intrinsics.fx, intrinsics.fy) * scale;
             linear = Matrix2::from_diagonal_element(1.0 / scale);
-            // Free of the principal point, so that a plain copy is the identity to the last bit.
+            // This form does not contain the principal point, so that a plain copy is exactly the identity.
             constant = (half - out / 2.0) / scale + full / 2.0 - half;
         } else {
             focal = Vector2::repeat((intrinsics.fx * intrinsics.fy).sqrt() * scale);
@@ -130,16 +128,16 @@ impl Framing {
         })
     }
 
-    /// Where an output pixel (u, v) lies in the source: `m[0][0] u + m[0][1] v + m[0][2]` is its
-    /// column and `m[1]` its row; both count from the centre of the top-left pixel.
+    /// Returns the map from an output pixel (u, v) to the source: `m[0][0] u + m[0][1] v + m[0][2]` is the column, and `m[1]` gives the
+    /// row. Both are counted from the centre of the top-left pixel.
     pub fn source_from_output(&self) -> [[f64; 3]; 2] {
         self.source_from_output
     }
 
-    /// Where a source pixel lies in the output: the inverse of [`Self::source_from_output`].
+    /// Returns the map from a source pixel to the output; the inverse of [`Self::source_from_output`].
     pub fn output_from_source(&self) -> [[f64; 3]; 2] {
         let [[a, b, c], [d, e, f]] = self.source_from_output;
-        // A turn and a scale other than 0.
+        // The matrix is a rotation with a scale other than 0.
         let determinant = a * e - b * d;
         let [[a, b], [d, e]] = [
             [e / determinant, -b / determinant],
@@ -148,17 +146,17 @@ impl Framing {
         [[a, b, -(a * c + b * f)], [d, e, -(d * c + e * f)]]
     }
 
-    /// The camera that takes the output image, of the output's size.
+    /// Returns the camera of the output image, with the output's size.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// Width and height of the output, in pixels.
+    /// Returns the width and height of the output, in pixels.
     pub fn out_size(&self) -> [u32; 2] {
         self.camera.intrinsics.size
     }
 
-    /// The angle by which the picture is turned, radians, clockwise as seen.
+    /// Returns the angle by which the picture is rotated clockwise, in radians.
     pub fn roll(&self) -> f64 {
         self.roll
     }
@@ -189,7 +187,7 @@ fn source_offset(
     Ok(Vector2::from(offset_px.map(f64::from)))
 }
 
-/// Size and scale of the output.
+/// Returns the size and scale of the output.
 fn output(calibrated: [u32; 2], wanted: OutSize) -> Result<([u32; 2], f64), FramingError> {
     let full = calibrated.map(f64::from);
     let [width, height] = match wanted {
@@ -207,13 +205,13 @@ fn output(calibrated: [u32; 2], wanted: OutSize) -> Result<([u32; 2], f64), Fram
     Ok((rounded.map(|extent| extent as u32), scale))
 }
 
-/// The roll that makes the world's up point up in the picture, in the middle of the rig.
+/// Returns the roll with which the world's up direction points up in the picture, at the focus of the rig.
 ///
-/// The direction from half a metre below to half a metre above the rig's focus is projected with the
-/// lens; [`Framing`] with the returned angle shows it vertical. Where the focus is not in view, a
-/// point on the camera's own axis is used. Radians in (-π, π], clockwise as seen.
+/// The vector from half a metre below to half a metre above the rig's focus is projected with the lens. [`Framing`] with the returned
+/// angle shows it vertical. If the focus is not in view, a point on the camera's own axis is used. The angle is in radians in (-π, π],
+/// clockwise.
 ///
-/// `None` if the rig has no up direction, or the camera looks straight up or down.
+/// Returns `None` if the rig has no up direction, or if the camera looks straight up or down.
 pub fn upright_roll(camera: &Camera, rig: &Rig) -> Option<f64> {
     let up = rig.up_in_world()?.into_inner();
     let on_axis = camera.centre_in_world() + camera.axis_in_world().into_inner() * 4.0;
@@ -226,7 +224,7 @@ pub fn upright_roll(camera: &Camera, rig: &Rig) -> Option<f64> {
     if direction.norm() < 1e-6 {
         return None;
     }
-    // Up in the picture is (0, -1): turn by the angle from `direction` to it.
+    // Up in the picture is (0, -1); the result is the angle from `direction` to it.
     Some((-direction.x).atan2(-direction.y))
 }
 

@@ -5,17 +5,17 @@ use nalgebra::{Matrix2, Point2, Vector2};
 mod inverse;
 mod limit;
 
-/// The shape of a lens's distortion, as `OpenCV` writes it.
+/// Distortion model of a lens, in the notation of `OpenCV`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum LensModel {
     /// No distortion.
     #[default]
     Pinhole,
-    /// Rational radial and tangential distortion of the normalised point (x, y), with r² = x² + y²:
-    /// `x (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²)`,
-    /// and alike for y with p1 and p2 exchanged. `OpenCV` lists the same as k1 k2 p1 p2 k3 k4 k5 k6.
+    /// Rational radial and tangential distortion of the normalised point (x, y), with r² = x² + y²: `x (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 +
+    /// k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²)`. The formula for y is the same with p1 and p2 exchanged. `OpenCV` lists the
+    /// coefficients as k1 k2 p1 p2 k3 k4 k5 k6.
     BrownConrady {
-        /// Radial coefficients k1 to k6; the last three divide.
+        /// Radial coefficients k1 to k6; k4 to k6 are in the denominator.
         k: [f64; 6],
         /// Tangential coefficients p1 and p2.
         p: [f64; 2],
@@ -29,7 +29,7 @@ pub enum LensModel {
 }
 
 impl std::fmt::Display for LensModel {
-    /// The name of the model, and the coefficients that are not 0.
+    /// Writes the name of the model, and the coefficients that are not 0.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let listed = |name: &str, values: &[f64]| {
             let nonzero = values.iter().enumerate().filter(|(_, value)| **value != 0.0);
@@ -47,10 +47,10 @@ impl std::fmt::Display for LensModel {
     }
 }
 
-/// A lens: its model and the part of the image in which that model can be inverted.
+/// A lens: its model, and the part of the image in which the model can be inverted.
 ///
-/// Distortion polynomials stop being monotonic somewhere outside the image they were fitted to.
-/// A lens refuses every ray beyond the first such turning point, and beyond 87 degrees off the axis.
+/// Outside the image they were fitted to, distortion polynomials stop being monotonic at some radius. A lens refuses every ray beyond the
+/// first such radius, and every ray more than 87 degrees off the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
     model: LensModel,
@@ -70,7 +70,7 @@ impl From<LensModel> for Lens {
 }
 
 impl Lens {
-    /// Finds the valid range of `model`. Takes microseconds: do it once for each camera.
+    /// Creates a lens and finds the valid range of `model`. This takes microseconds, so do it once per camera.
     pub fn new(model: LensModel) -> Self {
         Self {
             model,
@@ -78,29 +78,29 @@ impl Lens {
         }
     }
 
-    /// The model and its coefficients.
+    /// Returns the model and its coefficients.
     pub fn model(&self) -> &LensModel {
         &self.model
     }
 
-    /// The largest distance from the axis, in undistorted normalised coordinates, that the lens accepts.
+    /// Returns the largest distance from the axis that the lens accepts, in undistorted normalised coordinates.
     pub fn max_radius(&self) -> f64 {
         self.max_radius
     }
 
-    /// Where the ray through the normalised point (x / z, y / z) falls, in normalised coordinates.
+    /// Returns the distorted position of the normalised point (x / z, y / z), in normalised coordinates.
     ///
-    /// `None` outside the valid range of the model.
+    /// Returns `None` outside the valid range of the model.
     pub fn distort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         self.distort_with_jacobian(point).map(|(distorted, _)| distorted)
     }
 
-    /// [`distort`](Self::distort) with its derivative, row = output, column = input.
+    /// Works like [`distort`](Self::distort), and also returns the derivative (row = output, column = input).
     pub fn distort_with_jacobian(
         &self,
         point: &Point2<f64>,
     ) -> Option<(Point2<f64>, Matrix2<f64>)> {
-        // NaN is in no range.
+        // The range check also refuses NaN.
         if !(0.0..=self.max_radius).contains(&point.coords.norm()) {
             return None;
         }
@@ -108,17 +108,16 @@ impl Lens {
         (jacobian.determinant() > 0.0).then_some((distorted.into(), jacobian))
     }
 
-    /// The normalised point whose ray falls on `distorted` (normalised): the inverse of
-    /// [`distort`](Self::distort).
+    /// Returns the normalised point whose distorted position is `distorted`; the inverse of [`distort`](Self::distort).
     ///
-    /// `None` where no ray of the valid range falls, or the iteration does not reach it.
+    /// Returns `None` if no ray of the valid range has this position, or if the iteration does not converge.
     pub fn undistort(&self, distorted: &Point2<f64>) -> Option<Point2<f64>> {
         inverse::undistort(self, distorted)
     }
 }
 
 impl LensModel {
-    /// True if the model moves no point.
+    /// Returns true if the model moves no point.
     pub fn is_pinhole(&self) -> bool {
         match self {
             Self::Pinhole => true,
@@ -127,7 +126,7 @@ impl LensModel {
         }
     }
 
-    /// The coefficients of the model, none for a pinhole; radial before tangential.
+    /// Returns the coefficients of the model, radial before tangential; none for a pinhole.
     pub fn coefficients(&self) -> impl Iterator<Item = f64> + '_ {
         let (k, p): (&[f64], &[f64]) = match self {
             Self::Pinhole => (&[], &[]),
@@ -137,9 +136,9 @@ impl LensModel {
         k.iter().chain(p).copied()
     }
 
-    /// The model seen by a camera that is turned about its axis: coordinates turn by `angle`.
+    /// Returns the model for a camera that is rotated about its axis: coordinates rotate by `angle`.
     ///
-    /// Radial terms do not change; (p2, p1) is a vector in the image and turns with it.
+    /// Radial terms do not change. (p2, p1) is a vector in the image and rotates with it.
     #[must_use]
     pub fn rotated(self, angle: f64) -> Self {
         match self {
@@ -152,7 +151,7 @@ impl LensModel {
         }
     }
 
-    /// The derivative of the distorted point by a coefficient, numbered as [`coefficients`](Self::coefficients) lists them.
+    /// Returns the derivative of the distorted point with respect to a coefficient, numbered as in [`coefficients`](Self::coefficients).
     pub(crate) fn by_coefficient(&self, v: &Vector2<f64>, nth: usize) -> Vector2<f64> {
         let s = v.norm_squared();
         let power = |nth: usize| s.powi(nth as i32 + 1);
@@ -178,7 +177,7 @@ impl LensModel {
         }
     }
 
-    /// The radius at which a ray of undistorted radius `r` falls, tangential terms left out, and its derivative.
+    /// Returns the distorted radius of a ray with undistorted radius `r`, without tangential terms, and its derivative.
     fn radius(&self, r: f64) -> (f64, f64) {
         match self {
             Self::Pinhole => (r, 1.0),
@@ -194,7 +193,7 @@ impl LensModel {
         }
     }
 
-    /// The distorted point and its derivative, without regard to the valid range.
+    /// Returns the distorted point and its derivative, without a check of the valid range.
     fn distort(&self, v: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         match self {
             Self::Pinhole => (v, Matrix2::identity()),
@@ -228,7 +227,7 @@ impl LensModel {
     }
 }
 
-/// The rational radial factor at `s` = r², and its derivative by s.
+/// Returns the rational radial factor at `s` = r², and its derivative with respect to s.
 fn rational(k: &[f64; 6], s: f64) -> (f64, f64) {
     let over = 1.0 + s * (k[0] + s * (k[1] + s * k[2]));
     let under = 1.0 + s * (k[3] + s * (k[4] + s * k[5]));
@@ -238,7 +237,7 @@ fn rational(k: &[f64; 6], s: f64) -> (f64, f64) {
     (factor, (d_over - factor * d_under) / under)
 }
 
-/// The fisheye radius at an angle, and its derivative by the angle.
+/// Returns the fisheye radius at an angle, and its derivative with respect to the angle.
 fn fisheye(k: &[f64; 4], angle: f64) -> (f64, f64) {
     let s = angle * angle;
     let factor = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])));

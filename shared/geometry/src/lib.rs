@@ -1,10 +1,12 @@
-//! Cameras and points: project, undistort, frame, triangulate, and read calibration files.
+//! Cameras and points: projection, undistortion, framing, triangulation, and calibration files.
 //!
-//! Everything is `f64`. The world is in metres; cameras look along +z, with x to the right and y
-//! down (`OpenCV`), and are stored as `camera_from_world`. The centre of the top-left pixel is (0, 0).
-//! A *pixel* is a point of the recorded, distorted image; an *ideal pixel* is where the same ray
-//! would fall through a pinhole with the same focal lengths and principal point.
-//! No clock and no threads; only [`files::read`], [`files::read_many`] and [`files::write`] do input or output.
+//! All numbers are `f64`. The world is in metres. Cameras look along +z, with x to the right and y down (`OpenCV`), and are stored as
+//! `camera_from_world`. The centre of the top-left pixel is (0, 0).
+//!
+//! A *pixel* is a point of the recorded, distorted image. An *ideal pixel* is the position of the same ray in a pinhole camera with the
+//! same focal lengths and principal point.
+//!
+//! The crate uses no clock and no threads. Only [`files::read`], [`files::read_many`] and [`files::write`] do input or output.
 #![forbid(unsafe_code)]
 
 mod lens;

@@ -1,131 +1,131 @@
-//! A set of calibrated cameras in one world.
+//! A set of calibrated cameras in a common world.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::{Camera, Intrinsics};
 
-/// The longest focal length, in image sizes: a hundred times that of the longest telephoto lens.
+/// Maximum focal length, in image sizes: a hundred times that of the longest telephoto lens.
 const FOCAL_LIMIT: f64 = 1e4;
-/// The largest lens coefficient: calibrations that fit noise have some of thousands.
+/// Maximum lens coefficient. Calibrations that fit noise have coefficients in the thousands.
 const COEFFICIENT_LIMIT: f64 = 1e7;
-/// The largest distance of a camera from the origin: geocentric coordinates are within it.
+/// Maximum distance of a camera from the origin; geocentric coordinates are within it.
 const PLACE_LIMIT_METRES: f64 = 1e7;
 
-/// Why a set of cameras is no rig.
+/// Reason why a set of cameras does not form a rig.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RigError {
-    /// No camera at all.
+    /// There is no camera.
     #[error("a rig needs at least one camera")]
     NoCameras,
-    /// A camera without a name.
+    /// A camera has no name.
     #[error("camera {index} has an empty name")]
     EmptyName {
-        /// Position in the list, from 0.
+        /// Index of the camera in the list, from 0.
         index: usize,
     },
-    /// A name that cannot be used as the name of a folder.
+    /// A name cannot be used as the name of a folder.
     #[error("camera {index} is named {name:?}; expected {PLAIN_NAME}")]
     Name {
-        /// Position in the list, from 0.
+        /// Index of the camera in the list, from 0.
         index: usize,
-        /// The name.
+        /// Name of the camera.
         name: String,
     },
     /// Two cameras have the same name.
     #[error("two cameras are named {name:?}")]
     DuplicateName {
-        /// The name.
+        /// The name that occurs twice.
         name: String,
     },
-    /// A number is infinite or not a number.
+    /// A number is infinite or NaN.
     #[error("camera {camera:?}: {quantity} is {value}, not a finite number")]
     NotFinite {
         /// Name of the camera.
         camera: String,
         /// Name of the quantity.
         quantity: &'static str,
-        /// The number.
+        /// Value of the quantity.
         value: f64,
     },
-    /// An image without pixels.
+    /// The image has no pixels.
     #[error("camera {camera:?}: image size is {width}x{height}, both must be at least 1", width = .size[0], height = .size[1])]
     EmptyImage {
         /// Name of the camera.
         camera: String,
-        /// Width and height.
+        /// Width and height of the image, in pixels.
         size: [u32; 2],
     },
-    /// A focal length that is zero or negative.
+    /// A focal length is zero or negative.
     #[error("camera {camera:?}: focal length {value} px is not positive")]
     Focal {
         /// Name of the camera.
         camera: String,
-        /// The focal length in pixels.
+        /// Focal length, in pixels.
         value: f64,
     },
-    /// A principal point further from the image than the image is wide.
+    /// The principal point is further from the image than the image is wide.
     #[error(
         "camera {camera:?}: principal point {quantity} = {value} px is far outside an image of {extent} px"
     )]
     PrincipalPoint {
         /// Name of the camera.
         camera: String,
-        /// Either `cx` or `cy`.
+        /// Name of the coordinate: `cx` or `cy`.
         quantity: &'static str,
-        /// The coordinate in pixels.
+        /// Value of the coordinate, in pixels.
         value: f64,
         /// Width or height of the image.
         extent: u32,
     },
-    /// A focal length so long that all rays of the image are parallel to working precision.
+    /// A focal length is so long that all rays of the image are parallel to working precision.
     #[error(
         "camera {camera:?}: focal length {value} px is more than {limit:e} times the image, which is {extent} px"
     )]
     LongFocal {
         /// Name of the camera.
         camera: String,
-        /// The focal length in pixels.
+        /// Focal length, in pixels.
         value: f64,
-        /// The larger of width and height.
+        /// The larger of the image's width and height.
         extent: u32,
-        /// The longest accepted, as a multiple of it.
+        /// Maximum focal length, as a multiple of the extent.
         limit: f64,
     },
-    /// A lens coefficient larger than that of any real lens.
+    /// A lens coefficient is larger than that of any real lens.
     #[error(
-        "camera {camera:?}: lens coefficient {value:e} exceeds {limit:e}: is the order that of the format?"
+        "camera {camera:?}: lens coefficient {value:e} exceeds {limit:e}: do the coefficients have the order of the format?"
     )]
     LensCoefficient {
         /// Name of the camera.
         camera: String,
-        /// The coefficient.
+        /// Value of the coefficient.
         value: f64,
-        /// The largest accepted.
+        /// Maximum coefficient.
         limit: f64,
     },
-    /// A camera further from the origin than any place on the Earth.
+    /// A camera is further from the origin than any place on Earth is from its centre.
     #[error(
-        "camera {camera:?}: it stands {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
+        "camera {camera:?}: it is {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
     )]
     Place {
         /// Name of the camera.
         camera: String,
-        /// The distance.
+        /// Distance from the origin.
         metres: f64,
-        /// The largest accepted.
+        /// Maximum distance.
         limit: f64,
     },
-    /// The rotation is not a rotation.
+    /// The rotation matrix is not a rotation.
     #[error("camera {camera:?}: rotation")]
     Rotation {
         /// Name of the camera.
         camera: String,
-        /// How far it is from a rotation.
+        /// Deviation from a rotation.
         source: NotARotation,
     },
 }
 
-/// A matrix that does not rotate.
+/// Error for a matrix that is not a rotation.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "not a rotation: largest entry of R Rᵀ - I is {deviation:e} (limit {limit:e}), determinant {determinant}"
@@ -133,22 +133,22 @@ pub enum RigError {
 pub struct NotARotation {
     /// Largest absolute entry of R Rᵀ - I.
     pub deviation: f64,
-    /// The largest deviation accepted.
+    /// Largest accepted deviation.
     pub limit: f64,
-    /// Determinant; -1 for a mirrored frame.
+    /// Determinant of the matrix; -1 for a mirrored coordinate system.
     pub determinant: f64,
 }
 
-/// The rotation nearest to a matrix that was written with few digits.
+/// Returns the rotation nearest to a matrix that was written with few digits.
 ///
 /// # Errors
 ///
-/// [`NotARotation`] if an entry of R Rᵀ - I exceeds 1e-3, or the matrix mirrors.
+/// [`NotARotation`] if an entry of R Rᵀ - I exceeds 1e-3, or if the matrix is a reflection.
 pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, NotARotation> {
     const LIMIT: f64 = 1e-3;
     let deviation = (matrix * matrix.transpose() - Matrix3::identity()).abs().max();
     let determinant = matrix.determinant();
-    // `Matrix::max` ignores NaN, so the entries are checked too.
+    // `Matrix::max` ignores NaN, so the entries are checked as well.
     let finite = matrix.iter().all(|entry| entry.is_finite());
     if !finite || deviation > LIMIT || determinant <= 0.0 {
         return Err(NotARotation {
@@ -158,7 +158,7 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
         });
     }
     let mut nearest = *matrix;
-    // Newton's iteration for the polar decomposition: squares the deviation at every step.
+    // Newton's iteration for the polar decomposition, which squares the deviation at every step.
     for _ in 0..4 {
         let Some(inverse) = nearest.try_inverse() else {
             break;
@@ -170,16 +170,16 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     ))
 }
 
-/// A camera of a calibration file whose place the file does not say.
+/// A camera for which a calibration file has no pose.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LeftOut {
-    /// Its name.
+    /// Name of the camera.
     pub camera: String,
-    /// Why its place is not known; for the user.
+    /// Reason for the user why the pose is not known.
     pub why: &'static str,
 }
 
-/// Calibrated cameras in one world frame, validated on construction.
+/// Calibrated cameras in a common world, validated on construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rig {
     cameras: Vec<Camera>,
@@ -189,10 +189,10 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Makes a rig of cameras.
+    /// Creates a rig.
     ///
-    /// * `up_in_world`: the direction against gravity, where it is known.
-    /// * `source`: where the numbers come from; free text.
+    /// * `up_in_world`: up direction (opposite to gravity), if known.
+    /// * `source`: origin of the calibration, as free text.
     ///
     /// # Errors
     ///
@@ -228,13 +228,13 @@ impl Rig {
         })
     }
 
-    /// The rig with the cameras of its file whose place is not known.
+    /// Returns the rig with a list of the cameras for which its file has no pose.
     #[must_use]
     pub fn with_left_out(self, left_out: Vec<LeftOut>) -> Self {
         Self { left_out, ..self }
     }
 
-    /// The rig with another direction against gravity.
+    /// Returns the rig with another up direction.
     #[must_use]
     pub fn with_up(self, up_in_world: Option<UnitVector3<f64>>) -> Self {
         Self {
@@ -243,46 +243,46 @@ impl Rig {
         }
     }
 
-    /// The cameras of its file whose place is not known. Where lenses are enough, they are among [`cameras`](Self::cameras), at the
-    /// origin.
+    /// Returns the cameras for which the rig's file has no pose. If lenses suffice, these cameras are also among
+    /// [`cameras`](Self::cameras), at the origin.
     pub fn left_out(&self) -> &[LeftOut] {
         &self.left_out
     }
 
-    /// Describes a missing camera and those that the rig has, for errors: `no camera "c"; it has a, b`.
+    /// Returns an error text for a missing camera that lists the cameras of the rig: `no camera "c"; it has a, b`.
     pub fn lacks(&self, name: &str) -> String {
         if let Some(LeftOut { why, .. }) =
             self.left_out.iter().find(|left_out| left_out.camera == name)
         {
-            return format!("no place of camera {name:?}: {why}");
+            return format!("camera {name:?} has no pose: {why}");
         }
         let names: Vec<&str> = self.cameras.iter().map(|camera| &*camera.name).collect();
         format!("no camera {name:?}; it has {}", names.join(", "))
     }
 
-    /// The cameras, in the order of the file.
+    /// Returns the cameras, in the order of the file.
     pub fn cameras(&self) -> &[Camera] {
         &self.cameras
     }
 
-    /// The camera of a name.
+    /// Returns the camera of a name.
     pub fn camera(&self, name: &str) -> Option<&Camera> {
         self.cameras.iter().find(|camera| camera.name == name)
     }
 
-    /// The direction against gravity, where it is known.
+    /// Returns the up direction (opposite to gravity), if known.
     pub fn up_in_world(&self) -> Option<UnitVector3<f64>> {
         self.up_in_world
     }
 
-    /// Where the numbers come from.
+    /// Returns the origin of the calibration.
     pub fn source(&self) -> &str {
         &self.source
     }
 
-    /// The point nearest to all optical axes (least squares), in metres.
+    /// Returns the point nearest to all optical axes (least squares), in metres.
     ///
-    /// `None` if the axes are parallel, as they are for a single camera.
+    /// Returns `None` if the axes are parallel, or if there is only one camera.
     pub fn focus(&self) -> Option<Point3<f64>> {
         let origin = self.cameras.first()?.centre_in_world();
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -293,7 +293,7 @@ impl Rig {
             right += across * (camera.centre_in_world() - origin);
         }
         let eigen = normal.symmetric_eigenvalues();
-        // About half a degree between two axes; with less they are taken as parallel.
+        // The limit corresponds to about half a degree between two axes; below it, they count as parallel.
         if eigen.min() < 1e-4 {
             return None;
         }
@@ -346,7 +346,7 @@ fn check_finite(camera: &Camera) -> Result<(), RigError> {
     }
 }
 
-/// Refuses magnitudes that would leave no digits to compute with.
+/// Refuses magnitudes that would leave too few digits for computations.
 fn check_size(camera: &Camera) -> Result<(), RigError> {
     let Intrinsics {
         fx, fy, size, lens, ..
@@ -370,7 +370,7 @@ fn check_size(camera: &Camera) -> Result<(), RigError> {
             limit: COEFFICIENT_LIMIT,
         });
     }
-    // `amax` stays finite where the square of the norm overflows.
+    // `amax` stays finite even if the square of the norm overflows.
     let translation = camera.camera_from_world.translation.vector;
     let metres = translation.amax().max(translation.norm());
     if metres.is_nan() || metres > PLACE_LIMIT_METRES {

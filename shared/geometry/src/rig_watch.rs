@@ -14,70 +14,69 @@ use crate::{Camera, Ray};
 
 pub use swap::{Contradiction, Swap, SwapWatch};
 
-/// Frames of the running median.
+/// Number of frames of the running median.
 const WINDOW: usize = 60;
-/// The fewest frames for a result.
+/// Minimum number of frames for a result.
 const MIN_FRAMES: usize = 12;
-/// A camera is reported once it has been suspected in this many usable frames in a row.
+/// Number of successive usable frames in which a camera must be suspected before it is reported.
 const PERSISTENT: u32 = 8;
-/// The fewest points of a usable frame.
+/// Minimum number of points of a usable frame.
 const MIN_POINTS: usize = 5;
-/// Sine of the angle between two rays below which their meeting point is too uncertain.
+/// Minimum sine of the angle between two rays; below it, their intersection is too uncertain.
 const MIN_SINE: f64 = 0.2;
-/// A camera is suspected if the residual with it is at least this many times the residual without it, and at
-/// least this many degrees and pixels: detections lie on a grid of cells of four pixels, and may always be off
-/// by half a cell in the same direction.
+/// A camera is suspected if the residual with it is at least this many times the residual without it. It must also reach limits in degrees
+/// and pixels. Detections are on a grid of cells of four pixels, and may always be off by half a cell in the same direction.
 const FACTOR: f64 = 2.5;
 const MIN_DEGREES: f64 = 0.5;
 const MIN_PX: f64 = 4.0;
-/// No camera is suspected where the others disagree by more among themselves.
+/// Largest residual between the other cameras at which a camera can be suspected.
 const MAX_DEGREES: f64 = 1.5;
 
-/// Tracks the residual between the cameras on the same points, with each camera and without it.
+/// Tracks the residuals of the same points in all cameras, with and without each camera.
 ///
-/// With four or more cameras, the rays of every two others are triangulated and the point is projected into the
-/// camera; the offset of the camera's own observation from there is the residual. It is reduced by medians: over
-/// the points of a frame, in x and in y; over the last frames of such a group of three cameras, as a vector whose
-/// length is taken. (Detection errors change direction, the offset of a moved camera keeps it.) The residual of a
-/// camera is the median over all groups that contain it: one wrong camera affects those, and no others.
+/// With four or more cameras, the rays of every two other cameras are triangulated, and the point is projected into the camera. The
+/// residual is the offset of the camera's own observation from this projection. Two medians are taken: over the points of a frame, in x
+/// and in y; then over the last frames of each group of three cameras, as a vector. The length of this vector is used, because errors of
+/// detections change direction, but the offset of a moved camera does not. The residual of a camera is the median over all groups that contain it. A single
+/// wrong camera only affects these groups.
 ///
-/// With three cameras the epipolar distance to the ray of one other camera is used, without its direction, because
-/// the two cameras that are left may agree by chance. It hardly shows a camera that is turned along its epipolar
-/// lines. With two cameras it is undecidable which of them is wrong.
+/// With three cameras, the epipolar distance to the ray of one other camera is used instead, without its direction, because the two
+/// remaining cameras may agree by chance. This hardly detects a camera that is rotated along its epipolar lines. With two cameras, it is
+/// impossible to decide which one is wrong.
 ///
-/// Not a calibration: it detects that a camera was moved, not where it is now.
+/// This is not a calibration: it detects that a camera was moved, but not its new pose.
 #[derive(Debug, Clone)]
 pub struct RigWatch {
     cameras: Vec<Camera>,
     groups: Vec<Group>,
-    /// By camera: usable frames in a row in which it was suspected.
+    /// Number of successive usable frames in which each camera was suspected.
     streaks: Vec<u32>,
-    /// By camera: whether it was ever reported.
+    /// True for each camera that was ever reported.
     reported: Vec<bool>,
 }
 
-/// Some cameras, and their residuals on the same points.
+/// A group of cameras, and their residuals on the same points.
 #[derive(Debug, Clone)]
 struct Group {
-    /// The camera that is projected into, and the two others, or the one other twice.
+    /// The camera that is projected into, then the two other cameras; if there is only one other, it is listed twice.
     views: [usize; 3],
-    /// Median offset of the observed from the predicted points in each of the last frames, pixels.
+    /// Median offset of the observed from the predicted points in each of the last frames, in pixels.
     offsets_px: VecDeque<[f64; 2]>,
 }
 
-/// A camera that is not where the calibration says.
+/// A camera whose pose differs from the calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Suspect {
-    /// The camera.
+    /// Index of the camera.
     pub view: usize,
-    /// Residual of the groups with this camera, pixels.
+    /// Residual of the groups with this camera, in pixels.
     pub residual_px: f64,
-    /// Residual of the groups without it, pixels.
+    /// Residual of the groups without this camera, in pixels.
     pub without_px: f64,
 }
 
 impl RigWatch {
-    /// Starts without observations.
+    /// Creates a watch without observations.
     pub fn new(cameras: Vec<Camera>) -> Self {
         let n = cameras.len();
         let counts = |[view, a, b]: &[usize; 3]| {
@@ -99,8 +98,8 @@ impl RigWatch {
 
     /// Adds the observations of one frame.
     ///
-    /// * `points_px`: one entry per camera, `None` without a detection; the same points of the world in the
-    ///   same order, pixels of the recorded image.
+    /// * `points_px`: one entry per camera, `None` without a detection. All cameras list the same points of the world in the same order, in
+    ///   pixels of the recorded image.
     pub fn note(&mut self, points_px: &[Option<Vec<[f64; 2]>>]) {
         let views = self.cameras.iter().zip(points_px);
         let observe =
@@ -134,7 +133,7 @@ impl RigWatch {
         }
     }
 
-    /// Reports cameras that have been suspected long enough.
+    /// Updates the number of frames in which each camera was suspected, and reports cameras.
     fn update_streaks(&mut self) {
         let suspects = self.suspects();
         for (view, streak) in self.streaks.iter_mut().enumerate() {
@@ -144,31 +143,31 @@ impl RigWatch {
         }
     }
 
-    /// Returns true if a camera was ever suspected for several usable frames in a row.
+    /// Returns true if a camera was ever suspected for several successive usable frames.
     pub fn is_reported(&self, view: usize) -> bool {
         self.reported.get(view).copied().unwrap_or(false)
     }
 
-    /// Residual of the groups with a camera, pixels; `None` while there are too few observations.
+    /// Returns the residual of the groups with a camera, in pixels; `None` while there are too few observations.
     pub fn residual_px(&self, view: usize) -> Option<f64> {
         self.median_residual(|group| group.views.contains(&view))
     }
 
-    /// Residual of the groups without a camera, pixels.
+    /// Returns the residual of the groups without a camera, in pixels.
     pub fn without_px(&self, view: usize) -> Option<f64> {
         self.median_residual(|group| !group.views.contains(&view))
     }
 
-    /// The median over some groups.
+    /// Returns the median over some groups.
     fn median_residual(&self, counts: impl Fn(&Group) -> bool) -> Option<f64> {
         let groups = self.groups.iter().filter(|group| counts(group));
         median(groups.filter_map(Group::residual).collect())
     }
 
-    /// The cameras that are not where the calibration says.
+    /// Returns the cameras whose poses differ from the calibration.
     ///
-    /// One at a time: the one without which the others agree best. A wrong camera affects the residuals of the
-    /// others, so a second one is searched for among those that are left, of which there must be four.
+    /// Cameras are found one at a time: the first is the one without which the others agree best. A wrong camera affects the residuals of
+    /// the others, so a second one is searched for among the remaining cameras only. At least four must remain.
     pub fn suspects(&self) -> Vec<Suspect> {
         let mut left_out = Vec::new();
         let mut found = Vec::new();
@@ -211,7 +210,7 @@ impl RigWatch {
 }
 
 impl Group {
-    /// Adds the offsets of one frame. Returns whether there were enough of them.
+    /// Adds the offsets of one frame. Returns true if there were enough of them.
     fn note(&mut self, offsets_px: &[[f64; 2]]) -> bool {
         if offsets_px.len() < MIN_POINTS {
             return false;
@@ -244,13 +243,13 @@ impl ObservedPoint {
         Some(Self { at_px, ray })
     }
 
-    /// Its offset from the projection of the point where two rays meet, pixels.
+    /// Returns the offset of the observation from the projection of the intersection of two rays, in pixels.
     fn offset_from_meeting_point(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<[f64; 2]> {
         let [on_a, on_b] = closest(a, b)?;
         self.offset_from_point(camera, &nalgebra::center(&on_a, &on_b))
     }
 
-    /// Its offset from the projection of the point of a ray that is closest to its own ray, pixels.
+    /// Returns the offset of the observation from the projection of the closest point on another ray, in pixels.
     fn offset_from_ray(&self, camera: &Camera, ray: &Ray) -> Option<[f64; 2]> {
         let [on_ray, _] = closest(ray, &self.ray)?;
         self.offset_from_point(camera, &on_ray)
@@ -263,8 +262,7 @@ impl ObservedPoint {
     }
 }
 
-/// The closest points of two rays, one on each; `None` if the rays are almost parallel, or a point lies behind
-/// its camera.
+/// Returns the closest points of two rays, one on each; `None` if the rays are almost parallel, or if a point is behind its camera.
 fn closest(a: &Ray, b: &Ray) -> Option<[Point3<f64>; 2]> {
     let across = a.direction.cross(&b.direction);
     let squared_sine = across.norm_squared();
@@ -283,13 +281,13 @@ fn closest(a: &Ray, b: &Ray) -> Option<[Point3<f64>; 2]> {
     })
 }
 
-/// The median in x and in y; `None` of an empty list.
+/// Returns the medians in x and in y; `None` for an empty list.
 fn median_offset(all: &[[f64; 2]]) -> Option<[f64; 2]> {
     let along = |axis: usize| median(all.iter().map(|offset| offset[axis]).collect());
     Some([along(0)?, along(1)?])
 }
 
-/// The lower of the two in the middle; none of nothing.
+/// Returns the lower median; `None` for an empty list.
 pub(crate) fn median(all: Vec<f64>) -> Option<f64> {
     Sorted::new(all).lower_median()
 }

@@ -1,4 +1,4 @@
-//! How large frames are to be searched, from the calibration alone: a person should be as high in them as models know people.
+//! Choice of the size at which frames are searched, from the calibration alone: people should have the height that models expect.
 
 mod shared_space;
 
@@ -7,21 +7,21 @@ use shared_space::heights;
 
 pub use shared_space::PERSON_METRES;
 
-/// The height of a person that is aimed at, pixels of the searched frame.
+/// Target height of a person, in pixels of the searched frame.
 pub const AIM_PX: f64 = 200.0;
-/// Heights of a person with which the search is at its best, pixels of the searched frame.
+/// Range of heights of a person at which the search is best, in pixels of the searched frame.
 pub const GOOD_PX: [f64; 2] = [150.0, 250.0];
-/// Heights of a person that the search still does well, pixels of the searched frame.
+/// Range of heights of a person at which the search still works well, in pixels of the searched frame.
 pub const USABLE_PX: [f64; 2] = [110.0, 350.0];
-/// Most pixels of a frame that is searched unless more is asked for, which cost about 0.41 CPU-seconds.
+/// Maximum number of pixels of a searched frame unless more are requested. This number costs about 0.41 CPU-seconds.
 ///
-/// Four views of 1088x1920 with all defaults took, processor time per frame and view of all processes together (Intel
-/// Xeon, two cores, AVX-512): 0.22 s at 272x480, 0.32 s at 363x640, 0.43 s at 435x768 and 0.63 s at 544x960. Full HD
-/// becomes 640x360 at most; 640x480 stays what it is.
+/// Processor time was measured for four views of 1088x1920 with all defaults, per frame and view, over all processes together (Intel Xeon,
+/// two cores, AVX-512): 0.22 s at 272x480, 0.32 s at 363x640, 0.43 s at 435x768 and 0.63 s at 544x960. Full HD becomes 640x360 at most;
+/// 640x480 keeps its size.
 pub const MOST_PIXELS: u64 = 320_000;
 
-/// The scales that are chosen from, largest first. Neighbours differ by a quarter at most, so that a person is within
-/// 16 % of [`AIM_PX`]; resampling by one over a whole number is exact.
+/// Scales to choose from, largest first. Neighbours differ by at most a quarter, so that the height of a person is within 16 % of
+/// [`AIM_PX`]. Resampling by one over a whole number is exact.
 const SCALES: [f64; 15] = [
     1.0,
     0.75,
@@ -40,50 +40,50 @@ const SCALES: [f64; 15] = [
     1.0 / 24.0,
 ];
 
-/// How large the frames of one camera are searched.
+/// Size at which the frames of one camera are searched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSize {
-    /// The camera.
+    /// Name of the camera.
     pub camera: String,
-    /// Size of the frame as a share of the calibrated image: see [`OutSize::Scale`](crate::OutSize::Scale).
+    /// Size of the frame relative to the calibrated image; see [`OutSize::Scale`](crate::OutSize::Scale).
     pub scale: f64,
-    /// Width and height of the frame, pixels.
+    /// Width and height of the frame, in pixels.
     pub frame_size: [u32; 2],
-    /// How high a person of [`PERSON_METRES`] stands in the calibrated image, pixels: the median over the space that the
-    /// camera shares with others. None of a camera that shares no space.
+    /// Height of a person of [`PERSON_METRES`] in the calibrated image, in pixels: the median over the space that the camera shares with
+    /// others. It is `None` for a camera that shares no space.
     pub person_px: Option<f64>,
-    /// The scale that would be chosen if time did not matter; larger than `scale` where it does.
+    /// Scale that would be chosen without the limit on time; larger than `scale` if the limit applies.
     pub wanted: f64,
 }
 
 impl SearchSize {
-    /// How high the person stands in the frame, pixels.
+    /// Returns the height of the person in the frame, in pixels.
     pub fn person_in_frame_px(&self) -> Option<f64> {
         self.person_px.map(|person_px| person_px * self.scale)
     }
 
-    /// Returns true if the person is smaller than [`GOOD_PX`], for the sake of time.
+    /// Returns true if the limit on time makes the person smaller than [`GOOD_PX`].
     pub fn is_limited(&self) -> bool {
         let px = self.person_in_frame_px();
         self.scale < self.wanted && px.is_some_and(|px| px < GOOD_PX[0])
     }
 }
 
-/// How large the frames of all cameras of a rig are searched.
+/// Sizes at which the frames of all cameras of a rig are searched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSizes {
     /// Size for every camera, in the order of the rig.
     pub cameras: Vec<SearchSize>,
-    /// The most cameras that share a space in which a person can stand; 0 if no two do.
+    /// Maximum number of cameras that share a space in which a person can stand; 0 if no two cameras do.
     pub n_sharing: usize,
 }
 
-/// Chooses how large frames are searched.
+/// Chooses the sizes at which frames are searched.
 ///
-/// A person of [`PERSON_METRES`] who stands in the space that the cameras share is to be [`AIM_PX`] high, and between
-/// [`GOOD_PX`] in every camera: by one scale for all cameras if one does, else by one for each. No frame is larger than the
-/// calibrated image, nor has more than [`MOST_PIXELS`]. Where no two cameras share a space it is
-/// the largest frame within that limit. The same cameras give the same sizes, whatever their footage is.
+/// The target is a height of [`AIM_PX`] for a person of [`PERSON_METRES`] who stands in the space that the cameras share. If one scale
+/// gives a height within [`GOOD_PX`] in every camera, it is used for all; otherwise each camera has its own scale. No frame is larger than
+/// the calibrated image, or has more than [`MOST_PIXELS`]. If no two cameras share a space, the largest frame within this limit is used.
+/// The sizes depend on the cameras only, not on the footage.
 pub fn search_sizes(rig: &Rig) -> SearchSizes {
     let found = heights(rig);
     let sizes = rig.cameras().iter().map(|camera| camera.intrinsics.size);
@@ -107,7 +107,7 @@ pub fn search_sizes(rig: &Rig) -> SearchSizes {
     }
 }
 
-/// The one scale for all cameras that gives good heights in all, nearest to what is aimed at.
+/// Returns the scale that gives good heights in all cameras and is nearest to the target, if there is one.
 fn common(person_px: &[Option<f64>], limits: &[f64]) -> Option<f64> {
     let known: Vec<f64> = person_px.iter().flatten().copied().collect();
     let limits = person_px.iter().zip(limits).filter(|camera| camera.0.is_some());
@@ -124,7 +124,7 @@ fn common(person_px: &[Option<f64>], limits: &[f64]) -> Option<f64> {
     good.filter(|_| !known.is_empty()).min_by(|a, b| off(*a).total_cmp(&off(*b)))
 }
 
-/// The scale up to a limit that brings a height nearest to what is aimed at.
+/// Returns the scale, up to a limit, that brings a height nearest to the target.
 fn nearest(person_px: f64, limit: f64) -> f64 {
     let off = |scale: f64| (person_px * scale / AIM_PX).ln().abs();
     let within = SCALES.into_iter().filter(|scale| *scale <= limit);
@@ -132,23 +132,23 @@ fn nearest(person_px: f64, limit: f64) -> f64 {
     nearest.unwrap_or(limit)
 }
 
-/// The largest scale at which a frame is not too large to search.
+/// Returns the largest scale at which a frame is not too large to search.
 fn largest(image: [u32; 2]) -> f64 {
     let pixels = |scale: f64| at_scale(image, scale).into_iter().map(u64::from).product::<u64>();
     let largest = SCALES.into_iter().find(|scale| pixels(*scale) <= MOST_PIXELS);
     largest.unwrap_or_else(|| (MOST_PIXELS as f64 / pixels(1.0) as f64).sqrt())
 }
 
-/// Width and height of a frame, as [`OutSize::Scale`](crate::OutSize::Scale) rounds them.
+/// Returns the width and height of a frame, rounded like [`OutSize::Scale`](crate::OutSize::Scale).
 fn at_scale(image: [u32; 2], scale: f64) -> [u32; 2] {
     image.map(|image| (f64::from(image) * scale).round().max(1.0) as u32)
 }
 
-/// The scale that brings people to the height that is aimed at, as a number to write down.
+/// Returns the scale that brings people to the target height, rounded for a settings file.
 ///
-/// * `seen`: of every camera, the scale at which it was searched, and how high people were in its frames, pixels.
+/// * `seen`: for every camera, the scale at which it was searched, and the height of people in its frames in pixels.
 ///
-/// `None` without any; more than 1 enlarges.
+/// Returns `None` if `seen` is empty. A scale above 1 enlarges.
 pub fn better_scale(seen: &[[f64; 2]]) -> Option<f64> {
     let logs: Vec<f64> = seen.iter().map(|[scale, px]| (scale * AIM_PX / px).ln()).collect();
     let mean = logs.iter().sum::<f64>() / logs.len() as f64;

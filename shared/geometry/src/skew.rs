@@ -1,56 +1,57 @@
-//! Pictures that were not taken at the instant of their frame: how fast points move in them, and where the points were at the
-//! instant.
+//! Correction for pictures that were not taken at the instant of their frame.
 //!
-//! The *skew* of a picture is how long after the instant of its frame it was taken, seconds; negative for before. Two ways to take
-//! it into account: a point is moved to the instant by its own velocity ([`Tracks`], [`moved`]), or trusted less, by as much as it
-//! may have moved ([`widened_px`]). The test `clock` of the crate `pipeline` measures both: the first is far better, and best where a
-//! point whose velocity is not known, or that is moved beyond what was seen, is trusted less.
+//! The *skew* of a picture is the time from the instant of its frame to the picture, in seconds; it is negative if the picture is earlier.
+//! There are two corrections: a point is moved to the instant by its own velocity ([`Tracks`], [`moved`]), or its standard deviation is
+//! increased by the distance that it may have moved ([`widened_px`]). The test `clock` of the crate `pipeline` measures both. Moving the
+//! points is far better. It works best if the standard deviation is increased for points without a known velocity, and for points moved
+//! beyond the observed interval.
 
 use std::collections::VecDeque;
 
 use nalgebra::{Point2, Vector2};
 
-/// How many frames are remembered: enough to see whether two velocities in a row agree.
+/// Number of frames to store; enough to check whether two successive velocities agree.
 const N_NOTED: usize = 3;
-/// A point that moves faster is taken for another point: heights of the person per second. The foot of a jogger does 5.
+/// Maximum speed of a point, in heights of the person per second; a faster point is taken for a different one. The foot of a jogger moves
+/// at 5.
 const MOST_SPEED: f64 = 9.0;
-/// A velocity that changes by more from one interval to the next is not believed, because one of the two belongs to
-/// another point: heights per second.
+/// Maximum change of a velocity between successive intervals, in heights per second. A larger change means that one of the two velocities
+/// belongs to a different point.
 const MOST_CHANGE: f64 = 6.0;
-/// Pictures that are further apart say nothing of the velocity, seconds.
+/// Maximum time between two pictures that determine a velocity, in seconds.
 const LONGEST_GAP_S: f64 = 0.15;
-/// How fast a point may be whose velocity is not known: heights per second.
+/// Assumed speed of a point with unknown velocity, in heights per second.
 const UNKNOWN_SPEED: f64 = 1.0;
 
-/// Where the points of one view were in the last pictures.
+/// Positions of the points of one view in the last pictures.
 #[derive(Debug, Clone, Default)]
 pub struct Tracks {
-    /// The newest last.
+    /// Times and points of the last pictures, the newest last.
     noted: VecDeque<(f64, Vec<Option<Point2<f64>>>)>,
 }
 
-/// The velocity of a point in pictures.
+/// Velocity of a point in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Velocity {
-    /// Pixels per second.
+    /// Velocity, in pixels per second.
     pub px_per_s: Vector2<f64>,
-    /// Between the two pictures that it was measured in, seconds.
+    /// Time between the two pictures from which the velocity was measured, in seconds.
     pub gap_s: f64,
 }
 
 impl Velocity {
-    /// Amount by which the point moves in a time, pixels; `None` for more time than the velocity was measured over:
-    /// nobody moves evenly for so long.
+    /// Returns the movement of the point in a time, in pixels. Returns `None` for a time longer than that over which the velocity was
+    /// measured, because nobody moves evenly for so long.
     pub fn shift(&self, seconds: f64) -> Option<Vector2<f64>> {
         (seconds.abs() <= self.gap_s).then(|| self.px_per_s * seconds)
     }
 }
 
 impl Tracks {
-    /// Adds a picture. One that is not later than the one before begins anew.
+    /// Adds a picture. A picture that is not later than the previous one resets the tracks.
     ///
-    /// * `taken_s`: when it was taken, seconds.
-    /// * `points_px`: in the same order in every picture; `None` for one that is unknown.
+    /// * `taken_s`: time of the picture, in seconds.
+    /// * `points_px`: points, in the same order in every picture; `None` for an unknown point.
     pub fn note(&mut self, taken_s: f64, points_px: Vec<Option<Point2<f64>>>) {
         if self.noted.back().is_some_and(|noted| taken_s <= noted.0) {
             self.noted.clear();
@@ -64,11 +65,11 @@ impl Tracks {
         }
     }
 
-    /// The velocity of a point from the last picture to this one, which is not noted yet.
+    /// Returns the velocity of a point from the last picture to a new picture that is not added yet.
     ///
-    /// * `taken_s`: when this picture was taken, seconds.
-    /// * `height_px`: of the person, in pixels; the longer side of the rectangle around the points.
-    /// * Returns `None` for a point that is too fast, that was not seen before, or whose velocity was another one just before.
+    /// * `taken_s`: time of the new picture, in seconds.
+    /// * `height_px`: height of the person, in pixels; the longer side of the rectangle around the points.
+    /// * Returns `None` for a point that is too fast, that was not seen before, or whose previous velocity was different.
     pub fn velocity(
         &self,
         nth: usize,
@@ -97,15 +98,15 @@ fn between((from_s, from): (f64, Point2<f64>), (to_s, to): (f64, Point2<f64>)) -
         .then_some(Velocity { px_per_s, gap_s })
 }
 
-/// Where a point was at the instant of its frame, pixels, and the standard deviation that is to be added to its own.
+/// Returns the position of a point at the instant of its frame, in pixels, and the standard deviation to add to its own.
 ///
-/// A point that is moved is as good as one that was seen, as long as the instant lies between the two pictures that its velocity is
-/// from. Before the later picture by `-s`, `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
+/// A moved point is as accurate as an observed one while the instant is between the two pictures that give its velocity. At a time `s`
+/// after the later picture (negative for before), `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
 ///
-/// * `velocity`: of [`Tracks::velocity`]; a point without one, or with a skew that it does not reach, stays where it is, and is
-///   trusted less.
+/// * `velocity`: result of [`Tracks::velocity`]. A point without a velocity, or with a skew that is too long for it, keeps its position and
+///   gets a larger standard deviation.
 /// * `sigma_px`: standard deviation of the point.
-/// * `height_px`: of the person.
+/// * `height_px`: height of the person.
 pub fn moved(
     at: Point2<f64>,
     velocity: Option<Velocity>,
@@ -122,10 +123,10 @@ pub fn moved(
     (at - shift, more)
 }
 
-/// The standard deviation of a point that stays where its picture shows it, pixels.
+/// Returns the standard deviation of a point that is not moved, in pixels.
 ///
-/// * `sigma_px`: at the time of the picture.
-/// * `px_per_s`: its speed.
+/// * `sigma_px`: standard deviation at the time of the picture.
+/// * `px_per_s`: speed of the point.
 pub fn widened_px(sigma_px: f64, px_per_s: f64, skew_s: f64) -> f64 {
     sigma_px.hypot(px_per_s * skew_s)
 }
@@ -173,7 +174,7 @@ mod tests {
         tracks.note(0.9, at(98.0));
         tracks.note(1.0, at(100.0));
         assert_eq!(speed(&tracks, 1.1, 102.0).map(f64::round), Some(20.0));
-        // 1400 pixels per second where it did 20; and 2000, which is too fast anyway.
+        // The first point has 1400 pixels per second after 20; the second has 2000, which is always too fast.
         assert_eq!(speed(&tracks, 1.1, 240.0), None);
         tracks.note(1.1, at(240.0));
         assert_eq!(speed(&tracks, 1.2, 242.0), None, "nor on its way back");

@@ -1,4 +1,4 @@
-//! Detects cameras whose pictures were taken at other times than they say, from the points of a person who moves.
+//! Detects cameras whose pictures were taken at different times than stated, from the points of a moving person.
 
 mod block;
 
@@ -10,54 +10,56 @@ use crate::Camera;
 use crate::extent::longer_side;
 use block::{Block, Estimate};
 
-/// Frames whose samples make one estimate, and estimates that are kept.
+/// Number of frames whose samples give one estimate, and number of estimates to store.
 const N_BLOCK: usize = 60;
 const N_KEPT: usize = 12;
-/// The fewest estimates for a result.
+/// Minimum number of estimates for a result.
 const MIN_BLOCKS: usize = 5;
-/// A camera is out of step if its offset is larger than this by this many standard errors.
+/// Offset above which a camera is out of step. The offset must exceed it by a number of standard errors.
 pub const OUT_OF_STEP_MS: f64 = 5.0;
 const N_ERRORS: f64 = 3.0;
-/// No standard error is smaller, seconds.
+/// Minimum standard error, in seconds.
 const MIN_ERROR_S: f64 = 0.001;
-/// The fewest points of a usable pair of views.
+/// Minimum number of points of a usable pair of views.
 const MIN_POINTS: usize = 5;
-/// Pictures before and after one that are further apart say nothing of the speed, seconds.
+/// Maximum time between the previous and the next picture that give a speed, in seconds.
 const LONGEST_GAP_S: f64 = 0.35;
-/// A point that is faster is another one: longer sides of the person per second.
+/// Maximum speed of a point, in longer sides of the person per second; a faster point is taken for a different one.
 const MOST_SPEED: f64 = 9.0;
-/// A point that misses the epipolar line by more is another one, share of the longer side of the person in the picture.
+/// Maximum distance of a point from the epipolar line, relative to the longer side of the person in the picture. A point further away is
+/// taken for a different one.
 const MOST_MISS: f64 = 0.2;
 
-/// Estimates by how much later every camera took its pictures than their times say.
+/// Estimates how much later each camera took its pictures than their times state.
 ///
-/// Where camera B is late by `d`, a point that moves at `u` (pixels per second) is seen `u d` ahead, so that the epipolar
-/// residual is `e = g d` with `g = n . u`, `n` the normal of the epipolar line. With the true motion, the velocities in both
-/// pictures give the same `g`, but their errors are independent: `d = sum(e g) / sum(g_a g_b)` is not drawn to zero by them, and
-/// tells nothing of a person who stands. The means over the points of a frame, and over the frames of a point, are subtracted: what a
-/// camera that was moved adds is nearly the same for the whole person, and for some seconds for each point, while limbs move to and
-/// fro. The offsets of all pairs of views give those of the views, against their median; the mean of the last such estimates, by
-/// their certainty, is the result.
+/// If camera B is late by `d`, a point that moves at `u` (pixels per second) is seen `u d` ahead. The epipolar residual is then `e = g d`
+/// with `g = n . u`, where `n` is the normal of the epipolar line. With the true motion, the velocities in both pictures give the same `g`,
+/// but their errors are independent. The estimate `d = sum(e g) / sum(g_a g_b)` is therefore not biased towards zero, and a person who
+/// stands does not affect it.
 ///
-/// Not a synchronisation: beyond 40 ms, offsets come out too large (60 ms as 69), because limbs do not move evenly for so long.
+/// The means over the points of a frame, and over the frames of a point, are subtracted. The offset from a moved camera is nearly the same
+/// for the whole person, and for some seconds for each point, while limbs move to and fro. The offsets of all pairs of views give the
+/// offsets of the views, relative to their median. The result is the mean of the last estimates, weighted by their certainty.
+///
+/// This is not a synchronisation. Offsets beyond 40 ms come out too large (60 ms as 69), because limbs do not move evenly for so long.
 #[derive(Debug, Clone)]
 pub struct StepWatch {
     cameras: Vec<Camera>,
     /// The last three frames, the newest last.
     frames: VecDeque<Frame>,
     block: Block,
-    /// By camera: the estimates of the last blocks.
+    /// Estimates of the last blocks, by camera.
     estimates: Vec<VecDeque<Estimate>>,
-    /// By camera: whether it was ever out of step.
+    /// True for each camera that was ever out of step.
     reported: Vec<bool>,
 }
 
-/// The offset of a camera against the median of all.
+/// Offset of a camera relative to the median of all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// How much later its pictures were taken than their times say, milliseconds; negative for earlier.
+    /// Time by which the camera's pictures were taken later than stated, in milliseconds; negative if they were earlier.
     pub offset_ms: f64,
-    /// Standard error of that, milliseconds.
+    /// Standard error of the offset, in milliseconds.
     pub error_ms: f64,
 }
 
@@ -77,29 +79,29 @@ struct Frame {
 /// Observation of a view in a frame.
 #[derive(Debug, Clone)]
 struct View {
-    /// When, seconds; and how long after the instant of the frame.
+    /// Time of the picture in seconds, then its delay after the instant of the frame.
     seconds: f64,
     skew_s: f64,
-    /// Undistorted and normalised.
+    /// Points, undistorted and normalised.
     points: Vec<Option<Point2<f64>>>,
-    /// The longer side of the rectangle around the points.
+    /// Longer side of the rectangle around the points.
     side: f64,
 }
 
 /// A point of a view, and its velocity per second.
 type Moving = (Point2<f64>, Vector2<f64>);
 
-/// A view whose pictures before and after are known.
+/// A view whose previous and next pictures are known.
 #[derive(Debug, Clone)]
 struct Seen {
     points: Vec<Option<Moving>>,
-    /// The longer side of the person in the picture.
+    /// Longer side of the person in the picture.
     side: f64,
     skew_s: f64,
 }
 
 impl StepWatch {
-    /// Starts without observations.
+    /// Creates a watch without observations.
     pub fn new(cameras: Vec<Camera>) -> Self {
         let n = cameras.len();
         Self {
@@ -113,10 +115,10 @@ impl StepWatch {
 
     /// Adds the observations of one frame.
     ///
-    /// * `instant_s`: of the frame, seconds; frames in order.
-    /// * `points_px`: one entry per camera, `None` without a detection; the same points of the world in the same order, pixels of
-    ///   the recorded image.
-    /// * `skews_s`: by camera, how long after the instant its picture was taken by its own time, seconds.
+    /// * `instant_s`: instant of the frame, in seconds; frames must be in order.
+    /// * `points_px`: one entry per camera, `None` without a detection. All cameras list the same points of the world in the same order, in
+    ///   pixels of the recorded image.
+    /// * `skews_s`: for each camera, the stated time from the instant to its picture, in seconds.
     pub fn note(&mut self, instant_s: f64, points_px: &[Option<Vec<[f64; 2]>>], skews_s: &[f64]) {
         let views = self.cameras.iter().enumerate().map(|(nth, camera)| {
             let points = points_px.get(nth)?.as_ref()?;
@@ -150,7 +152,7 @@ impl StepWatch {
         }
     }
 
-    /// Turns the samples of a block into one estimate for every camera.
+    /// Computes one estimate for every camera from the samples of a block.
     fn close_block(&mut self) {
         let estimates = self.block.estimates();
         self.block = Block::new(&self.cameras);
@@ -166,7 +168,7 @@ impl StepWatch {
         }
     }
 
-    /// The offset of a camera; `None` while too little has moved, and of a single camera.
+    /// Returns the offset of a camera; `None` if there was too little movement, or if there is only one camera.
     pub fn step(&self, view: usize) -> Option<Step> {
         let kept = self.estimates.get(view)?;
         if kept.len() < MIN_BLOCKS {
@@ -177,7 +179,7 @@ impl StepWatch {
         let all: f64 = kept.iter().map(weight).sum();
         let sum: f64 = kept.iter().map(|estimate| weight(estimate) * estimate.offset_s).sum();
         let offset = sum / all;
-        // What the samples tell of themselves, or how the estimates scatter, whichever is more.
+        // The error is the larger of that stated by the samples and that from the scatter of the estimates.
         let off = |estimate: &Estimate| (weight(estimate) * (estimate.offset_s - offset)).powi(2);
         let scatter = kept.iter().map(off).sum::<f64>() * n / (n - 1.0) / (all * all);
         let error = scatter.max(1.0 / all).sqrt().max(MIN_ERROR_S);
@@ -207,7 +209,7 @@ impl View {
         })
     }
 
-    /// Its points with their velocities, from the pictures before and after.
+    /// Returns the points with their velocities, from the previous and next pictures.
     fn moving(&self, [before, after]: [&Self; 2]) -> Option<Vec<Option<Moving>>> {
         let gap = after.seconds - before.seconds;
         let is_between = before.seconds < self.seconds && self.seconds < after.seconds;

@@ -1,47 +1,47 @@
-//! A rig in numbers that can be compared with a tape measure: heights, distances, shared space, and the accuracy to expect in it.
+//! Measures of a rig to compare with a tape measure: heights, distances, the shared space, and the expected accuracy.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::{Camera, Rig};
 
-/// Spacing of the points that are tried for the shared space, metres.
+/// Spacing of the points that are tried for the shared space, in metres.
 const STEP_M: f64 = 0.2;
-/// How far from the focus points are tried, metres.
+/// Maximum distance from the focus at which points are tried, in metres.
 const REACH_M: f64 = 4.0;
 
-/// A rig in numbers.
+/// Measures of a rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
-    /// In the order of the rig.
+    /// Cameras in the order of the rig.
     pub cameras: Vec<Place>,
-    /// Least and largest distance between two cameras, metres.
+    /// Smallest and largest distance between two cameras, in metres.
     pub apart_m: Option<[f64; 2]>,
-    /// The point nearest to all optical axes, in the world.
+    /// Point nearest to all optical axes, in the world.
     pub focus: Option<Point3<f64>>,
     /// The space that all cameras see.
     pub shared: Option<Shared>,
-    /// Standard deviation of a point at the focus that is off by one pixel (standard deviation, in x and y) in every view that sees
-    /// it: root of the sum over the three axes, millimetres.
+    /// Expected error of a point at the focus, in millimetres: the root of the summed variances along the three axes. Every view that sees
+    /// the point is assumed to have an error of one pixel (standard deviation, in x and y).
     pub error_mm: Option<f64>,
 }
 
-/// Where a camera stands.
+/// Position of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
-    /// Its name.
+    /// Name of the camera.
     pub name: String,
-    /// Height above the origin of the world, metres; unknown if the rig does not say which way is up.
+    /// Height above the origin of the world, in metres; `None` if the rig has no up direction.
     pub height_m: Option<f64>,
-    /// Distance to the focus, metres.
+    /// Distance to the focus, in metres.
     pub distance_m: Option<f64>,
 }
 
-/// The space around the focus that all cameras see, as far as four metres from it.
+/// Space around the focus that all cameras see, up to four metres away.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shared {
-    /// Sides of the box around it, along the axes of the world, metres.
+    /// Sides of the box around the space, along the axes of the world, in metres.
     pub sides_m: [f64; 3],
-    /// Its volume, cubic metres.
+    /// Volume of the space, in cubic metres.
     pub volume_m3: f64,
 }
 
@@ -119,13 +119,13 @@ mod tests {
     use super::*;
     use crate::{Intrinsics, Lens};
 
-    /// Four cameras in a square of 4 m, 1.5 m high, that look at its centre at that height.
+    /// Returns four cameras in a square of 4 m, 1.5 m high, looking at its centre at that height.
     fn square() -> Rig {
         let cameras = [[2.0, 2.0], [-2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]];
         let cameras = cameras.iter().enumerate().map(|(nth, [x, y])| {
             let eye = Point3::new(*x, *y, 1.5);
             let target = Point3::new(0.0, 0.0, 1.5);
-            // Looks along +z with y down.
+            // The camera looks along +z with y down.
             let camera_from_world = Isometry3::look_at_lh(&eye, &target, &-Vector3::z());
             Camera {
                 name: format!("c{nth}"),
@@ -155,7 +155,7 @@ mod tests {
         let [least, most] = survey.apart_m.unwrap();
         close(least, 4.0);
         close(most, 32.0_f64.sqrt());
-        // Across each axis a pixel is 2.83 m / 500 px = 5.66 mm. Height is seen by four views, the others by two each.
+        // Across each axis, a pixel is 2.83 m / 500 px = 5.66 mm. Four views determine the height; two views determine each other axis.
         let pixel_mm = 1000.0 * 8.0_f64.sqrt() / 500.0;
         close(
             survey.error_mm.unwrap(),

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use crate::{Camera, Intrinsics, Lens, LensModel, Rig};
 
-/// Lens models: pinhole, mild and strong barrel, pincushion, tangential, rational and fisheye.
+/// Generates lens models: pinhole, mild and strong barrel, pincushion, tangential, rational and fisheye.
 pub(crate) fn lens_model() -> impl Strategy<Value = LensModel> {
     let brown = |k: [f64; 6], p: [f64; 2]| LensModel::BrownConrady { k, p };
     prop_oneof![
@@ -37,7 +37,7 @@ pub(crate) fn lens() -> impl Strategy<Value = Lens> {
     lens_model().prop_map(Lens::new)
 }
 
-/// Cameras of 640x480, 4 to 6 m from the origin, on any side, looking at it, with some roll.
+/// Generates cameras of 640x480, 4 to 6 m from the origin in any direction, looking at it, with some roll.
 pub(crate) fn camera() -> impl Strategy<Value = Camera> {
     let inside = (500.0..900.0, 0.9..1.1, 300.0..340.0, 220.0..260.0, lens());
     let place = (0.0..std::f64::consts::TAU, 4.0..6.0, -0.5..1.5, -0.6..0.6);
@@ -57,7 +57,7 @@ pub(crate) fn camera() -> impl Strategy<Value = Camera> {
     )
 }
 
-/// The pose of a camera on a circle about the world's z axis, which is up.
+/// Returns the pose of a camera on a circle about the world's z axis, which points up.
 pub(crate) fn looking_at_origin(
     bearing: f64,
     distance: f64,
@@ -66,12 +66,12 @@ pub(crate) fn looking_at_origin(
 ) -> Isometry3<f64> {
     let eye = Point3::new(distance * bearing.cos(), distance * bearing.sin(), height);
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-    // `look_at_rh` is x right, y up, z backward: half a turn about x makes it OpenCV's.
+    // `look_at_rh` has x right, y up and z backward; half a turn about x converts it to the convention of `OpenCV`.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     Isometry3::rotation(Vector3::z() * roll) * opencv * upright
 }
 
-/// `n` cameras spread over the circle, all with the same lens.
+/// Returns `n` cameras spread over the circle, all with the same lens.
 pub(crate) fn ring(n: usize, model: LensModel) -> Vec<Camera> {
     (0..n)
         .map(|i| Camera {
@@ -89,7 +89,7 @@ pub(crate) fn ring(n: usize, model: LensModel) -> Vec<Camera> {
         .collect()
 }
 
-/// A rig of [`ring`] with z up.
+/// Returns a rig of [`ring`] with z up.
 pub(crate) fn ring_rig(n: usize, model: LensModel) -> Rig {
     Rig::new(ring(n, model), Some(z_up()), "planted").expect("a rig")
 }
@@ -98,12 +98,12 @@ pub(crate) fn z_up() -> UnitVector3<f64> {
     Vector3::z_axis()
 }
 
-/// Points where a person may be.
+/// Generates points where a person may be.
 pub(crate) fn point() -> impl Strategy<Value = Point3<f64>> {
     (-0.8..0.8, -0.8..0.8, -0.8..0.8).prop_map(|(x, y, z)| Point3::new(x, y, z))
 }
 
-/// Euclidean distance.
+/// Returns the Euclidean distance.
 pub(crate) fn distance(a: &Point2<f64>, b: &Point2<f64>) -> f64 {
     (a - b).norm()
 }

@@ -14,30 +14,30 @@ mod subset;
 
 use views::Views;
 
-/// The most observations of one point: as many as `views_used` has bits.
+/// Maximum number of observations of one point: the number of bits of `views_used`.
 pub const MAX_VIEWS: usize = 32;
 
 /// The observation of a point by a camera.
 #[derive(Debug, Clone, Copy)]
 pub struct Observation<'a> {
-    /// The camera.
+    /// Camera that observed the point.
     pub camera: &'a Camera,
-    /// The position, in pixels of the recorded (distorted) image.
+    /// Position of the point, in pixels of the recorded (distorted) image.
     pub point_px: Point2<f64>,
-    /// Standard deviation of that position along each axis, in pixels.
+    /// Standard deviation of the position along each axis, in pixels.
     pub sigma_px: f64,
 }
 
 /// How observations are weighted and rejected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Width of the Cauchy loss on the reprojection error, in pixels. Infinite for plain least squares.
+    /// Width of the Cauchy loss on the reprojection error, in pixels; infinite for plain least squares.
     pub loss_px: f64,
-    /// Observations that end further than this, in pixels, from the point's image are left out.
+    /// Largest distance in pixels between an observation and the point's image; observations beyond it are left out.
     pub max_reprojection_px: Option<f64>,
-    /// The fewest observations that make a point; never less than 2.
+    /// Minimum number of observations of a point; never less than 2.
     pub min_views: usize,
-    /// The widest angle between two viewing rays must be at least this, in radians.
+    /// Minimum of the widest angle between two viewing rays, in radians.
     pub min_angle: f64,
 }
 
@@ -52,47 +52,47 @@ impl Default for Settings {
     }
 }
 
-/// Why no point could be computed. Views are positions in the list of observations, from 0.
+/// Reason why no point was computed. Views are indices of the list of observations, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TriangulateError {
-    /// Too few observations.
+    /// There are too few observations.
     #[error("triangulation needs at least {needed} views, got {views}")]
     TooFewViews {
-        /// Observations that could be used.
+        /// Number of usable observations.
         views: usize,
-        /// Observations asked for.
+        /// Required number of observations.
         needed: usize,
     },
-    /// More observations than [`MAX_VIEWS`].
+    /// There are more observations than [`MAX_VIEWS`].
     #[error("at most {MAX_VIEWS} views, got {views}")]
     TooManyViews {
-        /// Observations given.
+        /// Number of observations.
         views: usize,
     },
-    /// A position or a deviation that is not finite, or a deviation that is not positive.
+    /// A position or a standard deviation is not finite, or a standard deviation is not positive.
     #[error("view {view}: position ({x}, {y}) px with deviation {sigma_px} px is not usable")]
     BadObservation {
-        /// Which observation.
+        /// Index of the observation.
         view: usize,
-        /// Column in pixels.
+        /// Column of the position, in pixels.
         x: f64,
-        /// Row in pixels.
+        /// Row of the position, in pixels.
         y: f64,
-        /// Standard deviation in pixels.
+        /// Standard deviation, in pixels.
         sigma_px: f64,
     },
-    /// The viewing rays are parallel to working precision, so depth is unknown.
+    /// The viewing rays are parallel to working precision, so the depth is unknown.
     #[error("viewing rays are parallel: widest angle {angle:e} rad is below {limit:e}")]
     ParallelRays {
-        /// The widest angle between two rays, radians.
+        /// Widest angle between two rays, in radians.
         angle: f64,
-        /// The smallest angle accepted.
+        /// Smallest accepted angle, in radians.
         limit: f64,
     },
     /// The rays meet behind a camera.
     #[error("the point is behind the camera of view {view}")]
     BehindCamera {
-        /// Which observation.
+        /// Index of the observation.
         view: usize,
     },
     /// No subset of enough views agrees.
@@ -100,61 +100,60 @@ pub enum TriangulateError {
         "no {needed} views agree: best reprojection error {residual_px} px exceeds {limit_px} px"
     )]
     Inconsistent {
-        /// Observations asked for.
+        /// Required number of observations.
         needed: usize,
-        /// Largest residual of the best subset, pixels.
+        /// Largest residual of the best subset, in pixels.
         residual_px: f64,
-        /// The largest residual accepted.
+        /// Largest accepted residual, in pixels.
         limit_px: f64,
     },
-    /// The point lies where the lens of a view has no image.
+    /// The point is at a position for which the lens of a view has no image.
     #[error("the point is outside the valid range of the lens of view {view}")]
     OutsideLens {
-        /// Which observation.
+        /// Index of the observation.
         view: usize,
     },
     /// The refinement reached values that are not finite.
     #[error("refinement diverged after {iterations} iterations")]
     Diverged {
-        /// Iterations done.
+        /// Number of iterations.
         iterations: usize,
     },
 }
 
-/// A point in the world, and how well the views agree on it.
+/// A point in the world, and the agreement of the views about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangulated {
-    /// The point, in metres.
+    /// Position of the point, in metres.
     pub in_world: Point3<f64>,
     /// Covariance of the point, in square metres.
     pub covariance: Matrix3<f64>,
     /// Root mean square of the reprojection errors of the views used, in pixels.
     pub reprojection_px: f64,
-    /// Bit i is set if observation i was used.
+    /// Bit mask of the observations used: bit i is set if observation i was used.
     pub views_used: u32,
-    /// Reprojection error of each observation, in pixels, used or not; NaN where the view does not
-    /// show the point, and beyond the last observation.
+    /// Reprojection error of each observation, used or not, in pixels. It is NaN if the view does not show the point, and beyond the last
+    /// observation.
     pub residuals_px: [f64; MAX_VIEWS],
 }
 
 impl Triangulated {
-    /// Returns true if an observation was used, by its position in the list.
+    /// Returns true if an observation was used, by its index in the list.
     pub fn uses(&self, view: usize) -> bool {
         view < MAX_VIEWS && self.views_used & (1 << view) != 0
     }
 }
 
-/// Triangulates one point: linearly on undistorted rays, then by least reprojection error.
+/// Triangulates one point: linearly on undistorted rays, then by minimising the reprojection error.
 ///
-/// The refinement (Levenberg & Marquardt) minimises `Σ ρ(‖e‖²) / σ²` over the distorted pixel errors
-/// `e` with the Cauchy loss `ρ(s) = c² ln(1 + s / c²)`, c = `loss_px`, whose width shrinks from the
-/// worst initial error down to c, so that one outlier does not determine the minimum that is found. If the
-/// error of a view exceeds `max_reprojection_px`, every view is left out in turn, the subset whose worst
-/// error is least is kept, and so on down to `min_views`.
+/// The refinement (Levenberg & Marquardt) minimises `Σ ρ(‖e‖²) / σ²` over the distorted pixel errors `e` with the Cauchy loss `ρ(s) = c²
+/// ln(1 + s / c²)`, c = `loss_px`. The width of the loss shrinks from the worst initial error down to c, so that a single outlier does not
+/// determine the minimum. If the error of a view exceeds `max_reprojection_px`, every view is left out in turn, and the subset with the
+/// smallest worst error is kept. This repeats down to `min_views`.
 ///
-/// The covariance is the inverse of the normal matrix `Σ ρ' Jᵀ J / σ²`: as good as the `sigma_px` given.
-/// The result depends only on the arguments and their order; nothing is allocated.
-/// An observation beyond the valid range of its camera's lens is not used.
+/// The covariance is the inverse of the normal matrix `Σ ρ' Jᵀ J / σ²`; it is as accurate as the given `sigma_px`. The result depends
+/// only on the arguments and their order. The function does not allocate. An observation beyond the valid range of its camera's lens is not
+/// used.
 ///
 /// # Errors
 ///

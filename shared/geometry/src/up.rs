@@ -1,19 +1,19 @@
-//! Worlds turned so that a given axis points up, for files whose readers expect that.
+//! Rotations of the world so that a given axis points up, for files whose readers expect that.
 
 use nalgebra::{Matrix3, Rotation3, UnitVector3, Vector3};
 
-/// Turns the world so that z points up: the short way round, and not at all where it does already.
+/// Returns the smallest rotation of the world with which z points up; the identity if it already does.
 ///
-/// * `up`: against gravity, in the world.
+/// * `up`: up direction (opposite to gravity) in the world.
 pub fn z_up_from_world(up: &UnitVector3<f64>) -> Rotation3<f64> {
     Rotation3::rotation_between(up, &Vector3::z_axis())
-        // Only straight down has no short way; half a turn about x is one.
+        // Straight down has no unique smallest rotation; half a turn about x is used.
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI))
 }
 
-/// Turns the world so that y points up: z up, then `(X, Y, Z) = (y, z, x)`.
+/// Returns the rotation of the world with which y points up: z up, then `(X, Y, Z) = (y, z, x)`.
 ///
-/// * `up`: against gravity, in the world.
+/// * `up`: up direction (opposite to gravity) in the world.
 pub fn y_up_from_world(up: &UnitVector3<f64>) -> Rotation3<f64> {
     let cyclic = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
     Rotation3::from_matrix_unchecked(cyclic * z_up_from_world(up).matrix())

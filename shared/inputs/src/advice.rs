@@ -6,13 +6,13 @@ use std::path::Path;
 use failure::{ExitKind, Failure};
 use geometry::files::RigFileError;
 
-/// Returns the outcomes of all cameras, or the first failure with what the other cameras fail at.
+/// Returns the outcomes of all cameras, or the first failure with a hint about the other cameras that failed.
 ///
 /// * `cameras`: names and outcomes.
 ///
 /// # Errors
 ///
-/// A camera failed; the hint names the others that did.
+/// Fails if any camera failed.
 pub fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<T>, Failure> {
     let (mut all, mut first, mut others) = (Vec::new(), None, Vec::new());
     for (name, outcome) in cameras {
@@ -34,10 +34,10 @@ pub fn of_all<T>(cameras: Vec<(&str, Result<T, Failure>)>) -> Result<Vec<T>, Fai
     if others.is_empty() {
         return Err(failure);
     }
-    Err(failure.with_another_hint(format!("other cameras fail, too: {}", others.join("; "))))
+    Err(failure.with_another_hint(format!("other cameras also fail: {}", others.join("; "))))
 }
 
-/// The hint for a calibration that cannot be used; none if the error message suffices.
+/// Returns a hint for a calibration that cannot be used; `None` if the error message suffices.
 pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
     let path = match error {
         RigFileError::Read { path, source } if source.kind() == ErrorKind::PermissionDenied => {
@@ -47,11 +47,11 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
             ));
         }
         RigFileError::Read { path, .. } if path.is_dir() => {
-            return Some("a rig is one file: name it, not the folder that it lies in".to_owned());
+            return Some("a rig is one file: give the file, not its folder".to_owned());
         }
         RigFileError::Read { .. } | RigFileError::NoFiles => {
             return Some(
-                "a rig file says where the cameras stand; `parallax calib convert` makes one of other programs' calibrations"
+                "a rig file has the poses of the cameras; `parallax calib convert` makes one from the calibration of another program"
                     .to_owned(),
             );
         }
@@ -71,7 +71,7 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
     None
 }
 
-/// The failure to create a folder for results.
+/// Returns the failure to create a folder for results.
 pub(crate) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
     let in_the_way = folder
         .ancestors()

@@ -1,4 +1,4 @@
-//! Where the card of an ONNX file lies.
+//! Location of the card of an ONNX file.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -9,15 +9,15 @@ use keypoints::{CardError, CardKind};
 
 use crate::library::Library;
 
-/// The entry of an ONNX file's `metadata_props` that holds the text of its card.
+/// Entry of an ONNX file's `metadata_props` that contains the text of its card.
 pub const METADATA_KEY: &str = "parallax.card";
 
-/// Where a card was found.
+/// Place where a card was found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CardPlace {
-    /// In a file.
+    /// A separate file.
     File(PathBuf),
-    /// In the network's own file.
+    /// The metadata in the network's own file.
     Metadata,
 }
 
@@ -38,7 +38,7 @@ pub(crate) struct OnnxFile {
     pub(crate) card: Option<CardText>,
 }
 
-/// The text of a card that is not read yet.
+/// The text of a card that is not parsed yet.
 #[derive(Debug)]
 pub(crate) struct CardText {
     text: String,
@@ -65,9 +65,9 @@ impl OnnxFile {
         })
     }
 
-    /// A network that is built in, whose card is its own entry.
+    /// Loads a built-in network, whose card is in its metadata.
     ///
-    /// * `name`: what it is called in errors.
+    /// * `name`: name of the network in errors.
     pub(crate) fn built_in(name: &Path, bytes: &[u8], library: &Library) -> Result<Self, Failure> {
         let session = library.session(name, bytes.to_vec())?;
         Ok(Self {
@@ -79,7 +79,7 @@ impl OnnxFile {
 }
 
 impl CardText {
-    /// The card of a network in a file: the given one, or one beside it.
+    /// Returns the card of a network from a file: the given one, or one beside the network.
     fn beside(network: &Path, given: Option<&Path>) -> Result<Option<Self>, Failure> {
         let Some(file) = given.map(Path::to_path_buf).or_else(|| card_beside(network)) else {
             return Ok(None);
@@ -90,7 +90,7 @@ impl CardText {
         }))
     }
 
-    /// The card of a network in its own entry.
+    /// Returns the card of a network from its metadata.
     fn within(description: &Description) -> Option<Self> {
         let mut entries = description.metadata.iter().rev();
         let entry = entries.find(|entry| entry.0 == METADATA_KEY);
@@ -105,9 +105,9 @@ impl CardText {
         CardKind::of(&self.text)
     }
 
-    /// The card.
+    /// Parses the card.
     ///
-    /// * `network`: the file that it is of.
+    /// * `network`: file of the network that the card belongs to.
     pub(crate) fn read<T>(
         self,
         network: &Path,
@@ -125,7 +125,7 @@ impl CardText {
     }
 }
 
-/// The card file beside a network: `pose.toml` or `pose.onnx.toml` of `pose.onnx`.
+/// Returns the card file beside a network: `pose.toml` or `pose.onnx.toml` for `pose.onnx`.
 pub fn card_beside(network: &Path) -> Option<PathBuf> {
     let mut after = network.as_os_str().to_owned();
     after.push(".toml");
@@ -140,6 +140,6 @@ pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'stati
         path.display(),
         failure::wording::in_one_line(error)
     );
-    let hint = "docs/networks.md says what the keys of a card mean";
+    let hint = "docs/networks.md explains the keys of a card";
     Failure::new(ExitKind::Input, message).with_hint(hint)
 }

@@ -1,4 +1,4 @@
-//! ONNX files of which only their card says what they are: networks that find keypoints, or detectors of people.
+//! ONNX files whose card says whether they are networks that find keypoints or detectors of people.
 
 use std::path::Path;
 
@@ -10,23 +10,23 @@ use crate::detector::DetectorFile;
 use crate::library::Library;
 use crate::network::NetworkFile;
 
-/// An ONNX file, and what its card says it is.
+/// An ONNX file of the kind that its card declares.
 #[derive(Debug)]
 pub enum Described {
-    /// It finds keypoints, or has no card.
+    /// A network that finds keypoints, or a network without a card.
     Network(NetworkFile),
-    /// It finds boxes of people.
+    /// A detector that finds boxes of people.
     Detector(DetectorFile),
 }
 
 impl Described {
     /// Reads an ONNX file, and its card if there is one.
     ///
-    /// * `card`: the file of the card; if not given, the card is looked for as by [`NetworkFile::open`].
+    /// * `card`: file of the card; if it is `None`, the card is searched for as in [`NetworkFile::open`].
     ///
     /// # Errors
     ///
-    /// A file cannot be read, is no network that can be run, or no card.
+    /// Fails if a file cannot be read, is not a runnable network, or is not a card.
     pub fn open(path: &Path, card: Option<&Path>) -> Result<Self, Failure> {
         let read = OnnxFile::open(path, card, &Library::BuiltIn)?;
         let kind = read.card.as_ref().and_then(CardText::kind);

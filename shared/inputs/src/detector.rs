@@ -16,7 +16,7 @@ use crate::pictures::Picture;
 use crate::refused::refused;
 use crate::shipped::Shipped;
 
-/// A detector that was read.
+/// A detector file that was read.
 #[derive(Debug)]
 pub struct DetectorFile {
     path: PathBuf,
@@ -39,21 +39,21 @@ impl DetectorFile {
         })
     }
 
-    /// Returns the description of its inputs and outputs.
+    /// Returns the description of the network's inputs and outputs.
     pub fn description(&self) -> &Description {
         self.session.description()
     }
 
-    /// Its card, and where that was found.
+    /// Returns the card and the place where it was found.
     pub fn card(&self) -> Option<&(DetectorCard, CardPlace)> {
         self.card.as_ref()
     }
 
-    /// The detector, which is tried once on an empty picture.
+    /// Returns the detector, after a test run on an empty picture.
     ///
     /// # Errors
     ///
-    /// It has no card, or does not fit it.
+    /// Fails if the detector has no card, or does not fit its card.
     pub fn fitted(self) -> Result<Detector, Failure> {
         let Self {
             path,
@@ -74,23 +74,23 @@ impl DetectorFile {
     }
 }
 
-/// Reads a detector and its card, and tries it once.
+/// Reads a detector and its card, and runs it once as a test.
 ///
-/// * `card`: the file of the card; if not given, it is looked for as that of a network is
-///   ([`NetworkFile::open`](crate::network::NetworkFile::open)).
+/// * `card`: file of the card; if it is `None`, the card is searched for as in
+///   [`NetworkFile::open`](crate::network::NetworkFile::open).
 ///
 /// # Errors
 ///
-/// A file cannot be read, is no network that can be run, is no card, or the two do not fit.
+/// Fails if a file cannot be read, is not a runnable network, is not a card, or if the two do not fit.
 pub fn open(path: &Path, card: Option<&Path>) -> Result<Detector, Failure> {
     open_with(path, card, &Library::BuiltIn)
 }
 
-/// As [`open`], run by a library of choice; `shipped` stands for the detector that ships.
+/// Works like [`open`], with a given library; `shipped` means the detector that ships.
 ///
 /// # Errors
 ///
-/// As for [`open`].
+/// Fails like [`open`].
 pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<Detector, Failure> {
     if is_shipped(path) {
         let shipped = Shipped::Detector;
@@ -100,11 +100,11 @@ pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<
     DetectorFile::of(OnnxFile::open(path, card, library)?)?.fitted()
 }
 
-/// The people that a detector finds in a picture, the surest first; pixels.
+/// Returns the boxes of people that a detector finds in a picture, in pixels, those with the highest score first.
 ///
 /// # Errors
 ///
-/// The detector cannot be run, or gives values that are not finite.
+/// Fails if the detector cannot be run, or gives values that are not finite.
 pub fn people(
     detector: &Detector,
     picture: &Picture,
@@ -117,7 +117,7 @@ pub fn people(
     found.map_err(|error| refused(&picture.path, &error))
 }
 
-/// Draws the boxes of people over a picture, each with its score; the surest one last, on top.
+/// Draws the boxes of people on a picture, each with its score; the box with the highest score is on top.
 pub fn drawn(picture: &Picture, people: &[PersonBox]) -> Canvas {
     let mut canvas = Canvas::from_rgb(picture.size, &picture.rgb);
     for it in people.iter().rev() {

@@ -1,4 +1,4 @@
-//! Image files that a user names, alone or by their folder.
+//! Image files that a user names, individually or by their folder.
 
 use std::fs;
 use std::io;
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use failure::{ExitKind, Failure, in_file};
 
-/// The images that are named, those of folders in the order of their names.
+/// Returns the named images; those in folders are in the order of their names.
 ///
 /// # Errors
 ///
-/// A folder cannot be read, or has no image in it.
+/// Fails if a folder cannot be read, or contains no image.
 pub fn listed(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut images = Vec::new();
     for path in named {
@@ -34,7 +34,7 @@ pub fn listed(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(images)
 }
 
-/// Returns true if a file has an image's name.
+/// Returns true if a file has the name of an image.
 pub fn has_image_name(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["png", "jpg", "jpeg", "bmp"]

@@ -1,4 +1,4 @@
-//! Where joints lie among the parts of a model: the file that is named, or the one that ships with the model.
+//! Positions of joints relative to the parts of a model: from a named file, or from the one that ships with the model.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use skeleton::{JointMap, JointSet};
 use super::model_bytes;
 use crate::shipped::Shipped;
 
-/// Where joints lie among the parts.
+/// Positions of joints relative to the parts.
 #[derive(Debug, Clone)]
 pub struct Joints {
     file: Option<JointFile>,
@@ -21,13 +21,13 @@ pub struct Joints {
 impl Joints {
     /// Chooses the joints of a model.
     ///
-    /// * `file`: of joints; `shipped`: the one that ships, for a model that it was learned with; `none`: a joint is the
+    /// * `file`: file of joints. `shipped` means the one that ships, for a model that it was trained with. `none` means that a joint is the
     ///   centre of its part.
-    /// * `model`: the model file; the model that ships if not given.
+    /// * `model`: file of the model; `None` for the model that ships.
     ///
     /// # Errors
     ///
-    /// A file cannot be read, or the one that is named was learned with another model.
+    /// Fails if a file cannot be read, or if the named file was trained with another model.
     pub fn of(file: &Path, model: Option<&Path>) -> Result<Self, Failure> {
         let chosen = |joint_file| Self {
             file: joint_file,
@@ -51,20 +51,20 @@ impl Joints {
         );
         let failure = Failure::new(ExitKind::Input, message);
         Err(failure.with_hint(
-            "`parallax-lab train joints` makes such a file; \"none\" takes the centres of parts",
+            "`parallax-lab train joints` makes such a file; \"none\" uses the centres of parts",
         ))
     }
 
-    /// The map from parts to the joints of a set; a choice of parts without it.
+    /// Returns the map from parts to the joints of a set; without a map, a joint is one of the parts.
     ///
-    /// * `learned`: a consistency file; a map of its own counts before the file of joints that ships.
+    /// * `learned`: a consistency file. If it has a map of its own, that map takes precedence over the shipped file of joints.
     pub fn map(&self, learned: Option<&Learned>, set: &JointSet) -> Option<Arc<JointMap>> {
         let learned = learned.filter(|_| is_shipped(&self.from));
         let learned = learned.and_then(|learned| learned.joint_map(set));
         learned.or_else(|| self.file.as_ref()?.map(set))
     }
 
-    /// A text that differs for different joints.
+    /// Returns a text that differs for different joints.
     pub fn fingerprint(&self) -> String {
         let text = self.file.as_ref().and_then(|file| file.write().ok());
         text.map_or_else(String::new, |text| {

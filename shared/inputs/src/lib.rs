@@ -1,5 +1,5 @@
-//! The files that users name, read and checked before any process is started: rigs, models, networks with their cards, tables,
-//! and the files that ship; and pictures and videos to try them on. Every error says which file, and what to do.
+//! Files that users name, read and checked before any process starts: rigs, models, networks with their cards, tables, and the files that
+//! ship. This crate also reads pictures and videos on which networks are tried. Every error names the file and suggests what to do.
 #![forbid(unsafe_code)]
 
 pub mod advice;
@@ -45,16 +45,16 @@ pub use shipped::Shipped;
 ///
 /// # Errors
 ///
-/// The file cannot be read or is not a model.
+/// Fails if the file cannot be read, or is not a model.
 pub fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
     path.map_or_else(shipped_model, model)
 }
 
-/// The bytes of the named model file, or of the shipped model if none is named.
+/// Returns the bytes of the named model file, or of the shipped model if none is named.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is empty.
+/// Fails if the file cannot be read, or is empty.
 pub fn model_bytes(path: Option<&Path>) -> Result<Cow<'static, [u8]>, Failure> {
     path.map_or_else(
         || Ok(Cow::Borrowed(Shipped::Model.bytes())),
@@ -71,7 +71,7 @@ fn shipped_model() -> Result<Arc<Model>, Failure> {
 ///
 /// # Errors
 ///
-/// The file cannot be read or is not a model.
+/// Fails if the file cannot be read, or is not a model.
 pub fn model(path: &Path) -> Result<Arc<Model>, Failure> {
     if deployment::is_shipped(path) {
         return shipped_model();
@@ -85,7 +85,7 @@ pub fn model(path: &Path) -> Result<Arc<Model>, Failure> {
 ///
 /// # Errors
 ///
-/// A file cannot be read or is not a calibration; the hint says what to try.
+/// Fails if a file cannot be read, or is not a calibration; the hint suggests what to try.
 pub fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Failure> {
     let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
     geometry::files::read_many(&paths, options).map_err(|error| {
@@ -106,16 +106,16 @@ pub fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Fai
 ///
 /// # Errors
 ///
-/// As for [`rig`].
+/// Fails like [`rig`].
 pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
     rig_with(deployment, ReadOptions::default())
 }
 
-/// As [`rig_of`], for what needs the lenses alone: a camera without a place stands at the origin.
+/// Works like [`rig_of`], for uses that need only the lenses: a camera without a pose is at the origin.
 ///
 /// # Errors
 ///
-/// As for [`rig`].
+/// Fails like [`rig`].
 pub fn lenses_of(deployment: &Deployment) -> Result<Rig, Failure> {
     let options = ReadOptions {
         lenses_suffice: true,
@@ -138,11 +138,11 @@ fn rig_with(deployment: &Deployment, options: ReadOptions) -> Result<Rig, Failur
     })
 }
 
-/// A camera of a deployment in its rig.
+/// Returns a camera of a deployment from its rig.
 ///
 /// # Errors
 ///
-/// The rig has no such camera, or not its place.
+/// Fails if the rig has no such camera, or no pose for it.
 pub fn camera_of<'a>(
     rig: &'a Rig,
     name: &str,
@@ -161,7 +161,7 @@ pub fn camera_of<'a>(
 ///
 /// # Errors
 ///
-/// A file cannot be read, its part types are not those of the model, or the two contradict each other.
+/// Fails if a file cannot be read, if its part types are not those of the model, or if the two contradict each other.
 fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
     let n_types: Vec<usize> = (0..model.n_parts()).map(|part| model.n_types(part)).collect();
     let read = |file: &Path| -> Result<Compatibility, Failure> {
@@ -184,7 +184,7 @@ fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> 
 ///
 /// # Errors
 ///
-/// The file cannot be read or was learned with another model.
+/// Fails if the file cannot be read, or was trained with another model.
 pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Failure> {
     let Some(file) = file else {
         return Ok(None);
@@ -197,12 +197,12 @@ pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Fa
     Ok(Some(learned))
 }
 
-/// Reads what tells in which direction a person faces; nothing for the word `none`, and for a model of other parts
-/// than those it was learned for.
+/// Reads the network that estimates the direction in which a person faces. Returns `None` for the name `none`, and for the shipped
+/// network if the model has other parts than those it was trained for.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is another one.
+/// Fails if the file cannot be read, is of another kind, or does not fit the parts of the model.
 pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, Failure> {
     let has_head = model.n_parts() == skeleton::N_PARTS;
     if deployment::is_none(file) || (!has_head && deployment::is_shipped(file)) {
@@ -223,11 +223,11 @@ pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, 
     Ok(Some(Arc::new(Detector::new(network))))
 }
 
-/// The part-type tables of all pairs of the given cameras: those named in the settings, else the learned ones.
+/// Returns the part-type tables of all pairs of the given cameras: those named in the settings, otherwise the learned ones.
 ///
 /// # Errors
 ///
-/// A table cannot be read, or there are no learned tables for the rig that `paper.consistency` names.
+/// Fails if a table cannot be read, or if there are no learned tables for the rig that `paper.consistency` names.
 pub fn pair_tables(
     config: &deployment::paper::Config,
     learned: Option<&Learned>,
@@ -276,7 +276,7 @@ pub fn pair_tables(
 ///
 /// # Errors
 ///
-/// The file cannot be read or is not a table for this number of parts.
+/// Fails if the file cannot be read, or is not a table for this number of parts.
 pub fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
     Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
 }
@@ -285,7 +285,7 @@ pub fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
 ///
 /// # Errors
 ///
-/// The file cannot be read or is not a network for this number of parts.
+/// Fails if the file cannot be read, or is not a network for this number of parts.
 pub fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
     let bytes = Shipped::Network.read(file)?.into_owned();
     Network::parse(bytes, n_parts).map_err(|error| unusable(file, &error))
@@ -295,7 +295,7 @@ pub fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
 ///
 /// # Errors
 ///
-/// The file cannot be read or is not a network for this number of parts.
+/// Fails if the file cannot be read, or is not a network for this number of parts.
 pub fn quality_network(
     errors: Option<&deployment::paper::Errors>,
     n_parts: usize,
@@ -304,18 +304,18 @@ pub fn quality_network(
     file.map(|file| network(file, n_parts)).transpose()
 }
 
-/// The failure for a network that cannot be used, with the cause that the library reports.
+/// Returns the failure for a network that cannot be used, with the cause that the library reports.
 fn unusable(file: &Path, error: &NetworkError) -> Failure {
     let cause = std::error::Error::source(error).map(|cause| format!(": {cause}"));
     let message = format!("{}: {error}{}", file.display(), cause.unwrap_or_default());
     Failure::new(ExitKind::Input, message)
 }
 
-/// Reads the thresholds (tau) of a model with `n_parts` parts, pixels.
+/// Reads the thresholds (tau) of a model with `n_parts` parts, in pixels.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or does not have one threshold per part.
+/// Fails if the file cannot be read, or does not have one threshold per part.
 pub fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
     let tau = Tau::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))?;
     Ok(tau.px().to_vec())
@@ -325,12 +325,12 @@ pub fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
 ///
 /// # Errors
 ///
-/// The folder cannot be created; the hint says what to try.
+/// Fails if the folder cannot be created; the hint suggests what to try.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, &error))
 }
 
-/// Adds the origin of the data, if the deployment file gives one, to a failure to read an input.
+/// Adds the origin of the data to a failure to read an input, if the deployment file gives it.
 pub fn of_deployment(failure: Failure, deployment: &Deployment) -> Failure {
     match &deployment.data {
         Some(data) if failure.kind() == ExitKind::Input => {

@@ -10,7 +10,7 @@ use crate::refused::refused;
 /// Library that runs networks.
 #[derive(Debug, Default)]
 pub enum Library {
-    /// The library that is built in.
+    /// The built-in library.
     #[default]
     BuiltIn,
     /// ONNX Runtime, which the user provides.
@@ -22,11 +22,11 @@ impl Library {
     /// Loads ONNX Runtime.
     ///
     /// * `file`: the library, for example `/usr/lib/libonnxruntime.so`.
-    /// * `provider`: where it runs networks.
+    /// * `provider`: hardware on which it runs networks.
     ///
     /// # Errors
     ///
-    /// It cannot be loaded.
+    /// Fails if the library cannot be loaded.
     #[cfg(feature = "ort")]
     pub fn load(file: &Path, provider: Provider) -> Result<Self, Failure> {
         let loaded = inference::OnnxRuntime::load(file);
@@ -41,7 +41,7 @@ impl Library {
     ///
     /// # Errors
     ///
-    /// Always: this Parallax was built without it.
+    /// Always fails, because this Parallax was built without ONNX Runtime.
     #[cfg(not(feature = "ort"))]
     pub fn load(file: &Path, _provider: Provider) -> Result<Self, Failure> {
         let message = format!(
@@ -53,11 +53,11 @@ impl Library {
 
     /// Loads a network.
     ///
-    /// * `path`: what it is called in errors.
+    /// * `path`: name of the network in errors.
     ///
     /// # Errors
     ///
-    /// It is no network that can be run.
+    /// Fails if the bytes are not a runnable network.
     pub(crate) fn session(&self, path: &Path, bytes: Vec<u8>) -> Result<Session, Failure> {
         let session = match self {
             Self::BuiltIn => Session::parse(bytes),

@@ -13,11 +13,11 @@ use posenetwork::{Detector, PoseNetwork};
 
 use crate::shipped::Shipped;
 
-/// Loads the network of a camera, if it has one, and tries it once.
+/// Loads the network of a camera, if it has one, and runs it once as a test.
 ///
 /// # Errors
 ///
-/// A file cannot be read, is no network that can be run or no card, or the two do not fit.
+/// Fails if a file cannot be read, is not a runnable network or not a card, or if the two do not fit.
 pub fn pose_network(
     deployment: &Deployment,
     camera: usize,
@@ -29,7 +29,7 @@ pub fn pose_network(
     let network = open_network((file, None), &library)?;
     match network.run_by() {
         RunBy::OnnxRuntime(place @ Place::ProcessorForCuda(_)) => {
-            tracing::warn!(network = %file.display(), "ONNX Runtime runs it on {place}");
+            tracing::warn!(network = %file.display(), "ONNX Runtime runs the network on {place}");
         }
         by => tracing::info!(network = %file.display(), "run by {by}"),
     }
@@ -40,13 +40,13 @@ pub fn pose_network(
     Ok(Some(network))
 }
 
-/// The same network, which looks at mirror images as well.
+/// Returns the same network with the additional use of mirror images.
 ///
-/// * `asked`: the setting or option that asks for it.
+/// * `asked`: the setting or option that requests mirror images.
 ///
 /// # Errors
 ///
-/// [`ExitKind::Config`]: it cannot.
+/// [`ExitKind::Config`] if the network cannot use mirror images.
 pub fn mirrored(network: PoseNetwork, asked: &str) -> Result<PoseNetwork, Failure> {
     let name = network.card().name.clone();
     network.mirrored().map_err(|error| {
@@ -55,13 +55,13 @@ pub fn mirrored(network: PoseNetwork, asked: &str) -> Result<PoseNetwork, Failur
     })
 }
 
-/// Reads a network that finds keypoints and its card; `shipped` stands for the one that ships.
+/// Reads a network that finds keypoints, and its card; `shipped` means the one that ships.
 ///
-/// * `card`: the file of the card, if that is not beside the network.
+/// * `card`: file of the card, if it is not beside the network.
 ///
 /// # Errors
 ///
-/// A file cannot be read, is no network that can be run, or no card.
+/// Fails if a file cannot be read, is not a runnable network, or is not a card.
 pub fn open_network(
     (file, card): (&Path, Option<&Path>),
     library: &Library,
@@ -73,11 +73,11 @@ pub fn open_network(
     NetworkFile::open_with(file, card, library)
 }
 
-/// The card of a camera's network; none without a network or a card.
+/// Returns the card of a camera's network; `None` without a network or a card.
 ///
 /// # Errors
 ///
-/// The network or its card cannot be read.
+/// Fails if the network or its card cannot be read.
 pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Card>, Failure> {
     let Some(file) = deployment.pose_network(camera) else {
         return Ok(None);
@@ -89,22 +89,22 @@ pub fn network_card(deployment: &Deployment, camera: usize) -> Result<Option<Car
     Ok(network.card().map(|card| card.0.clone()))
 }
 
-/// Loads the detector of a deployment, and tries it once.
+/// Loads the detector of a deployment, and runs it once as a test.
 ///
 /// # Errors
 ///
-/// As for [`pose_network`].
+/// Fails like [`pose_network`].
 pub fn detector(deployment: &Deployment) -> Result<Detector, Failure> {
     let config = &deployment.network;
     let library = library(config, deployment.device)?;
     crate::detector::open_with(&config.detector, None, &library)
 }
 
-/// Loads every network of a deployment once, to see that each fits its card.
+/// Loads every network of a deployment once, to check that each fits its card.
 ///
 /// # Errors
 ///
-/// As for [`pose_network`].
+/// Fails like [`pose_network`].
 pub fn check_maps(deployment: &Deployment) -> Result<(), Failure> {
     let mut known = Vec::new();
     for camera in 0..deployment.cameras.len() {

@@ -1,11 +1,11 @@
-//! Check that there is memory for the search of an image.
+//! Check that there is enough memory to search an image.
 
 use fmp::Layout;
 
-/// Memory of a whole search per byte of the responses: 1.53 where it was measured.
+/// Memory of a whole search per byte of the responses; the measured value is 1.53.
 const SHARE_OF_RESPONSES: f64 = 1.6;
 
-/// A search that this machine has no memory for.
+/// Error for a search that needs more memory than this machine has free.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "searching all of {width}x{height} takes about {needed_gb:.1} GB of memory, and {free_gb:.1} GB are free"
@@ -17,7 +17,7 @@ pub(crate) struct TooLarge {
     free_gb: f64,
 }
 
-/// Memory that can be had without swapping, bytes, as the kernel estimates it; none where it does not say.
+/// Returns the memory available without swapping, in bytes, as the kernel estimates it; `None` if the kernel does not report it.
 fn available_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
@@ -25,11 +25,11 @@ fn available_bytes() -> Option<u64> {
     Some(1024 * kib)
 }
 
-/// Refuses a search that this machine has no memory for.
+/// Refuses a search that needs more memory than this machine has free.
 ///
 /// # Errors
 ///
-/// More memory is needed than is free.
+/// Fails if more memory is needed than is free.
 pub(crate) fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
     let needed = SHARE_OF_RESPONSES * (layout.n_responses() * size_of::<f32>()) as f64;
     let [width, height] = layout.image_size;

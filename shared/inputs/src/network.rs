@@ -23,7 +23,7 @@ use crate::refused::refused;
 pub use drawn::{limbs, sheet};
 pub use nearest::{nearest, nearest_detectors};
 
-/// An ONNX file that was read.
+/// An ONNX file that was read, with its card if there is one.
 #[derive(Debug)]
 pub struct NetworkFile {
     path: PathBuf,
@@ -34,32 +34,32 @@ pub struct NetworkFile {
 impl NetworkFile {
     /// Reads a network, and its card if there is one.
     ///
-    /// * `card`: the file of the card. If not given it is the first of: the file beside the network whose ending is `.toml`
-    ///   in place of `.onnx`, or after it; the entry [`METADATA_KEY`](crate::cards::METADATA_KEY) of the network.
+    /// * `card`: file of the card. If it is `None`, the card is the first of these that exists: the file beside the network whose ending is
+    ///   `.toml` instead of `.onnx` or after it; the entry [`METADATA_KEY`](crate::cards::METADATA_KEY) of the network.
     ///
     /// # Errors
     ///
-    /// A file cannot be read, is no network that can be run, or no card.
+    /// Fails if a file cannot be read, is not a runnable network, or is not a card.
     pub fn open(path: &Path, card: Option<&Path>) -> Result<Self, Failure> {
         Self::open_with(path, card, &Library::BuiltIn)
     }
 
-    /// As [`Self::open`], run by a library of choice.
+    /// Works like [`Self::open`], with a given library.
     ///
     /// # Errors
     ///
-    /// As for [`Self::open`].
+    /// Fails like [`Self::open`].
     pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<Self, Failure> {
         Self::of(OnnxFile::open(path, card, library)?)
     }
 
-    /// A network that is built in, run by a library of choice.
+    /// Loads a built-in network with a given library.
     ///
-    /// * `name`: what it is called in errors.
+    /// * `name`: name of the network in errors.
     ///
     /// # Errors
     ///
-    /// It is not a network that can be run, or its card is not valid.
+    /// Fails if the bytes are not a runnable network, or if the card is not valid.
     pub fn built_in(name: &Path, bytes: &[u8], library: &Library) -> Result<Self, Failure> {
         Self::of(OnnxFile::built_in(name, bytes, library)?)
     }
@@ -78,26 +78,26 @@ impl NetworkFile {
         })
     }
 
-    /// Returns the description of its inputs and outputs.
+    /// Returns the description of the network's inputs and outputs.
     pub fn description(&self) -> &Description {
         self.session.description()
     }
 
-    /// The library that runs it.
+    /// Returns the library that runs the network.
     pub fn run_by(&self) -> &RunBy {
         self.session.run_by()
     }
 
-    /// Its card, and where that was found.
+    /// Returns the card and the place where it was found.
     pub fn card(&self) -> Option<&(Card, CardPlace)> {
         self.card.as_ref()
     }
 
-    /// The network, which is tried once on an empty picture.
+    /// Returns the network, after a test run on an empty picture.
     ///
     /// # Errors
     ///
-    /// It has no card, or does not fit it.
+    /// Fails if the network has no card, or does not fit its card.
     pub fn fitted(self) -> Result<PoseNetwork, Failure> {
         let Self {
             path,
@@ -118,13 +118,13 @@ impl NetworkFile {
     }
 }
 
-/// Looks at a box of a picture with a network: left, top, right, bottom, pixels.
+/// Runs a network on a box of a picture, given as left, top, right, bottom in pixels.
 ///
-/// * `turn`: how the picture is turned for the network.
+/// * `turn`: rotation of the picture for the network.
 ///
 /// # Errors
 ///
-/// The network cannot be run, or gives values that are not finite; the box has no extent.
+/// Fails if the network cannot be run or gives values that are not finite, or if the box has no extent.
 pub fn look<'a>(
     network: &'a PoseNetwork,
     picture: &Picture,
@@ -142,14 +142,14 @@ pub fn look<'a>(
     })
 }
 
-/// The box that fits a person best who is seen in another one, as a deployment looks for it ([`Looker::look_closer`]), and how the
-/// picture is to be turned there.
+/// Returns the box that best fits a person seen in another box, as a deployment determines it ([`Looker::look_closer`]), and the rotation
+/// of the picture there.
 ///
-/// * `outline`: the box in which the person is seen, pixels of the picture.
+/// * `outline`: box in which the person is seen, in pixels of the picture.
 ///
 /// # Errors
 ///
-/// As for [`look`].
+/// Fails like [`look`].
 pub fn closest(
     network: &PoseNetwork,
     picture: &Picture,
@@ -171,11 +171,11 @@ pub fn closest(
     Ok(seen.map_or(as_it_is, |seen| (seen.outline, seen.turn)))
 }
 
-/// Returns the keypoints with their names, pixels of the picture, as JSON.
+/// Returns the keypoints with their names as JSON, in pixels of the picture.
 ///
 /// # Errors
 ///
-/// The answer of the network cannot be decoded.
+/// Fails if the output of the network cannot be decoded.
 pub fn keypoints_json(sight: &Sight<'_>) -> Result<Vec<Value>, Failure> {
     let found = sight.keypoints().or_fail(ExitKind::Input)?;
     let names = sight.network().names().iter();

@@ -1,4 +1,4 @@
-//! The pictures of a file, and the size at which one is searched.
+//! Pictures of a file, and the size at which a picture is searched.
 
 use std::path::{Path, PathBuf};
 
@@ -10,39 +10,39 @@ use kernels::Rgb8View;
 use crate::images::has_image_name;
 use crate::memory::check_memory;
 
-/// Which frames of a video are taken.
+/// Selection of the frames of a video.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frames {
-    /// Uses the first frame and every n-th frame after it.
+    /// Step between frames; the first frame and every n-th frame after it are used.
     pub every: u64,
-    /// At most this many; all if not given.
+    /// Maximum number of frames; `None` for all.
     pub most: Option<u64>,
 }
 
-/// A picture as people see it.
+/// A picture in its upright orientation.
 #[derive(Debug)]
 pub struct Picture {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The frame of it, if it is a video.
+    /// Number of the frame, if the file is a video.
     pub frame: Option<u64>,
-    /// How it was turned.
+    /// Rotation that was applied to the picture.
     pub turn: Turn,
-    /// Its size, pixels.
+    /// Size of the picture, in pixels.
     pub size: Size,
-    /// Its pixels, row by row.
+    /// Pixels of the picture, row by row.
     pub rgb: Vec<u8>,
 }
 
 impl Picture {
-    /// For people: the name of the file, and the frame.
+    /// Returns a readable title: the name of the file, and the frame.
     pub fn title(&self) -> String {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
         let frame = self.frame.map(|frame| format!(" {frame}"));
         format!("{name}{}", frame.unwrap_or_default())
     }
 
-    /// For the names of files: that of the file without its ending, and the frame.
+    /// Returns a stem for names of output files: the name of the file without its ending, and the frame.
     pub fn stem(&self) -> String {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let frame = self.frame.map(|frame| format!("-{frame:06}"));
@@ -50,10 +50,10 @@ impl Picture {
     }
 }
 
-/// The pictures of a file, one after the other.
+/// The pictures of a file, one after another.
 #[derive(Debug)]
 pub enum Pictures {
-    /// An image; none once it was handed out.
+    /// An image; `None` after it was returned.
     Image(Option<PathBuf>),
     /// A video.
     Video(PathBuf, Box<Source>),
@@ -64,7 +64,7 @@ impl Pictures {
     ///
     /// # Errors
     ///
-    /// It cannot be read, or is neither an image nor a video.
+    /// Fails if the file cannot be read, or is neither an image nor a video.
     pub fn open(path: &Path, frames: Frames) -> Result<Self, Failure> {
         if path.is_file() && footage::is_image(path).or_fail(ExitKind::Input)? {
             return Ok(Self::Image(Some(path.to_path_buf())));
@@ -73,11 +73,11 @@ impl Pictures {
         Ok(Self::Video(path.to_path_buf(), Box::new(source)))
     }
 
-    /// The next one; none at the end.
+    /// Returns the next picture; `None` at the end.
     ///
     /// # Errors
     ///
-    /// It cannot be decoded.
+    /// Fails if the picture cannot be decoded.
     pub fn next_picture(&mut self) -> Result<Option<Picture>, Failure> {
         match self {
             Self::Image(path) => path.take().map(image).transpose(),
@@ -116,7 +116,7 @@ fn spec(path: &Path, frames: Frames) -> SourceSpec {
     }
 }
 
-/// How many pictures a file promises; one if it does not say.
+/// Returns the number of pictures that a file declares; 1 if it declares none.
 pub fn count(path: &Path, frames: Frames) -> usize {
     if has_image_name(path) {
         return 1;
@@ -125,25 +125,25 @@ pub fn count(path: &Path, frames: Frames) -> usize {
     source.map_or(1, |source| source.info().n_frames as usize)
 }
 
-/// Part of a picture that is searched.
+/// A picture prepared for the search, possibly at a smaller size.
 #[derive(Debug)]
 pub struct Searched {
-    /// The pyramid of it.
+    /// Pyramid of the searched image.
     layout: Layout,
-    /// Pixels of the picture per pixel of it.
+    /// Number of pixels of the picture per searched pixel.
     per_pixel: [f64; 2],
-    /// Its pixels; none where they are the picture's own.
+    /// Pixels of the searched image; `None` if they are those of the picture.
     smaller: Option<Vec<u8>>,
 }
 
 impl Searched {
     /// Prepares a picture for the search.
     ///
-    /// * `longest`: longest side that is searched, pixels; none: all pixels.
+    /// * `longest`: maximum length of the longer side to search, in pixels; `None` for the full size.
     ///
     /// # Errors
     ///
-    /// The picture is too small for the model, or there is no memory for the search.
+    /// Fails if the picture is too small for the model, or if there is not enough memory for the search.
     pub fn new(
         picture: &Picture,
         longest: Option<usize>,
@@ -177,21 +177,21 @@ impl Searched {
         })
     }
 
-    /// The pyramid of what is searched.
+    /// Returns the pyramid of the searched image.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// Pixels of the picture per pixel that is searched, `[x, y]`.
+    /// Returns the number of pixels of the picture per searched pixel, `[x, y]`.
     pub fn per_pixel(&self) -> [f64; 2] {
         self.per_pixel
     }
 
-    /// The pixels that are searched.
+    /// Returns the pixels to search.
     ///
     /// # Errors
     ///
-    /// Size and pixels of the picture disagree.
+    /// Fails if the size and the pixels of the picture disagree.
     pub fn image<'a>(&'a self, picture: &'a Picture) -> Result<Rgb8View<'a>, Failure> {
         let [width, height] = self.layout.image_size;
         let rgb = self.smaller.as_deref().unwrap_or(&picture.rgb);
@@ -199,13 +199,13 @@ impl Searched {
         image.map_err(|error| in_file(&picture.path, &error))
     }
 
-    /// Where a point of it is in the picture.
+    /// Returns the position in the picture of a point of the searched image.
     pub fn in_picture(&self, point: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| (point[axis] + 0.5) * self.per_pixel[axis] - 0.5)
     }
 }
 
-/// The size with the longest side that is allowed, and the same shape.
+/// Returns the largest size with the same shape whose longer side is allowed.
 fn bounded(size: Size, longest: Option<usize>) -> Size {
     let side = size.width.max(size.height);
     let Some(longest) = longest.filter(|longest| *longest < side) else {

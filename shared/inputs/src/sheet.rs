@@ -1,4 +1,4 @@
-//! Contact sheets: pages of thumbnails with what was found.
+//! Contact sheets: pages of thumbnails with the skeletons that were found.
 
 use std::path::PathBuf;
 
@@ -6,25 +6,25 @@ use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use footage::{Canvas, Fill, Limb, Side, Size, Tile, Warp, compose, draw_limbs, resize_map};
 
-/// Thumbnails of a row, and of a page.
+/// Number of thumbnails in a row, and on a page.
 const N_COLUMNS: usize = 8;
 const N_TILES: usize = 40;
 
-/// Longer side of a thumbnail, pixels.
+/// Length of the longer side of a thumbnail, in pixels.
 const SIDE_PX: usize = 220;
 
-/// Skeleton that is drawn on a thumbnail.
+/// Skeleton to draw on a thumbnail.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
-    /// Pixels of the image.
+    /// Points of the skeleton, in pixels of the image.
     pub points: Vec<[f64; 2]>,
-    /// The lines.
+    /// Lines between the points.
     pub limbs: Vec<Limb>,
-    /// For the caption.
+    /// Score to show in the caption.
     pub score: f32,
 }
 
-/// A line from every part to its parent, in the colour of its side.
+/// Returns a line from every part to its parent, in the colour of its side.
 pub fn limbs(model: &Model) -> Vec<Limb> {
     let limb = |(to, part): (usize, &fmp::PartSpec)| {
         let side = match &part.name {
@@ -42,7 +42,7 @@ pub fn limbs(model: &Model) -> Vec<Limb> {
     parts.filter_map(limb).collect()
 }
 
-/// Thumbnails that wait for their page to be full.
+/// A contact sheet, with thumbnails of the current page.
 #[derive(Debug)]
 pub struct Sheet {
     path: PathBuf,
@@ -54,8 +54,8 @@ pub struct Sheet {
 impl Sheet {
     /// Begins the first page.
     ///
-    /// * `path`: the PNG file; several pages are numbered before the ending.
-    /// * `n_images`: how many will be added.
+    /// * `path`: path of the PNG file; several pages are numbered before the ending.
+    /// * `n_images`: number of images that will be added.
     pub fn new(path: PathBuf, n_images: usize) -> Self {
         Self {
             path,
@@ -65,14 +65,14 @@ impl Sheet {
         }
     }
 
-    /// Adds an image; writes the page if it is the last of it.
+    /// Adds an image. Writes the page if it is full.
     ///
-    /// * `name`: for the caption.
+    /// * `name`: name for the caption.
     /// * `rgb`: pixels of an image of `size`, row by row.
     ///
     /// # Errors
     ///
-    /// The page cannot be written.
+    /// Fails if the page cannot be written.
     pub fn add(
         &mut self,
         name: &str,
@@ -102,11 +102,11 @@ impl Sheet {
         Ok(())
     }
 
-    /// Writes what is left.
+    /// Writes the last page, if it has any images.
     ///
     /// # Errors
     ///
-    /// The page cannot be written.
+    /// Fails if the page cannot be written.
     pub fn finish(mut self) -> Result<(), Failure> {
         if self.waiting.is_empty() {
             return Ok(());
@@ -124,7 +124,7 @@ impl Sheet {
         Ok(())
     }
 
-    /// `sheet.png`, or `sheet-1.png` and on if there are several.
+    /// Returns `sheet.png`, or `sheet-1.png` and so on if there are several pages.
     fn path_of_page(&self) -> PathBuf {
         if self.n_pages <= 1 {
             return self.path.clone();
@@ -137,7 +137,7 @@ impl Sheet {
     }
 }
 
-/// Size of the thumbnail of an image, and thumbnail pixels per pixel.
+/// Returns the size of the thumbnail of an image, and the number of thumbnail pixels per pixel.
 fn shrunk(size: Size) -> (Size, f64) {
     let scale = SIDE_PX as f64 / size.width.max(size.height).max(1) as f64;
     let side = |value: usize| ((value as f64 * scale).round() as usize).max(1);

@@ -12,13 +12,13 @@ use failure::{ExitKind, Failure, in_file};
 pub enum Shipped {
     /// The person model.
     Model,
-    /// The network that predicts the expected errors of its parts.
+    /// The network that predicts the expected errors of the model's parts.
     Network,
     /// The learned multi-view consistency of the model.
     Consistency,
-    /// The network that tells in which direction a person faces.
+    /// The network that estimates the direction in which a person faces.
     Orientation,
-    /// Where joints lie among the parts of the model.
+    /// The positions of joints relative to the parts of the model.
     Joints,
     /// The network that finds joints.
     PoseNetwork,
@@ -27,7 +27,7 @@ pub enum Shipped {
 }
 
 impl Shipped {
-    /// All of them.
+    /// All shipped files.
     const ALL: [Self; 7] = [
         Self::Model,
         Self::Network,
@@ -38,7 +38,7 @@ impl Shipped {
         Self::Detector,
     ];
 
-    /// The content of the file.
+    /// Returns the content of the file.
     pub fn bytes(self) -> &'static [u8] {
         match self {
             Self::Model => include_bytes!("../../../configs/models/person.fmp"),
@@ -51,7 +51,7 @@ impl Shipped {
         }
     }
 
-    /// A unique name, for example `shipped:model`; settings call every shipped file `shipped`.
+    /// Returns a unique name, such as `shipped:model`. In settings, the name of every shipped file is `shipped`.
     pub fn name(self) -> PathBuf {
         let kind = match self {
             Self::Model => "model",
@@ -68,7 +68,7 @@ impl Shipped {
     /// Terms of use of the shipped files.
     pub const TERMS: &str = "for research only: learned from photographs that are for research (PARSE, LSP-extended, INRIA Person)";
 
-    /// Returns the shipped file that has the content of a user's file; `shipped` stands for the person model.
+    /// Returns the shipped file with the same content as a user's file; `shipped` means the person model.
     pub fn of_file(file: &Path) -> Option<Self> {
         if is_shipped(file) {
             return Some(Self::Model);
@@ -77,16 +77,16 @@ impl Shipped {
         Self::ALL.into_iter().find(|kind| kind.bytes() == bytes)
     }
 
-    /// The file with the given unique name.
+    /// Returns the file with the given unique name.
     pub fn of_name(name: &Path) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 
-    /// Reads a file of this kind; `shipped` stands for the shipped one.
+    /// Reads a file of this kind; `shipped` means the shipped one.
     ///
     /// # Errors
     ///
-    /// The file does not exist, cannot be read, or is empty.
+    /// Fails if the file does not exist, cannot be read, or is empty.
     pub fn read(self, file: &Path) -> Result<Cow<'static, [u8]>, Failure> {
         if is_shipped(file) {
             return Ok(Cow::Borrowed(self.bytes()));
@@ -107,7 +107,7 @@ impl Shipped {
         Ok(Cow::Owned(bytes))
     }
 
-    /// The hint for a missing file.
+    /// Returns the hint for a missing file.
     fn hint(self) -> String {
         let [key, made_by] = match self {
             Self::Model => ["paper.model", "train fmp"],
@@ -119,7 +119,7 @@ impl Shipped {
             Self::Detector => ["network.detector", "train finder"],
         };
         format!(
-            "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\": the one that is built in"
+            "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\" for the built-in one"
         )
     }
 }

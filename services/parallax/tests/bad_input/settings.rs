@@ -39,7 +39,7 @@ const FILES: &[Mistake] = &[
         command: "config check rig.toml",
         code: 3,
         says: &["this is a rig file"],
-        tries: &["name the deployment file"],
+        tries: &["give the deployment file"],
     },
     Mistake {
         what: "a folder",

@@ -1,4 +1,4 @@
-//! Everything adjusted at once; then again without the corners that are wrong.
+//! Adjustment of everything at once, then again without wrong corners.
 
 use geometry::Camera;
 use geometry::bundle::{Cameras, Free, Loss, Settings, solve};
@@ -9,12 +9,12 @@ use super::outcome::{Adjusted, Shown, middle, outcome};
 use super::problem::{BoardProblem, Observation};
 use super::{BoardError, CornerLoss, Outcome, Task};
 
-/// Corners further off than this many standard deviations are wrong; those within this many pixels never are.
+/// Corners with a residual above this many standard deviations are wrong, unless it is below a limit in pixels.
 const WRONG_SIGMAS: f64 = 5.0;
 const WRONG_PX: f64 = 0.7;
-/// The median length of a residual in standard deviations along an axis.
+/// Median length of a residual, in standard deviations along an axis.
 const RAYLEIGH_MEDIAN: f64 = 1.177_410;
-/// How often wrong corners are looked for: what is wrong is seen better the better the rest fits.
+/// Number of times that wrong corners are searched; they stand out more as the rest fits better.
 const ROUNDS: usize = 4;
 
 /// Adjusts cameras and boards.
@@ -64,7 +64,7 @@ pub(crate) fn adjusted(
     ))
 }
 
-/// Adjusts again and again without the corners that are wrong by then; which ones are used.
+/// Adjusts repeatedly without the corners found to be wrong. Returns the corners that were used.
 fn without_wrong(
     places: &mut BoardProblem<'_>,
     n_cameras: usize,
@@ -98,7 +98,7 @@ fn without_wrong(
     Ok(kept)
 }
 
-/// The corners of a frame, with their numbers.
+/// Returns the corners of a frame, with their numbers.
 fn observations(task: &Task, board: &Shown) -> Vec<(usize, Observation)> {
     let centre = middle(task).translation.vector;
     let sights = board.sights.iter().zip(&board.spreads);
@@ -122,7 +122,7 @@ fn observations(task: &Task, board: &Shown) -> Vec<(usize, Observation)> {
     each.collect()
 }
 
-/// Beyond how many pixels a corner of each camera is wrong.
+/// Returns the largest residual of a correct corner for each camera, in pixels.
 fn limits(solved: &BoardProblem<'_>, n_cameras: usize) -> Vec<f64> {
     let mut lengths: Vec<Vec<f64>> = vec![Vec::new(); n_cameras];
     for (frame, seen) in solved.seen.iter().enumerate() {
@@ -137,7 +137,7 @@ fn limits(solved: &BoardProblem<'_>, n_cameras: usize) -> Vec<f64> {
     lengths.into_iter().map(limit).collect()
 }
 
-/// For every corner of every frame whether it is within the limits.
+/// Returns true for every corner of every frame that is within the limits.
 fn right(solved: &BoardProblem<'_>, limits: &[f64]) -> Vec<Vec<bool>> {
     let of_frame = |(frame, seen): (usize, &Vec<Observation>)| {
         let each = solved.residuals(frame).into_iter().zip(seen);

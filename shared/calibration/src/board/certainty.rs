@@ -1,23 +1,23 @@
-//! Standard deviations of corners where the pictures of a frame were not taken at the same time.
+//! Standard deviations of corners if the pictures of a frame were not taken at the same time.
 
 use std::collections::BTreeMap;
 
 use super::Sight;
 
-/// How far apart in time the pictures of one frame are, frames: a standard deviation of cameras that start at will.
+/// Standard deviation of the time between pictures of one frame, in frames, for cameras that start independently.
 const APART: f64 = 0.5;
-/// Corners of a board that stands still move by less between two pictures, in standard deviations of a corner.
+/// A board stands still if its corners move less than this between two pictures, in standard deviations of a corner.
 const STILL_SIGMAS: f64 = 2.0;
-/// The assumed speed of a board that no other picture shows, pixels a frame.
+/// Assumed speed of a board that no other picture shows, in pixels per frame.
 const UNKNOWN_PX: f64 = 100.0;
 
-/// Amount by which the standard deviation of a corner is larger than that of a board that stands still.
+/// Returns the factor by which the standard deviation of a corner is larger than that of a board that stands still.
 ///
-/// All corners of a board that moved between two pictures of a frame are off together, so that a sight says no more
-/// about that than one corner would.
+/// If a board moved between two pictures of a frame, all its corners share the same error. A sight therefore says no more about this
+/// error than a single corner would.
 ///
-/// * `speeds`: of the board, pixels a frame, by camera and frame.
-/// * `sigma_px`: standard deviation of a corner, pixels.
+/// * `speeds`: speed of the board in pixels per frame, by camera and frame.
+/// * `sigma_px`: standard deviation of a corner, in pixels.
 pub(super) fn spread(sight: &Sight, speeds: &BTreeMap<(usize, usize), f64>, sigma_px: f64) -> f64 {
     let speed = speeds.get(&(sight.camera, sight.frame));
     let speed = speed.unwrap_or(&UNKNOWN_PX) / sigma_px.max(0.01);

@@ -1,4 +1,4 @@
-//! Which frames are used: those that cover the pictures, distances and tilts, not all.
+//! Choice of frames that cover the pictures, distances and tilts.
 
 use std::collections::BTreeMap;
 
@@ -8,15 +8,15 @@ use statistics::Sorted;
 
 use super::Sight;
 
-/// Cells of a picture along each side.
+/// Number of cells of a picture along each side.
 const CELLS: [usize; 2] = [8, 6];
-/// Steps of the apparent size of a board (a factor of 1.5 each), and of its tilt.
+/// Number of steps of the board's apparent size (a factor of 1.5 each), and of its tilt.
 const SIZES: usize = 8;
 const TILTS: usize = 6;
-/// The frames of `sights` that cover most, at most `most`, in their order.
+/// Returns the frames of `sights` with the best coverage, at most `most`, in their original order.
 ///
-/// One after the other the frame is taken that adds most of what has been seen least: cells of each camera's picture, sizes and
-/// tilts of the board, and pairs of cameras that see it together.
+/// Frames are chosen one by one. Each choice adds most to the features that were seen least so far: cells of each camera's picture, sizes
+/// and tilts of the board, and pairs of cameras that see the board together.
 pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<usize> {
     let mut all: Vec<usize> = sights.iter().map(|sight| sight.frame).collect();
     all.sort_unstable();
@@ -42,7 +42,7 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
                 for b in &own {
                     if a.camera < b.camera {
                         let pair = a.camera * n_cameras + b.camera;
-                        // Pairs hold the rig together: they count several times.
+                        // Pairs connect the cameras of the rig, so they count several times.
                         list.extend([n_cameras * per_camera + pair; 6]);
                     }
                 }
@@ -70,8 +70,8 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
     taken.map(|(frame, _)| *frame).collect()
 }
 
-/// How fast corners of the board move in the picture of a camera, by camera and frame, pixels a frame: the faster of the movements from
-/// the last picture in which it was seen, and to the next.
+/// Returns the speed of the board's corners in the picture, in pixels per frame, by camera and frame. It is the larger of the speeds since
+/// the previous picture with the board and to the next one.
 pub(crate) fn speeds(sights: &[Sight], n_cameras: usize) -> BTreeMap<(usize, usize), f64> {
     let mut speeds = BTreeMap::new();
     for camera in 0..n_cameras {
@@ -90,7 +90,7 @@ pub(crate) fn speeds(sights: &[Sight], n_cameras: usize) -> BTreeMap<(usize, usi
     speeds
 }
 
-/// The sights of frames that several cameras see and in which the board moves least: half of them, and at least `least`.
+/// Returns the sights of frames that several cameras see and in which the board moves least: half of these frames, but at least `least`.
 pub(crate) fn slow(
     sights: &[Sight],
     speeds: &BTreeMap<(usize, usize), f64>,
@@ -113,7 +113,7 @@ pub(crate) fn slow(
     sights.iter().filter(is_slow).cloned().collect()
 }
 
-/// The median movement of corners between two pictures, pixels a frame.
+/// Returns the median movement of corners between two pictures, in pixels per frame.
 fn speed(a: &Sight, b: &Sight) -> Option<f64> {
     let moved = a.points.iter().filter_map(|(id, at)| {
         let other = b.points.iter().find(|point| point.0 == *id)?;
@@ -123,7 +123,7 @@ fn speed(a: &Sight, b: &Sight) -> Option<f64> {
     Some(moved / a.frame.abs_diff(b.frame).max(1) as f64)
 }
 
-/// Returns the features that a sight of a board covers: cells, its size, its tilt in both directions.
+/// Returns the features that a sight of a board covers: cells, the board's size, and its tilt in both directions.
 fn features_of(sight: &Sight, size: [f64; 2]) -> impl Iterator<Item = usize> {
     let mut cells: Vec<usize> = sight.points.iter().map(|(_, at)| cell(*at, size)).collect();
     cells.sort_unstable();
@@ -141,7 +141,7 @@ fn features_of(sight: &Sight, size: [f64; 2]) -> impl Iterator<Item = usize> {
     cells.into_iter()
 }
 
-/// The cell of a place in a picture.
+/// Returns the cell of a position in a picture.
 fn cell(at: Point2<f64>, size: [f64; 2]) -> usize {
     let along = |axis: usize| {
         let share = (at[axis] + 0.5) / size[axis];
@@ -150,7 +150,7 @@ fn cell(at: Point2<f64>, size: [f64; 2]) -> usize {
     along(1) * CELLS[0] + along(0)
 }
 
-/// The share of a picture's cells that some points are in, from 0 to 1.
+/// Returns the fraction of a picture's cells that contain points, from 0 to 1.
 pub(crate) fn coverage(points: impl Iterator<Item = Point2<f64>>, size: [u32; 2]) -> f64 {
     let mut is_seen = [false; CELLS[0] * CELLS[1]];
     for at in points {
@@ -159,7 +159,7 @@ pub(crate) fn coverage(points: impl Iterator<Item = Point2<f64>>, size: [u32; 2]
     is_seen.iter().filter(|is_seen| **is_seen).count() as f64 / is_seen.len() as f64
 }
 
-/// The root mean square distance of points from their middle, pixels.
+/// Returns the root mean square distance of points from their centre, in pixels.
 fn spread(sight: &Sight) -> f64 {
     let n = sight.points.len().max(1) as f64;
     let middle = sight.points.iter().map(|point| point.1.coords);
@@ -168,7 +168,7 @@ fn spread(sight: &Sight) -> f64 {
     (square.sum::<f64>() / n).sqrt()
 }
 
-/// How much the far side of a board is smaller than the near one, along its two axes.
+/// Returns how much smaller the far side of a board is than the near one, along its two axes.
 fn tilt(sight: &Sight) -> Option<[f64; 2]> {
     let map =
         Homography::fit(sight.on_board.iter().zip(&sight.points).map(|(on, at)| (*on, at.1, 1.0)))?;

@@ -1,17 +1,17 @@
-//! How cameras stand to one another, from boards that pairs of them saw at the same time.
+//! Relative poses of cameras, from boards that pairs of them saw at the same time.
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-/// A board before two cameras at the same time: `a_from_b` for each orientation in which the board looks the same.
+/// A board seen by two cameras at the same time.
 #[derive(Debug, Clone)]
 pub(crate) struct Meeting {
-    /// Every pose that the pair may have by this board; the first is the most likely.
+    /// Possible poses of the pair, one for each orientation in which the board looks the same; the first is the most likely.
     pub(crate) a_from_b: Vec<Isometry3<f64>>,
-    /// How much it counts.
+    /// Weight of this board.
     pub(crate) weight: f64,
 }
 
-/// The pose of a pair, and how many of its meetings agree with it.
+/// The relative pose of a pair, and the number of boards that agree with it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pair {
     pub(crate) a_from_b: Isometry3<f64>,
@@ -19,11 +19,12 @@ pub(crate) struct Pair {
     pub(crate) n: usize,
 }
 
-/// How far two poses of a pair may be apart and agree: a turn in radians, a shift as a share of the distance of the cameras.
+/// Largest difference between two poses of a pair that agree: a rotation in radians, and a shift as a fraction of the distance between
+/// the cameras.
 const SAME_TURN: f64 = 0.1;
 const SAME_SHIFT: f64 = 0.15;
 
-/// The pose that most meetings agree with, then the mean of these.
+/// Finds the pose that most meetings agree with, and returns the mean of these.
 pub(crate) fn pair(meetings: &[Meeting]) -> Option<Pair> {
     let step = meetings.len().div_ceil(60).max(1);
     let candidates = meetings.iter().step_by(step).flat_map(|meeting| meeting.a_from_b.iter());
@@ -50,7 +51,7 @@ pub(crate) fn pair(meetings: &[Meeting]) -> Option<Pair> {
     })
 }
 
-/// The distance of two poses in the limits above.
+/// Returns the difference between two poses, relative to the limits above.
 pub(crate) fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let turn = a.rotation.angle_to(&b.rotation);
     let length = a.translation.vector.norm().max(b.translation.vector.norm());
@@ -72,18 +73,18 @@ fn mean(near: &Isometry3<f64>, poses: &[(Isometry3<f64>, f64)]) -> Isometry3<f64
     Isometry3::from_parts((shift / total).into(), rotation)
 }
 
-/// The cameras that the first one of each group is connected with, the largest group first.
+/// Groups of connected cameras, the largest group first, and the poses within that group.
 #[derive(Debug, Clone)]
 pub(crate) struct Standing {
-    /// `camera_from_first` of every camera, `None` outside the first group.
+    /// `camera_from_first` of every camera; `None` for cameras outside the first group.
     pub(crate) poses: Vec<Option<Isometry3<f64>>>,
-    /// The groups, each in the order of the cameras.
+    /// Groups of cameras, each in the order of the cameras.
     pub(crate) groups: Vec<Vec<usize>>,
 }
 
-/// The poses of all cameras along the strongest connections: a tree of the pairs with most meetings.
+/// Finds the poses of all cameras along the strongest connections: a tree of the pairs with most meetings.
 ///
-/// * `pairs`: cameras a < b, and their pose.
+/// * `pairs`: cameras a < b, and their relative pose.
 pub(crate) fn standing(n_cameras: usize, pairs: &[([usize; 2], Pair)]) -> Standing {
     let mut poses = vec![None; n_cameras];
     let mut groups: Vec<Vec<usize>> = Vec::new();

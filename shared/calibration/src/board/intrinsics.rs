@@ -1,4 +1,4 @@
-//! The intrinsics of one camera from boards, without knowing anything of it.
+//! Intrinsics of one camera from boards, without prior knowledge.
 
 use geometry::bundle::{Cameras, Free, Loss, Settings, solve};
 use geometry::{Camera, Intrinsics, Lens, LensModel};
@@ -8,14 +8,14 @@ use super::pose::{Sighted, board_pose, linear};
 use super::problem::{BoardProblem, Observation};
 use super::{CornerLoss, LensKind};
 
-/// Focal lengths that are tried, as shares of the longer side of the picture: from this on, each larger by a factor.
+/// Shortest focal length that is tried, as a fraction of the longer side of the picture. Each further one is larger by a constant factor.
 const SHORTEST: f64 = 0.25;
 const FACTOR: f64 = 1.12;
 const TRIED: i32 = 26;
-/// The most boards that a first look uses.
+/// Maximum number of boards for the initial estimate.
 const FIRST_LOOK: usize = 25;
 
-/// A start: the focal length under which boards look most like boards, no distortion.
+/// Returns an initial estimate: the focal length with which the boards fit best, without distortion.
 pub(crate) fn start(size: [u32; 2], lens: LensKind, boards: &[Vec<Sighted>]) -> Option<Intrinsics> {
     let longer = f64::from(size[0].max(size[1]));
     let step = boards.len().div_ceil(FIRST_LOOK).max(1);
@@ -49,7 +49,7 @@ fn with_focal(size: [u32; 2], lens: LensKind, focal: f64) -> Intrinsics {
     }
 }
 
-/// The mean square of the residuals of a pose, pixels.
+/// Returns the mean square of the residuals of a pose, in square pixels.
 fn square(intrinsics: &Intrinsics, pose: &Isometry3<f64>, points: &[Sighted]) -> Option<f64> {
     let camera = Camera {
         name: String::new(),
@@ -78,10 +78,10 @@ pub(crate) fn free(lens: LensKind, pose: bool) -> Free {
     }
 }
 
-/// The intrinsics from boards: what [`start`] gives, adjusted step by step with the poses of the boards.
+/// Returns the intrinsics from boards: the result of [`start`], adjusted step by step with the poses of the boards.
 ///
-/// First the focal length, then the first coefficient of the lens, then everything: a lens that is bent much has no near
-/// minimum otherwise.
+/// First the focal length is adjusted, then also the first coefficient of the lens, then everything. Without these steps, a strongly
+/// distorted lens may end at a wrong minimum.
 pub(crate) fn adjusted(
     start: Intrinsics,
     lens: LensKind,

@@ -7,20 +7,20 @@ use nalgebra::{Isometry3, Point2, Translation3, Vector3};
 use super::problem::{BoardProblem, Observation};
 use super::{CameraOutcome, Known, Outcome, Residual, Sight, Task, choose};
 
-/// Into how many parts a recording is divided at most, to see how they differ.
+/// Maximum number of parts into which a recording is divided to compare them.
 const MOST_PARTS: usize = 10;
 
 /// A frame that is used.
 pub(crate) struct Shown {
     pub(crate) frame: usize,
-    /// Pose of the board; its origin is in its middle.
+    /// Pose of the board; its origin is the centre of the board.
     pub(crate) world_from_board: Isometry3<f64>,
     pub(crate) sights: Vec<Sight>,
-    /// Spread of each sight, see [`Observation::spread`].
+    /// Spread of each sight; see [`Observation::spread`].
     pub(crate) spreads: Vec<f64>,
 }
 
-/// The frame of the board with its origin in the middle of the board.
+/// Returns the coordinate system of the board with its origin at the centre of the board.
 pub(crate) fn middle(task: &Task) -> Isometry3<f64> {
     let n = task.board.len().max(1) as f64;
     let sum = task.board.iter().map(|board| board.coords);
@@ -35,11 +35,11 @@ pub(crate) struct Adjusted<'a> {
     pub(crate) all: &'a [Vec<(usize, Observation)>],
     /// True for corners that were used.
     pub(crate) kept: &'a [Vec<bool>],
-    /// With what was used.
+    /// The problem solved with the corners that were used.
     pub(crate) solved: &'a BoardProblem<'a>,
 }
 
-/// The outcome, without pairs and doubts.
+/// Returns the outcome, without pairs and doubts.
 pub(crate) fn outcome(task: &Task, adjusted: &Adjusted<'_>) -> Outcome {
     let Adjusted {
         boards,
@@ -97,10 +97,11 @@ fn rms(off: impl Iterator<Item = nalgebra::Vector2<f64>>) -> f64 {
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
-/// Every free number with its standard deviation; infinite where the pictures do not determine it.
+/// Returns every free parameter with its standard deviation, which is infinite if the pictures do not determine the parameter.
 ///
-/// The larger of two deviations: of corners that err independently, and by how parts of the recording differ, whatever successive
-/// frames have in common (a board that moves is blurred, scanned row by row, and elsewhere in the next camera's picture).
+/// The standard deviation is the larger of two. One assumes that corners have independent errors. The other is from the differences
+/// between parts of the recording. It also covers errors that successive frames share: a moving board is blurred, scanned row by row, and
+/// in another position in the next camera's picture.
 fn numbers(solved: &BoardProblem<'_>) -> Vec<Known> {
     let spread = covariance(solved).ok();
     let n_parts = solved.boards.len().min(MOST_PARTS);

@@ -1,4 +1,4 @@
-//! Where a flat board is before one camera.
+//! Pose of a flat board relative to one camera.
 
 use crate::boards::Homography;
 use geometry::{Camera, Intrinsics};
@@ -7,23 +7,23 @@ use nalgebra::{
     UnitQuaternion, Vector3,
 };
 
-/// A point of a board (metres) and where it is in a picture (pixels).
+/// A point of a board (metres) and its position in a picture (pixels).
 pub type Sighted = (Point2<f64>, Point2<f64>);
 
-/// Steps of the refinement.
+/// Number of steps of the refinement.
 const STEPS: usize = 25;
 
-/// The pose of a board before a camera, and the root mean square of its residuals in pixels.
+/// Pose of a board relative to a camera, and the root mean square of its residuals in pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoardPose {
     pub(crate) camera_from_board: Isometry3<f64>,
     pub(crate) rms_px: f64,
 }
 
-/// The pose of a board: from the projective map of its plane (Zhang 2000, section 3.1), refined; of the two poses that a
-/// small board may have (turned about the line of sight to it), the one with the smaller residuals.
+/// Returns the pose of a board, from the projective map of its plane (Zhang 2000, section 3.1), then refined.
 ///
-/// `None` for fewer than four points, points on a line, or points that the lens cannot see.
+/// A small board may have a second possible pose, with its normal mirrored about the line of sight. The one with the smaller residuals is
+/// returned. Returns `None` for fewer than four points, points on a line, or points that the lens cannot see.
 pub(crate) fn board_pose(intrinsics: &Intrinsics, points: &[Sighted]) -> Option<BoardPose> {
     let start = linear(intrinsics, points)?;
     let first = refined(intrinsics, points, start);
@@ -34,7 +34,7 @@ pub(crate) fn board_pose(intrinsics: &Intrinsics, points: &[Sighted]) -> Option<
     }
 }
 
-/// The pose by the linear method alone.
+/// Returns the pose found by the linear method alone.
 pub(crate) fn linear(intrinsics: &Intrinsics, points: &[Sighted]) -> Option<Isometry3<f64>> {
     let pairs = points.iter().filter_map(|(on_board, in_picture)| {
         let ideal = intrinsics.lens.undistort(&intrinsics.normalised(in_picture))?;
@@ -67,7 +67,7 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     Some(UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// The other pose: the normal of the board mirrored at the line of sight to its middle.
+/// Returns the second possible pose: the normal of the board is mirrored about the line of sight to its centre.
 fn mirrored(pose: &Isometry3<f64>, points: &[Sighted]) -> Isometry3<f64> {
     let middle = points.iter().map(|point| point.0.coords);
     let middle = middle.sum::<nalgebra::Vector2<f64>>() / points.len() as f64;
@@ -82,7 +82,7 @@ fn mirrored(pose: &Isometry3<f64>, points: &[Sighted]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(translation), rotation)
 }
 
-/// Least squares of the residuals in pixels, by Gauss and Newton with damping.
+/// Minimises the squared residuals in pixels with the damped Gauss-Newton method.
 pub(crate) fn refined(
     intrinsics: &Intrinsics,
     points: &[Sighted],
@@ -125,7 +125,7 @@ pub(crate) fn refined(
     })
 }
 
-/// The sum of squares; `None` if a point has no image.
+/// Returns the sum of the squared residuals; `None` if a point has no image.
 fn square(camera: &Camera, points: &[Sighted]) -> Option<f64> {
     points.iter().try_fold(0.0, |sum, (on_board, in_picture)| {
         let image = camera.project(&Point3::new(on_board.x, on_board.y, 0.0))?;

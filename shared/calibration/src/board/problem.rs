@@ -1,12 +1,12 @@
-//! The adjustment of cameras and boards: the terms of [`geometry::bundle`].
+//! Adjustment of cameras and boards: the terms for [`geometry::bundle`].
 
 use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
 use geometry::{Camera, LensModel};
 use nalgebra::{Isometry3, Matrix2x3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 
-/// Prior on any camera, as standard deviations: pixels are square to half a percent, the principal point is within a few
-/// percent of the middle, lenses are centred. It holds what few pictures leave open; where pictures cover much it has no
-/// influence: they determine each of these at least ten times better.
+/// Prior on every camera, as standard deviations. Pixels are square to half a percent, the principal point is within a few percent of
+/// the centre, and lenses are centred. The prior fixes parameters that few pictures leave open. It has no influence if the pictures cover
+/// much, because they then determine each parameter at least ten times better.
 const PRINCIPAL_POINT: f64 = 0.04;
 const ASPECT: f64 = 0.005;
 const RADIAL: f64 = 0.5;
@@ -17,19 +17,19 @@ const TANGENTIAL: f64 = 0.005;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observation {
     pub(crate) camera: usize,
-    /// On the board, from its middle, metres.
+    /// Position on the board relative to its centre, in metres.
     pub(crate) on_board: Point3<f64>,
-    /// In the picture, pixels.
+    /// Position in the picture, in pixels.
     pub(crate) seen: Point2<f64>,
-    /// Amount by which its standard deviation is larger than that of a corner of a board that stands still.
+    /// Factor by which the standard deviation is larger than that of a corner of a board that stands still.
     pub(crate) spread: f64,
 }
 
-/// Cameras, and a board that is somewhere else in every frame.
+/// Cameras, and a board with a different pose in every frame.
 #[derive(Debug, Clone)]
 pub(crate) struct BoardProblem<'a> {
     pub(crate) cameras: Cameras,
-    /// `world_from_board` of every frame, of a board whose origin is its middle.
+    /// `world_from_board` of every frame; the origin of the board is its centre.
     pub(crate) boards: Vec<Isometry3<f64>>,
     /// Corners observed in every frame.
     pub(crate) seen: &'a [Vec<Observation>],
@@ -39,7 +39,7 @@ pub(crate) struct BoardProblem<'a> {
 }
 
 impl BoardProblem<'_> {
-    /// The residuals (image less seen, pixels) of a frame; `None` for a point without an image.
+    /// Returns the residuals of a frame (projected minus seen position, in pixels); `None` for a point without an image.
     pub(crate) fn residuals(&self, frame: usize) -> Vec<Option<nalgebra::Vector2<f64>>> {
         let residual = |observation: &Observation| {
             let camera: &Camera = &self.cameras.cameras()[observation.camera];
@@ -113,7 +113,7 @@ impl Problem for BoardProblem<'_> {
     }
 }
 
-/// The residual of the prior of a parameter, and its derivative; `None` of poses and focal lengths.
+/// Returns the residual of the prior of a parameter, and its derivative; `None` for poses and focal lengths.
 fn prior(camera: &Camera, name: &str) -> Option<(f64, f64)> {
     let intrinsics = &camera.intrinsics;
     let number = name.rsplit(": ").next()?;
@@ -140,7 +140,7 @@ fn prior(camera: &Camera, name: &str) -> Option<(f64, f64)> {
                 _ if is_fisheye => RADIAL,
                 6.. => TANGENTIAL,
                 3..=5 => DIVIDING,
-                // With a divisor the factors above and below it are large together.
+                // In a model with a divisor, coefficients in the numerator and denominator can grow together.
                 _ if camera
                     .intrinsics
                     .lens

@@ -1,4 +1,4 @@
-//! From sights of a board to cameras.
+//! Calibration of cameras from sights of a board.
 
 use geometry::bundle::Free;
 use geometry::{Camera, Intrinsics};
@@ -13,20 +13,20 @@ use super::{
     Task, Together, certainty, choose, intrinsics, verdict,
 };
 
-/// The most pictures that intrinsics of one camera are begun with.
+/// Maximum number of pictures for the initial intrinsics of one camera.
 const MOST_FOR_START: usize = 60;
-/// Cameras are out of step if the residuals of all together are this many times those of each camera alone, and at least
-/// this large.
+/// Cameras are out of step if the residuals of all cameras together exceed those of each camera alone by this factor, and also exceed a
+/// limit in pixels.
 const OUT_OF_STEP: f64 = 1.4;
 const OUT_OF_STEP_PX: f64 = 0.4;
 
 /// Calibrates cameras from a board.
 ///
-/// The world is the frame of the first camera; which way is up is not known.
+/// The world is the coordinate system of the first camera; its up direction is unknown.
 ///
 /// # Errors
 ///
-/// [`BoardError`] where there is no answer; an answer that is not to be trusted has [`Outcome::doubts`].
+/// [`BoardError`] if there is no result. A result that should not be trusted has [`Outcome::doubts`].
 pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     let usable = |sight: &&Sight| sight.points.len() >= LEAST_CORNERS && verdict::is_spread(sight);
     let sights: Vec<Sight> = task.sights.iter().filter(usable).cloned().collect();
@@ -70,8 +70,8 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     Ok(outcome)
 }
 
-/// Returns the evidence that cameras fit worse together than each alone: by residuals, or by lenses, which bend to hide it where
-/// few frames have several cameras.
+/// Returns evidence that cameras fit worse together than each one alone. The evidence is in the residuals, or in the lenses: if few frames
+/// have several cameras, lenses are distorted to reduce the residuals.
 fn out_of_step(alone: &Outcome, together: &Outcome) -> Option<OutOfStep> {
     let [alone_px, together_px] = [alone, together].map(pooled);
     let is_worse = together_px > OUT_OF_STEP * alone_px && together_px > OUT_OF_STEP_PX;
@@ -89,9 +89,9 @@ fn out_of_step(alone: &Outcome, together: &Outcome) -> Option<OutOfStep> {
 
 /// Places cameras whose pictures of one frame were not taken at the same time.
 ///
-/// Such pictures put boards where they were not, and an adjustment bends lenses to fit. Each camera therefore finds its
-/// lens from board poses of its own, as it does alone, and a sight of a faster board counts less for the places of the
-/// cameras.
+/// Such pictures give wrong poses of the board, and an adjustment distorts lenses to fit them. The lens of each camera is therefore
+/// found with board poses of its own, as if the camera were alone. For the poses of the cameras, a sight of a faster board has a lower
+/// weight.
 fn in_step(
     task: &Task,
     (cameras, alone): (Vec<Camera>, &Outcome),
@@ -115,7 +115,8 @@ fn in_step(
     shown.sort_by_key(|board| board.frame);
     let free: Vec<Free> = (0..cameras.len()).map(|nth| free_of(task, nth, nth != 0)).collect();
     let mut outcome = adjusted(task, cameras, &free, &shown)?;
-    // One board a frame, and the corners of every camera once: as it alone sees them, since others were taken at other times.
+    // Keep one board per frame, and each camera's corners once. Residuals are those of the camera alone, because the other cameras took
+    // their pictures at other times.
     outcome.boards.dedup_by_key(|(frame, _)| *frame);
     for (camera, alone) in outcome.cameras.iter_mut().zip(&alone.cameras) {
         *camera = CameraOutcome {
@@ -127,14 +128,14 @@ fn in_step(
     Ok(outcome)
 }
 
-/// Returns the sights of one camera and those that were placed.
+/// Returns the sights of one camera, and its sights with a known board pose.
 fn own(nth: usize, sights: &[Sight], placed: &[Placed]) -> (Vec<Sight>, Vec<Placed>) {
     let sights = sights.iter().filter(|sight| sight.camera == nth);
     let placed = placed.iter().filter(|placed| placed.sight.camera == nth);
     (sights.cloned().collect(), placed.cloned().collect())
 }
 
-/// The root mean square of all residuals that were used, pixels.
+/// Returns the root mean square of all residuals that were used, in pixels.
 fn pooled(outcome: &Outcome) -> f64 {
     let all = outcome.cameras.iter().flat_map(|camera| &camera.residuals);
     let squares: Vec<f64> = all
@@ -165,7 +166,7 @@ fn camera_of(
     }
 }
 
-/// Every camera separately.
+/// Calibrates every camera separately.
 fn each_alone(
     task: &Task,
     sights: &[Sight],
@@ -200,7 +201,7 @@ fn each_alone(
     Ok(outcome)
 }
 
-/// The intrinsics that are known, or those that the camera's own boards give.
+/// Returns the known intrinsics, or those from the camera's own boards.
 fn first_intrinsics(
     task: &Task,
     camera: usize,
@@ -227,7 +228,7 @@ fn first_intrinsics(
     let chosen = own.iter().filter(|sight| frames.contains(&sight.frame));
     let boards: Vec<_> = chosen.map(Sight::sighted).collect();
     let kind = task.lens;
-    // Eight coefficients are begun with five, whose minimum is wider.
+    // Eight coefficients start from a fit of five, whose minimum is wider.
     let first = if kind == LensKind::Eight {
         LensKind::Five
     } else {
@@ -238,7 +239,7 @@ fn first_intrinsics(
         .ok_or_else(|| BoardError::NoStart { camera: name() })
 }
 
-/// A sight with the pose of the board, one for each orientation in which the board looks the same.
+/// A sight with the possible poses of the board, one for each orientation in which it looks the same.
 #[derive(Clone)]
 struct Placed {
     sight: Sight,
@@ -297,7 +298,8 @@ fn pairs(task: &Task, placed: &[Placed]) -> (Vec<([usize; 2], Pair)>, Vec<Togeth
     (pairs, together)
 }
 
-/// The board in the world in every frame: the pose by one of the cameras that all of them like best.
+/// Returns the pose of the board in the world in every frame. Each camera suggests a pose; the one with the lowest cost over all cameras
+/// is chosen.
 fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) -> Vec<Shown> {
     let mut list = Vec::new();
     for &frame in frames {
@@ -333,7 +335,7 @@ fn boards(task: &Task, cameras: &[Camera], placed: &[Placed], frames: &[usize]) 
     list
 }
 
-/// The mean length of a sight's residuals, those of many pixels counting as so many.
+/// Returns the mean length of a sight's residuals; very long residuals are capped.
 fn cost(camera: &Camera, world_from_board: &Isometry3<f64>, sight: &Sight) -> f64 {
     let each = sight.sighted().into_iter().map(|(on_board, at)| {
         let in_world = world_from_board * Point3::new(on_board.x, on_board.y, 0.0);

@@ -1,4 +1,4 @@
-//! A board that does not move, before cameras whose places are known.
+//! Pose of a board that does not move, seen by cameras with known poses.
 
 use geometry::Camera;
 use geometry::bundle::{Cameras, Free, Loss, Settings, solve};
@@ -8,9 +8,10 @@ use super::pose::board_pose;
 use super::problem::{BoardProblem, Observation};
 use super::{LEAST_CORNERS, Sight};
 
-/// Where a board is in the world, and the root mean square of its residuals in pixels; `None` if no camera sees enough of it.
+/// Returns the pose of a board in the world, and the root mean square of its residuals in pixels. Returns `None` if no camera sees enough
+/// of the board.
 ///
-/// * `sights`: of all cameras, in one frame or more; the board is in one place in all of them.
+/// * `sights`: sights of all cameras in one or more frames; the board has the same pose in all of them.
 pub fn standing_board(
     cameras: &[Camera],
     board: &[Point2<f64>],

@@ -1,4 +1,4 @@
-//! Boards that do not exist, before cameras that are known.
+//! Tests with simulated boards and known cameras.
 
 use geometry::{Lens, LensModel};
 use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -58,7 +58,7 @@ struct Show<'a> {
     noise_px: f64,
 }
 
-/// Returns the sight of a board by a camera in a frame, from either side if the board has two.
+/// Returns the sight of a board by a camera in a frame, from either side if the board is visible from both.
 fn seen(
     (nth, camera): (usize, &Camera),
     (board, pose): (&[Point2<f64>], &Isometry3<f64>),
@@ -79,7 +79,7 @@ fn seen(
     (sight.points.len() >= LEAST_CORNERS).then_some(sight)
 }
 
-/// Somewhere before the cameras.
+/// Returns a random pose in view of the cameras.
 fn somewhere(random: &mut fastrand::Rng) -> Isometry3<f64> {
     let mut spread = |reach: f64| reach * (2.0 * random.f64() - 1.0);
     let turn = Vector3::new(spread(0.6), spread(3.1), spread(0.6));
@@ -95,7 +95,7 @@ fn noisy(random: &mut fastrand::Rng, noise_px: f64) -> f64 {
 }
 
 impl Show<'_> {
-    /// The board moved about, seen where at least `LEAST_CORNERS` of its front are in a picture.
+    /// Returns sights of a moving board, if at least `LEAST_CORNERS` corners of its front are in a picture.
     fn sights(&self, random: &mut fastrand::Rng) -> Vec<Sight> {
         let mut sights = Vec::new();
         for frame in 0..self.n_frames {
@@ -123,7 +123,7 @@ fn task(cameras: &[Camera], board: &[Point2<f64>], sights: Vec<Sight>) -> Task {
     }
 }
 
-/// The largest errors: focal lengths as a share, turns in degrees, distances from the first camera as a share.
+/// Returns the largest errors: focal lengths as a fraction, rotations in degrees, and distances from the first camera as a fraction.
 fn errors(outcome: &Outcome, truth: &[Camera]) -> [f64; 3] {
     let mut worst = [0.0_f64; 3];
     let first = &truth[0].camera_from_world;
@@ -153,7 +153,7 @@ fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
     };
     let mut random = fastrand::Rng::with_seed(3);
     let mut sights = show.sights(&mut random);
-    // One corner in a hundred is elsewhere.
+    // One corner in a hundred is displaced.
     let mut n_wrong = 0;
     for sight in &mut sights {
         for (_, at) in &mut sight.points {
@@ -181,7 +181,7 @@ fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
         "{}",
         outcome.sigma_px
     );
-    // What is said of the focal lengths is true.
+    // The stated standard deviations of the focal lengths are correct.
     for (found, truth) in outcome.cameras.iter().zip(&truth) {
         let focal = found.numbers.iter().find(|number| number.name == "focal length");
         let off = (found.camera.intrinsics.fx - truth.intrinsics.fx).abs();
@@ -261,7 +261,7 @@ fn what_cannot_be_known_is_refused_with_the_reason() {
         noise_px: 0.2,
     };
     let sights = show.sights(&mut fastrand::Rng::with_seed(3));
-    // Cameras 0, 1 and cameras 2, 3 never at the same time.
+    // Cameras 0 and 1 never see the board at the same time as cameras 2 and 3.
     let apart = sights.iter().filter(|sight| (sight.camera < 2) == (sight.frame % 2 == 0));
     let error = calibrate(&task(&truth, &board, apart.cloned().collect())).unwrap_err();
     assert!(
@@ -329,13 +329,13 @@ fn a_board_with_two_sides_tells_how_opposite_cameras_stand() {
     assert!(outcome.pairs[0].n > 20, "{:?}", outcome.pairs);
 }
 
-/// A board that is carried from place to place, before cameras whose pictures of a frame are taken parts of a frame apart.
+/// A board that is carried from place to place, seen by cameras whose pictures of a frame are fractions of a frame apart.
 struct Carried<'a> {
     truth: &'a [Camera],
     board: &'a [Point2<f64>],
-    /// Frames for which it is held still at every place.
+    /// Number of frames for which the board is held still at every place.
     n_held: usize,
-    /// Every n-th frame is used.
+    /// Step between frames that are used.
     every: usize,
 }
 
@@ -365,7 +365,7 @@ impl Carried<'_> {
     }
 }
 
-/// Errors of focal lengths, turns and places along each axis, in stated deviations.
+/// Returns the errors of focal lengths, rotations and positions along each axis, in stated standard deviations.
 fn errors_in_deviations(outcome: &Outcome, truth: &[Camera]) -> Vec<f64> {
     let mut list = Vec::new();
     let first = truth[0].camera_from_world;
@@ -393,7 +393,8 @@ fn cameras_out_of_step_have_lenses_by_their_own_pictures_and_what_is_stated_hold
     let truth = ring(3, BROWN);
     let board = board(6, 4);
     let mut errors_stated = Vec::new();
-    // Of few frames an adjustment of all cameras leaves hardly larger residuals than each alone: it bends lenses by up to a quarter.
+    // With few frames, an adjustment of all cameras has hardly larger residuals than each camera alone, because it distorts lenses by up to
+    // a quarter.
     for (n_held, every, seed) in [(8, 1, 7), (0, 1, 7), (3, 1, 2), (8, 6, 3), (0, 6, 4)] {
         let carried = Carried {
             truth: &truth,

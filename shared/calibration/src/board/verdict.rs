@@ -2,93 +2,94 @@
 
 use super::{CameraOutcome, Outcome, Sight, Task};
 
-/// Limits: fewer boards, less of the picture, larger residuals or less certain focal lengths are doubts.
+/// Limits below or above which a doubt is raised: number of boards, coverage of the picture, residuals, uncertainty of focal lengths.
 const FEW_BOARDS: usize = 6;
 const LITTLE_COVERED: f64 = 0.2;
 const LARGE_PX: f64 = 3.0;
 const FOCAL_SHARE: f64 = 0.01;
-/// A lens shows whether cameras are out of step if its own camera determines it to this share.
+/// Largest uncertainty of a focal length, as a fraction, for which its change may show that cameras are out of step.
 const TOLD_SHARE: f64 = 0.1;
-/// Lenses are the same within this many standard deviations.
+/// Two lenses are equal if they differ by less than this many standard deviations.
 const SAME_SIGMAS: f64 = 3.0;
-/// Cameras out of step: least certainty of a place, as a share of the distance from the first camera, and of a turn,
-/// degrees; anything less is a doubt.
+/// For cameras out of step: largest accepted uncertainty of a position, as a fraction of the distance from the first camera, and of a
+/// rotation, in degrees.
 const PLACE_SHARE: f64 = 0.02;
 const TURN_DEGREES: f64 = 0.5;
 const WRONG_SHARE: f64 = 0.15;
 const AGREEING_SHARE: f64 = 0.6;
-/// Residuals are judged in a picture of this longer side; larger ones are allowed as much more.
+/// Limits of residuals are for a picture whose longer side has this many pixels; other pictures have limits in proportion, but at least
+/// half.
 const USUAL_SIDE: f64 = 1280.0;
 
-/// Why a calibration is not to be trusted.
+/// Reason not to trust a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
-    /// Few pictures with the board.
+    /// The board was used in too few pictures.
     FewBoards {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// How many.
+        /// Number of pictures.
         n: usize,
     },
-    /// The board was seen in a small part of the picture.
+    /// The board covered only a small part of the picture.
     LittleCovered {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// The share of the picture, from 0 to 1.
+        /// Covered fraction of the picture, from 0 to 1.
         share: f64,
     },
-    /// Large residuals.
+    /// The residuals are large.
     LargeResiduals {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Root mean square, pixels.
+        /// Root mean square of the residuals, in pixels.
         rms_px: f64,
-        /// The limit for its picture.
+        /// Limit for a picture of this size, in pixels.
         limit_px: f64,
     },
-    /// The focal length is not known well.
+    /// The focal length is too uncertain.
     Focal {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Its standard deviation as a share of it.
+        /// Standard deviation of the focal length, as a fraction of it.
         share: f64,
     },
-    /// Pictures of one frame were not taken at the same time, and too little shows where the camera stands.
+    /// Pictures of one frame were not taken at the same time, and the pose of the camera is too uncertain.
     Place {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Standard deviation of its turn, degrees, and of its place, metres.
+        /// Standard deviation of the rotation, in degrees.
         degrees: f64,
-        /// See there.
+        /// Standard deviation of the position, in metres.
         metres: f64,
     },
     /// Many corners do not fit.
     ManyWrong {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Their share, from 0 to 1.
+        /// Fraction of corners that do not fit, from 0 to 1.
         share: f64,
     },
-    /// Frames of a pair that contradict one another.
+    /// Frames of a pair contradict each other.
     Disagreement {
-        /// The cameras.
+        /// Indices of the two cameras.
         cameras: [usize; 2],
-        /// Frames that agree, and all.
+        /// Number of frames that agree, and number of all frames.
         n: [usize; 2],
     },
 }
 
 impl Doubt {
-    /// As a sentence that says what to do.
+    /// Returns the doubt as a sentence that suggests what to do.
     pub fn text(&self, names: &[String]) -> String {
         let name = |camera: &usize| names.get(*camera).map_or("?", String::as_str);
         match self {
             Self::FewBoards { camera, n } => format!(
-                "{}: the board was used in {n} pictures only, {FEW_BOARDS} are the least: show it longer, in other places and tilts",
+                "{}: the board was used in only {n} pictures, but at least {FEW_BOARDS} are needed: show it for longer, at other places and tilts",
                 name(camera)
             ),
             Self::LittleCovered { camera, share } => format!(
-                "{}: its board covered {:.0} % of the picture, the lens is not known beyond it: move the board into the corners",
+                "{}: its board covered {:.0} % of the picture, and the lens is unknown outside that area: move the board into the corners",
                 name(camera),
                 100.0 * share
             ),
@@ -97,11 +98,11 @@ impl Doubt {
                 rms_px,
                 limit_px,
             } => format!(
-                "{}: residuals of {rms_px:.2} px (limit {limit_px:.2}): is the board flat, its description right, the lens of another kind (--lens)?",
+                "{}: residuals of {rms_px:.2} px (limit {limit_px:.2}): is the board flat, is its description correct, and is the lens of another kind (--lens)?",
                 name(camera)
             ),
             Self::Focal { camera, share } => format!(
-                "{}: its focal length is known to {:.1} % only: show the board tilted by 30 to 45 degrees, nearer and further away",
+                "{}: its focal length is known to only {:.1} %: show the board tilted by 30 to 45 degrees, nearer and further away",
                 name(camera),
                 100.0 * share
             ),
@@ -110,7 +111,7 @@ impl Doubt {
                 degrees,
                 metres,
             } => format!(
-                "{}: where it stands is known to {degrees:.1} degrees and {:.0} mm only, since pictures of one frame were not taken at the same \
+                "{}: its pose is known to only {degrees:.1} degrees and {:.0} mm, because pictures of one frame were not taken at the same \
                  time: hold the board still for a second at every place, or synchronise the cameras",
                 name(camera),
                 1000.0 * metres
@@ -121,7 +122,7 @@ impl Doubt {
                 100.0 * share
             ),
             Self::Disagreement { cameras: [a, b], n } => format!(
-                "{} and {}: {} of {} frames agree about where they stand: are the videos synchronised, did a camera move?",
+                "{} and {}: {} of {} frames agree about their relative pose: are the videos synchronised, or did a camera move?",
                 name(a),
                 name(b),
                 n[0],
@@ -150,7 +151,7 @@ pub(super) fn is_spread(sight: &Sight) -> bool {
     finite && eigenvalues.min() > 0.01 * eigenvalues.max()
 }
 
-/// Standard deviation of a focal length, share of it; infinite if it is not determined.
+/// Returns the standard deviation of a focal length as a fraction of it; infinite if it is not determined.
 fn focal_share(camera: &CameraOutcome) -> f64 {
     let focal = camera.numbers.iter().find(|number| number.name == "focal length");
     focal.map_or(f64::INFINITY, |focal| focal.sd / focal.value)
@@ -161,7 +162,7 @@ fn is_lens_told(camera: &CameraOutcome) -> bool {
     camera.is_known || focal_share(camera) <= TOLD_SHARE
 }
 
-/// Returns true if a joint adjustment kept every lens as found from the camera's own pictures, where these determine it.
+/// Returns true if a joint adjustment changed no lens that the camera's own pictures determine.
 pub(super) fn are_lenses_the_same(joint: &Outcome, alone: &Outcome) -> bool {
     let is_same = |(joint, alone): (&CameraOutcome, &CameraOutcome)| {
         let [own, joint] = [alone, joint].map(|camera| camera.camera.intrinsics.fx);
@@ -171,7 +172,7 @@ pub(super) fn are_lenses_the_same(joint: &Outcome, alone: &Outcome) -> bool {
     joint.cameras.iter().zip(&alone.cameras).all(is_same)
 }
 
-/// How well a turn, degrees, and a place, metres, are known: the largest deviations.
+/// Returns the largest standard deviations of a camera's rotation (degrees) and position (metres).
 fn place_of(camera: &CameraOutcome) -> [f64; 2] {
     ["rotation", "place"].map(|name| {
         let own = camera.numbers.iter().filter(|number| number.name.starts_with(name));
@@ -179,14 +180,14 @@ fn place_of(camera: &CameraOutcome) -> [f64; 2] {
     })
 }
 
-/// Adds the doubts of an outcome to it.
+/// Adds doubts to an outcome.
 pub(super) fn doubt(task: &Task, outcome: &mut Outcome) {
     let mut doubts = Vec::new();
     let centre = |camera_outcome: &CameraOutcome| camera_outcome.camera.centre_in_world();
     for (camera, it) in outcome.cameras.iter().enumerate() {
         let side = f64::from(task.sizes[camera][0].max(task.sizes[camera][1]));
         let limit_px = LARGE_PX * (side / USUAL_SIDE).max(0.5);
-        // Out of step, residuals of all together tell of the times, and the deviations of what comes of it.
+        // If cameras are out of step, the joint residuals reflect the time differences, and the deviations already include the effect.
         let rms_px = outcome.out_of_step.map_or(it.rms_px, |out_of_step| out_of_step.alone_px);
         if outcome.out_of_step.is_some() {
             let [degrees, metres] = place_of(it);

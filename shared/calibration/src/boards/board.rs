@@ -1,103 +1,103 @@
-//! A board in one line of text.
+//! Board described by one line of text.
 
 use core::fmt;
 use core::str::FromStr;
 
 use calib_targets_aruco::{Dictionary, builtins};
 
-/// The most squares or markers along a side.
+/// Maximum number of squares or markers along a side.
 const MOST: usize = 100;
-/// The dictionary of a `ChArUco` board that names none.
+/// Default dictionary of a `ChArUco` board.
 const USUAL_MARKERS: &str = "DICT_4X4_1000";
-/// The dictionary of an `AprilTag` grid that names none.
+/// Default dictionary of an `AprilTag` grid.
 const USUAL_TAGS: &str = "DICT_APRILTAG_36h11";
 
 /// Pattern of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Black and white squares; counted are inner corners.
+    /// Black and white squares; the counts are those of inner corners.
     Chessboard,
-    /// Black and white squares with a marker in each white one; counted are squares.
+    /// Black and white squares with a marker in each white one; the counts are those of squares.
     Charuco,
-    /// Markers side by side; counted are markers.
+    /// Markers side by side; the counts are those of markers.
     Grid,
 }
 
-/// A board to calibrate with.
+/// A calibration board.
 ///
-/// As text: `charuco:7x5:40mm`, `chessboard:9x6:25mm`, `aprilgrid:6x6:88mm`, with options after further colons.
+/// Its text form is `charuco:7x5:40mm`, `chessboard:9x6:25mm` or `aprilgrid:6x6:88mm`, with options after further colons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Board {
-    /// Its pattern.
+    /// Pattern of the board.
     pub kind: Kind,
-    /// Squares (`ChArUco`), inner corners (chessboard) or markers (grid) from left to right.
+    /// Number of squares (`ChArUco`), inner corners (chessboard) or markers (grid) from left to right.
     pub columns: usize,
-    /// The same from top to bottom.
+    /// Number of squares, inner corners or markers from top to bottom.
     pub rows: usize,
     /// Side of a square, or of a marker of a grid, in metres.
     pub square_metres: f64,
-    /// Side of a marker as a share of the square's (`ChArUco`); gap between markers as a share of theirs (grid).
+    /// For `ChArUco`, the side of a marker relative to that of a square; for a grid, the gap between markers relative to their side.
     pub ratio: f64,
-    /// Name of the dictionary, none for a chessboard.
+    /// Name of the dictionary; `None` for a chessboard.
     pub dictionary: Option<&'static str>,
-    /// `ChArUco` as `OpenCV` before 4.6 drew it: where the count of rows is even, the upper left square is white.
+    /// True for a `ChArUco` board as `OpenCV` before 4.6 drew it: if the number of rows is even, the upper left square is white.
     pub is_legacy: bool,
 }
 
-/// Why a text is not a board.
+/// Reason why a text does not describe a board.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BoardError {
-    /// Not enough parts, or an unknown kind.
+    /// The text has too few parts, or an unknown kind.
     #[error(
         "{text:?} is not a board: expected KIND:COLUMNSxROWS:SIDE such as charuco:7x5:40mm (squares), chessboard:9x6:25mm (inner corners) or aprilgrid:6x6:88mm (tags)"
     )]
     Shape {
-        /// The text.
+        /// The text that was given.
         text: String,
     },
-    /// Counts that are no board.
+    /// The numbers of columns and rows are out of range.
     #[error("{columns}x{rows}: a board has 2 to {limit} squares, corners or tags along each side", limit = MOST)]
     Counts {
-        /// Columns.
+        /// Number of columns.
         columns: usize,
-        /// Rows.
+        /// Number of rows.
         rows: usize,
     },
-    /// A text that is not a length.
+    /// A part of the text is not a length.
     #[error(
         "{text:?} is not a length: expected a number above 0 with mm, cm, m or in, such as 40mm"
     )]
     Length {
-        /// The text.
+        /// The part of the text.
         text: String,
     },
-    /// An option that is unknown or invalid.
+    /// An option is unknown or invalid.
     #[error("{text:?}: {expected}")]
     Option {
-        /// The text.
+        /// The option.
         text: String,
         /// Accepted values.
         expected: &'static str,
     },
-    /// A dictionary that does not exist.
+    /// The dictionary does not exist.
     #[error("{text:?} is not a dictionary; expected one of {}", dictionary_names().collect::<Vec<_>>().join(", "))]
     Dictionary {
-        /// The text.
+        /// The name that was given.
         text: String,
     },
-    /// More markers than the dictionary has.
+    /// The board has more markers than the dictionary.
     #[error("the board needs {needed} markers, {dictionary} has {available}")]
     TooFewMarkers {
-        /// Markers of the board.
+        /// Number of markers on the board.
         needed: usize,
-        /// The dictionary.
+        /// Name of the dictionary.
         dictionary: &'static str,
-        /// Markers of the dictionary.
+        /// Number of markers in the dictionary.
         available: usize,
     },
 }
 
-/// The names of all dictionaries, short: `4x4_50`, `apriltag_36h11`.
+/// Returns the short names of all dictionaries, such as `4x4_50` and `apriltag_36h11`.
 pub fn dictionary_names() -> impl Iterator<Item = String> {
     builtins::BUILTIN_DICTIONARY_NAMES.iter().map(|name| short(name))
 }
@@ -119,12 +119,12 @@ fn dictionary_named(text: &str) -> Result<&'static str, BoardError> {
 }
 
 impl Board {
-    /// The codes of its markers; `None` for a chessboard.
+    /// Returns the codes of the board's markers; `None` for a chessboard.
     pub fn codes(&self) -> Option<Dictionary> {
         builtins::builtin_dictionary(self.dictionary?)
     }
 
-    /// The same board with another dictionary; `None` if that has too few markers.
+    /// Returns the same board with another dictionary; `None` if the dictionary has too few markers.
     #[must_use]
     pub fn with_dictionary(&self, name: &'static str) -> Option<Self> {
         let other = Self {
@@ -134,7 +134,7 @@ impl Board {
         other.check().is_ok().then_some(other)
     }
 
-    /// The board with columns and rows exchanged.
+    /// Returns the board with columns and rows exchanged.
     #[must_use]
     pub fn turned(&self) -> Self {
         Self {
@@ -144,7 +144,7 @@ impl Board {
         }
     }
 
-    /// Width and height of what is black and white, in metres, without the margin.
+    /// Returns the width and height of the pattern in metres, without the margin.
     pub fn size_metres(&self) -> [f64; 2] {
         let side = |count: usize| match self.kind {
             Kind::Charuco => count as f64 * self.square_metres,
@@ -157,11 +157,11 @@ impl Board {
         [side(self.columns), side(self.rows)]
     }
 
-    /// How many markers it has.
+    /// Returns the number of markers.
     pub fn n_markers(&self) -> usize {
         match self.kind {
             Kind::Chessboard => 0,
-            // Half of the squares; the upper left one is black unless the board is a legacy one with even rows.
+            // Half of the squares have a marker. The upper left square is black, except on a legacy board with an even number of rows.
             Kind::Charuco => {
                 let squares = self.columns * self.rows;
                 let is_white_first = self.is_legacy && self.rows.is_multiple_of(2);
@@ -237,7 +237,7 @@ impl Board {
     }
 }
 
-/// A length in metres.
+/// Parses a length and returns it in metres.
 fn length(text: &str) -> Result<f64, BoardError> {
     let invalid = || BoardError::Length {
         text: text.to_owned(),
@@ -248,7 +248,7 @@ fn length(text: &str) -> Result<f64, BoardError> {
     });
     let (number, per_metre) = unit.ok_or_else(invalid)?;
     let value = number.parse::<f64>().map_err(|_not_a_number| invalid())? / per_metre;
-    // So that 1 in and 25.4 mm are the same.
+    // Rounded so that 1 in equals 25.4 mm.
     let value = (value * 1e12).round() / 1e12;
     if value.is_finite() && (1e-5..1e3).contains(&value) {
         Ok(value)
@@ -290,7 +290,7 @@ impl FromStr for Board {
 }
 
 impl fmt::Display for Board {
-    /// The text that it is read from, every option written out.
+    /// Writes the text form of the board, with every option.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kind = match self.kind {
             Kind::Chessboard => "chessboard",
@@ -315,7 +315,7 @@ impl fmt::Display for Board {
     }
 }
 
-/// Rounded to a millionth, for text.
+/// Rounds to a millionth, for text.
 fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

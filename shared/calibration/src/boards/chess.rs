@@ -1,4 +1,4 @@
-//! Chessboards without markers, by `calib-targets`.
+//! Detection of chessboards without markers, by `calib-targets`.
 
 use calib_targets_chessboard::{
     ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config, detect_corners,
@@ -8,10 +8,10 @@ use nalgebra::Point2;
 use crate::boards::grow::{Known, grow};
 use crate::boards::{Board, Corner, Layout, Nothing, Picture};
 
-/// The share of a board's corners that must be seen by the first look.
+/// Minimum fraction of a board's corners that the first search must find.
 const LEAST_SEEN: f64 = 0.7;
 
-/// The smallest side of a picture that is looked at: the detector does not expect smaller ones.
+/// Minimum side of a picture; the detector does not support smaller ones.
 const SMALLEST: usize = 32;
 
 /// Corners of a grid, by column and row.
@@ -21,10 +21,10 @@ struct Grid {
     corners: Vec<([usize; 2], Point2<f64>)>,
 }
 
-/// The corners of a chessboard.
+/// Finds the corners of a chessboard.
 ///
-/// Its upper left corner is the one with a black square before it; where both ends have one, it is the one that is
-/// further up or left in the picture.
+/// The first corner is the upper left one, next to a black square. If corners at both ends are next to a black square, the first corner is
+/// the one further up or left in the picture.
 ///
 /// # Errors
 ///
@@ -70,7 +70,7 @@ fn grids(picture: &Picture, scale: f64) -> Vec<Grid> {
     let grid = |found: calib_targets_chessboard::ChessboardDetection| {
         let places = found.corners.iter().map(|corner| {
             let at = Point2::new(f64::from(corner.position.x), f64::from(corner.position.y));
-            // Where the middle of a pixel is after scaling.
+            // Position of the pixel centre after scaling.
             let at = at.map(|at| (at + 0.5) / scale - 0.5);
             (
                 [corner.grid.u.max(0) as usize, corner.grid.v.max(0) as usize],
@@ -89,7 +89,7 @@ fn grids(picture: &Picture, scale: f64) -> Vec<Grid> {
     detector.detect_all(&corners).into_iter().map(grid).collect()
 }
 
-/// A grid as the board: which corner is the first, and every corner at sub-pixel.
+/// Matches a grid to the board: finds the first corner, then refines every corner to sub-pixel precision.
 fn placed(
     picture: &Picture,
     board: &Board,
@@ -136,7 +136,7 @@ fn placed(
     Ok(best)
 }
 
-/// The number of a corner of the board: exchanges the axes of a grid, then counts columns and rows from the other end.
+/// Returns the number of a corner of the board, after exchanging the axes of a grid or counting from the other end.
 fn number(
     at: [usize; 2],
     [turn, flip_column, flip_row]: [bool; 3],
@@ -152,12 +152,12 @@ fn number(
     row * columns + column
 }
 
-/// Turns of a chessboard by which it looks the same, besides none: for each, the number that a corner then has.
+/// Returns the rotations after which a chessboard looks the same; for each, the number that every corner then has.
 pub(crate) fn look_alikes(board: &Board) -> Vec<Vec<usize>> {
     let size = [board.columns, board.rows];
     let mut turns: Vec<[bool; 3]> = Vec::new();
     let is_even = |count: usize| count.is_multiple_of(2);
-    // Half a turn keeps the colours if both counts of squares are odd, or both even.
+    // Half a turn keeps the colours if both counts of squares are odd, or both are even.
     if is_even(board.columns) == is_even(board.rows) {
         turns.push([false, true, true]);
     }

@@ -1,19 +1,19 @@
-//! A corner to a fraction of a pixel.
+//! Sub-pixel position of a corner.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::boards::Picture;
 
-/// Iterations at most, and the step in pixels that ends them.
+/// Maximum number of iterations, and the step in pixels that ends them.
 const MOST_STEPS: usize = 30;
 const LAST_STEP: f64 = 1e-3;
 
-/// The corner near `start`: the point q at which every slope g of the picture at p around it is across p - q, so that
-/// the weighted sum of (g · (p - q))² is least (Förstner & Gülch 1987; what `OpenCV` calls `cornerSubPix`).
+/// Returns the corner near `start` (Förstner & Gülch 1987; `cornerSubPix` in `OpenCV`). It is the point q that minimises the weighted sum
+/// of (g · (p - q))², where g is the gradient of the picture at a nearby point p.
 ///
-/// * `radius`: half the side of the window, pixels. The weight is a Gaussian of 0.7 of it.
+/// * `radius`: half the side of the window, in pixels. The weight is a Gaussian with 0.7 times this standard deviation.
 ///
-/// `None` if slopes point one way only (an edge), or the corner is not within `radius` of `start`.
+/// Returns `None` if all gradients have the same direction (an edge), or if the corner is not within `radius` of `start`.
 pub(crate) fn refine(picture: &Picture, start: Point2<f64>, radius: f64) -> Option<Point2<f64>> {
     let steps = radius.ceil() as i32;
     let mut at = start;
@@ -35,7 +35,7 @@ pub(crate) fn refine(picture: &Picture, start: Point2<f64>, radius: f64) -> Opti
             }
         }
         let trace = normal.trace();
-        // The smaller eigenvalue over the larger: an edge has none.
+        // Ratio of the smaller eigenvalue to the larger; it is 0 for an edge.
         let sharpness = normal.determinant();
         if sharpness.is_nan() || sharpness <= 0.02 * trace * trace / 4.0 {
             return None;

@@ -1,4 +1,4 @@
-//! A board on a page: rectangles, lines and text in millimetres.
+//! Drawing of a board on a page: rectangles, lines and text in millimetres.
 
 use core::str::FromStr;
 
@@ -7,29 +7,29 @@ use nalgebra::Point2;
 use crate::boards::layout::is_black;
 use crate::boards::{Board, Kind, Layout};
 
-/// White around the board, and room for the ruler and the text below it, millimetres.
+/// White margin around the board, and space for the ruler and the text below it, in millimetres.
 const MARGIN: f64 = 8.0;
 const FOOT: f64 = 20.0;
 
-/// A shape of a drawing, in millimetres from the upper left corner of the page, y down.
+/// A shape of a drawing, in millimetres from the upper left corner of the page, with y down.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A filled rectangle.
     Rectangle {
-        /// Its upper left corner.
+        /// Upper left corner of the rectangle.
         at: [f64; 2],
         /// Width and height.
         size: [f64; 2],
-        /// Black, or white on black.
+        /// True if the rectangle is black; otherwise it is white on black.
         is_black: bool,
     },
     /// Text in black.
     Text {
-        /// Where its line begins.
+        /// Start of the baseline.
         at: [f64; 2],
         /// Height of the letters.
         size: f64,
-        /// The text, ASCII.
+        /// The text, in ASCII.
         text: String,
     },
 }
@@ -39,41 +39,41 @@ pub enum Shape {
 pub struct Drawing {
     /// Width and height of the page, millimetres.
     pub page: [f64; 2],
-    /// Where the upper left corner of the board is.
+    /// Position of the board's upper left corner on the page.
     pub board_at: [f64; 2],
-    /// Shapes on the page; later ones cover earlier ones.
+    /// Shapes on the page; later shapes cover earlier ones.
     pub shapes: Vec<Shape>,
 }
 
-/// The page.
+/// Size of the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Paper {
-    /// The smallest of A4 to A0 that the board fits on, upright or across; else as large as the board needs.
+    /// The smallest of A4 to A0 that the board fits on, in portrait or landscape; otherwise as large as the board needs.
     Fitting,
-    /// A size in millimetres, turned if the board fits on it only then.
+    /// A size in millimetres; the page is rotated if the board only fits then.
     Sized([f64; 2]),
 }
 
-/// A board that does not fit on its page, or an unknown page.
+/// Reason why a board cannot be drawn on a page.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PaperError {
-    /// Too small.
+    /// The page is too small for the board.
     #[error(
         "the board needs {:.0} x {:.0} mm with its margin and ruler, the page has {:.0} x {:.0} mm: print smaller squares, or on a larger page",
         .needed[0], .needed[1], .page[0], .page[1]
     )]
     TooSmall {
-        /// Size that the board needs, millimetres.
+        /// Size that the board needs, in millimetres.
         needed: [f64; 2],
-        /// The page.
+        /// Size of the page, in millimetres.
         page: [f64; 2],
     },
-    /// Not the name of a page.
+    /// The text is not the name of a page.
     #[error(
         "{text:?} is not a page: expected a4, a3, a2, a1, a0, letter, legal, tabloid, fit or WIDTHxHEIGHT in mm"
     )]
     Unknown {
-        /// The text.
+        /// The text that was given.
         text: String,
     },
 }
@@ -115,7 +115,7 @@ impl FromStr for Paper {
 }
 
 impl Drawing {
-    /// The page by the name that [`Paper`] is read from, where it has one.
+    /// Returns the name of the page, as [`Paper`] is parsed from, if it has one.
     pub fn paper(&self) -> Option<&'static str> {
         let [width, height] = self.page;
         let is_page = |size: &[f64; 2]| *size == [width, height] || *size == [height, width];
@@ -123,7 +123,7 @@ impl Drawing {
         found.map(|(name, _)| *name)
     }
 
-    /// A board in its true size on a page, with a ruler and its description below.
+    /// Draws a board in its true size on a page, with a ruler and its description below.
     ///
     /// # Errors
     ///
@@ -189,7 +189,7 @@ impl Drawing {
             for row in 0..cells {
                 let is_white = |column: usize| (code >> (row * cells + column)) & 1 == 0;
                 let mut column = 0;
-                // White cells side by side are one rectangle: no hairlines between them.
+                // Adjacent white cells form one rectangle, to avoid hairlines between them.
                 while column < cells {
                     let run = (column..cells).take_while(|i| is_white(*i)).count();
                     if run > 0 {
@@ -205,7 +205,7 @@ impl Drawing {
         }
     }
 
-    /// A ruler of whole centimetres, and what the board is.
+    /// Adds a ruler of whole centimetres, and the description of the board.
     fn foot(&mut self, board: &Board, size: [f64; 2]) {
         let left = self.board_at[0];
         let top = self.board_at[1] + size[1] + MARGIN;

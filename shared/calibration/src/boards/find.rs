@@ -1,4 +1,4 @@
-//! A board in a picture.
+//! Detection of a board in a picture.
 
 use crate::boards::board::Kind;
 use crate::boards::chess;
@@ -8,23 +8,23 @@ use crate::boards::marker::{Codes, Sighting};
 use crate::boards::quads::quads;
 use crate::boards::{Board, Corner, Layout, Nothing, Picture};
 
-/// The smallest picture that is doubled for a second look has this side at most.
+/// Largest side of a picture that is enlarged to twice its size for another search.
 const DOUBLED_UP_TO: usize = 2000;
-/// The largest picture that is not halved.
+/// Side of a picture from which it is also searched at half its size.
 const HALVED_FROM: usize = 900;
 
 /// A board found in a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// The corners, by number.
+    /// Corners of the board, by number.
     pub corners: Vec<Corner>,
-    /// Which of [`Finder::variants`] it is.
+    /// Index of the board in [`Finder::variants`].
     pub variant: usize,
-    /// White is black.
+    /// True if black and white are exchanged.
     pub is_inverted: bool,
-    /// Left is right. Only markers show it.
+    /// True if left and right are exchanged, which only markers show.
     pub is_mirrored: bool,
-    /// Markers that were read.
+    /// Number of markers that were read.
     pub n_markers: usize,
 }
 
@@ -33,18 +33,18 @@ pub struct Found {
 pub struct Hints {
     /// True if black and white are exchanged.
     pub is_inverted: Option<bool>,
-    /// The variant of the board.
+    /// Index of the board's variant.
     pub variant: Option<usize>,
 }
 
-/// A way in which a board may differ from what was said.
+/// A board that may have been described wrongly, in a possible other form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variant {
-    /// The board.
+    /// The board in this form.
     pub board: Board,
-    /// Its layout.
+    /// Layout of the board.
     pub layout: Layout,
-    /// How it differs, as a sentence; `None` for the board as it was said to be.
+    /// Difference from the description, as a sentence; `None` if there is no difference.
     pub note: Option<String>,
 }
 
@@ -56,8 +56,8 @@ pub struct Finder {
 }
 
 impl Finder {
-    /// Looks for a board and for those that it may have been confused with: rows and columns exchanged, the older
-    /// pattern of `OpenCV`, tags counted from below.
+    /// Creates a finder for a board and for boards that may be confused with it: with rows and columns exchanged, with the older pattern of
+    /// `OpenCV`, or with tags counted from below.
     pub fn new(board: &Board) -> Self {
         let codes = board.codes().map(|dictionary| {
             Codes::new(
@@ -71,12 +71,12 @@ impl Finder {
         }
     }
 
-    /// The board as it was said to be, then what it may be instead.
+    /// Returns the board as described, then its other possible forms.
     pub fn variants(&self) -> &[Variant] {
         &self.variants
     }
 
-    /// The numbers that corners have after a turn by which the board looks the same, one list for each such turn.
+    /// Returns the rotations after which the board looks the same; for each, the number that every corner then has.
     pub fn look_alikes(&self) -> Vec<Vec<usize>> {
         match &self.variants[0].board {
             board if board.kind == Kind::Chessboard => chess::look_alikes(board),
@@ -88,7 +88,7 @@ impl Finder {
     ///
     /// # Errors
     ///
-    /// [`Nothing`] that says what was seen instead.
+    /// [`Nothing`] with what was seen instead.
     pub fn find(&self, picture: &Picture, hints: Hints) -> Result<Found, Nothing> {
         if let Some(codes) = &self.codes {
             return self.by_markers(codes, picture, hints);
@@ -165,7 +165,7 @@ impl Finder {
         self.variants[0].layout.markers.len()
     }
 
-    /// Widths of the frame of a marker that are tried: Kalibr's tags have two cells.
+    /// Returns the frame widths of a marker to try, in cells; Kalibr's tags have two.
     fn frames(&self) -> &'static [usize] {
         match self.variants[0].board.kind {
             Kind::Grid => &[1, 2],
@@ -173,7 +173,7 @@ impl Finder {
         }
     }
 
-    /// The variant that most sightings agree with, and these.
+    /// Returns the variant that most sightings agree with, and these sightings.
     fn agreed(&self, sightings: &[Sighting], hints: Hints) -> Option<(usize, Vec<Sighting>)> {
         let mut best: Option<(usize, Vec<Sighting>)> = None;
         for (index, variant) in self.variants.iter().enumerate() {
@@ -189,7 +189,7 @@ impl Finder {
     }
 }
 
-/// Scales that are looked at: as it is, then smaller where it is large, then larger where it is not.
+/// Returns the scales at which a picture is searched: 1, then 2 unless the picture is too large, then 0.5 unless it is too small.
 fn scales(picture: &Picture) -> Vec<f64> {
     let side = picture.width().max(picture.height());
     let mut scales = vec![1.0];
@@ -262,7 +262,7 @@ fn variants(board: &Board) -> Vec<Variant> {
                     for turn in 0..4 {
                         let layout =
                             regrouped(Layout::of(&told), told.columns, is_from_below, turn);
-                        // Where tags are counted from, and which way up they are, is not part of what was said.
+                        // The description does not say where tags are counted from or how they are rotated.
                         add(told.clone(), layout, turned.clone());
                     }
                 }
@@ -272,7 +272,7 @@ fn variants(board: &Board) -> Vec<Variant> {
     list
 }
 
-/// A grid whose tags are counted from the lowest row, and are turned by quarters.
+/// Returns a grid whose tags may be counted from the lowest row, and are rotated by quarter turns.
 fn regrouped(layout: Layout, columns: usize, is_from_below: bool, turn: usize) -> Layout {
     let rows = layout.markers.len() / columns;
     let mut markers = layout.markers.clone();

@@ -1,16 +1,16 @@
-//! The markers that agree with the layout of a board.
+//! Selection of markers that agree with the layout of a board.
 
 use nalgebra::Point2;
 
 use crate::boards::marker::Sighting;
 use crate::boards::{Homography, Layout};
 
-/// How far a marker may be from where the others say, in sides of it: lenses bend boards.
+/// Largest distance of a marker from its position predicted by the others, in sides of the marker. It allows for lens distortion.
 const OFF_SIDES: f64 = 0.45;
-/// The most pairs of markers that are tried.
+/// Maximum number of pairs of markers to try.
 const MOST_PAIRS: usize = 300;
 
-/// The largest set of sightings that one projective map takes to the layout, each number at most once; at least two.
+/// Returns the largest set of sightings that one projective map takes to the layout, with at least two sightings and no number twice.
 pub(crate) fn agreeing(layout: &Layout, sightings: &[Sighting]) -> Vec<Sighting> {
     let mut best: (f64, Vec<Sighting>) = (f64::MAX, Vec::new());
     let pairs = (0..sightings.len()).flat_map(|a| (a + 1..sightings.len()).map(move |b| [a, b]));
@@ -33,7 +33,7 @@ pub(crate) fn agreeing(layout: &Layout, sightings: &[Sighting]) -> Vec<Sighting>
             best = found;
         }
     }
-    // Once more with the map of all of them.
+    // Repeat with the map that was fitted to all of them.
     if let Some(map) = map_of(layout, &best.1) {
         let found = supporters(layout, &map, sightings);
         if found.1.len() >= best.1.len() {
@@ -55,7 +55,7 @@ fn map_of(layout: &Layout, sightings: &[Sighting]) -> Option<Homography> {
     Homography::fit(pairs.flatten())
 }
 
-/// The sightings near where a map has them, and the sum of their distances in sides.
+/// Returns the sightings near the positions that a map predicts, and the sum of their distances in sides.
 fn supporters(layout: &Layout, map: &Homography, sightings: &[Sighting]) -> (f64, Vec<Sighting>) {
     let mut kept: Vec<(f64, Sighting)> = Vec::new();
     for sighting in sightings {
@@ -73,7 +73,7 @@ fn supporters(layout: &Layout, map: &Homography, sightings: &[Sighting]) -> (f64
     (sum, kept.into_iter().map(|kept| kept.1).collect())
 }
 
-/// The largest distance of a corner of a marker from where a map has it, in its sides.
+/// Returns the largest distance of a marker's corner from the position that a map predicts, in sides of the marker.
 fn off_sides(layout: &Layout, map: &Homography, sighting: &Sighting) -> Option<f64> {
     let marker = layout.marker(sighting.id)?;
     let mut worst: f64 = 0.0;
@@ -84,10 +84,10 @@ fn off_sides(layout: &Layout, map: &Homography, sighting: &Sighting) -> Option<f
     Some(worst)
 }
 
-/// The map near a point of the board: of the known points, near ones count most.
+/// Returns the map near a point of the board; known points near it have the largest weight.
 ///
-/// * `known`: on the board (metres), in the picture (pixels), weight.
-/// * `reach`: the distance in metres beyond which points count little.
+/// * `known`: position on the board (metres), position in the picture (pixels), and weight.
+/// * `reach`: distance in metres beyond which points have a low weight.
 pub(crate) fn map_near(
     known: &[(Point2<f64>, Point2<f64>, f64)],
     at: Point2<f64>,

@@ -1,4 +1,4 @@
-//! From a few known places of a board to every corner that can be seen.
+//! Search for all visible corners of a board, from a few known positions.
 
 use nalgebra::{Point2, Vector2};
 
@@ -6,19 +6,19 @@ use crate::boards::corner::refine;
 use crate::boards::fit::map_near;
 use crate::boards::{Board, Corner, Kind, Layout, Picture};
 
-/// The largest window around a corner, pixels from its middle.
+/// Largest half-width of the window around a corner, in pixels.
 const WIDEST_WINDOW: f64 = 9.0;
 const NARROWEST_WINDOW: f64 = 2.0;
-/// How far a corner may be from where its neighbours say, in squares, and at least in pixels.
+/// Largest distance of a corner from the position predicted by its neighbours, in squares, with a minimum in pixels.
 const OFF_SQUARES: f64 = 0.06;
 const OFF_PX: f64 = 1.2;
-/// The least difference between white and black at a crossing, grey values.
+/// Minimum difference between white and black at a crossing, in grey values.
 const LEAST_CONTRAST: f64 = 8.0;
 
-/// A place of the board that is known in the picture: metres, pixels, weight.
+/// A known position on the board: metres on the board, pixels in the picture, and weight.
 pub(crate) type Known = (Point2<f64>, Point2<f64>, f64);
 
-/// Every corner of the layout that is seen, found from known places.
+/// Returns every visible corner of the layout, found from known positions.
 ///
 /// `picture` has the polarity of the print: black is dark.
 pub(crate) fn grow(
@@ -30,7 +30,7 @@ pub(crate) fn grow(
     let side = board.square_metres;
     let mut known = first.to_vec();
     let mut found: Vec<Option<Corner>> = vec![None; layout.points.len()];
-    // Near known places first; what they give carries further.
+    // Corners near known positions are searched first; they then help to find corners further away.
     for reach in [1.2, 1.8, 3.0, 100.0] {
         for (id, point) in layout.points.iter().enumerate() {
             let is_near = known.iter().any(|known| (known.0 - point).norm() < reach * side);
@@ -50,7 +50,7 @@ pub(crate) fn grow(
     corners
 }
 
-/// One corner at sub-pixel, if it is there.
+/// Returns one corner with sub-pixel precision, if it is visible.
 fn look(
     picture: &Picture,
     board: &Board,
@@ -87,7 +87,7 @@ fn look(
     is_there.then_some(at)
 }
 
-/// Returns true if black and white lie around a corner as on the board; `value` is the grey value by the offset in squares.
+/// Returns true if black and white around a corner are as on the board; `value` gives the grey value at an offset in squares.
 fn is_crossing(
     is_black_before: bool,
     board: &Board,
@@ -110,7 +110,7 @@ fn is_crossing(
     apart > LEAST_CONTRAST && apart > 0.25 * mean
 }
 
-/// The shorter of a length's images along both axes of the board, pixels.
+/// Returns the shorter of a length's images along both axes of the board, in pixels.
 fn narrow_px(map: &crate::boards::Homography, point: Point2<f64>, metres: f64) -> Option<f64> {
     let at = map.apply(point)?;
     let mut least = f64::MAX;
@@ -121,7 +121,7 @@ fn narrow_px(map: &crate::boards::Homography, point: Point2<f64>, metres: f64) -
     Some(least)
 }
 
-/// Half the window around a corner: no marker may be in it.
+/// Returns half the side of the window around a corner, which must not contain a marker.
 fn window_px(map: &crate::boards::Homography, board: &Board, point: Point2<f64>) -> Option<f64> {
     let free = match board.kind {
         Kind::Chessboard => 0.35,
@@ -132,7 +132,7 @@ fn window_px(map: &crate::boards::Homography, board: &Board, point: Point2<f64>)
     Some(free_px.clamp(NARROWEST_WINDOW, WIDEST_WINDOW))
 }
 
-/// The corner that is furthest from where the others say, if that is too far.
+/// Returns the corner that is furthest from its predicted position, if that distance is too large.
 fn worst_off(layout: &Layout, side: f64, corners: &[Corner]) -> Option<usize> {
     if corners.len() < 6 {
         return None;
@@ -153,7 +153,7 @@ fn worst_off(layout: &Layout, side: f64, corners: &[Corner]) -> Option<usize> {
         else {
             continue;
         };
-        // At the border of the board the others say less.
+        // At the border of the board, the prediction from the other corners is less exact.
         let around = others.iter().filter(|other| (other.0 - point).norm() < 1.6 * side);
         let slack = if around.count() >= 5 { 1.0 } else { 2.0 };
         let off = (expected - corner.at).norm() / (slack * (OFF_SQUARES * square_px).max(OFF_PX));

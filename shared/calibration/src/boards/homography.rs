@@ -1,4 +1,4 @@
-//! The projective map of a plane onto a picture.
+//! Projective map from a plane to a picture.
 
 use nalgebra::{Matrix3, Point2, SMatrix, SVector, Vector3};
 
@@ -9,10 +9,10 @@ pub struct Homography {
 }
 
 impl Homography {
-    /// The map that takes each first point near its second: the normalised direct linear transform (Hartley & Zisserman,
-    /// *Multiple View Geometry*, 2nd ed., section 4.4), each pair with a weight.
+    /// Returns the map that takes each first point near its second, with a weight for each pair. It uses the normalised direct linear
+    /// transform (Hartley & Zisserman, *Multiple View Geometry*, 2nd ed., section 4.4).
     ///
-    /// `None` for fewer than four pairs, for pairs on a line and for numbers that are not finite.
+    /// Returns `None` for fewer than four pairs, for pairs on a line and for numbers that are not finite.
     pub fn fit(
         pairs: impl Iterator<Item = (Point2<f64>, Point2<f64>, f64)> + Clone,
     ) -> Option<Self> {
@@ -40,7 +40,7 @@ impl Homography {
         let [least, next, .., most] = order[..] else {
             return None;
         };
-        // Two vanishing eigenvalues: points on a line.
+        // If two eigenvalues vanish, the points are on a line.
         let second = eigen.eigenvalues[next];
         if second.is_nan() || second <= 1e-11 * eigen.eigenvalues[most] {
             return None;
@@ -54,13 +54,13 @@ impl Homography {
         })
     }
 
-    /// The map of the corners (0, 0), (1, 0), (1, 1), (0, 1) to four points.
+    /// Returns the map from the corners (0, 0), (1, 0), (1, 1), (0, 1) to four points.
     pub fn of_unit_square(to: [Point2<f64>; 4]) -> Option<Self> {
         let from = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from);
         Self::fit(from.into_iter().zip(to).map(|(from, to)| (from, to, 1.0)))
     }
 
-    /// Where a point goes; `None` at infinity.
+    /// Returns the image of a point; `None` if it is at infinity.
     pub fn apply(&self, point: Point2<f64>) -> Option<Point2<f64>> {
         let mapped = self.matrix * Vector3::new(point.x, point.y, 1.0);
         let result = Point2::new(mapped.x / mapped.z, mapped.y / mapped.z);
@@ -68,13 +68,13 @@ impl Homography {
             .then_some(result)
     }
 
-    /// The matrix, up to scale.
+    /// Returns the matrix, which is defined up to scale.
     pub fn matrix(&self) -> &Matrix3<f64> {
         &self.matrix
     }
 }
 
-/// Takes the middle of points to the origin, and their mean distance to the square root of 2.
+/// Returns the map that takes the centre of the points to the origin, and their mean distance to the square root of 2.
 fn spread(points: impl Iterator<Item = (Point2<f64>, f64)> + Clone) -> Option<Matrix3<f64>> {
     let total: f64 = points.clone().map(|(_, weight)| weight).sum();
     let sum = points.clone().fold(nalgebra::Vector2::zeros(), |sum, (point, weight)| {

@@ -1,4 +1,4 @@
-//! Where the points and markers of a board are.
+//! Positions of the points and markers of a board.
 
 use nalgebra::Point2;
 
@@ -7,14 +7,14 @@ use crate::boards::{Board, Kind};
 /// A marker of a board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marker {
-    /// Its number in the dictionary.
+    /// Number of the marker in the dictionary.
     pub id: usize,
-    /// Its corners in metres, clockwise from the upper left one.
+    /// Corners in metres, clockwise from the upper left one.
     pub corners: [Point2<f64>; 4],
 }
 
 impl Marker {
-    /// Its middle, in metres.
+    /// Returns the centre of the marker, in metres.
     pub fn centre(&self) -> Point2<f64> {
         let [a, .., d] = self.corners;
         let [_, b, c, _] = self.corners;
@@ -22,20 +22,20 @@ impl Marker {
     }
 }
 
-/// The points that are measured, and the markers that tell them apart.
+/// The points that are measured, and the markers that identify them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
-    /// The points in metres; their index is their number. Row by row from the upper left (chessboard, `ChArUco`: inner
-    /// corners), or four for each marker, clockwise (grid).
+    /// Points in metres; the index of a point is its number. For a chessboard or `ChArUco` board, these are the inner corners row by row
+    /// from the upper left. For a grid, they are the four corners of each marker, clockwise.
     pub points: Vec<Point2<f64>>,
     /// The markers, by number.
     pub markers: Vec<Marker>,
-    /// True if the square up and left of a point is black, for points between squares.
+    /// True if the square to the upper left of a point is black, for points between squares.
     pub is_black_before: Vec<bool>,
 }
 
 impl Layout {
-    /// The layout of a board as it is printed.
+    /// Returns the layout of a board as printed.
     pub fn of(board: &Board) -> Self {
         match board.kind {
             Kind::Chessboard => chessboard(board.columns, board.rows, board),
@@ -44,13 +44,13 @@ impl Layout {
         }
     }
 
-    /// The marker with a number of the dictionary.
+    /// Returns the marker with a given number in the dictionary.
     pub fn marker(&self, id: usize) -> Option<&Marker> {
         self.markers.get(id)
     }
 }
 
-/// Returns true if a square is black; columns and rows from 0 at the upper left.
+/// Returns true if a square is black; columns and rows are counted from 0 at the upper left.
 pub(crate) fn is_black(board: &Board, column: usize, row: usize) -> bool {
     let is_white_first =
         board.kind == Kind::Charuco && board.is_legacy && board.rows.is_multiple_of(2);
@@ -130,7 +130,7 @@ mod tests {
         let layout = Layout::of(&board);
         assert_eq!((layout.points.len(), layout.markers.len()), (12, 10));
         assert!((layout.points[2] - Point2::new(0.162, 0.054)).norm() < 1e-12);
-        // The upper left square is black, and the first marker is in the second one.
+        // The upper left square is black, and the first marker is in the second square.
         assert!((layout.markers[0].centre() - Point2::new(0.081, 0.027)).norm() < 1e-12);
         let legacy: Board = "charuco:5x4:54mm:legacy".parse().unwrap();
         let layout = Layout::of(&legacy);

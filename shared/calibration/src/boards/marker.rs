@@ -1,23 +1,23 @@
-//! Markers read from quadrilaterals.
+//! Reading of markers from quadrilaterals.
 
 use nalgebra::Point2;
 
 use crate::boards::{Homography, Picture};
 
-/// The least difference between black and white in a marker, grey values.
+/// Minimum difference between black and white in a marker, in grey values.
 const LEAST_CONTRAST: f64 = 12.0;
-/// The largest share of the cells of the frame that may be white.
+/// Largest fraction of the frame's cells that may be white.
 const WHITE_FRAME: f64 = 0.15;
-/// The most wrong bits that are put up with, however far apart codes are.
+/// Maximum number of wrong bits that are tolerated, even if codes differ by many bits.
 const MOST_WRONG_BITS: u32 = 3;
 
 /// The codes of a board's markers.
 #[derive(Debug, Clone)]
 pub(crate) struct Codes {
-    /// Cells along a side, without the frame.
+    /// Number of cells along a side, without the frame.
     side: usize,
     bits: Vec<u64>,
-    /// Bits that may be wrong.
+    /// Number of bits that may be wrong.
     tolerance: u32,
 }
 
@@ -25,10 +25,10 @@ pub(crate) struct Codes {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sighting {
     pub(crate) id: usize,
-    /// In the order of the board: clockwise from the upper left one of the marker.
+    /// Corners in the order of the board: clockwise from the marker's upper left corner.
     pub(crate) corners: [Point2<f64>; 4],
     pub(crate) is_mirrored: bool,
-    /// Bits that differ from the code.
+    /// Number of bits that differ from the code.
     pub(crate) n_wrong: u32,
 }
 
@@ -38,7 +38,7 @@ impl Sighting {
         Point2::from(sum.sum::<nalgebra::Vector2<f64>>() / 4.0)
     }
 
-    /// The mean length of its sides, pixels.
+    /// Returns the mean length of the marker's sides, in pixels.
     pub(crate) fn side_px(&self) -> f64 {
         let sides = (0..4).map(|i| (self.corners[(i + 1) % 4] - self.corners[i]).norm());
         sides.sum::<f64>() / 4.0
@@ -46,7 +46,7 @@ impl Sighting {
 }
 
 impl Codes {
-    /// The first `n` codes of a dictionary, bit `y * side + x` set where a cell is black.
+    /// Creates a dictionary from codes; bit `y * side + x` is set if a cell is black.
     pub(crate) fn new(side: usize, codes: &[u64]) -> Self {
         let mut least = side * side;
         for (i, code) in codes.iter().enumerate() {
@@ -67,7 +67,7 @@ impl Codes {
         }
     }
 
-    /// Every marker of these codes among quadrilaterals; `frames` are widths of the black frame in cells that are tried.
+    /// Returns every marker with these codes among the quadrilaterals; `frames` are the widths of the black frame to try, in cells.
     pub(crate) fn read(
         &self,
         picture: &Picture,
@@ -111,7 +111,7 @@ impl Codes {
                     if n_wrong <= self.tolerance && best.is_none_or(|best| n_wrong < best.n_wrong) {
                         let corners = [0, 1, 2, 3].map(|nth| {
                             let along = (turn + nth) % 4;
-                            // In a mirror the corners run the other way.
+                            // In a mirror image, the order of the corners is reversed.
                             quad[if is_mirrored { (4 - along) % 4 } else { along }]
                         });
                         best = Some(Sighting {
@@ -128,7 +128,7 @@ impl Codes {
     }
 }
 
-/// The four readings of a code, from each corner of the marker as the first.
+/// Returns the four readings of a code, one with each corner of the marker as the first.
 fn turns(code: u64, side: usize) -> [u64; 4] {
     let mut turns = [code; 4];
     for i in 1..4 {
@@ -152,7 +152,7 @@ fn rearranged(code: u64, side: usize, source: impl Fn(usize, usize) -> [usize; 2
     result
 }
 
-/// The inner cells of a quadrilateral as bits, set where black; `None` if it has no black frame.
+/// Returns the inner cells of a quadrilateral as bits, set if black; `None` if it has no black frame.
 fn cells(picture: &Picture, quad: [Point2<f64>; 4], side: usize, frame: usize) -> Option<u64> {
     let total = side + 2 * frame;
     let map = Homography::of_unit_square(quad)?;
@@ -185,7 +185,7 @@ fn cells(picture: &Picture, quad: [Point2<f64>; 4], side: usize, frame: usize) -
     }))
 }
 
-/// The value that parts values into two groups best (Otsu 1979); `None` if they do not differ.
+/// Returns the threshold that best separates values into two groups (Otsu 1979); `None` if all values are equal.
 fn between_two_groups(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,18 +1,18 @@
-//! A drawing as PDF: one page, filled rectangles, one of the fonts that every reader has.
+//! Output of a drawing as PDF: one page, filled rectangles, and a font that every reader has.
 
 use core::fmt::Write as _;
 
 use crate::boards::{Drawing, Shape};
 
-/// Points of PDF in a millimetre.
+/// Number of PDF points per millimetre.
 const POINTS: f64 = 72.0 / 25.4;
 
-/// A PDF file (version 1.4).
+/// Returns a PDF file (version 1.4).
 pub fn pdf(drawing: &Drawing) -> Vec<u8> {
     let [width, height] = drawing.page.map(|page| page * POINTS);
     let content = content(drawing);
     let objects = [
-        // Readers are asked not to fit the page to the paper.
+        // This entry asks readers not to scale the page to the paper.
         "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>".to_owned(),
         "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".to_owned(),
         format!(
@@ -46,7 +46,7 @@ pub fn pdf(drawing: &Drawing) -> Vec<u8> {
     out.into_bytes()
 }
 
-/// The stream of a page: y up, from the lower left corner.
+/// Returns the content stream of a page, with y up from the lower left corner.
 fn content(drawing: &Drawing) -> String {
     let height = drawing.page[1];
     let mut out = String::new();

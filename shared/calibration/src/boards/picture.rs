@@ -1,4 +1,4 @@
-//! A grey picture: between its pixels, turned, mirrored, larger and smaller.
+//! A grey picture, with interpolation, mirroring and scaling.
 
 use nalgebra::{Point2, Vector2};
 
@@ -11,7 +11,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Takes grey values, row by row; returns `None` if there are none or not width times height.
+    /// Creates a picture from grey values, row by row. Returns `None` if it would be empty, or if there are not width times height values.
     pub fn new(width: usize, height: usize, pixels: Vec<u8>) -> Option<Self> {
         let count = width.checked_mul(height)?;
         (count > 0 && count == pixels.len()).then_some(Self {
@@ -21,7 +21,8 @@ impl Picture {
         })
     }
 
-    /// Takes red, green and blue; returns `None` as [`new`](Self::new) does. Weights of ITU-R BT.601.
+    /// Creates a picture from red, green and blue values with the weights of ITU-R BT.601. Returns `None` in the same cases as
+    /// [`new`](Self::new).
     pub fn of_rgb(width: usize, height: usize, rgb: &[u8]) -> Option<Self> {
         let grey = |rgb: &[u8]| {
             let [r, g, b] = [rgb[0], rgb[1], rgb[2]].map(u32::from);
@@ -30,29 +31,29 @@ impl Picture {
         Self::new(width, height, rgb.chunks_exact(3).map(grey).collect())
     }
 
-    /// Width in pixels.
+    /// Returns the width in pixels.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height in pixels.
+    /// Returns the height in pixels.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The grey values, row by row.
+    /// Returns the grey values, row by row.
     pub fn pixels(&self) -> &[u8] {
         &self.pixels
     }
 
-    /// The grey value of a pixel; that of the nearest one outside.
+    /// Returns the grey value of a pixel; outside the picture, that of the nearest pixel.
     pub(crate) fn at(&self, x: isize, y: isize) -> f64 {
         let x = x.clamp(0, self.width as isize - 1) as usize;
         let y = y.clamp(0, self.height as isize - 1) as usize;
         f64::from(self.pixels[y * self.width + x])
     }
 
-    /// The grey value between pixels, bilinear.
+    /// Returns the grey value between pixels, interpolated bilinearly.
     pub(crate) fn between(&self, at: Point2<f64>) -> f64 {
         let (left, top) = (at.x.floor(), at.y.floor());
         let (x, y) = (left as isize, top as isize);
@@ -61,7 +62,7 @@ impl Picture {
             + v * ((1.0 - u) * self.at(x, y + 1) + u * self.at(x + 1, y + 1))
     }
 
-    /// The slope of the grey value between pixels: differences over two pixels.
+    /// Returns the gradient of the grey value between pixels, from differences over two pixels.
     pub(crate) fn slope(&self, at: Point2<f64>) -> Vector2<f64> {
         let side = |dx: f64, dy: f64| self.between(Point2::new(at.x + dx, at.y + dy));
         Vector2::new(
@@ -70,7 +71,7 @@ impl Picture {
         )
     }
 
-    /// Returns true if a point is inside by a margin in pixels.
+    /// Returns true if a point is inside the picture by a margin in pixels.
     pub(crate) fn holds(&self, at: Point2<f64>, margin: f64) -> bool {
         at.x >= margin
             && at.y >= margin
@@ -78,7 +79,7 @@ impl Picture {
             && at.y <= self.height as f64 - 1.0 - margin
     }
 
-    /// Black for white.
+    /// Returns the picture with black and white exchanged.
     #[must_use]
     pub(crate) fn inverted(&self) -> Self {
         Self {
@@ -87,7 +88,7 @@ impl Picture {
         }
     }
 
-    /// Right for left.
+    /// Returns the picture with left and right exchanged.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let rows = self.pixels.chunks_exact(self.width);
@@ -97,7 +98,7 @@ impl Picture {
         }
     }
 
-    /// Twice as large: pixel x comes to lie at 2 x + 0.5.
+    /// Returns the picture at twice its size: pixel x moves to 2 x + 0.5.
     #[must_use]
     pub(crate) fn doubled(&self) -> Self {
         let (width, height) = (2 * self.width, 2 * self.height);
@@ -115,7 +116,7 @@ impl Picture {
         }
     }
 
-    /// Half as large, the mean of four: pixel x comes to lie at (x - 0.5) / 2. `None` below 2 pixels.
+    /// Returns the picture at half its size, as the mean of four pixels: pixel x moves to (x - 0.5) / 2. Returns `None` below 2 pixels.
     pub(crate) fn halved(&self) -> Option<Self> {
         let (width, height) = (self.width / 2, self.height / 2);
         let mut pixels = Vec::with_capacity(width * height);

@@ -1,20 +1,21 @@
-//! Dark quadrilaterals: where markers may be.
+//! Search for dark quadrilaterals, which may be markers.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::boards::Picture;
 use crate::boards::threshold::dark;
 
-/// Radii of the neighbourhoods that pixels are compared with.
+/// Radii of the neighbourhoods with which pixels are compared.
 const RADII: [usize; 3] = [6, 13, 28];
-/// The shortest side of a quadrilateral, pixels.
+/// Shortest side of a quadrilateral, in pixels.
 const SHORTEST_SIDE: f64 = 6.0;
-/// How far an outline may leave a side, as a share of its length around.
+/// Largest deviation of an outline from a side, as a fraction of its perimeter.
 const STRAY: f64 = 0.035;
 
-/// Dark quadrilaterals of a picture, corners clockwise, to about half a pixel.
+/// Returns the dark quadrilaterals of a picture, with corners clockwise and exact to about half a pixel.
 ///
-/// As `OpenCV` looks for `ArUco` markers: threshold against the neighbourhood, outlines, polygons of four corners.
+/// The method is that of `OpenCV` for `ArUco` markers: a threshold relative to the neighbourhood, then outlines, then polygons of four
+/// corners.
 pub(crate) fn quads(picture: &Picture) -> Vec<[Point2<f64>; 4]> {
     let mut found = Vec::new();
     for radius in RADII {
@@ -28,7 +29,7 @@ pub(crate) fn quads(picture: &Picture) -> Vec<[Point2<f64>; 4]> {
 
 type Pixel = [i32; 2];
 
-/// The outer outlines of connected dark regions that do not touch the edge, clockwise.
+/// Returns the outer outlines of connected dark regions that do not touch the edge, clockwise.
 fn outlines(mask: &[bool], width: usize, height: usize) -> Vec<Vec<Pixel>> {
     let mut seen = vec![false; mask.len()];
     let mut stack = Vec::new();
@@ -67,7 +68,7 @@ fn outlines(mask: &[bool], width: usize, height: usize) -> Vec<Vec<Pixel>> {
     result
 }
 
-/// The eight neighbours, clockwise from the left one, y down.
+/// Offsets to the eight neighbours, clockwise from the left one, with y down.
 const AROUND: [Pixel; 8] = [
     [-1, 0],
     [-1, -1],
@@ -79,7 +80,7 @@ const AROUND: [Pixel; 8] = [
     [-1, 1],
 ];
 
-/// Moore's neighbour tracing from the first pixel of a region in reading order. The region does not touch the edge.
+/// Traces a region with Moore's neighbour tracing, from its first pixel in reading order. The region must not touch the edge.
 fn trace(mask: &[bool], width: usize, start: Pixel) -> Vec<Pixel> {
     let is_dark = |at: Pixel| mask[at[1] as usize * width + at[0] as usize];
     let mut outline = vec![start];
@@ -102,14 +103,14 @@ fn trace(mask: &[bool], width: usize, start: Pixel) -> Vec<Pixel> {
         }
         at = [at[0] + AROUND[direction][0], at[1] + AROUND[direction][1]];
         outline.push(at);
-        // The search goes on from the pixel that was looked at before this one.
+        // The search continues from the pixel before this one.
         from = (direction + 4) % 8;
     }
     outline.pop();
     outline
 }
 
-/// The corners of an outline that is a convex quadrilateral.
+/// Returns the corners of an outline if it is a convex quadrilateral.
 fn four_corners(outline: &[Pixel]) -> Option<[Point2<f64>; 4]> {
     let n = outline.len();
     if n < 16 {
@@ -142,7 +143,7 @@ fn furthest(outline: &[Pixel], distance: impl Fn(Point2<f64>) -> f64) -> Option<
     distances.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Douglas and Peucker's corners between two points of a closed outline, in order.
+/// Adds the Douglas-Peucker corners between two points of a closed outline, in order.
 fn split(outline: &[Pixel], [a, b]: [usize; 2], stray: f64, corners: &mut Vec<usize>) {
     let n = outline.len();
     let (from, to) = (point(outline[a % n]), point(outline[b % n]));
@@ -152,7 +153,7 @@ fn split(outline: &[Pixel], [a, b]: [usize; 2], stray: f64, corners: &mut Vec<us
         along.perp(&offset).abs() / along.norm().max(1e-9)
     };
     let worst = (a + 1..b).max_by(|&i, &j| off(i).total_cmp(&off(j)));
-    // More than four corners are no quadrilateral: no need to go on.
+    // A polygon with more than four corners is not a quadrilateral, so the search can stop.
     if let Some(worst) = worst.filter(|&index| off(index) > stray && corners.len() < 8) {
         split(outline, [a, worst], stray, corners);
         corners.push(worst % n);
@@ -160,7 +161,7 @@ fn split(outline: &[Pixel], [a, b]: [usize; 2], stray: f64, corners: &mut Vec<us
     }
 }
 
-/// Where lines through the sides meet, half a pixel outside the pixels of the outline.
+/// Returns the intersections of lines through the sides, half a pixel outside the pixels of the outline.
 fn sharpened(outline: &[Pixel], corners: [usize; 4]) -> Option<[Point2<f64>; 4]> {
     let n = outline.len();
     let mut lines = Vec::new();
@@ -180,7 +181,7 @@ fn sharpened(outline: &[Pixel], corners: [usize; 4]) -> Option<[Point2<f64>; 4]>
         let normals = Matrix2::new(n.x, n.y, m.x, m.y);
         let offsets = Vector2::new(n.dot(&p.coords) + 0.5, m.dot(&q.coords) + 0.5);
         *corner = Point2::from(normals.try_inverse()? * offsets);
-        // A corner that runs away is not one of this outline.
+        // A corner far from the outline does not belong to it.
         if (*corner - point(outline[corners[i]])).norm() > 4.0 + 0.05 * n_sides(outline) {
             return None;
         }
@@ -192,7 +193,7 @@ fn n_sides(outline: &[Pixel]) -> f64 {
     outline.len() as f64 / 4.0
 }
 
-/// The line through points that run clockwise: a point of it, and its normal to the outside (y down).
+/// Returns the line through points in clockwise order: a point on it, and its normal to the outside (y down).
 fn line(places: &[Point2<f64>]) -> Option<(Point2<f64>, Vector2<f64>)> {
     let (first, last) = (places.first()?, places.last()?);
     let sum = places.iter().fold(Vector2::zeros(), |sum, it| sum + it.coords);
@@ -206,7 +207,7 @@ fn line(places: &[Point2<f64>]) -> Option<(Point2<f64>, Vector2<f64>)> {
     let least = usize::from(eigen.eigenvalues[1] < eigen.eigenvalues[0]);
     let normal: Vector2<f64> = eigen.eigenvectors.column(least).into_owned();
     let along = last - first;
-    // Clockwise with y down: the outside is to the left of the way, which is (along.y, -along.x).
+    // In clockwise order with y down, the outside is to the left of the direction, which is (along.y, -along.x).
     let outside = Vector2::new(along.y, -along.x);
     let turned = if normal.dot(&outside) < 0.0 {
         -normal

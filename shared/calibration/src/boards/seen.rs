@@ -1,41 +1,41 @@
-//! A corner of a board in a picture, or why there is none.
+//! A corner of a board in a picture, or the reason why no board was found.
 
 use nalgebra::Point2;
 
 /// A corner of the board in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
-    /// Its number: an index of [`Layout::points`](crate::boards::Layout::points).
+    /// Number of the corner: an index of [`Layout::points`](crate::boards::Layout::points).
     pub id: usize,
-    /// Where it is, pixels.
+    /// Position of the corner, in pixels.
     pub at: Point2<f64>,
 }
 
-/// Why there is no board.
+/// Reason why no board was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Nothing {
-    /// No grid of corners.
+    /// The picture has no grid of corners.
     NoGrid,
-    /// A grid of other counts than the board's.
+    /// The picture has a grid with other counts than the board's.
     OtherGrid {
-        /// Inner corners from left to right, or from top to bottom.
+        /// Number of inner corners along one side of the grid.
         columns: usize,
-        /// The others.
+        /// Number of inner corners along the other side.
         rows: usize,
     },
-    /// Fewer than two markers of the board.
+    /// The picture has fewer than two markers of the board.
     NoMarkers,
-    /// Markers, but not where the board has them.
+    /// The picture has markers, but not in the arrangement of the board.
     Elsewhere {
-        /// How many were read.
+        /// Number of markers that were read.
         n_markers: usize,
     },
-    /// The board is there; too few of its corners are sharp.
+    /// The board is in the picture, but too few of its corners are sharp.
     NoCorners,
 }
 
 impl Nothing {
-    /// The one that says more.
+    /// Returns the more informative of two reasons.
     pub(crate) fn or(self, other: Self) -> Self {
         let says = |nothing: Self| match nothing {
             Self::NoGrid | Self::NoMarkers => 0,

@@ -1,10 +1,10 @@
-//! A drawing as SVG.
+//! Output of a drawing as SVG.
 
 use core::fmt::Write as _;
 
 use crate::boards::{Drawing, Shape};
 
-/// An SVG file, in millimetres.
+/// Returns an SVG file, in millimetres.
 pub fn svg(drawing: &Drawing) -> String {
     let [width, height] = drawing.page;
     let mut out = format!(
@@ -28,7 +28,7 @@ pub fn svg(drawing: &Drawing) -> String {
                 text.replace('&', "&amp;").replace('<', "&lt;")
             ),
         };
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         writeln!(out, "{line}").unwrap_or_default();
     }
     out + "</svg>\n"

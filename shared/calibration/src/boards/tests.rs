@@ -1,4 +1,4 @@
-//! Boards are printed, photographed by a pinhole that does not exist, and found.
+//! Tests that print boards, photograph them with a simulated pinhole camera, and find them.
 
 use nalgebra::{Matrix3, Point2};
 
@@ -21,14 +21,14 @@ fn grey(drawing: &Drawing, at: [f64; 2]) -> f64 {
     value
 }
 
-/// A picture of a page: `map` takes pixels to millimetres of the page; grey beyond it.
+/// Returns a picture of a page: `map` takes pixels to millimetres of the page; the surroundings are grey.
 fn photographed(drawing: &Drawing, map: &Matrix3<f64>, [width, height]: [usize; 2]) -> Picture {
     let mut random = fastrand::Rng::with_seed(5);
     let mut pixels = Vec::new();
     for y in 0..height {
         for x in 0..width {
             let mut sum = 0.0;
-            // Sixteen samples of a pixel and a little of its neighbours: a lens is not sharper than that.
+            // Sixteen samples cover a pixel and a little of its neighbours, because no lens is sharper than that.
             for v in 0..4 {
                 for u in 0..4 {
                     let offset = [u, v].map(|value| (f64::from(value) - 1.5) * 0.375);
@@ -46,7 +46,7 @@ fn photographed(drawing: &Drawing, map: &Matrix3<f64>, [width, height]: [usize; 
     Picture::new(width, height, pixels).unwrap()
 }
 
-/// The map of a view that is `scale` pixels a millimetre, turned and tilted.
+/// Returns the map of a view with `scale` pixels per millimetre, rotated and tilted.
 fn view(drawing: &Drawing, size: [usize; 2], scale: f64, angle: f64) -> Matrix3<f64> {
     let (sin, cos) = angle.sin_cos();
     let page_middle = Matrix3::new(
@@ -88,7 +88,7 @@ fn view(drawing: &Drawing, size: [usize; 2], scale: f64, angle: f64) -> Matrix3<
 
 struct Shot {
     picture: Picture,
-    /// The true places of the corners of the layout.
+    /// True positions of the corners of the layout.
     truth: Vec<Point2<f64>>,
 }
 
@@ -110,7 +110,7 @@ fn shot(text: &str, size: [usize; 2], angle: f64) -> Shot {
     }
 }
 
-/// The share of corners that are found, and the largest error in pixels.
+/// Returns the fraction of corners that were found, and the largest error in pixels.
 fn compared(found: &Found, truth: &[Point2<f64>]) -> (f64, f64) {
     let errors = found.corners.iter().map(|corner| (corner.at - truth[corner.id]).norm());
     let share = found.corners.len() as f64 / truth.len() as f64;
@@ -135,7 +135,7 @@ fn printed_boards_are_found_where_they_are() {
         let found = finder(text).find(&shot.picture, Hints::default());
         let found = found.unwrap_or_else(|error| panic!("{text}: {error:?}"));
         let (share, worst) = compared(&found, &shot.truth);
-        // The corners of tags are not crossings: what is bright spills over what is dark.
+        // The corners of tags are not crossings: bright areas spill over dark ones.
         let limit = if text.starts_with("aprilgrid") {
             0.4
         } else {

@@ -1,11 +1,11 @@
-//! Which pixels are darker than what is around them.
+//! Search for pixels that are darker than their surroundings.
 
 use crate::boards::Picture;
 
-/// How much darker than the mean around it a pixel is, grey values.
+/// Minimum difference between a pixel and the brighter mean around it, in grey values.
 const DARKER: i64 = 7;
 
-/// For every pixel whether it is darker than the mean of the square of `2 radius + 1` pixels around it.
+/// Returns true for every pixel that is darker than the mean of the square of `2 radius + 1` pixels around it.
 pub(crate) fn dark(picture: &Picture, radius: usize) -> Vec<bool> {
     let (width, height) = (picture.width(), picture.height());
     let sums = Sums::new(picture);
@@ -23,7 +23,7 @@ pub(crate) fn dark(picture: &Picture, radius: usize) -> Vec<bool> {
     mask
 }
 
-/// Sums over boxes of pixels.
+/// Sums over rectangles of pixels.
 struct Sums {
     stride: usize,
     sums: Vec<i64>,

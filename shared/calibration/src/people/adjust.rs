@@ -1,4 +1,4 @@
-//! All cameras, time offsets, bones and joints at once.
+//! Adjustment of all cameras, time offsets, bones and joints at once.
 
 use geometry::Camera;
 use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
@@ -10,55 +10,55 @@ use super::bias::Biases;
 use super::instant::{Instant, Seen, WIDTH, instant};
 use super::sightings::Sightings;
 
-/// Places of a joint nearer than this share of the size of the person are one place.
+/// Positions of a joint that are closer than this count as one place, as a fraction of the size of the person.
 const PLACE: f64 = 0.04;
-/// Standard deviation of a bone's length over time, as a share of it.
+/// Standard deviation of a bone's length over time, as a fraction of its length.
 const BONE_SPREAD: f64 = 0.06;
 
 /// Prior on the pose of a camera.
 #[derive(Debug, Clone)]
 pub(crate) struct PosePrior {
     pub(crate) camera: Camera,
-    /// Standard deviations: radians, and metres.
+    /// Standard deviations, in radians and metres.
     pub(crate) sd: [f64; 2],
 }
 
-/// Prior terms, besides the observations.
+/// Prior terms, in addition to the observations.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Beliefs {
-    /// The distance of two cameras, which holds the scale: exactly for all that matters.
+    /// Two cameras and the distance between them, which fixes the scale. Its uncertainty is negligible.
     pub(crate) baseline: Option<(usize, usize, f64)>,
-    /// Poses known beforehand, by camera.
+    /// Prior poses, by camera.
     pub(crate) poses: Vec<Option<PosePrior>>,
-    /// Standard deviation of a time offset about what it is now, seconds; none: offsets are held.
+    /// Standard deviation of a time offset about its current value, in seconds; `None` if offsets are held.
     pub(crate) offset_sd_s: Option<f64>,
-    /// Standard deviation of focal lengths about what they were given as, as a share.
+    /// Standard deviation of focal lengths about the given values, as a fraction.
     pub(crate) focal_sd: f64,
-    /// Standard deviation of what a joint errs by in a camera all the time, pixels, by camera; none: joints have no such habits.
+    /// Standard deviation of the constant error of a joint in a camera, in pixels, by camera; `None` if joints have no constant error.
     pub(crate) bias_sd_px: Option<Vec<f64>>,
 }
 
-/// How far a joint is from where it is seen, pixels.
+/// Distance between the predicted and the seen position of a joint, in pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual {
     pub(crate) camera: usize,
     pub(crate) joint: usize,
-    /// Where it should be, less where it is seen.
+    /// Predicted position minus seen position.
     pub(crate) whole: Vector2<f64>,
-    /// The same without what the joint errs by in this camera all the time.
+    /// The same difference without the constant error of the joint in this camera.
     pub(crate) own: Vector2<f64>,
-    /// Where it is seen.
+    /// Position where the joint is seen.
     pub(crate) at: Point2<f64>,
 }
 
-/// The problem of [`geometry::bundle`].
+/// The problem for [`geometry::bundle`].
 #[derive(Debug, Clone)]
 pub(crate) struct Adjustment {
     cameras: Cameras,
     given_focal: Vec<f64>,
-    /// The parameter of each camera's offset, and by how much it has changed, seconds.
+    /// Parameter of each camera's offset, and the change of the offset, in seconds.
     offsets: Vec<(Option<usize>, f64)>,
-    /// The parameter of each bone's kind, and its length.
+    /// Parameter of each kind of bone.
     bones: [Option<usize>; N_BONES],
     lengths: Vec<f64>,
     first_bone: usize,
@@ -68,7 +68,7 @@ pub(crate) struct Adjustment {
     n_instants: usize,
 }
 
-/// The bones whose length stays the same in every posture.
+/// Returns true if the length of a bone is the same in every posture.
 fn is_stiff(kind: Kind) -> bool {
     matches!(
         kind,
@@ -77,7 +77,9 @@ fn is_stiff(kind: Kind) -> bool {
 }
 
 impl Adjustment {
-    /// * `sigmas_px`: expected error of every joint in every camera, pixels.
+    /// Creates the problem.
+    ///
+    /// * `sigmas_px`: expected error of every joint in every camera, in pixels.
     pub(crate) fn new(
         cameras: Cameras,
         sightings: &Sightings,
@@ -95,7 +97,7 @@ impl Adjustment {
         let mut next = cameras.n_parameters();
         let mut offsets = vec![(None, 0.0); n];
         if beliefs.offset_sd_s.is_some() {
-            // The clock of the first camera is that of all.
+            // The clock of the first camera is the common clock.
             for (parameter, _) in offsets.iter_mut().skip(1) {
                 *parameter = Some(next);
                 next += 1;
@@ -123,7 +125,7 @@ impl Adjustment {
         it
     }
 
-    /// A joint errs alike wherever it is in one place: all its instants there count as one.
+    /// Finds the weights of joints. The error of a joint is the same while it stays in one place, so all instants there count as one.
     fn find_shares(&mut self) {
         let sizes: Vec<f64> = self.instants.iter().map(Instant::size).collect();
         let near = PLACE * Sorted::new(sizes).upper_median().unwrap_or(0.0);
@@ -143,7 +145,7 @@ impl Adjustment {
         }
     }
 
-    /// Lengths of bones at the start: medians, left and right together.
+    /// Finds the initial lengths of bones: medians over left and right together.
     fn find_bones(&mut self) {
         let mut kinds: Vec<(Kind, usize)> = Vec::new();
         for (nth, bone) in BONES.iter().enumerate() {
@@ -171,7 +173,7 @@ impl Adjustment {
         }
     }
 
-    /// The same with poses that are believed so many times more: to see what joints tell that count for less.
+    /// Returns the same problem with priors of poses that are stronger by a factor. This has the effect of joints with a lower weight.
     pub(crate) fn believing(&self, times: f64) -> Self {
         let mut it = self.clone();
         for prior in it.beliefs.poses.iter_mut().flatten() {
@@ -184,27 +186,27 @@ impl Adjustment {
         &self.cameras
     }
 
-    /// Amount by which the offset of each camera has changed, seconds.
+    /// Returns the change of each camera's offset, in seconds.
     pub(crate) fn offset_steps_s(&self) -> Vec<f64> {
         self.offsets.iter().map(|offset| offset.1).collect()
     }
 
-    /// The parameter of a camera's offset.
+    /// Returns the parameter of a camera's offset.
     pub(crate) fn offset_parameter(&self, camera: usize) -> Option<usize> {
         self.offsets[camera].0
     }
 
-    /// Which of all instants each local block is.
+    /// Returns the index of the instant of each local block.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = usize> {
         self.instants.iter().map(|instant| instant.nth)
     }
 
-    /// Points of all instants.
+    /// Returns the number of points over all instants.
     pub(crate) fn n_points(&self) -> usize {
         self.instants.iter().map(|instant| instant.points.len()).sum()
     }
 
-    /// Calls back for every joint seen.
+    /// Calls `take` for every visible joint.
     pub(crate) fn residuals(&self, take: &mut dyn FnMut(Residual)) {
         for instant in &self.instants {
             for seen in &instant.seen {
@@ -265,7 +267,7 @@ impl Adjustment {
             term.by_local(3 * a + axis, &[-by]);
             term.by_local(3 * b + axis, &[by]);
         }
-        // The spread is a share of the length, which changes with it.
+        // The standard deviation is a fraction of the length, which is itself a parameter.
         term.by_shared(parameter, &[-ratio / length]);
         true
     }
@@ -283,13 +285,13 @@ impl Adjustment {
         let way = now.centre_in_world() - prior.camera.centre_in_world();
         let turn = turn.scaled_axis() / prior.sd[0];
         let way = way / prior.sd[1];
-        // One loss for rotation and place: a camera that was moved is believed to be elsewhere altogether.
+        // Rotation and position share one loss, because a moved camera differs in both.
         let all = [turn.x, turn.y, turn.z, way.x, way.y, way.z];
         let mut term = Term::default();
         term.begin(&all, Loss::Cauchy(WIDTH));
         for (nth, parameter) in parameters.into_iter().enumerate() {
             let mut column = [0.0; 6];
-            // To first order in the turn, which is small where it matters.
+            // Derivatives to first order in the rotation, which is small while the prior matters.
             column[nth] = 1.0 / prior.sd[usize::from(nth >= 3)];
             term.by_shared(parameter, &column);
         }
@@ -312,7 +314,7 @@ impl Problem for Adjustment {
         }
         let bone = self.bones.iter().position(|bone| *bone == Some(parameter));
         bone.map_or_else(
-            || "what a joint errs by all the time".to_owned(),
+            || "the constant error of a joint".to_owned(),
             |bone| format!("length of the {}", BONES[bone].name),
         )
     }
@@ -396,7 +398,7 @@ impl Problem for Adjustment {
     }
 }
 
-/// The joints of all instants, by instant and joint.
+/// Returns the joints of all instants, by instant and joint.
 pub(crate) fn skeletons(it: &Adjustment, n_joints: usize) -> Vec<Vec<Option<Point3<f64>>>> {
     let mut all = vec![vec![None; n_joints]; it.n_instants];
     for instant in &it.instants {

@@ -1,4 +1,4 @@
-//! A start: the first pair of cameras, and the others by resection.
+//! Initial rig: the first pair of cameras, then each other camera by resection.
 
 use fastrand::Rng;
 use geometry::bundle::{Cameras, Free, Settings as Search, solve};
@@ -12,20 +12,20 @@ use super::resect::{Known, resected};
 use super::sightings::{Chain, Sightings};
 use super::two_view::{Match, Relative, normalised, relative};
 
-/// Expected error of a joint before anything is known: this share of the size of the person.
+/// Expected error of a joint at the start, as a fraction of the size of the person.
 pub(crate) const SHARE: f64 = 0.015;
-/// Pairs of cameras that may be the first.
+/// Maximum number of pairs of cameras to try as the first pair.
 const MOST_PAIRS: usize = 10;
-/// A pair begins only with this share of its joints in agreement.
+/// Minimum fraction of joints that must agree in the first pair.
 const LEAST_INLIERS: f64 = 0.4;
-/// An angle between rays at which a pair is as good as any, radians.
+/// Angle between rays above which a pair is not preferred further, in radians.
 const WIDE: f64 = 0.5;
-/// A camera is placed where the mean cost of a joint, log(1 + (residual / sigma)^2), is less than this.
+/// Largest mean cost of a joint, log(1 + (residual / sigma)^2), with which a camera is placed.
 const MOST_COST: f64 = 3.2;
-/// Distance of the offsets that are searched, seconds.
+/// Step between the offsets that are searched, in seconds.
 const STEP_S: f64 = 0.1;
 
-/// Which person a camera sees, by which clock, with which sides.
+/// Choice of the person seen by a camera, the offset of its clock, and whether left and right are exchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Choice {
     pub(crate) chain: usize,
@@ -36,26 +36,26 @@ pub(crate) struct Choice {
 /// Input of the search for a first rig.
 #[derive(Debug, Clone)]
 pub(crate) struct Study<'a> {
-    /// Without distortion.
+    /// Cameras without distortion.
     pub(crate) cameras: Vec<Camera>,
     pub(crate) chains: &'a [Vec<Chain>],
     pub(crate) times_s: Vec<f64>,
     pub(crate) n_joints: usize,
     pub(crate) sides: &'a [usize],
-    /// Choices for each camera, the likeliest first.
+    /// Choices for each camera, the most likely first.
     pub(crate) choices: Vec<Vec<Choice>>,
 }
 
-/// Cameras that stand somewhere, in a world of their own.
+/// Initial rig, in a world of its own.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub(crate) cameras: Vec<Camera>,
     pub(crate) choices: Vec<Choice>,
-    /// The first pair, the distance of which is 1.
+    /// The first pair of cameras; the distance between them is 1.
     pub(crate) pair: [usize; 2],
 }
 
-/// All that a camera may be.
+/// Returns all possible choices for a camera.
 pub(crate) fn choices(n_chains: usize, offset_s: f64, window_s: f64, as_seen: bool) -> Vec<Choice> {
     let steps = (window_s / STEP_S).ceil() as i64;
     let mut all = Vec::new();
@@ -97,7 +97,7 @@ impl Study<'_> {
         all
     }
 
-    /// Expected error of a joint of a camera at the start, pixels.
+    /// Returns the expected error of a joint of a camera at the start, in pixels.
     pub(crate) fn sigma_px(&self, camera: usize, choice: Choice) -> f64 {
         SHARE * self.chains[camera][choice.chain].size()
     }
@@ -125,7 +125,7 @@ impl Study<'_> {
         matches
     }
 
-    /// The first pair.
+    /// Finds the first pair of cameras.
     fn pair(&self, random: &mut Rng) -> Option<([usize; 2], [Choice; 2], Relative)> {
         let n = self.cameras.len();
         let mut pairs: Vec<([usize; 2], usize)> = Vec::new();
@@ -143,7 +143,7 @@ impl Study<'_> {
         let mut most = 0.0;
         for (pair, _) in pairs {
             let [a, b] = pair;
-            // The clock and the sides of the first camera are those that the other one is compared with.
+            // The clock and sides of the first camera are the reference for the other camera.
             let mut of_a = self.choices[a].clone();
             let first = of_a[0];
             of_a.retain(|choice| {
@@ -174,7 +174,7 @@ impl Study<'_> {
         best
     }
 
-    /// Cameras that stand somewhere.
+    /// Finds the initial rig.
     pub(crate) fn start(&self, random: &mut Rng) -> Result<Start, Doubt> {
         let (pair, chosen, found) = self.pair(random).ok_or(Doubt::NoPair)?;
         let mut cameras = self.cameras.clone();
@@ -206,7 +206,7 @@ impl Study<'_> {
         })
     }
 
-    /// Adjusts the cameras that are placed.
+    /// Adjusts the cameras that are placed so far.
     fn settle(&self, cameras: &mut Vec<Camera>, choices: &[Option<Choice>], pair: [usize; 2]) {
         let free: Vec<Free> = choices
             .iter()
@@ -232,7 +232,7 @@ impl Study<'_> {
         *cameras = end.cameras().cameras().to_vec();
     }
 
-    /// Expected errors at the start, by camera and joint.
+    /// Returns the expected errors at the start, by camera and joint.
     pub(crate) fn sigmas(&self, choices: &[Option<Choice>]) -> Vec<Vec<f64>> {
         let of = |(camera, it): (usize, &Option<Choice>)| {
             let sigma = it.map_or(1.0, |choice| self.sigma_px(camera, choice));
@@ -241,7 +241,7 @@ impl Study<'_> {
         choices.iter().enumerate().map(of).collect()
     }
 
-    /// The camera that is placed best, and where.
+    /// Returns the camera that can be placed best, and its pose.
     fn next(
         &self,
         cameras: &[Camera],
@@ -274,7 +274,7 @@ impl Study<'_> {
         best
     }
 
-    /// Joints where the cameras that are placed say: by instant and joint.
+    /// Returns the joints as triangulated by the placed cameras, by instant and joint.
     fn points(
         &self,
         cameras: &[Camera],

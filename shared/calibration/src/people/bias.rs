@@ -1,8 +1,7 @@
-//! Constant error of a joint in a camera: a hip is marked elsewhere from the front than from the side.
+//! Constant error of a joint in a camera. For example, a hip is marked in a different place from the front than from the side.
 //!
-//! Such errors do not average out over a recording in which a person stays in one place. Each is an unknown of its own,
-//! believed to be near 0 by a standard deviation that the residuals tell: where people walk about it comes out as next
-//! to nothing.
+//! Such errors do not average out over a recording in which a person stays in one place. Each error is therefore an unknown. Its prior
+//! has mean 0 and a standard deviation estimated from the residuals. If people walk about, the estimated error is close to 0.
 
 use geometry::bundle::{Loss, Term};
 use nalgebra::Vector2;
@@ -10,30 +9,32 @@ use statistics::Sorted;
 
 use super::instant::Instant;
 
-/// A joint that a camera sees fewer times has no bias of its own.
+/// Minimum number of times that a camera must see a joint for the joint to have a bias of its own.
 const LEAST: usize = 6;
-/// The most that a joint is believed to err by all the time, as a share of the size of the person.
+/// Largest prior standard deviation of a constant error, as a fraction of the size of the person.
 const MOST: f64 = 0.02;
-/// And the least, below which it cannot be determined.
+/// Smallest constant error that can be determined, as a fraction of the size of the person.
 const NOTHING: f64 = 0.0005;
-/// The median of the squares of a normal number.
+/// Median of the square of a standard normal variable.
 const MEDIAN_SQUARE: f64 = 0.4549;
 
-/// The bias of every joint in every camera.
+/// Bias of every joint in every camera.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Biases {
-    /// The first of two parameters.
+    /// Index of the first bias parameter; each bias has two.
     first: usize,
-    /// By camera and joint: which.
+    /// Index of the bias, by camera and joint.
     places: Vec<Vec<Option<usize>>>,
-    /// Pixels.
+    /// Values of the biases, in pixels.
     values: Vec<Vector2<f64>>,
-    /// Standard deviation of each beforehand, pixels.
+    /// Prior standard deviation of each bias, in pixels.
     sd_px: Vec<f64>,
 }
 
 impl Biases {
-    /// * `first`: the first parameter; `sd_px`: what is believed, by camera.
+    /// Creates biases of 0.
+    ///
+    /// * `first`: index of the first parameter; `sd_px`: prior standard deviation, by camera.
     pub(super) fn new(first: usize, sd_px: &[f64], instants: &[Instant]) -> Self {
         let n_joints = instants.iter().flat_map(|instant| &instant.joints).max();
         let mut counts = vec![vec![0_usize; n_joints.map_or(0, |joint| joint + 1)]; sd_px.len()];
@@ -69,12 +70,12 @@ impl Biases {
         self.places.get(camera)?.get(joint).copied()?
     }
 
-    /// Pixels; 0 where there is none.
+    /// Returns the bias of a joint in a camera, in pixels; 0 if there is none.
     pub(super) fn of(&self, camera: usize, joint: usize) -> Vector2<f64> {
         self.place(camera, joint).map_or_else(Vector2::zeros, |i| self.values[i])
     }
 
-    /// The derivatives of what a camera sees of a joint.
+    /// Adds the derivatives of an observed joint with respect to its bias.
     pub(super) fn observed(&self, (camera, joint): (usize, usize), sigma_px: f64, term: &mut Term) {
         if let Some(place) = self.place(camera, joint) {
             let parameter = self.first + 2 * place;
@@ -83,7 +84,7 @@ impl Biases {
         }
     }
 
-    /// Gives the prior terms.
+    /// Passes the prior terms to `take`.
     pub(super) fn priors(&self, take: &mut dyn FnMut(&Term)) {
         let mut term = Term::default();
         for (nth, (value, sd)) in self.values.iter().zip(&self.sd_px).enumerate() {
@@ -103,10 +104,10 @@ impl Biases {
     }
 }
 
-/// Returns the constant error of joints, from their residuals, as a share of the size of the person, all joints and cameras
-/// together; `None` where it is next to nothing.
+/// Returns the constant error of joints over all joints and cameras, from their residuals, as a fraction of the size of the person.
+/// Returns `None` if the error is negligible.
 ///
-/// * `residuals`: of each joint in each camera, as shares of the size.
+/// * `residuals`: residuals of each joint in each camera, as fractions of the size.
 pub(super) fn share_of(residuals: &[Vec<Vector2<f64>>]) -> Option<f64> {
     let mut squares = Vec::new();
     for of_joint in residuals.iter().filter(|residual| residual.len() >= LEAST) {
@@ -115,7 +116,7 @@ pub(super) fn share_of(residuals: &[Vec<Vector2<f64>>]) -> Option<f64> {
             let middle = Sorted::new(each.clone()).upper_median()?;
             let away = each.iter().map(|value| (value - middle).abs());
             let noise = 1.4826 * Sorted::new(away.collect::<Vec<_>>()).upper_median()?;
-            // The median of n numbers has pi / 2 times the variance of their mean.
+            // The variance of the median of n numbers is pi / 2 times the variance of their mean.
             let chance = core::f64::consts::FRAC_PI_2 * noise.powi(2) / of_joint.len() as f64;
             squares.push(middle.powi(2) - chance);
         }
@@ -130,7 +131,7 @@ mod tests {
 
     use super::*;
 
-    /// Residuals of 40 joints over 60 instants: by noise, and by what each errs by all the time.
+    /// Returns residuals of 40 joints over 60 instants, with noise and with a constant error for each joint.
     fn residuals(noise: f64, bias: f64) -> Vec<Vec<Vector2<f64>>> {
         let mut random = Rng::with_seed(3);
         let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;

@@ -1,4 +1,4 @@
-//! How well a rig is known: how far blocks of the recording, and its halves, would have it elsewhere.
+//! Uncertainty of a rig, from differences between blocks of the recording and between its halves.
 
 use fastrand::Rng;
 use geometry::Camera;
@@ -13,20 +13,20 @@ use super::outcome::Outcome;
 use super::solve::{Solved, Wanted, solved};
 use crate::align::{Difference, aligned, differences};
 
-/// The most that a camera may be off, one standard deviation: degrees, and share of its distance to the people.
+/// Largest accepted standard deviation of a camera: degrees, and fraction of its distance to the people.
 const MOST_SD: [f64; 2] = [1.5, 0.04];
-/// A camera that is known so well is known well: what calibrations are to reach.
+/// Standard deviation below which a camera is known well, in the same units. Calibrations should reach this.
 const GOOD_SD: [f64; 2] = [0.3, 0.01];
-/// Difference of halves: that of a rig which is off by the most, as each half is off by the square root of two times as much as the
-/// whole, and both differ by the square root of two times that.
+/// Largest accepted difference between halves. If the error of the whole is `MOST_SD`, the error of each half is √2 times as large, and
+/// the difference between two halves is √2 times that again.
 pub(crate) const MOST_HALVES: [f64; 2] = [2.0 * MOST_SD[0], 2.0 * MOST_SD[1]];
-/// Blocks of the recording, which the halves take in turns, are at least so long, seconds.
+/// Minimum length of a block of the recording, in seconds. The halves take blocks alternately.
 pub(crate) const BLOCK_S: f64 = 1.0;
-/// Numbers of blocks that give the standard deviations, at least and at most: with 8 a deviation is known to 27 %, with
-/// 16 to 18 %, and the longer a block the more of what errors have in common is within it.
+/// Minimum and maximum number of blocks that give the standard deviations. With 8 blocks, a deviation is known to 27 %; with 16 blocks,
+/// to 18 %. Longer blocks contain more of the errors that neighbouring instants share.
 const BLOCKS: [f64; 2] = [8.0, 16.0];
 
-/// Blocks of time to which the local blocks of an adjustment belong.
+/// Returns the blocks of time to which the local blocks of an adjustment belong.
 pub(super) fn blocks(problem: &Adjustment, times_s: &[f64]) -> Vec<usize> {
     let [from, to] = [times_s[0], times_s[times_s.len() - 1]];
     let n = ((to - from) / BLOCK_S).floor().clamp(BLOCKS[0], BLOCKS[1]);
@@ -37,8 +37,8 @@ pub(super) fn blocks(problem: &Adjustment, times_s: &[f64]) -> Vec<usize> {
     problem.numbers().map(of).collect()
 }
 
-/// How far every camera may be from where it is: degrees, and units of the solution. Rigs that are one standard deviation away along
-/// each axis of the covariance are laid upon the one that was found, so that no camera counts as exact.
+/// Returns the standard deviation of every camera's pose, in degrees and units of the solution. Rigs that are one standard deviation away
+/// along each axis of the covariance are aligned with the rig that was found, so that no camera counts as exact.
 pub(super) fn spread(all: &Solved, known: &Covariance) -> Vec<[f64; 2]> {
     let cameras = all.problem.cameras();
     let n = cameras.n_parameters();
@@ -57,7 +57,7 @@ pub(super) fn spread(all: &Solved, known: &Covariance) -> Vec<[f64; 2]> {
     sums.iter().map(|sum| sum.map(f64::sqrt)).collect()
 }
 
-/// The distance of a camera to the people, metres.
+/// Returns the distance of each camera to the people, in metres.
 fn distances(outcome: &Outcome) -> Vec<f64> {
     let all: Vec<&Point3<f64>> = outcome.skeletons.iter().flatten().flatten().collect();
     let axis = |axis: usize| {
@@ -72,9 +72,8 @@ fn distances(outcome: &Outcome) -> Vec<f64> {
     each.map(|camera| (camera.centre_in_world() - middle).norm()).collect()
 }
 
-/// Adds to the deviations of the rotations an error that no block of the recording shows: where a network finds the
-/// joints, rigs of few cameras come out turned alike in every block, by a few tenths of a degree. The median residual as
-/// an angle is as much.
+/// Adds an error to the standard deviations of the rotations that no block of the recording shows. If a network finds the joints, rigs of
+/// few cameras have the same rotation error in every block, a few tenths of a degree. The median residual as an angle is about as large.
 fn add_common(outcome: &mut Outcome) {
     for (report, camera) in outcome.reports.iter_mut().zip(&outcome.cameras) {
         let focal_px = 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy);
@@ -89,7 +88,7 @@ pub(super) fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) 
     let distances = distances(outcome);
     for (camera, report) in outcome.reports.iter().enumerate() {
         let sd = [report.sd[0], report.sd[1] / distances[camera]];
-        // NaN is not less.
+        // The comparison is written so that NaN is not within the limits.
         let is_within = |limits: [f64; 2]| sd[0] < limits[0] && sd[1] < limits[1];
         let uncertain = |limits: [f64; 2]| Doubt::Uncertain { camera, sd, limits };
         if !is_within(MOST_SD) {
@@ -103,8 +102,7 @@ pub(super) fn certainty(outcome: &mut Outcome, study: &Study<'_>, all: &Solved) 
     }
 }
 
-/// Enlarges the deviations if the two halves differ by more than they suggest: each camera's by the share of all cameras
-/// together.
+/// Enlarges the standard deviations if the two halves differ by more than the deviations suggest. All cameras get the same factor.
 fn widen(outcome: &mut Outcome, apart: &[Difference]) {
     let of = |difference: &Difference| [0.5 * difference.turn.to_degrees(), 0.5 * difference.way];
     for axis in 0..2 {
@@ -117,7 +115,7 @@ fn widen(outcome: &mut Outcome, apart: &[Difference]) {
     }
 }
 
-/// Which half an instant belongs to: blocks in turns.
+/// Returns the half to which an instant belongs; blocks alternate between the halves.
 pub(crate) fn half_of(time_s: f64, [from, to]: [f64; 2]) -> usize {
     let n = ((to - from) / BLOCK_S).floor().clamp(2.0, 16.0);
     let n = 2.0 * (n / 2.0).floor();
@@ -125,7 +123,7 @@ pub(crate) fn half_of(time_s: f64, [from, to]: [f64; 2]) -> usize {
     block.clamp(0.0, n - 1.0) as usize % 2
 }
 
-/// Both halves of the recording from the beginning, beside the whole.
+/// Calibrates both halves of the recording independently, and compares them with each other.
 pub(super) fn halves(
     outcome: &mut Outcome,
     study: &Study<'_>,

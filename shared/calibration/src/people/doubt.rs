@@ -1,96 +1,96 @@
-//! Why an answer is not to be used.
+//! Reasons not to use a result.
 
-/// Median residual of a camera, as a share of the size of a person.
+/// Largest accepted median residual of a camera, as a fraction of the size of a person.
 const MOST_RESIDUAL: f64 = 0.04;
 
-/// A reason not to use what was found. Cameras by number, from 0.
+/// Reason not to use a result. Cameras are given by index, from 0.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
-    /// A camera sees nobody for long enough.
+    /// A camera sees no person for long enough.
     NoPeople {
-        /// Which.
+        /// Index of the camera.
         camera: usize,
-        /// How long it sees people, seconds.
+        /// Time for which the camera sees people, in seconds.
         seen_s: f64,
-        /// How long it should, seconds.
+        /// Minimum time, in seconds.
         least_s: f64,
     },
     /// The cameras see people together at too few instants.
     FewInstants {
-        /// Instants.
+        /// Number of instants.
         n: usize,
-        /// The fewest.
+        /// Minimum number of instants.
         least: usize,
     },
-    /// No two cameras see enough of one person at the same time to say where they stand.
+    /// No two cameras see enough of one person at the same time to determine their relative pose.
     NoPair,
-    /// A camera cannot be placed among the others.
+    /// A camera cannot be placed relative to the others.
     Unplaced {
-        /// Which.
+        /// Index of the camera.
         camera: usize,
-        /// Mean cost of a joint at the best place; none where too few joints are in view of it and of two others.
+        /// Mean cost of a joint at the best pose; `None` if too few joints are seen by this camera and by two others.
         cost: Option<f64>,
     },
-    /// Joints do not fit the rig.
+    /// The joints do not fit the rig.
     Fit {
-        /// Which camera.
+        /// Index of the camera.
         camera: usize,
-        /// Median residual as a share of the size of the person.
+        /// Median residual as a fraction of the size of the person.
         share: f64,
-        /// The most.
+        /// Largest accepted value.
         limit: f64,
     },
-    /// The adjustment did not come to an end.
+    /// The adjustment did not converge.
     NotConverged {
-        /// Iterations.
+        /// Number of iterations.
         iterations: usize,
     },
     /// The joints do not determine the rig at all.
     Undetermined {
-        /// Which of it.
+        /// Description of the undetermined part.
         what: String,
     },
     /// The pose of a camera is too uncertain.
     Uncertain {
-        /// Which.
+        /// Index of the camera.
         camera: usize,
-        /// Standard deviations: degrees, and share of the distance to the people.
+        /// Standard deviations: degrees, and fraction of the distance to the people.
         sd: [f64; 2],
-        /// The most of each.
+        /// Largest accepted value of each.
         limits: [f64; 2],
     },
     /// Two halves of the recording give different rigs.
     Halves {
-        /// The camera that differs most.
+        /// Index of the camera that differs most.
         camera: usize,
-        /// By how much: degrees, and share of the distance to the people.
+        /// Difference: degrees, and fraction of the distance to the people.
         by: [f64; 2],
-        /// The most of each.
+        /// Largest accepted value of each.
         limits: [f64; 2],
     },
-    /// A half of the recording gives no rig.
+    /// One half of the recording gives no rig.
     NoHalf {
-        /// Why.
+        /// Reason why it gives no rig.
         why: Box<Self>,
     },
-    /// Bones change their lengths.
+    /// The lengths of bones change over time.
     Bones {
-        /// Median deviation as a share of the length.
+        /// Median deviation as a fraction of the length.
         spread: f64,
-        /// The most.
+        /// Largest accepted value.
         limit: f64,
     },
-    /// Too few bones are seen to determine scale and vertical.
+    /// Too few bones are seen to determine the scale and the vertical.
     NoBody,
 }
 
 impl Doubt {
-    /// The doubt that the joints of a camera do not fit, if they do not.
+    /// Returns a doubt if the joints of a camera do not fit.
     ///
-    /// * `residual_px`: the median; `size_px`: of the person in the camera's pictures.
+    /// * `residual_px`: median residual; `size_px`: size of the person in the camera's pictures.
     pub(crate) fn of_fit(camera: usize, residual_px: f64, size_px: f64) -> Option<Self> {
         let (share, limit) = (residual_px / size_px, MOST_RESIDUAL);
-        // NaN is not less.
+        // NaN is also a doubt.
         (share >= limit || share.is_nan()).then_some(Self::Fit {
             camera,
             share,
@@ -98,9 +98,9 @@ impl Doubt {
         })
     }
 
-    /// For people to read.
+    /// Returns the doubt as a sentence.
     ///
-    /// * `names`: of the cameras.
+    /// * `names`: names of the cameras.
     #[expect(clippy::too_many_lines, reason = "one sentence for each doubt")]
     pub fn text(&self, names: &[&str]) -> String {
         let name = |camera: &usize| names.get(*camera).copied().unwrap_or("?");
@@ -116,17 +116,17 @@ impl Doubt {
             Self::FewInstants { n, least } => format!(
                 "two cameras see a person together at {n} instants, fewer than {least}"
             ),
-            Self::NoPair => "no two cameras see enough of one person at the same time, from different sides, to say where they stand"
+            Self::NoPair => "no two cameras see enough of one person at the same time, from different sides, to determine their relative pose"
                 .to_owned(),
             Self::Unplaced { camera, cost: None } => format!(
-                "{} sees too little of what two others see at the same time: nothing connects it with them",
+                "{} shares too few joints with two other cameras at the same time, so its pose cannot be found",
                 name(camera)
             ),
             Self::Unplaced {
                 camera,
                 cost: Some(cost),
             } => format!(
-                "{} fits the others nowhere (mean cost {cost:.1}): its intrinsics, its clock or its people may be wrong",
+                "{} does not fit the other cameras in any pose (mean cost {cost:.1}): its intrinsics, its clock or its people may be wrong",
                 name(camera)
             ),
             Self::Fit {
@@ -134,17 +134,17 @@ impl Doubt {
                 share,
                 limit,
             } => format!(
-                "the joints of {} are {:.1} % of a person's size from where the rig says, more than {:.1} %",
+                "the joints of {} are {:.1} % of a person's size away from the rig's prediction, more than {:.1} %",
                 name(camera),
                 100.0 * share,
                 100.0 * limit
             ),
             Self::NotConverged { iterations } => {
-                format!("the adjustment did not come to an end in {iterations} steps")
+                format!("the adjustment did not converge in {iterations} steps")
             }
             Self::Undetermined { what } => what.clone(),
             Self::Uncertain { camera, sd, limits } => format!(
-                "{} is known to {:.2} degrees and {:.1} % of its distance only (at most {} and {})",
+                "{} is known to only {:.2} degrees and {:.1} % of its distance (at most {} and {})",
                 name(camera),
                 sd[0],
                 100.0 * sd[1],
@@ -153,7 +153,7 @@ impl Doubt {
             ),
             Self::Halves { camera, by, limits } => format!(
                 "two halves of the recording disagree about {} by {:.2} degrees and {:.1} % of its distance (at most {} and {}): \
-                 too little of the volume was walked through, or a camera moved",
+                 people walked through too little of the volume, or a camera moved",
                 name(camera),
                 by[0],
                 100.0 * by[1],
@@ -166,7 +166,7 @@ impl Doubt {
                 100.0 * spread,
                 100.0 * limit
             ),
-            Self::NoBody => "too few joints are seen to tell how large a person is, and which way is up".to_owned(),
+            Self::NoBody => "too few joints are seen to determine the size of the person and the up direction".to_owned(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The whole: what is looked at, the rig, and what forbids to use it.
+//! The whole estimation: selection of data, the rig, and doubts about it.
 
 use crate::synchronisation::Film;
 use fastrand::Rng;
@@ -17,47 +17,47 @@ use super::sightings::{Chain, chains, ideal, interval_s, longest};
 use super::solve::{Clocks, Solved, Wanted, with_clocks};
 use super::{Recording, Settings};
 
-/// A camera sees people for at least so long, seconds.
+/// Minimum time for which each camera must see people, in seconds.
 pub(crate) const LEAST_SEEN_S: f64 = 0.5;
-/// The fewest instants.
+/// Minimum number of instants.
 pub(crate) const LEAST_INSTANTS: usize = 12;
-/// Change of bones.
+/// Largest accepted change of bone lengths, as a fraction.
 const MOST_BONES: f64 = 0.2;
 
-/// Why nothing was looked at.
+/// Reason why a recording cannot be used at all.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PeopleError {
-    /// One camera, or films of other cameras.
+    /// There is only one camera, or the number of films differs from that of cameras.
     #[error(
         "{cameras} cameras with {films} films: at least 2 cameras are needed, each with its film"
     )]
     Number {
-        /// Cameras.
+        /// Number of cameras.
         cameras: usize,
-        /// Films.
+        /// Number of films.
         films: usize,
     },
-    /// The joints are fewer than those of a body, or the number of sides is another.
-    #[error("{joints} joints with {sides} sides: at least {least} are needed, each with its side", least = N_JOINTS)]
+    /// There are fewer joints than a body has, or the number of sides differs from that of joints.
+    #[error("{joints} joints with {sides} sides: at least {least} joints are needed, each with its side", least = N_JOINTS)]
     Joints {
-        /// Joints.
+        /// Number of joints.
         joints: usize,
-        /// Sides.
+        /// Number of sides.
         sides: usize,
     },
-    /// A length that cannot be used.
-    #[error("a length of {metres} m cannot be used")]
+    /// A length is not a positive number.
+    #[error("the length {metres} m is not a positive number")]
     Length {
-        /// The number.
+        /// The length, in metres.
         metres: f64,
     },
 }
 
-/// Estimates where the cameras stand.
+/// Estimates the poses of the cameras.
 ///
 /// # Errors
 ///
-/// [`PeopleError`]: what cannot be looked at. If too little can be determined, the result is an [`Outcome`] with doubts.
+/// [`PeopleError`] if the recording cannot be used at all. If it determines too little, the result is an [`Outcome`] with doubts.
 pub fn estimate(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
     let Recording { cameras, films } = *recording;
     check(cameras, films, settings)?;
@@ -110,7 +110,7 @@ pub fn estimate(recording: &Recording<'_>, settings: &Settings) -> Result<Outcom
     Ok(outcome)
 }
 
-/// Solves, and says what is to be said of the answer.
+/// Solves for the rig, and adds doubts and uncertainties to the outcome.
 fn answer(outcome: &mut Outcome, given: (&[Camera], &Study<'_>), settings: &Settings) {
     let (study, focal) = (given.1, settings.focal);
     let mut random = Rng::with_seed(settings.seed);
@@ -144,7 +144,7 @@ fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), 
     }
 }
 
-/// Sees that the joints are those of a body, and every side is one of them.
+/// Checks that the joints are those of a body, and that every side is one of the joints.
 pub(crate) fn check_joints(joints: usize, sides: &[usize]) -> Result<(), PeopleError> {
     if joints < N_JOINTS || sides.len() != joints || sides.iter().any(|side| *side >= joints) {
         let sides = sides.len();
@@ -176,9 +176,9 @@ fn nothing(cameras: &[Camera], settings: &Settings) -> Outcome {
     }
 }
 
-/// Instants at which at least two cameras see their first person, evenly over the recording.
+/// Returns instants at which at least two cameras see their first person, evenly distributed over the recording.
 ///
-/// * `offsets_s`: of the clocks; 0 where none is given. `most`: the most instants.
+/// * `offsets_s`: offsets of the clocks; 0 for those that are not given. `most`: maximum number of instants.
 pub(crate) fn instants(
     chains: &[Vec<Chain>],
     (offsets_s, most): (&[f64], usize),

@@ -1,4 +1,4 @@
-//! The floor of a rig that is known already, from where people stood.
+//! Floor of a rig that is already known, from people who stood on it.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use statistics::Sorted;
@@ -8,22 +8,22 @@ use super::frame::{ANKLE, LEAST, Skeletons, Vertical, standing, stature_of, vert
 /// The floor that people stood on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Floor {
-    /// Against gravity.
+    /// Up direction, opposite to gravity.
     pub up: UnitVector3<f64>,
-    /// On the floor, in the middle of where people stood.
+    /// Point on the floor at the centre of the positions where people stood.
     pub middle: Point3<f64>,
-    /// Where the vertical comes from.
+    /// Source of the vertical.
     pub vertical: Vertical,
-    /// Feet that stood.
+    /// Number of standing feet that were used.
     pub n: usize,
-    /// How far their ankles were from one height: the median, metres.
+    /// Median deviation of the ankles from a common height, in metres.
     pub spread_m: f64,
 }
 
-/// The floor, below the ankles of people who stand; none where hardly anybody does.
+/// Returns the floor, below the ankles of people who stand; `None` if too few people stand.
 ///
-/// * `times_s`: of every instant, ascending.
-/// * `skeletons`: the 14 joints at each, metres in the world of the rig.
+/// * `times_s`: time of every instant, ascending.
+/// * `skeletons`: the 14 joints at each instant, in metres in the world of the rig.
 pub fn floor(times_s: &[f64], skeletons: &Skeletons) -> Option<Floor> {
     let (up, vertical) = vertical(times_s, skeletons)?;
     let feet = standing(times_s, skeletons, &up);
@@ -58,7 +58,7 @@ mod tests {
     use super::super::testing::walker;
     use super::*;
 
-    /// Someone who walks on the floor z = 0, in a world that was moved, with errors of joints.
+    /// Returns a person who walks on the floor z = 0, in a transformed world, with errors of the joints.
     fn walk(size: f64, noise: f64) -> (Vec<f64>, Skeletons, Isometry3<f64>) {
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -0.4, 1.1));
         let moved = Isometry3::from_parts(Translation3::new(2.0, -1.0, 0.5), rotation);
@@ -98,7 +98,7 @@ mod tests {
         assert_ne!(found.vertical, Vertical::Feet);
         let nobody: Skeletons = vec![vec![None; 14]; times_s.len()];
         assert_eq!(floor(&times_s, &nobody), None);
-        // Someone who is carried past, and never stands.
+        // This person is carried past and never stands.
         let mut carried = walk(0.0, 0.0).1;
         for (skeleton, time_s) in carried.iter_mut().zip(&times_s) {
             for joint in skeleton.iter_mut().flatten() {

@@ -1,4 +1,4 @@
-//! The world of a rig that has none: lengths, the vertical, and the floor.
+//! World coordinates for a rig without any: scale, vertical and floor.
 
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, UnitQuaternion, UnitVector3, Vector3};
@@ -7,59 +7,59 @@ use statistics::Sorted;
 
 use crate::align::{Similarity, aligned};
 
-/// Ankles slower than this stand, metres per second.
+/// Speed below which an ankle counts as standing, in metres per second.
 const STANDING_M_S: f64 = 0.25;
-/// Feet have to stand so far apart, metres, and so nearly in one plane, for it to be the floor.
+/// Minimum distance between standing feet, and largest deviation from a plane, for the plane to be the floor; metres.
 const FLOOR_M: [f64; 2] = [0.3, 0.06];
-/// The normal of the floor is within so much of the direction of bodies, radians.
+/// Largest angle between the normal of the floor and the direction of bodies, in radians.
 const FROM_BODIES: f64 = 0.5;
-/// Legs bent by less than this belong to a person who stands, radians.
+/// Largest bend of the legs of a person who stands, in radians.
 const STRAIGHT: f64 = 0.35;
-/// Height of the ankle above the floor as a share of the stature (Drillis & Contini 1966).
+/// Height of the ankle above the floor as a fraction of the stature (Drillis & Contini 1966).
 pub(crate) const ANKLE: f64 = 0.039;
-/// The fewest skeletons, or feet, that say anything.
+/// Minimum number of skeletons or feet for an estimate.
 pub(crate) const LEAST: usize = 5;
-/// Ankles, knees, hips of both sides, and the neck.
+/// Ankle, knee and hip of each side, and the neck.
 const LEGS: [[usize; 3]; 2] = [[0, 1, 2], [5, 4, 3]];
 const NECK: usize = 12;
 
 /// Source of the scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scale {
-    /// The standing height of the person, metres, by the lengths of the bones.
+    /// Standing height of the person in metres, from the lengths of the bones.
     Height(f64),
-    /// The distance of two cameras, metres.
+    /// Distance between two cameras, in metres.
     Distance(usize, usize, f64),
-    /// The rig that was given: its scale, and its world.
+    /// The given rig, with its scale and its world.
     Rig,
 }
 
-/// Where the vertical comes from.
+/// Source of the vertical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Vertical {
     /// The plane in which the feet stand.
     Feet,
     /// People who stand upright.
     Bodies,
-    /// Bodies in the mean: nobody stands with straight legs. May be off by many degrees.
+    /// Mean direction of bodies, used if nobody stands with straight legs. It may be wrong by many degrees.
     Leaning,
-    /// The rig that was given.
+    /// The given rig.
     Rig,
 }
 
 /// Skeletons by instant and joint.
 pub type Skeletons = Vec<Vec<Option<Point3<f64>>>>;
 
-/// Takes the world of a solution to metres, with the floor at z = 0, and says where the vertical comes from.
+/// Transformation from the world of a solution to metres with the floor at z = 0, with the source of the vertical.
 pub(crate) struct World {
     pub(crate) to_metres: Similarity,
     pub(crate) up: Option<UnitVector3<f64>>,
     pub(crate) vertical: Vertical,
-    /// Standard deviation of the scale, as a share, as far as bones determine it.
+    /// Relative standard deviation of the scale, if the bones determine it.
     pub(crate) scale_sd: f64,
 }
 
-/// `None` if too few bones are seen to determine the scale.
+/// Returns the transformation; `None` if too few bones are seen to determine the scale.
 pub(crate) fn world(
     cameras: &[Camera],
     given: (&[Camera], Option<UnitVector3<f64>>),
@@ -114,7 +114,7 @@ pub(crate) fn world(
     })
 }
 
-/// The turn that takes a direction to z by the shortest way.
+/// Returns the smallest rotation that takes a direction to z.
 fn turn_to_z(up: UnitVector3<f64>) -> UnitQuaternion<f64> {
     let half = UnitQuaternion::rotation_between(&up, &Vector3::z());
     half.unwrap_or_else(|| {
@@ -133,7 +133,7 @@ fn joints(skeleton: &[Option<Point3<f64>>]) -> Joints {
     joints
 }
 
-/// The stature of all skeletons together, the median, and its deviation; metres.
+/// Returns the median stature over all skeletons, and its standard deviation, in metres.
 pub(crate) fn stature_of(skeletons: &Skeletons) -> Option<(f64, f64)> {
     let mut each: Vec<[f64; 2]> = skeletons
         .iter()
@@ -148,9 +148,9 @@ pub(crate) fn stature_of(skeletons: &Skeletons) -> Option<(f64, f64)> {
     Some((metres, sd))
 }
 
-/// Metres in a unit such that the person is `metres` tall, with the relative deviation.
+/// Returns the number of metres per unit if the person is `metres` tall, and its relative standard deviation.
 fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
-    // Shares of the stature depend on the stature a little, so the factor is found by bisection.
+    // The proportions of the body depend slightly on the stature, so the factor is found by bisection.
     let tall = |factor: f64| {
         let scaled = skeletons.iter();
         let scaled: Skeletons = scaled
@@ -173,9 +173,9 @@ fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
     Some((factor, sd / metres))
 }
 
-/// The lower ankle of every instant at which it stands, metres.
+/// Returns the lower ankle of every instant at which it stands, in metres.
 ///
-/// * `up`: about against gravity.
+/// * `up`: approximate up direction.
 pub(crate) fn standing(
     times_s: &[f64],
     skeletons: &Skeletons,
@@ -205,7 +205,7 @@ pub(crate) fn standing(
     feet
 }
 
-/// The direction against gravity.
+/// Returns the up direction, and its source.
 pub(crate) fn vertical(
     times_s: &[f64],
     skeletons: &Skeletons,
@@ -235,7 +235,7 @@ pub(crate) fn vertical(
     Some((bodies, source))
 }
 
-/// The normal of the plane that feet stand in.
+/// Returns the normal of the plane in which the feet stand.
 fn floor(feet: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
     let mut kept: Vec<Point3<f64>> = feet.to_vec();
     let mut normal = None;
@@ -262,7 +262,7 @@ fn floor(feet: &[Point3<f64>]) -> Option<UnitVector3<f64>> {
     normal
 }
 
-/// From the middle of the ankles to the neck of someone who stands on a straight leg, with a straight trunk above it.
+/// Returns the vector from the midpoint of the ankles to the neck, for a person who stands on a straight leg with a straight trunk.
 fn body(skeleton: &[Option<Point3<f64>>], most: f64) -> Option<Vector3<f64>> {
     let neck = skeleton[NECK]?.coords;
     let (mut ankles, mut hips) = (Vector3::zeros(), Vector3::zeros());
@@ -278,7 +278,7 @@ fn body(skeleton: &[Option<Point3<f64>>], most: f64) -> Option<Vector3<f64>> {
     (is_straight && way.norm() > 1e-9).then(|| way / way.norm())
 }
 
-/// The direction in the middle: each axis by its median.
+/// Returns the direction whose coordinates are the medians along each axis.
 fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
     if all.len() < LEAST {
         return None;
@@ -289,7 +289,7 @@ fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
     UnitVector3::try_new(Vector3::new(axis(0)?, axis(1)?, axis(2)?), 1e-9)
 }
 
-/// How much the bones change their lengths over time: the median over bones of the median deviation, as a share.
+/// Returns the change of bone lengths over time: the median over bones of their median deviation, as a fraction.
 pub(crate) fn bone_spread(skeletons: &Skeletons) -> Option<f64> {
     let mut each = Vec::new();
     for bone in BONES.iter().filter(|bone| bone.from[0] == bone.from[1]) {

@@ -1,20 +1,20 @@
-//! One person at one instant: joints in space, and what the cameras see of them.
+//! One person at one instant: joints in space, and their positions in the cameras.
 
 use geometry::{Camera, Observation, Settings, triangulate};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::sightings::Sight;
 
-/// Residuals beyond this many standard deviations lose their weight.
+/// Number of standard deviations beyond which residuals lose their weight.
 pub(super) const WIDTH: f64 = 2.0;
-/// Rays that meet at a smaller angle do not determine depth, radians.
+/// Minimum angle between rays, in radians; a smaller angle does not determine the depth.
 const LEAST_ANGLE: f64 = 0.02;
 
 /// A joint that a camera sees.
 #[derive(Debug, Clone)]
 pub(super) struct Seen {
     pub(super) camera: usize,
-    /// Which point of the instant.
+    /// Index of the point in the instant.
     pub(super) point: usize,
     pub(super) at: Point2<f64>,
     pub(super) speed: Vector2<f64>,
@@ -24,12 +24,12 @@ pub(super) struct Seen {
 /// One person at one instant.
 #[derive(Debug, Clone)]
 pub(super) struct Instant {
-    /// Which of all instants.
+    /// Index of the instant.
     pub(super) nth: usize,
     /// The joint of each point.
     pub(super) joints: Vec<usize>,
     pub(super) points: Vec<Point3<f64>>,
-    /// Weight of each point: a joint that stays in its place has the same error all the time.
+    /// Weight of each point. It is lower for a joint that stays in one place, because its error is then always the same.
     pub(super) shares: Vec<f64>,
     pub(super) seen: Vec<Seen>,
 }
@@ -39,7 +39,7 @@ impl Instant {
         self.joints.iter().position(|known| *known == joint)
     }
 
-    /// From one end of the person to the other.
+    /// Returns the extent of the person.
     pub(super) fn size(&self) -> f64 {
         let extent = |axis: usize| {
             let each = self.points.iter().map(|point| point[axis]);
@@ -57,7 +57,7 @@ impl Instant {
     }
 }
 
-/// The joints of an instant that at least two cameras see, triangulated.
+/// Triangulates the joints of an instant that at least two cameras see.
 pub(super) fn instant(
     cameras: &[Camera],
     seen: &[Vec<Option<Sight>>],
@@ -103,7 +103,7 @@ pub(super) fn instant(
     all
 }
 
-/// A point by robust triangulation.
+/// Returns a point from robust triangulation.
 pub(crate) fn place(observations: &[Observation<'_>]) -> Option<Point3<f64>> {
     let sigma = observations.first()?.sigma_px;
     let settings = Settings {

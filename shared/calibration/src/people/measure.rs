@@ -1,26 +1,26 @@
-//! How well joints fit, and where in the picture they are.
+//! Quality of the fit of joints, and their distribution over the picture.
 use statistics::Sorted;
 
 use super::adjust::Adjustment;
 use super::bias::share_of;
 
-/// Fewer joints of a kind have the expected error of all.
+/// Minimum number of residuals of a joint for an expected error of its own; below this, the error of all joints is used.
 const LEAST: usize = 30;
-/// The least expected error, pixels.
+/// Smallest expected error, in pixels.
 const LEAST_PX: f64 = 0.3;
-/// The median length of a residual in the plane is this many standard deviations of one axis.
+/// Median length of a residual in the plane, in standard deviations of one axis.
 const MEDIAN: f64 = 1.1774;
-/// Joints take part in what they are measured by: four views of eight numbers determine three.
+/// Correction for joints that are part of the fit they are compared with: the eight numbers of four views determine three coordinates.
 const FITTED: f64 = 1.25;
-/// Cells of a picture along each axis.
+/// Number of cells of a picture along each axis.
 pub(crate) const CELLS: usize = 8;
 
-/// Expected errors from the residuals, by camera and joint.
+/// Returns the expected errors from the residuals, by camera and joint.
 ///
-/// Each joint has one, as a share of the size of the person, which all cameras together tell: errors of every camera
-/// separately would let one camera have its way in all.
+/// Each joint has one error relative to the size of the person, estimated from all cameras together. With separate errors for each camera,
+/// a single camera could dominate the result.
 ///
-/// * `sizes_px`: the size of the person in each camera.
+/// * `sizes_px`: size of the person in each camera.
 pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {
     let mut all = vec![Vec::new(); n_joints];
     problem.residuals(&mut |residual| {
@@ -38,7 +38,7 @@ pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
     sizes_px.iter().map(of_camera).collect()
 }
 
-/// Returns the constant error of joints by camera, pixels; `None` where it is next to nothing.
+/// Returns the constant error of joints by camera, in pixels; `None` if it is negligible.
 pub(crate) fn biases(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Option<Vec<f64>> {
     let mut all = vec![Vec::new(); n_joints * sizes_px.len()];
     problem.residuals(&mut |residual| {
@@ -49,20 +49,20 @@ pub(crate) fn biases(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) ->
     Some(sizes_px.iter().map(|sizes_px| share * sizes_px).collect())
 }
 
-/// How the joints of a camera fit.
+/// Quality of the fit of a camera's joints.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Fit {
-    /// Joints that count.
+    /// Number of joints that were used.
     pub(crate) n: usize,
     /// Median residual, pixels.
     pub(crate) median_px: f64,
-    /// Share of joints within three times their expected error.
+    /// Fraction of joints within three times their expected error.
     pub(crate) inliers: f64,
-    /// How many joints fall into each cell of the picture, row by row.
+    /// Number of joints in each cell of the picture, row by row.
     pub(crate) cells: Vec<usize>,
 }
 
-/// The fit of every camera.
+/// Returns the fit of every camera.
 pub(crate) fn fits(problem: &Adjustment, sigmas_px: &[Vec<f64>]) -> Vec<Fit> {
     let cameras = problem.cameras().cameras();
     let mut lengths = vec![Vec::new(); cameras.len()];

@@ -7,9 +7,9 @@ use statistics::Sorted;
 
 use super::frame::Skeletons;
 
-/// The fewest joints of a person that show how well it fits.
+/// Minimum number of joints of a person to judge the fit.
 const LEAST: usize = 6;
-/// Two pictures of a camera are at least so far apart, seconds.
+/// Minimum time between two pictures of a camera, in seconds.
 const APART_S: f64 = 0.5;
 
 /// A rig and the films of its cameras.
@@ -19,31 +19,31 @@ pub struct Fitted<'a> {
     pub cameras: &'a [Camera],
     /// Film of each camera.
     pub films: &'a [Film],
-    /// Offset added to the times of each camera to get common times, seconds.
+    /// Offset to add to the times of each camera to get common times, in seconds.
     pub offsets_s: &'a [f64],
-    /// The mirror of each joint on the other side of the body.
+    /// For each joint, the index of its mirror on the other side of the body.
     pub sides: &'a [usize],
-    /// Instants, seconds on the common clock, and the skeleton at each.
+    /// Instants in seconds on the common clock, and the skeleton at each.
     pub skeletons: (&'a [f64], &'a Skeletons),
 }
 
-/// A picture, and how its person fits.
+/// A picture, and the fit of its person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Misfit {
-    /// The camera.
+    /// Index of the camera.
     pub camera: usize,
-    /// When it was taken, seconds by the clock of the camera.
+    /// Time of the picture, in seconds by the clock of the camera.
     pub time_s: f64,
-    /// Median distance of the joints from where the rig has them, pixels.
+    /// Median distance of the joints from the positions that the rig predicts, in pixels.
     pub residual_px: f64,
-    /// Joints as they were seen, and where the rig has them; pixels of the calibrated picture.
+    /// Seen position and predicted position of each joint, in pixels of the calibrated picture.
     pub joints: Vec<[[f64; 2]; 2]>,
 }
 
 impl Fitted<'_> {
-    /// The worst pictures of each camera, worst first.
+    /// Returns the worst pictures of each camera, worst first.
     ///
-    /// * `most`: of a camera.
+    /// * `most`: maximum number of pictures per camera.
     pub fn worst(&self, most: usize) -> Vec<Misfit> {
         let mut worst: Vec<Misfit> = Vec::new();
         for camera in 0..self.cameras.len() {
@@ -90,7 +90,7 @@ impl Fitted<'_> {
         found
     }
 
-    /// How a person fits a skeleton, with the sides that fit better.
+    /// Returns the fit of a person to a skeleton; left and right are exchanged if that fits better.
     fn fit(
         &self,
         camera: usize,
@@ -149,7 +149,7 @@ mod tests {
                         score: 1.0,
                     })
                 });
-                // The sides of one camera are exchanged.
+                // One camera has left and right exchanged.
                 let other = |joint: usize| if nth == 2 { sides()[joint] } else { joint };
                 let joints = (0..14).map(|i| joints[other(i)]).collect();
                 Shot {

@@ -6,56 +6,56 @@ use nalgebra::{Point3, UnitVector3};
 use super::doubt::Doubt;
 use super::frame::Vertical;
 
-/// Result for a camera.
+/// Result for one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraReport {
-    /// Joints that took part.
+    /// Number of joints that were used.
     pub joints: usize,
-    /// Median residual, pixels.
+    /// Median residual, in pixels.
     pub residual_px: f64,
-    /// Share of joints within three times their expected error.
+    /// Fraction of joints within three times their expected error.
     pub inliers: f64,
-    /// Joints in each of 8 x 8 cells of the picture, row by row.
+    /// Number of joints in each of 8 x 8 cells of the picture, row by row.
     pub cells: Vec<usize>,
-    /// How far it may be from where it is, by the residuals, the rigs being laid upon one another: degrees, metres.
+    /// Standard deviation of the pose in degrees and metres, from the residuals, after alignment of the whole rig.
     pub sd: [f64; 2],
-    /// Standard deviation of the focal length, pixels, where it was estimated.
+    /// Standard deviation of the focal length in pixels, if it was estimated.
     pub focal_sd_px: Option<f64>,
-    /// Difference between halves of the recording: degrees, metres.
+    /// Difference between the halves of the recording, in degrees and metres.
     pub halves: Option<[f64; 2]>,
-    /// Offset added to its times to have common ones, seconds, and the standard deviation.
+    /// Offset to add to the camera's times to get common times, and its standard deviation, in seconds.
     pub offset_s: [f64; 2],
 }
 
 /// Result of a calibration from people.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// The cameras with their new poses; as given where there is no answer at all.
+    /// The cameras with their new poses; unchanged if there is no result.
     pub cameras: Vec<Camera>,
-    /// Against gravity.
+    /// Up direction, opposite to gravity.
     pub up: Option<UnitVector3<f64>>,
-    /// Where that comes from.
+    /// Source of the up direction.
     pub vertical: Vertical,
-    /// Standard deviation of the scale as a share, as far as the bones determine it.
+    /// Relative standard deviation of the scale, if the bones determine it.
     pub scale_sd: f64,
-    /// The standing height of the person by the lengths of the bones, metres.
+    /// Standing height of the person from the lengths of the bones, in metres.
     pub stature_m: Option<f64>,
-    /// One for each camera; none where there is no answer.
+    /// Results for the cameras; empty if there is no result.
     pub reports: Vec<CameraReport>,
-    /// Every reason not to use it.
+    /// Every reason not to use the result.
     pub doubts: Vec<Doubt>,
-    /// Warnings about cameras that are known less well than is good.
+    /// Warnings about cameras that are less certain than they should be.
     pub cautions: Vec<Doubt>,
-    /// True if time offsets were found, the joints contradicting those that were given; else they are as given.
+    /// True if time offsets were estimated because the joints contradict the given ones; otherwise the offsets are unchanged.
     pub clocks_are_found: bool,
-    /// Instants that were looked at.
+    /// Number of instants that were used.
     pub n_instants: usize,
-    /// Their first and last, seconds on the common clock.
+    /// First and last instant, in seconds on the common clock.
     pub span_s: [f64; 2],
-    /// Views whose left and right were exchanged.
+    /// Number of views whose left and right were exchanged.
     pub n_exchanged: usize,
-    /// The instants that were looked at, seconds on the common clock.
+    /// Instants that were used, in seconds on the common clock.
     pub times_s: Vec<f64>,
-    /// The skeletons that were found on the way, metres: by instant and joint.
+    /// Skeletons found during the calibration, by instant and joint, in metres.
     pub skeletons: Vec<Vec<Option<Point3<f64>>>>,
 }

@@ -1,4 +1,4 @@
-//! The pose of a camera, from joints whose places are known.
+//! Pose of a camera from joints with known positions.
 
 use fastrand::Rng;
 use geometry::Camera;
@@ -10,17 +10,17 @@ use nalgebra::{
 
 use super::two_view::normalised;
 
-/// Samples of six joints that are drawn.
+/// Number of samples of six joints.
 const SAMPLES: usize = 250;
-/// Joints that a sample is judged by, and that a pose is fitted to.
+/// Number of joints by which a sample is judged, and number of joints to which a pose is fitted.
 const JUDGES: [usize; 2] = [250, 700];
-/// Poses that are fitted: the best of the samples.
+/// Number of poses to fit: the best of the samples.
 const STARTS: usize = 5;
 
-/// A joint: its place in the world, in the ideal picture, and the expected error, pixels.
+/// A joint: its position in the world, its position in the ideal picture, and its expected error in pixels.
 pub(crate) type Known = (Point3<f64>, Point2<f64>, f64);
 
-/// A camera put where its picture says, with the mean cost of a joint; none where too few are known.
+/// Returns a camera placed according to its picture, with the mean cost of a joint; `None` if too few joints are known.
 pub(crate) fn resected(
     camera: &Camera,
     known: &[Known],
@@ -76,7 +76,7 @@ fn mean_cost(camera: &Camera, known: &[Known]) -> f64 {
     known.iter().map(cost).sum::<f64>() / known.len() as f64
 }
 
-/// The linear solution of six joints, with the nearest rotation.
+/// Returns the linear solution for six joints, with the nearest rotation.
 fn linear(camera: &Camera, sample: &[Known; 6]) -> Option<Isometry3<f64>> {
     let centre = sample.iter().map(|sample| sample.0.coords).sum::<nalgebra::Vector3<f64>>() / 6.0;
     let mut normal = SMatrix::<f64, 12, 12>::zeros();
@@ -111,7 +111,7 @@ fn linear(camera: &Camera, sample: &[Known; 6]) -> Option<Isometry3<f64>> {
     translation.iter().all(|value| value.is_finite()).then_some(pose)
 }
 
-/// One camera, and joints that stay where they are.
+/// Problem with one camera and fixed joints.
 #[derive(Clone)]
 struct Resection<'a> {
     cameras: Cameras,

@@ -1,4 +1,4 @@
-//! Left and right exchanged: which view at which instant has it the other way round.
+//! Detection of views in which left and right are exchanged at an instant.
 
 use geometry::{Camera, Observation};
 use nalgebra::Point3;
@@ -7,12 +7,12 @@ use super::instant::place;
 use super::sightings::{Sight, Sightings};
 use super::two_view::{Match, essential_of, normalised, sampson};
 
-/// Amount by which the cost has to be less the other way round.
+/// Minimum decrease of the cost for an exchange.
 const CLEARLY: f64 = 4.0;
-/// The fewest joints with sides that are compared.
+/// Minimum number of joints with sides to compare.
 pub(crate) const LEAST_JOINTS: usize = 4;
 
-/// Costs of joints as named and with sides exchanged.
+/// Costs of joints with sides as named and with sides exchanged.
 #[derive(Default)]
 struct Costs {
     here: f64,
@@ -26,9 +26,9 @@ impl Costs {
     }
 }
 
-/// Exchanges the sides of a view at an instant where the other views clearly say so; returns how many times.
+/// Exchanges the sides of a view at an instant if the other views clearly indicate it. Returns the number of exchanges.
 ///
-/// With three views and more each is compared with the joints that the others triangulate, with two by epipolar lines.
+/// With three or more views, each view is compared with the joints that the others triangulate. With two views, epipolar lines are used.
 pub(crate) fn exchange(
     cameras: &[Camera],
     sightings: &mut Sightings,
@@ -37,7 +37,7 @@ pub(crate) fn exchange(
 ) -> usize {
     let mut n = 0;
     for instant in 0..sightings.seen.len() {
-        // The worst of an instant first: an exchanged view makes the others look wrong.
+        // The worst view of an instant goes first, because an exchanged view makes the others look wrong.
         for _ in 0..cameras.len() {
             let seen = &sightings.seen[instant];
             let gain = |camera: usize| {
@@ -90,7 +90,7 @@ fn costs(
     costs
 }
 
-/// Where the other cameras see a joint.
+/// Returns a joint as triangulated by the other cameras.
 pub(crate) fn point(
     cameras: &[Camera],
     seen: &[Vec<Option<Sight>>],
@@ -116,7 +116,7 @@ fn of_point(camera: &Camera, point: &Point3<f64>, both: [Sight; 2]) -> Option<[f
     Some(both.map(|sight| (sight.at - image).norm()))
 }
 
-/// Distances from the epipolar line, pixels of the second camera.
+/// Returns the distances from the epipolar line, in pixels of the second camera.
 pub(crate) fn of_pair(
     cameras: &[Camera],
     [a, b]: [usize; 2],

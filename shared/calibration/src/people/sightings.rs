@@ -1,57 +1,57 @@
-//! From films to sightings: where the joints of one person are in every camera, at the same instants.
+//! Sightings from films: the joints of one person in every camera at common instants.
 
 use crate::synchronisation::{Film, Track, tracks};
 use geometry::{Camera, Lens};
 use nalgebra::{Point2, Vector2};
 use statistics::Sorted;
 
-/// Standard deviation of the kernel that smooths places over time: this many intervals between pictures, and seconds.
+/// Standard deviation of the kernel that smooths positions over time, in intervals between pictures and in seconds.
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
-/// Two tracks of a camera can be one person where the second begins within this many seconds.
+/// Largest gap between two tracks of a camera that can be one person, in seconds.
 const LONGEST_GAP_S: f64 = 3.0;
-/// Or this many seconds before the first ends, in one place: a person whose pose is seen in two ways for a while.
+/// Largest overlap of two tracks in one place that can be one person, in seconds. For a moment, one person may be detected in two poses.
 const LONGEST_OVERLAP_S: f64 = 0.25;
-/// Two tracks are in one place where joints of the one end nearer than this to where those of the other begin, sizes of the person.
+/// Largest distance between the end of one track and the start of another in one place, in sizes of the person.
 const ONE_PLACE: f64 = 0.3;
-/// Chains of a camera that are looked at, those that are seen best.
+/// Maximum number of chains of a camera; those with the best visibility are used.
 const MOST_CHAINS: usize = 3;
-/// Chains with less than this share of the pictures of the longest one are not.
+/// Minimum length of a chain relative to the longest one.
 const LEAST_SHARE: f64 = 0.15;
 
 /// A joint in a camera at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sight {
-    /// Ideal pixels.
+    /// Position, in ideal pixels.
     pub(crate) at: Point2<f64>,
-    /// Ideal pixels per second; 0 where it is not known.
+    /// Speed, in ideal pixels per second; 0 if it is not known.
     pub(crate) speed: Vector2<f64>,
-    /// 0 to 1.
+    /// Weight, 0 to 1.
     pub(crate) weight: f64,
 }
 
-/// Tracks of a camera that may be one person: one after the other.
+/// Successive tracks of a camera that may be one person.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     tracks: Vec<Track>,
-    /// Between two pictures, seconds.
+    /// Time between two pictures, in seconds.
     interval_s: f64,
 }
 
 impl Chain {
-    /// How long it is seen, seconds.
+    /// Returns the time for which the person is seen, in seconds.
     pub(crate) fn seen_s(&self) -> f64 {
         let each = self.tracks.iter().map(Track::span);
         each.map(|[from, to]| to - from).sum()
     }
 
-    /// How much it may be of use: how long it is seen, as large and as surely as it is. What a network takes for a person, a chair say, is
-    /// seen for as long as anybody, but neither large nor surely.
+    /// Returns the likely usefulness of the chain: its duration, weighted by size and score. An object that a network takes for a person,
+    /// such as a chair, may be seen for as long as a person, but is small or has a low score.
     fn worth(&self) -> f64 {
         let of = |track: &Track| (track.span()[1] - track.span()[0]) * track.size() * track.score();
         self.tracks.iter().map(of).sum()
     }
 
-    /// First and last time, by the clock of the camera.
+    /// Returns the first and last time, by the clock of the camera.
     pub(crate) fn span(&self) -> [f64; 2] {
         let each = self.tracks.iter().map(Track::span);
         each.fold([f64::INFINITY, f64::NEG_INFINITY], |span, it| {
@@ -59,7 +59,7 @@ impl Chain {
         })
     }
 
-    /// The size of the person, ideal pixels.
+    /// Returns the size of the person, in ideal pixels.
     pub(crate) fn size(&self) -> f64 {
         let mut each: Vec<f64> = self.tracks.iter().map(Track::size).collect();
         each.sort_by(f64::total_cmp);
@@ -77,10 +77,10 @@ impl Chain {
         })
     }
 
-    /// By the places one picture before and one after.
+    /// Returns the speed of a joint, from its positions one picture before and one after.
     ///
-    /// The slope of the line that tells the place would not do: between two pictures its errors are those of the place, too, so that
-    /// an adjustment would move clocks to where the two cancel, half a picture away from the truth.
+    /// The slope of the line that gives the position is not suitable. Between two pictures, its errors are those of the position as well.
+    /// An adjustment would then move clocks until both errors cancel, half a picture away from the truth.
     fn speed(&self, track: &Track, joint: usize, time_s: f64) -> Vector2<f64> {
         let at = |time_s: f64| Some(Vector2::from(track.place(joint, time_s)?.at));
         let ends = [-1.0, 1.0].map(|sign| at(time_s + sign * self.interval_s));
@@ -90,7 +90,7 @@ impl Chain {
         (after - before) / (2.0 * self.interval_s)
     }
 
-    /// Returns the gap before a track that this chain may continue with, seconds; less than 0 where both are seen at once.
+    /// Returns the gap in seconds before a track with which this chain may continue; negative if they overlap.
     fn gap(&self, track: &Track, n_joints: usize) -> Option<f64> {
         let [[_, end], [begin, track_end]] = [self.span(), track.span()];
         let gap = begin - end;
@@ -99,12 +99,12 @@ impl Chain {
         (can_be && may_be).then_some(gap)
     }
 
-    /// Returns true if a track begins where the last one of the chain then is.
+    /// Returns true if a track begins near the end of the chain's last track.
     fn is_in_place(&self, track: &Track, n_joints: usize) -> bool {
         let Some(last) = self.tracks.last() else {
             return false;
         };
-        // Where a joint is first seen, or last: not all are at the very end.
+        // Returns the first or last visible position of a joint, which may not be visible at the very end.
         let near = |track: &Track, joint: usize, from_s: f64, sign: f64| {
             let n = (LONGEST_OVERLAP_S / self.interval_s).ceil() as i32;
             let mut times = (0..=n).map(|nth| from_s + sign * self.interval_s * f64::from(nth));
@@ -121,7 +121,7 @@ impl Chain {
     }
 }
 
-/// The people that a camera sees longest, those first who are seen best.
+/// Returns the people that a camera sees longest, those with the best visibility first.
 pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: f64) -> Vec<Chain> {
     let own_s = self::interval_s(film).unwrap_or(interval_s);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
@@ -146,27 +146,27 @@ pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: 
     chains
 }
 
-/// Whom a camera sees longest.
+/// Returns the person that a camera sees longest.
 pub(crate) fn longest(chains: &[Chain]) -> Option<&Chain> {
     let each = chains.iter();
     each.max_by(|a, b| a.seen_s().total_cmp(&b.seen_s()))
 }
 
-/// A camera without distortion, which sees ideal pixels.
+/// Returns the camera without distortion; its pixels are the ideal pixels.
 pub(crate) fn ideal(camera: &Camera) -> Camera {
     let mut camera = camera.clone();
     camera.intrinsics.lens = Lens::default();
     camera
 }
 
-/// Between two pictures of a film, seconds.
+/// Returns the time between two pictures of a film, in seconds.
 pub(crate) fn interval_s(film: &Film) -> Option<f64> {
     let each = film.shots.array_windows();
     let steps: Vec<f64> = each.map(|[a, b]| b.time_s - a.time_s).collect();
     Sorted::new(steps).upper_median().filter(|upper_median| *upper_median > 0.0)
 }
 
-/// The joints of one person at instants: by instant, camera and joint.
+/// Joints of one person, by instant, camera and joint.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sightings {
     pub(crate) times_s: Vec<f64>,
@@ -174,10 +174,10 @@ pub(crate) struct Sightings {
 }
 
 impl Sightings {
-    /// Looks up all cameras at instants of the common clock.
+    /// Finds the joints in all cameras at instants of the common clock.
     ///
-    /// * `chains`: the person in every camera, none where he is not known there.
-    /// * `offsets_s`: what is added to the times of a camera to have the common ones.
+    /// * `chains`: the person in every camera; `None` if the person is not known there.
+    /// * `offsets_s`: offsets to add to the times of each camera to get common times.
     pub(crate) fn new(
         chains: &[Option<&Chain>],
         times_s: &[f64],
@@ -196,14 +196,14 @@ impl Sightings {
         }
     }
 
-    /// Exchanges left and right of a camera at an instant.
+    /// Exchanges left and right of a camera at one instant.
     pub(crate) fn exchange(&mut self, instant: usize, camera: usize, sides: &[usize]) {
         let own = &self.seen[instant][camera];
         let other = sides.iter().map(|side| own.get(*side).copied().flatten());
         self.seen[instant][camera] = other.collect();
     }
 
-    /// Exchanges left and right of a camera everywhere.
+    /// Exchanges left and right of a camera at all instants.
     pub(crate) fn exchange_all(&mut self, camera: usize, sides: &[usize]) {
         for instant in 0..self.seen.len() {
             self.exchange(instant, camera, sides);
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use crate::people::testing::{N_JOINTS, ring};
 
-    /// Someone who stands, with noise, at 10 Hz.
+    /// Returns a film of a person who stands, with noise, at 10 Hz.
     fn standing() -> Film {
         let mut random = Rng::with_seed(2);
         let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
@@ -262,7 +262,7 @@ mod tests {
         assert!(sizes[0] > 3.0 * sizes[1], "{sizes:?}");
     }
 
-    /// Someone at 60 Hz who is seen in another pose from one second on, and for a moment in both.
+    /// Returns a film at 60 Hz of a person whose detected pose changes after one second; for a moment, both poses are detected.
     fn in_two_poses(away_px: f64) -> Film {
         let mut film = standing();
         film.shots.truncate(120);
@@ -329,7 +329,7 @@ mod tests {
                 }
             }
             let correlation = both / (squares[0] * squares[1]).sqrt();
-            // Of some 8000 numbers.
+            // The correlation is over about 8000 numbers.
             assert!(correlation.abs() < 0.04, "{correlation} at {phase} s");
         }
     }

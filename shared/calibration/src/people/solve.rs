@@ -1,4 +1,4 @@
-//! From a start to the adjustment of everything.
+//! Solution from an initial rig to the adjustment of everything.
 
 use fastrand::Rng;
 use geometry::Camera;
@@ -12,22 +12,22 @@ use super::measure::{Fit, biases, fits, sigmas};
 use super::sides::exchange;
 use super::sightings::Sightings;
 
-/// Rounds of clocks, sides, expected errors and adjustment.
+/// Number of rounds of clocks, sides, expected errors and adjustment.
 const ROUNDS: usize = 4;
-/// Standard deviation of an offset about what the start knows, seconds.
+/// Standard deviation of an offset about its initial value, in seconds.
 const OFFSET_SD_S: f64 = 0.1;
-/// Standard deviation of a focal length that is estimated, as a share.
+/// Standard deviation of an estimated focal length, as a fraction.
 const FOCAL_SD: f64 = 0.1;
 
-/// A rig in a world of its own, and all that led to it.
+/// A solved rig in a world of its own, with the data it was solved from.
 #[derive(Debug, Clone)]
 pub(crate) struct Solved {
     pub(crate) choices: Vec<Choice>,
     pub(crate) problem: Adjustment,
     pub(crate) report: Report,
-    /// By camera and joint, pixels.
+    /// Expected errors by camera and joint, in pixels.
     pub(crate) sigmas_px: Vec<Vec<f64>>,
-    /// Views whose sides were exchanged.
+    /// Number of views whose sides were exchanged.
     pub(crate) n_exchanged: usize,
 }
 
@@ -36,21 +36,21 @@ impl Solved {
         self.problem.cameras().cameras()
     }
 
-    /// By instant and joint.
+    /// Returns the skeletons, by instant and joint.
     pub(crate) fn skeletons(&self, n_joints: usize) -> Vec<Vec<Option<Point3<f64>>>> {
         skeletons(&self.problem, n_joints)
     }
 }
 
-/// Joints contradict the clocks that were given where they fit by this share better with others.
+/// Minimum improvement of the fit, as a fraction, for which the joints contradict the given clocks.
 const BETTER: f64 = 0.15;
 
 /// Treatment of the clocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Clocks {
-    /// They are as given.
+    /// The given clocks are used.
     Given,
-    /// They are found.
+    /// The clocks are estimated.
     Found,
 }
 
@@ -61,12 +61,13 @@ pub(crate) struct Wanted {
     pub(crate) clocks: Clocks,
 }
 
-/// A rig from nothing, with the clocks that were given unless the joints contradict them.
+/// Solves a rig without prior poses. The given clocks are used unless the joints contradict them.
 ///
-/// If a person walks in a circle, only the swing of the limbs distinguishes another clock of a camera from another place
-/// of it, and errors of the joints look much the same. Clocks that do not matter to how well joints fit are left alone.
+/// If a person walks in a circle, a change of a camera's clock looks much like a change of its position. Only the swing of the limbs
+/// distinguishes them, and errors of the joints have similar effects. Clocks with little effect on the fit of the joints are left
+/// unchanged.
 ///
-/// * `search`: whether clocks are searched far around.
+/// * `search`: true if clocks are searched over a wide range.
 pub(crate) fn with_clocks(
     study: &Study<'_>,
     (focal, search): (bool, bool),
@@ -94,7 +95,7 @@ pub(crate) fn with_clocks(
     }
 }
 
-/// The mean over cameras of the median residual, as a share of the size of the person.
+/// Returns the mean over cameras of the median residual, as a fraction of the size of the person.
 fn misfit(study: &Study<'_>, it: &Solved) -> f64 {
     let fits = fits(&it.problem, &it.sigmas_px);
     let n = fits.len() as f64;
@@ -105,7 +106,7 @@ fn misfit(study: &Study<'_>, it: &Solved) -> f64 {
     each.map(share).sum::<f64>() / n
 }
 
-/// A rig from nothing.
+/// Solves a rig without prior poses.
 pub(crate) fn solved(study: &Study<'_>, wanted: Wanted, random: &mut Rng) -> Result<Solved, Doubt> {
     from(study, study.start(random)?, wanted)
 }
@@ -132,7 +133,7 @@ fn from(study: &Study<'_>, start: Start, wanted: Wanted) -> Result<Solved, Doubt
     rounds(study, Cameras::new(cameras, &free), choices, &beliefs)
 }
 
-/// Clocks, sides, expected errors and everything else, in turns.
+/// Alternates between clocks, sides, expected errors and the adjustment of everything else.
 pub(crate) fn rounds(
     study: &Study<'_>,
     mut cameras: Cameras,

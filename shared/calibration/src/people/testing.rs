@@ -1,4 +1,4 @@
-//! Someone who walks, and what a ring of cameras sees of it.
+//! A simulated walking person, as seen by a ring of cameras.
 
 use core::f64::consts::TAU;
 
@@ -10,12 +10,12 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 pub(crate) const N_JOINTS: usize = 14;
 pub(crate) const RADIUS: f64 = 5.0;
 
-/// Returns the mirror of each joint on the other side of the body.
+/// Returns, for each joint, the index of its mirror on the other side of the body.
 pub(crate) fn sides() -> Vec<usize> {
     vec![5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13]
 }
 
-/// A camera at a place that looks at a point 0.9 m above the origin.
+/// Returns a camera at a position, looking at a point 0.9 m above the origin.
 pub(crate) fn looking(name: String, centre: Vector3<f64>, lens: LensModel) -> Camera {
     let forward = Vector3::new(0.0, 0.0, 0.9) - centre;
     let forward = forward / forward.norm();
@@ -38,7 +38,7 @@ pub(crate) fn looking(name: String, centre: Vector3<f64>, lens: LensModel) -> Ca
     }
 }
 
-/// `n` cameras in a ring, at different heights.
+/// Returns `n` cameras in a ring, at different heights.
 pub(crate) fn ring(n: usize) -> Vec<Camera> {
     let lens = LensModel::BrownConrady {
         k: [-0.05, 0.02, 0.0, 0.0, 0.0, 0.0],
@@ -53,11 +53,11 @@ pub(crate) fn ring(n: usize) -> Vec<Camera> {
     (0..n).map(camera).collect()
 }
 
-/// Someone at a place, turned, in a phase of a step; 1.75 m tall, with bones that keep their lengths.
+/// Returns a person at a position, facing a direction, in a phase of a step. The person is 1.75 m tall, with bones of constant lengths.
 fn stepping([x, y]: [f64; 2], turn: f64, phase: f64) -> [[f64; 3]; N_JOINTS] {
     let swing = 0.45 * phase.sin();
     let legs = |sign: f64| {
-        // Hip above the floor; thigh and shank of 0.43 m each, bent at the knee while the leg swings.
+        // The hip is above the floor; thigh and shank are 0.43 m each, and the knee bends while the leg swings.
         let hip = [0.0, -0.09 * sign, 0.92];
         let angle = sign * swing;
         let bend = 0.9 * (sign * phase.cos()).max(0.0);
@@ -106,7 +106,7 @@ fn stepping([x, y]: [f64; 2], turn: f64, phase: f64) -> [[f64; 3]; N_JOINTS] {
         [0.0, 0.0, 1.45],
         [0.03, 0.0, 1.75],
     ];
-    // The lower ankle stands.
+    // The lower ankle stands on the floor.
     let lift = ra[2].min(la[2]) - 0.07;
     body.map(|[forward, left, up]| {
         let (sin, cos) = turn.sin_cos();
@@ -118,9 +118,9 @@ fn stepping([x, y]: [f64; 2], turn: f64, phase: f64) -> [[f64; 3]; N_JOINTS] {
     })
 }
 
-/// Someone who walks a figure of eight of a size about the origin, and stops now and then.
+/// Returns a person who walks a figure of eight around the origin, and stops now and then.
 pub(crate) fn walker(time_s: f64, size: f64) -> [[f64; 3]; N_JOINTS] {
-    // Stops for 0.4 s every two seconds.
+    // The person stops for 0.4 s every two seconds.
     let way = |time_s: f64| {
         let share = (time_s.rem_euclid(2.0) / 1.6).min(1.0);
         2.0 * ((time_s / 2.0).floor() + share * share * (3.0 - 2.0 * share))
@@ -136,7 +136,7 @@ pub(crate) fn walker(time_s: f64, size: f64) -> [[f64; 3]; N_JOINTS] {
     stepping(now, turn, TAU * 0.95 * way(time_s))
 }
 
-/// Flaws of the cameras and of the finder of joints.
+/// Simulated flaws of the cameras and of the joint detector.
 #[derive(Debug, Clone)]
 pub(crate) struct Flaws {
     pub(crate) seconds: f64,
@@ -164,7 +164,7 @@ impl Flaws {
         }
     }
 
-    /// 5 % of views exchanged, 10 % of joints wrong, 10 % missing, 3 px of noise.
+    /// Returns typical flaws: 5 % of views exchanged, 10 % of joints wrong, 10 % missing, and 3 px of noise.
     pub(crate) fn usual(seed: u64) -> Self {
         Self {
             noise_px: 3.0,

@@ -1,4 +1,4 @@
-//! Rings of cameras around someone who walks.
+//! Tests with rings of cameras around a walking person.
 
 use super::testing::{Flaws, N_JOINTS, RADIUS, ring, sides};
 use super::*;
@@ -18,7 +18,7 @@ fn settings() -> Settings {
     }
 }
 
-/// Cameras whose poses say nothing.
+/// Returns the cameras with uninformative poses.
 fn nowhere(cameras: &[Camera]) -> Vec<Camera> {
     let each = cameras.iter().cloned();
     each.map(|camera| Camera {
@@ -28,7 +28,7 @@ fn nowhere(cameras: &[Camera]) -> Vec<Camera> {
     .collect()
 }
 
-/// The largest turn, degrees, and way, share of the radius, of a rig from the truth.
+/// Returns the largest errors of a rig: rotation in degrees, and position as a fraction of the radius.
 fn worst(found: &[Camera], truth: &[Camera], with_scale: bool) -> [f64; 2] {
     let each = differences(found, truth, with_scale);
     each.iter().fold([0.0; 2], |worst, it| {
@@ -64,7 +64,7 @@ fn the_height_of_the_person_and_the_feet_make_a_world() {
     let outcome = estimate(&recording, &height).unwrap();
     assert_eq!(outcome.doubts, []);
     assert_eq!(outcome.vertical, Vertical::Feet);
-    // Shares of people's statures are means: the scale is known to a few percent.
+    // The assumed body proportions are means, so the scale is known to a few percent.
     let heights = outcome.cameras.iter().zip(&truth);
     for (a, b) in heights {
         let [a, b] = [a, b].map(|camera| camera.centre_in_world().z);
@@ -114,7 +114,7 @@ fn clocks_that_joints_do_not_contradict_are_as_given() {
     assert!(offsets.eq(given), "{:?}", outcome.reports);
 }
 
-/// All joints of a camera beside their places, alike for half a second, then elsewhere.
+/// Shifts all joints of a camera, by the same amount for half a second, then by another.
 fn drifting(films: &mut [Film], px: f64, seed: u64) {
     let mut random = fastrand::Rng::with_seed(seed);
     for film in films {
@@ -171,7 +171,7 @@ fn a_rig_that_is_not_known_well_says_so() {
     assert!(!outcome.cautions.is_empty(), "{:?}", outcome.reports);
     let text = outcome.cautions[0].text(&["a", "b", "c"]);
     assert!(text.contains("degrees and"), "{text}");
-    // And one that is known well has nothing to say.
+    // A well-known rig has no cautions.
     let outcome = found(&truth, &Flaws::none(4), &settings());
     assert_eq!(outcome.cautions, []);
 }
@@ -179,7 +179,7 @@ fn a_rig_that_is_not_known_well_says_so() {
 #[test]
 fn what_cannot_be_known_is_refused() {
     let truth = ring(3);
-    // Cameras that see different moments have nothing in common.
+    // Cameras that see different moments cannot be matched.
     let mut films = Flaws::none(1).films(&truth);
     let far = Flaws::none(40).films(&truth);
     films[2] = far[2].clone();
@@ -190,7 +190,7 @@ fn what_cannot_be_known_is_refused() {
     let outcome = estimate(&recording, &settings()).unwrap();
     assert!(!outcome.doubts.is_empty());
 
-    // Nobody.
+    // This camera sees nobody.
     films[1] = Film::default();
     let recording = Recording {
         cameras: &truth,
@@ -203,7 +203,7 @@ fn what_cannot_be_known_is_refused() {
     ));
 }
 
-/// The number of recordings of each ring.
+/// Number of recordings of each ring.
 const N_SEEDS: u64 = 2;
 
 #[test]
@@ -236,7 +236,7 @@ fn rings_are_found_and_no_wrong_answer_goes_unrefused() {
     }
 }
 
-/// Joints that every camera sees beside where they are, all the time.
+/// Shifts each joint in every camera by a constant amount.
 fn beside(films: &mut [Film], px: f64) {
     let mut random = fastrand::Rng::with_seed(8);
     for film in films {

@@ -1,4 +1,4 @@
-//! The relative pose of two cameras, from joints that both see.
+//! Relative pose of two cameras, from joints that both see.
 
 use fastrand::Rng;
 use nalgebra::{
@@ -6,13 +6,13 @@ use nalgebra::{
     UnitQuaternion, Vector2, Vector3,
 };
 
-/// Samples of eight joints that are drawn.
+/// Number of samples of eight joints.
 const SAMPLES: usize = 400;
-/// Matches that a sample is judged by, and that a pose is fitted to.
+/// Number of matches by which a sample is judged, and number of matches to which a pose is fitted.
 const JUDGES: [usize; 2] = [250, 700];
-/// Poses that are fitted: the best of the samples.
+/// Number of poses to fit: the best of the samples.
 const STARTS: usize = 6;
-/// Steps of a fit.
+/// Number of steps of a fit.
 const STEPS: usize = 25;
 
 /// A joint in both cameras: normalised coordinates (x / z, y / z).
@@ -22,22 +22,22 @@ pub(crate) struct Match {
     pub(crate) b: Vector2<f64>,
 }
 
-/// Where the second camera stands as seen from the first one.
+/// Relative pose of two cameras, and the quality of its fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Relative {
-    /// The length of the translation is 1.
+    /// Pose of the second camera; the length of the translation is 1.
     pub(crate) b_from_a: Isometry3<f64>,
-    /// Mean of log(1 + (residual / sigma)^2).
+    /// Mean of log(1 + (residual / sigma)^2) over the matches.
     pub(crate) cost: f64,
-    /// Share of matches within three sigma, in front of both cameras.
+    /// Fraction of matches within three sigma and in front of both cameras.
     pub(crate) inliers: f64,
-    /// Median angle between the rays of a match, radians.
+    /// Median angle between the rays of a match, in radians.
     pub(crate) parallax: f64,
 }
 
-/// The pose that fits matches best; none for fewer than 12, or where all fail.
+/// Returns the pose that fits the matches best; `None` for fewer than 12 matches, or if all fits fail.
 ///
-/// * `sigma`: expected error of a match, normalised coordinates.
+/// * `sigma`: expected error of a match, in normalised coordinates.
 pub(crate) fn relative(matches: &[Match], sigma: f64, random: &mut Rng) -> Option<Relative> {
     if matches.len() < 12 {
         return None;
@@ -65,7 +65,7 @@ pub(crate) fn relative(matches: &[Match], sigma: f64, random: &mut Rng) -> Optio
     let best = poses
         .map(|pose| (mean_cost(&fitted, &essential_of(&pose), sigma), pose))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    // The fit knows the essential matrix alone: which of the four poses it is, the matches say again.
+    // The fit uses the essential matrix alone, so the matches select one of its four poses again.
     let pose = decompose(&essential_of(&best.1), &fitted, sigma)?;
     Some(judged(pose, best.0, &fitted, sigma))
 }
@@ -91,13 +91,13 @@ fn judged(pose: Isometry3<f64>, cost: f64, matches: &[Match], sigma: f64) -> Rel
     }
 }
 
-/// Every n-th, so that about `most` are left.
+/// Returns every n-th match, so that about `most` are left.
 fn thinned(matches: &[Match], most: usize) -> Vec<Match> {
     let step = matches.len().div_ceil(most).max(1);
     matches.iter().step_by(step).copied().collect()
 }
 
-/// First-order distance of a match from its epipolar constraint (Sampson), normalised coordinates.
+/// Returns the first-order distance of a match from its epipolar constraint (Sampson), in normalised coordinates.
 pub(crate) fn sampson(it: &Match, essential: &Matrix3<f64>) -> f64 {
     let (a, b) = (it.a.push(1.0), it.b.push(1.0));
     let (of_a, of_b) = (essential * a, essential.tr_mul(&b));
@@ -105,7 +105,7 @@ pub(crate) fn sampson(it: &Match, essential: &Matrix3<f64>) -> f64 {
     b.dot(&of_a) / slope.max(f64::MIN_POSITIVE).sqrt()
 }
 
-/// The essential matrix of a pose.
+/// Returns the essential matrix of a pose.
 pub(crate) fn essential_of(b_from_a: &Isometry3<f64>) -> Matrix3<f64> {
     let rotation = b_from_a.rotation.to_rotation_matrix();
     b_from_a.translation.vector.cross_matrix() * rotation.matrix()
@@ -116,7 +116,7 @@ fn mean_cost(matches: &[Match], essential: &Matrix3<f64>, sigma: f64) -> f64 {
     each.sum::<f64>() / matches.len() as f64
 }
 
-/// The linear solution of eight matches (Hartley 1997), with singular values 1, 1, 0.
+/// Returns the linear solution for eight matches (Hartley 1997), with singular values 1, 1, 0.
 fn eight_points(sample: &[Match; 8]) -> Option<Matrix3<f64>> {
     let of_a = normaliser(&sample.map(|sample| sample.a))?;
     let of_b = normaliser(&sample.map(|sample| sample.b))?;
@@ -134,7 +134,7 @@ fn eight_points(sample: &[Match; 8]) -> Option<Matrix3<f64>> {
     essential.iter().all(|value| value.is_finite()).then_some(essential)
 }
 
-/// Moves points to the origin, at a mean distance of √2.
+/// Returns the map that moves points to the origin and to a mean distance of √2.
 fn normaliser(points: &[Vector2<f64>; 8]) -> Option<Matrix3<f64>> {
     let centre = points.iter().sum::<Vector2<f64>>() / 8.0;
     let away = points.iter().map(|point| (point - centre).norm()).sum::<f64>() / 8.0;
@@ -144,7 +144,7 @@ fn normaliser(points: &[Vector2<f64>; 8]) -> Option<Matrix3<f64>> {
     scale.is_finite().then_some(matrix)
 }
 
-/// Returns the pose with most matches in front of both cameras, among the four of an essential matrix.
+/// Returns the pose with most matches in front of both cameras, among the four poses of an essential matrix.
 fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<Isometry3<f64>> {
     let svd = essential.svd(true, true);
     let (mut u, mut v_t) = (svd.u?, svd.v_t?);
@@ -154,7 +154,7 @@ fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<
     if v_t.determinant() < 0.0 {
         v_t = -v_t;
     }
-    // The direction without an image belongs to the least singular value.
+    // The null direction belongs to the smallest singular value.
     let least = svd.singular_values.imin();
     if least != 2 {
         return None;
@@ -184,7 +184,7 @@ fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<
     (2 * in_front(best) > good.len()).then_some(*best)
 }
 
-/// The depths of a match in both cameras, and the angle between its rays.
+/// Returns the depths of a match in both cameras, and the angle between its rays.
 fn depths(b_from_a: &Isometry3<f64>, it: &Match) -> Option<([f64; 2], f64)> {
     let a = b_from_a.rotation * it.a.push(1.0);
     let b = it.b.push(1.0);
@@ -201,7 +201,7 @@ fn depths(b_from_a: &Isometry3<f64>, it: &Match) -> Option<([f64; 2], f64)> {
     Some(([depth_a, depth_b], a.angle(&b)))
 }
 
-/// Robust refinement of rotation and direction of translation (Gauss and Newton's steps, weighted anew, damped).
+/// Refines the rotation and the direction of the translation robustly (damped Gauss-Newton steps with updated weights).
 fn fit(start: Isometry3<f64>, matches: &[Match], sigma: f64) -> Isometry3<f64> {
     const STEP: f64 = 1e-6;
     let (mut at, mut damping) = (start, 1e-3);
@@ -247,7 +247,7 @@ fn fit(start: Isometry3<f64>, matches: &[Match], sigma: f64) -> Isometry3<f64> {
     at
 }
 
-/// A pose moved by a turn (3) and a turn of the direction of its translation (2).
+/// Returns a pose changed by a rotation (3 parameters) and a rotation of its translation (2 parameters).
 fn turned(pose: &Isometry3<f64>, step: &SVector<f64, 5>) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(step[0], step[1], step[2]));
     let way = pose.translation.vector;
@@ -263,7 +263,7 @@ fn turned(pose: &Isometry3<f64>, step: &SVector<f64, 5>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(way / way.norm()), turn * pose.rotation)
 }
 
-/// A place in an ideal picture as normalised coordinates.
+/// Returns a position in an ideal picture in normalised coordinates.
 pub(crate) fn normalised(camera: &geometry::Camera, at: &Point2<f64>) -> Vector2<f64> {
     camera.intrinsics.normalised(at).coords
 }

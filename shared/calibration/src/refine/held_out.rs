@@ -1,4 +1,4 @@
-//! Two rigs beside one another on what neither was fitted to, and which person each camera sees.
+//! Comparison of two rigs on data that neither was fitted to, and selection of the person for each camera.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +10,14 @@ use crate::people::begin::{Choice, Study};
 use crate::people::certainty::BLOCK_S;
 use crate::people::sides::{exchange, of_pair, point};
 
-/// A rig is better only where the distance becomes less by this share.
+/// Minimum decrease of the distance for a rig to be better, as a fraction.
 const LEAST_GAIN: f64 = 0.02;
-/// The mean gain of a block must also be this many standard errors.
+/// Minimum mean gain of a block for a rig to be better, in standard errors.
 const CERTAIN: f64 = 2.0;
-/// A block has at least this many joints.
+/// Minimum number of joints in a block.
 const LEAST: usize = 20;
 
-/// Returns for each camera the chain that fits the other cameras best, by the rig that is given.
+/// Returns for each camera the chain that fits the other cameras best, according to the given rig.
 pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     let choice = |(camera, chain): (usize, usize)| Choice {
         chain,
@@ -26,7 +26,7 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     };
     let n = study.cameras.len();
     let n_chains = |camera: usize| study.chains[camera].len();
-    // Everybody in view of the camera with fewest people may be the one whom all cameras see.
+    // Each person seen by the camera with the fewest people is a candidate for the person that all cameras see.
     let anchor = (0..n).min_by_key(|i| n_chains(*i)).unwrap_or(0);
     let followed = (0..n_chains(anchor)).map(|chain| {
         let with = |camera: usize| {
@@ -47,10 +47,10 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     chains.map(|(camera, it)| choice((camera, it.1))).collect()
 }
 
-/// How far joints of a person in one camera are from where another one sees a person, median, as a share of the size
-/// there; infinite where too few are seen by both.
+/// Returns the median distance between the joints of a person in one camera and those of a person in another, as a fraction of the
+/// person's size. It is infinite if both cameras see too few joints.
 ///
-/// * `pair`: each a camera and a chain.
+/// * `pair`: a camera and a chain for each.
 fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) -> f64 {
     let [(anchor, _), (camera, chain)] = pair;
     let mut all = vec![None; study.cameras.len()];
@@ -74,17 +74,17 @@ fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) 
     })
 }
 
-/// Distances of joints from where the other cameras see them, by block of time, before and after.
+/// Distances of joints from the positions that the other cameras predict, by block of time, before and after.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
-    /// Mean robust costs of each block.
+    /// Mean robust costs of each block, before and after.
     costs: BTreeMap<i64, [f64; 2]>,
-    /// All distances of each camera, pixels.
+    /// All distances of each camera in pixels, before and after.
     distances: Vec<[Vec<f64>; 2]>,
 }
 
 impl Blocks {
-    /// Adds what a rig was not fitted to.
+    /// Adds data that a rig was not fitted to.
     pub(super) fn add(
         &mut self,
         rest: &Study<'_>,
@@ -133,7 +133,7 @@ impl Blocks {
         }
     }
 
-    /// Median distances of a camera, pixels: before and after.
+    /// Returns the median distances of a camera in pixels, before and after.
     pub(super) fn of_camera(&self, camera: usize) -> [f64; 2] {
         let of = |distances: &Vec<f64>| {
             Sorted::new(distances.clone()).upper_median().unwrap_or(f64::NAN)
@@ -143,7 +143,7 @@ impl Blocks {
         })
     }
 
-    /// Decides if the new rig is better.
+    /// Decides whether the new rig is better.
     pub(super) fn judge(&self, outcome: &mut Outcome) {
         let all = |nth: usize| {
             let each = self.distances.iter().flat_map(|distance| distance[nth].iter().copied());

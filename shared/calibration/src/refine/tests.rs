@@ -1,4 +1,4 @@
-//! Rings of which a camera was moved, or none.
+//! Tests with rings of cameras, of which at most one was moved.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -17,7 +17,7 @@ fn settings() -> Settings {
     }
 }
 
-/// A camera turned about its own axes, degrees.
+/// Returns a camera rotated about its own axes, in degrees.
 fn turned(camera: &Camera, degrees: f64) -> Camera {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.6, 0.8, 0.0) * degrees.to_radians());
     let by = Isometry3::from_parts(Translation3::identity(), turn);

@@ -1,16 +1,16 @@
-//! The cost of a pair of cameras over the offset between their clocks.
+//! Cost of the offset between the clocks of a pair of cameras.
 
 use geometry::Camera;
 
 use crate::synchronisation::pair::{Epipolar, cost};
 use crate::synchronisation::track::{LEAST_JOINTS, Track};
 
-/// Distance of the offsets that are tried, and of the times at which people are looked at; seconds.
+/// Step between the offsets that are tried, and between the times at which people are compared, in seconds.
 pub(crate) const STEP_S: f64 = 0.01;
-/// Most samples of a pair.
+/// Maximum number of samples of a pair.
 const MOST_SAMPLES: usize = 500;
 
-/// The people of one camera at times that are multiples of [`STEP_S`], by its own clock.
+/// People of one camera at multiples of [`STEP_S`], by the camera's own clock.
 #[derive(Debug, Clone)]
 pub(crate) struct Grid {
     first: i64,
@@ -21,12 +21,14 @@ pub(crate) struct Grid {
 #[derive(Debug, Clone)]
 struct Standing {
     size: f64,
-    /// Place and weight by joint; a weight of 0 where it is not known.
+    /// Position and weight by joint; the weight is 0 if the position is not known.
     joints: Vec<([f64; 2], f64)>,
 }
 
 impl Grid {
-    /// * `span`: what is looked at, seconds by the clock of the camera.
+    /// Creates the grid.
+    ///
+    /// * `span`: times to cover, in seconds by the clock of the camera.
     pub(crate) fn new(tracks: &[Track], n_joints: usize, span: [f64; 2]) -> Self {
         let first = (span[0] / STEP_S).ceil() as i64;
         let last = (span[1] / STEP_S).floor() as i64;
@@ -59,19 +61,19 @@ impl Grid {
     }
 }
 
-/// One person of the first camera at one time, and what each offset costs it.
+/// One person of the first camera at one time, with the cost of each offset.
 #[derive(Debug, Clone)]
 pub(crate) struct Costs {
-    /// Seconds by the clock of the first camera.
+    /// Time in seconds by the clock of the first camera.
     pub(crate) time_s: f64,
-    /// By offset; not a number where the second camera sees nobody.
+    /// Cost by offset; NaN if the second camera sees nobody.
     each: Vec<f32>,
-    /// Mean over the offsets that have a cost.
+    /// Mean cost over the offsets that have one.
     mean: f64,
 }
 
 impl Costs {
-    /// Amount by which an offset costs less than the others do; none where it has no cost.
+    /// Returns the decrease of the cost relative to the mean of all offsets; `None` if the offset has no cost.
     pub(crate) fn gain(&self, nth: usize) -> Option<f64> {
         let cost = f64::from(*self.each.get(nth)?);
         cost.is_finite().then_some(self.mean - cost)
@@ -85,26 +87,26 @@ impl Costs {
 )]
 #[derive(Debug, Clone)]
 pub struct Curve {
-    /// The cameras, by number.
+    /// Indices of the two cameras.
     pub cameras: [usize; 2],
-    /// Distance between offsets, seconds.
+    /// Step between offsets, in seconds.
     pub step_s: f64,
-    /// The offset of the first entry, seconds: what is added to a time of the first camera to have that of the second.
+    /// Offset of the first entry in seconds. An offset is added to a time of the first camera to get the time of the second.
     pub first_s: f64,
-    /// Amount by which each offset costs less than the mean of all, over all samples.
+    /// Decrease of the cost by offset relative to the mean of all offsets, over all samples.
     pub gain: Vec<f64>,
-    /// The mean cost by offset; not a number where nothing overlaps.
+    /// Mean cost by offset; NaN if nothing overlaps.
     pub cost: Vec<f64>,
-    /// Samples by offset.
+    /// Number of samples by offset.
     pub n: Vec<f64>,
     pub(crate) samples: Vec<Costs>,
 }
 
 impl Curve {
-    /// The full search.
+    /// Searches all offsets.
     ///
-    /// * `window_s`: offsets up to this, both ways.
-    /// * `mirror`: of each joint the one on the other side, where sides may be exchanged.
+    /// * `window_s`: largest offset in both directions.
+    /// * `mirror`: for each joint, the index of its mirror, if sides may be exchanged.
     pub(crate) fn search(
         numbers: [usize; 2],
         cameras: [&Camera; 2],
@@ -166,20 +168,20 @@ impl Curve {
         it
     }
 
-    /// The entry nearest to an offset; none outside the window.
+    /// Returns the entry nearest to an offset; `None` outside the window.
     pub(crate) fn index(&self, offset_s: f64) -> Option<usize> {
         let nth = ((offset_s - self.first_s) / self.step_s).round();
         (nth >= 0.0 && nth < self.gain.len() as f64).then_some(nth as usize)
     }
 
-    /// The offset of an entry, seconds.
+    /// Returns the offset of an entry, in seconds.
     pub fn offset_s(&self, nth: usize) -> f64 {
         self.first_s + nth as f64 * self.step_s
     }
 }
 
 impl Epipolar {
-    /// The mean cost of the joints that two people have both; none where these are too few.
+    /// Returns the mean cost of the joints that two people have in common; `None` if they are too few.
     fn costs(&self, a: &Standing, b: &Standing, mirror: Option<&[usize]>) -> Option<f64> {
         let plain = self.costs_of(a, b, |joint| joint)?;
         let Some(mirror) = mirror else {

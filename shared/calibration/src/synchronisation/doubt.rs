@@ -1,154 +1,154 @@
-//! Why offsets are not to be trusted.
+//! Reasons not to trust offsets.
 
 use core::fmt;
 
-/// Why offsets are not to be trusted. Cameras are numbers of the list that was given.
+/// Reason not to trust offsets. Cameras are indices of the given list.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
-    /// A camera sees hardly anyone.
+    /// A camera hardly sees anyone.
     NoPeople {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// For how long someone is followed, seconds.
+        /// Time for which a person is followed, in seconds.
         seen_s: f64,
-        /// The least.
+        /// Minimum time, in seconds.
         least_s: f64,
     },
-    /// Nothing connects a camera to the others: they stand in one place, or see people at other times.
+    /// Nothing connects a camera to the others. The cameras are in one place, or see people at different times.
     Unconnected {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Joints that it sees together with others.
+        /// Number of joints that the camera sees together with others.
         n: usize,
-        /// The least.
+        /// Minimum number of joints.
         least: usize,
     },
-    /// Another offset of some cameras explains the movement nearly as well: it repeats itself, or is not seen well enough.
+    /// Another offset of some cameras explains the movement nearly as well, because the movement repeats itself or is not seen well enough.
     Ambiguous {
-        /// The cameras.
+        /// Indices of the cameras.
         cameras: Vec<usize>,
-        /// The other offset against the best one, seconds.
+        /// Difference between the other offset and the best one, in seconds.
         away_s: f64,
-        /// Its gain as a share of the best.
+        /// Gain of the other offset relative to the best one.
         ratio: f64,
-        /// The largest that is accepted.
+        /// Largest accepted ratio.
         most_ratio: f64,
-        /// By how many standard errors the best is better.
+        /// Difference between both gains, in standard errors.
         t: f64,
-        /// The least that is accepted.
+        /// Smallest accepted difference, in standard errors.
         least_t: f64,
     },
-    /// The offset is where the search ends: the right one may be outside.
+    /// The offset is at the edge of the search, so the correct offset may be outside.
     Edge {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Its offset, seconds.
+        /// Offset of the camera, in seconds.
         offset_s: f64,
-        /// The window, seconds.
+        /// Search window, in seconds.
         window_s: f64,
     },
-    /// The minimum is flat: there is too little movement.
+    /// The minimum is flat, because there is too little movement.
     Flat {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Standard error of its offset, seconds.
+        /// Standard error of the camera's offset, in seconds.
         error_s: f64,
-        /// The largest that is accepted.
+        /// Largest accepted standard error, in seconds.
         most_s: f64,
     },
-    /// Too little movement to tell offsets apart.
+    /// There is too little movement to distinguish offsets.
     Still {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Amount by which the best offset costs less than the mean of all, as a share.
+        /// Decrease of the cost at the best offset relative to the mean of all offsets, as a fraction.
         gain: f64,
-        /// The least that is accepted.
+        /// Smallest accepted decrease.
         least: f64,
     },
-    /// The views do not fit each other at any offset: cameras exchanged, moved, or of another scene.
+    /// The views do not fit each other at any offset: cameras were exchanged or moved, or are from different scenes.
     Misfit {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Median residual, percent of the size of the person.
+        /// Median residual, in percent of the size of the person.
         percent: f64,
-        /// The largest that is accepted.
+        /// Largest accepted residual, in percent.
         most: f64,
     },
-    /// A pair that is sure by itself finds another offset than all together.
+    /// A pair with a clear offset of its own contradicts the common solution.
     Pair {
-        /// The cameras.
+        /// Indices of the two cameras.
         cameras: [usize; 2],
-        /// Amount by which the pair's own offset is away, seconds.
+        /// Difference between the pair's own offset and the common one, in seconds.
         away_s: f64,
-        /// The gain of the common offset as a share of the pair's best.
+        /// Gain of the common offset relative to the pair's best.
         share: f64,
-        /// The least that is accepted.
+        /// Smallest accepted ratio of gains.
         least_share: f64,
     },
-    /// A clock that runs at another speed than clocks do: the frame rate is wrong, or frames are missing.
+    /// The drift of a clock is implausible: the frame rate is wrong, or frames are missing.
     Speed {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Its drift, as a share.
+        /// Drift of the clock, as a fraction.
         drift: f64,
-        /// The largest that is accepted.
+        /// Largest accepted drift.
         most: f64,
     },
-    /// A camera recorded hardly any sound that begins.
+    /// The recording of a camera has too few sudden sounds.
     Quiet {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// Sounds that begin.
+        /// Number of sounds that begin.
         n: usize,
-        /// The least.
+        /// Minimum number of sounds.
         least: usize,
     },
-    /// A camera did not hear what the others heard, or it fits at several offsets; the pair is the one that fits best.
+    /// A camera did not record the sounds of the others, or its sounds fit at several offsets. The pair is the one that fits best.
     Unheard {
-        /// The cameras.
+        /// Indices of the two cameras.
         cameras: [usize; 2],
-        /// Beginnings of sounds that fall together.
+        /// Number of sounds that begin at the same time.
         n: usize,
-        /// The least.
+        /// Minimum number of sounds.
         least: usize,
-        /// The cosine between their beginnings.
+        /// Cosine between the beginnings of sounds in both recordings.
         cosine: f64,
-        /// The least that is accepted.
+        /// Smallest accepted cosine.
         least_cosine: f64,
-        /// How good another offset is, as a share.
+        /// Quality of another offset relative to the best one.
         ratio: f64,
-        /// The largest that is accepted.
+        /// Largest accepted ratio.
         most_ratio: f64,
     },
-    /// A pair heard sounds further apart than their way and the offsets of all allow.
+    /// The offset of a pair differs from the common one by more than the travel time of sound allows.
     Heard {
-        /// The cameras.
+        /// Indices of the two cameras.
         cameras: [usize; 2],
-        /// By how much, seconds.
+        /// Difference of the offsets, in seconds.
         away_s: f64,
-        /// The largest that is accepted.
+        /// Largest accepted difference, in seconds.
         most_s: f64,
     },
     /// Two parts of the footage give different offsets.
     Parts {
-        /// The camera.
+        /// Index of the camera.
         camera: usize,
-        /// By how much, seconds.
+        /// Difference of the offsets, in seconds.
         away_s: f64,
-        /// The largest that is accepted.
+        /// Largest accepted difference, in seconds.
         most_s: f64,
     },
 }
 
 impl Doubt {
-    /// The doubt in words.
+    /// Returns the doubt in words.
     ///
-    /// * `names`: of the cameras.
+    /// * `names`: names of the cameras.
     pub fn text(&self, names: &[&str]) -> String {
         Worded { doubt: self, names }.to_string()
     }
 
-    /// The cameras that it concerns.
+    /// Returns the cameras that the doubt concerns.
     pub fn cameras(&self) -> Vec<usize> {
         match self {
             Self::Ambiguous { cameras, .. } => cameras.clone(),
@@ -183,12 +183,12 @@ impl fmt::Display for Worded<'_> {
                 least_s,
             } => write!(
                 f,
-                "{}: someone is followed for {seen_s:.1} s, at least {least_s:.1} s are needed",
+                "{}: a person is followed for {seen_s:.1} s, but at least {least_s:.1} s are needed",
                 name(camera)
             ),
             Doubt::Unconnected { camera, n, least } => write!(
                 f,
-                "{}: {n} joints are seen together with other cameras at these offsets, at least {least} are needed",
+                "{}: {n} joints are shared with other cameras at these offsets, but at least {least} are needed",
                 name(camera)
             ),
             Doubt::Ambiguous {
@@ -203,7 +203,7 @@ impl fmt::Display for Worded<'_> {
                 write!(
                     f,
                     "{}: ambiguous: {:+.0} ms away is {:.0} % as good (at most {:.0} % is accepted), the difference is {t:.1} standard \
-                     errors (at least {least_t:.0}); movement that repeats itself, or too little of it",
+                     errors (at least {least_t:.0}); the movement repeats itself, or there is too little of it",
                     named.join(", "),
                     1e3 * *away_s,
                     100.0 * ratio,
@@ -225,7 +225,7 @@ impl fmt::Display for Worded<'_> {
 }
 
 impl Worded<'_> {
-    /// Too little that tells, or nothing that fits.
+    /// Writes a doubt about too little movement, or about views that do not fit.
     fn fit(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = |camera: &usize| self.names.get(*camera).map_or("?", |name| name);
         match self.doubt {
@@ -246,7 +246,7 @@ impl Worded<'_> {
                 least,
             } => write!(
                 f,
-                "{}: the best offset costs {:.0} % less than the others do, at least {:.0} % is needed: too little movement, or the \
+                "{}: the best offset costs {:.0} % less than the mean of all, but at least {:.0} % is needed: too little movement, or the \
                  calibration does not fit",
                 name(camera),
                 100.0 * gain,
@@ -258,8 +258,8 @@ impl Worded<'_> {
                 most,
             } => write!(
                 f,
-                "{}: joints are {percent:.1} % of a person's size off what the other cameras say (median; at most {most:.1} %): cameras \
-                 exchanged, moved, or not of one scene",
+                "{}: joints are {percent:.1} % of a person's size away from the prediction of the other cameras (median; at most {most:.1} %): \
+                 cameras were exchanged or moved, or show different scenes",
                 name(camera)
             ),
             _ => self.contradiction(f),
@@ -290,7 +290,7 @@ impl Worded<'_> {
                 most,
             } => write!(
                 f,
-                "{}: its clock would run {:+.2} % off, at most {:.0} % is accepted: is the frame rate right?",
+                "{}: its clock would be {:+.2} % off, but at most {:.0} % is accepted: is the frame rate right?",
                 name(camera),
                 100.0 * drift,
                 100.0 * most
@@ -301,7 +301,7 @@ impl Worded<'_> {
                 most_s,
             } => write!(
                 f,
-                "{}: parts of the footage give offsets {:.0} ms apart, at most {:.0} ms is accepted: frames missing, or another speed",
+                "{}: parts of the footage give offsets {:.0} ms apart, at most {:.0} ms is accepted: frames are missing, or the speed changed",
                 name(camera),
                 1e3 * *away_s,
                 1e3 * *most_s
@@ -316,7 +316,7 @@ impl Worded<'_> {
         match self.doubt {
             Doubt::Quiet { camera, n, least } => write!(
                 f,
-                "{}: {n} sounds begin in its recording, at least {least} are needed: clap a few times, unevenly",
+                "{}: {n} sounds begin in its recording, but at least {least} are needed: clap a few times, unevenly",
                 name(camera)
             ),
             Doubt::Unheard {
@@ -330,7 +330,7 @@ impl Worded<'_> {
             } => write!(
                 f,
                 "{} and {}: {n} sounds begin together at the best offset (at least {least}), with a cosine of {cosine:.2} (at least \
-                 {least_cosine:.1}); another offset is {:.0} % as good (at most {:.0} %): not of one room, outside the search, or a beat",
+                 {least_cosine:.1}); another offset is {:.0} % as good (at most {:.0} %): different rooms, an offset outside the search, or a regular beat",
                 name(a),
                 name(b),
                 100.0 * ratio,

@@ -1,4 +1,4 @@
-//! The whole estimation.
+//! The whole estimation of offsets and drifts.
 
 mod doubts;
 
@@ -12,94 +12,93 @@ use crate::synchronisation::refine::{Clock, Fit, Problem};
 use crate::synchronisation::search::{peak, search, second};
 use crate::synchronisation::track::{Track, tracks};
 
-/// Standard deviation of the kernel that smooths places over time: this many intervals between pictures, and seconds.
+/// Standard deviation of the kernel that smooths positions over time, in intervals between pictures and in seconds.
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
-/// Length of footage that is searched in full, seconds: the part with most movement. The rest is for the drift.
+/// Length of footage that is searched in full, in seconds: the part with most movement. The rest is used for the drift only.
 const SEARCHED_S: f64 = 60.0;
-/// For how long someone has to be followed in a camera, seconds.
+/// Minimum time for which a person must be followed in a camera, in seconds.
 const LEAST_SEEN_S: f64 = 0.5;
-/// Drifts are refined from this length on, seconds.
+/// Minimum length of footage to refine drifts, in seconds.
 const LEAST_DRIFT_S: f64 = 10.0;
-/// A drift is determined where its error makes less than this over the footage, seconds.
+/// Largest accepted error of a drift, accumulated over the footage, in seconds.
 const MOST_DRIFT_ERROR_S: f64 = 0.005;
-/// A drift is taken as such if it is this many standard errors away from none.
+/// Minimum size of a drift to be used, in standard errors.
 const SURE_DRIFT: f64 = 4.0;
 
-/// How clocks are estimated.
+/// Settings of the estimation of clocks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// The camera whose clock is the common one, by its place in the list.
+    /// Index of the camera whose clock is the common one.
     pub reference: usize,
-    /// Offsets between two cameras are searched up to this, both ways, seconds.
+    /// Largest offset between two cameras to search, in both directions, in seconds.
     pub window_s: f64,
-    /// The mirror of each joint on the other side of the body, where the finder of joints may have exchanged sides.
+    /// For each joint, the index of its mirror on the other side of the body, if the joint detector may have exchanged sides.
     pub mirror: Option<Vec<usize>>,
     /// Number of joints of a person.
     pub n_joints: usize,
 }
 
-/// The clock of one camera.
+/// Clock of one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraClock {
-    /// Offset added to its times to have common ones, at its time 0, seconds.
+    /// Offset to add to the camera's times to get common times, at the camera's time 0, in seconds.
     pub offset_s: f64,
-    /// Standard error of the offset in the middle of the footage, seconds; infinite where nothing is known.
+    /// Standard error of the offset in the middle of the footage, in seconds; infinite if the offset is unknown.
     pub error_s: f64,
-    /// Amount by which a second of it is longer than one of the common clock: 1e-6 is one part per million. 0 if it is not
-    /// determined, or cannot be distinguished from 0.
+    /// Amount by which a second of the camera's clock is longer than a second of the common clock; 1e-6 is one part per million. It is 0 if
+    /// it is not determined, or cannot be distinguished from 0.
     pub drift: f64,
-    /// Standard error of the drift; none where the footage is too short to determine it.
+    /// Standard error of the drift; `None` if the footage is too short to determine it.
     pub drift_error: Option<f64>,
-    /// Joints that it sees together with other cameras.
+    /// Number of joints that the camera sees together with other cameras.
     pub n: usize,
-    /// Median residual without offsets, pixels; not a number where nothing overlaps.
+    /// Median residual without offsets, in pixels; NaN if nothing overlaps.
     pub before_px: f64,
-    /// Median residual with them, pixels.
+    /// Median residual with offsets, in pixels.
     pub after_px: f64,
 }
 
 /// Result for a pair of cameras alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairReport {
-    /// The cameras, by number.
+    /// Indices of the two cameras.
     pub cameras: [usize; 2],
-    /// The offset of all cameras together: of the first less that of the second, seconds.
+    /// Offset of the pair in the common solution: that of the first camera minus that of the second, in seconds.
     pub offset_s: f64,
-    /// The best one of the pair alone.
+    /// Best offset of the pair alone, in seconds.
     pub best_s: f64,
-    /// Its second best.
+    /// Second-best offset of the pair alone, in seconds.
     pub second_s: f64,
-    /// The gain of the second best as a share of the best.
+    /// Gain of the second-best offset relative to the best.
     pub ratio: f64,
-    /// Samples at the best.
+    /// Number of samples at the best offset.
     pub n: usize,
 }
 
 /// Result of a synchronisation.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// One for each camera, in order.
+    /// Clocks of the cameras, in order.
     pub cameras: Vec<CameraClock>,
-    /// One for each pair that was searched.
+    /// Results for each pair that was searched.
     pub pairs: Vec<PairReport>,
-    /// The costs of these over the offset.
+    /// Cost by offset of these pairs.
     pub curves: Vec<Curve>,
-    /// For each group of cameras against the others, the most doubtful first: how good another offset is, as a share.
+    /// Quality of the most doubtful second-best offset of a group of cameras relative to the others, as a fraction of the best.
     pub second_best: f64,
-    /// Every reason not to use it; it is to be used if there is none.
+    /// Every reason not to use the result; if empty, the result can be used.
     pub doubts: Vec<Doubt>,
-    /// Length of the footage that people are seen in, seconds.
+    /// Length of the footage in which people are seen, in seconds.
     pub length_s: f64,
 }
 
 /// Estimates the clocks.
 ///
-/// * `films`: what the cameras saw, in the order of `cameras`.
+/// * `films`: films of the cameras, in the order of `cameras`.
 ///
 /// # Errors
 ///
-/// [`FilmError`]: films that cannot be used at all. Usable footage that determines too little gives an [`Outcome`] with
-/// doubts.
+/// [`FilmError`] if the films cannot be used at all. Usable footage that determines too little gives an [`Outcome`] with doubts.
 pub fn estimate(
     cameras: &[Camera],
     films: &[Film],
@@ -147,7 +146,7 @@ fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), 
     each.try_for_each(|(camera, it)| it.check(camera))
 }
 
-/// Refuses what no clocks can be compared with.
+/// Refuses settings with which no clocks can be compared.
 pub(crate) fn check_settings(n: usize, reference: usize, window_s: f64) -> Result<(), FilmError> {
     if n < 2 {
         return Err(FilmError::OneCamera { cameras: n });
@@ -164,7 +163,7 @@ pub(crate) fn check_settings(n: usize, reference: usize, window_s: f64) -> Resul
     Ok(())
 }
 
-/// For how long someone is followed, seconds.
+/// Returns the time for which a person is followed, in seconds.
 fn seen_s(tracks: &[Track]) -> f64 {
     let mut spans: Vec<[f64; 2]> = tracks.iter().map(|track| track.span).collect();
     spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -223,7 +222,7 @@ impl Study<'_> {
         }
     }
 
-    /// The costs of all pairs.
+    /// Returns the costs of all pairs.
     fn curves(&self) -> Vec<Curve> {
         let window_s = self.settings.window_s;
         let searched = self.searched();
@@ -246,7 +245,7 @@ impl Study<'_> {
         curves
     }
 
-    /// The part of the footage with most movement, by the clocks of the cameras; all of it if it is short.
+    /// Returns the part of the footage with most movement, by the clocks of the cameras; all of it if it is short.
     fn searched(&self) -> [f64; 2] {
         let spans = self.active.iter().flat_map(|i| &self.tracks[*i]);
         let ends =
@@ -267,7 +266,7 @@ impl Study<'_> {
         [from, from + SEARCHED_S]
     }
 
-    /// How fast people move at a time, sizes of them per second, over all cameras.
+    /// Returns the speed of people at a time, in sizes of a person per second, over all cameras.
     fn movement(&self, time_s: f64) -> f64 {
         let all = self.active.iter().flat_map(|i| &self.tracks[*i]);
         let alive = all.filter(|track| track.span[0] <= time_s && time_s <= track.span[1]);
@@ -296,7 +295,7 @@ impl Study<'_> {
         }
     }
 
-    /// The common time in which at least two cameras see someone.
+    /// Returns the common time in which at least two cameras see people.
     fn span(&self, clocks: &[Clock]) -> [f64; 2] {
         let (mut starts, mut ends) = (Vec::new(), Vec::new());
         for &camera in self.active {
@@ -316,7 +315,7 @@ impl Study<'_> {
         }
     }
 
-    /// The fit, and the errors of the drifts if these are determined.
+    /// Returns the fit, and the errors of the drifts if they are determined.
     fn fit(
         &self,
         problem: &Problem<'_>,

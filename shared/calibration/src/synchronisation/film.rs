@@ -1,86 +1,86 @@
-//! Films: people in the pictures of every camera.
+//! Films: the people in the pictures of every camera.
 
-/// Pictures of one camera, by its own clock.
+/// Pictures of one camera, by the camera's own clock.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Film {
-    /// Its pictures, in the order of their times.
+    /// The pictures, in order of time.
     pub shots: Vec<Shot>,
 }
 
 /// One picture.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shot {
-    /// When it was taken, seconds by the clock of the camera.
+    /// Time of the picture, in seconds by the clock of the camera.
     pub time_s: f64,
-    /// The people in it, in any order. One person may be there several times, as candidates.
+    /// People in the picture, in any order. One person may appear several times, as candidates.
     pub people: Vec<Person>,
 }
 
 /// A person, or a candidate for one.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Person {
-    /// By number, the same in all cameras; none where the joint was not found.
+    /// Joints by number, which is the same in all cameras; `None` for a joint that was not found.
     pub joints: Vec<Option<Joint>>,
 }
 
 /// A joint that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joint {
-    /// Column and row, pixels of the calibrated picture. One that is not finite counts as not found.
+    /// Column and row, in pixels of the calibrated picture. A joint with a value that is not finite counts as not found.
     pub at: [f64; 2],
-    /// How sure its finder is, 0 to 1.
+    /// Score of the joint detector, 0 to 1.
     pub score: f64,
 }
 
-/// Why films cannot be used.
+/// Reason why films cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilmError {
-    /// There are not as many films as cameras.
+    /// The number of films differs from that of cameras.
     #[error("{films} films were given for {cameras} cameras")]
     Number {
-        /// Films.
+        /// Number of films.
         films: usize,
-        /// Cameras.
+        /// Number of cameras.
         cameras: usize,
     },
-    /// Fewer than two cameras.
+    /// There are fewer than two cameras.
     #[error("{cameras} camera: at least 2 are needed to compare their clocks")]
     OneCamera {
-        /// How many.
+        /// Number of cameras.
         cameras: usize,
     },
-    /// The times of a camera do not rise.
+    /// The times of a camera are not ascending.
     #[error(
-        "camera {camera}: picture {shot} is of {time_s} s, which is not after the one before it"
+        "camera {camera}: picture {shot} has the time {time_s} s, which is not after the previous picture"
     )]
     Times {
-        /// Position in the list, from 0.
+        /// Index of the camera, from 0.
         camera: usize,
-        /// Picture of it, from 0.
+        /// Index of the picture, from 0.
         shot: usize,
-        /// Its time.
+        /// Time of the picture, in seconds.
         time_s: f64,
     },
-    /// A setting is not a usable number.
-    #[error("a window of {window_s} s, expected 0.1 to 60")]
+    /// The search window is out of range.
+    #[error("the window is {window_s} s, expected 0.1 to 60")]
     Window {
-        /// The setting.
+        /// The window, in seconds.
         window_s: f64,
     },
-    /// A camera is not the reference that was asked for.
+    /// The reference camera does not exist.
     #[error(
         "reference camera {reference} does not exist: there are {cameras} cameras, counted from 0"
     )]
     Reference {
-        /// Position in the list, from 0.
+        /// Index of the requested reference, from 0.
         reference: usize,
-        /// How many there are.
+        /// Number of cameras.
         cameras: usize,
     },
 }
 
 impl Film {
-    /// Sees that times are finite and rise.
+    /// Checks that times are finite and ascending.
     pub(crate) fn check(&self, camera: usize) -> Result<(), FilmError> {
         let mut before = f64::NEG_INFINITY;
         for (shot, it) in self.shots.iter().enumerate() {
@@ -97,7 +97,7 @@ impl Film {
         Ok(())
     }
 
-    /// Time between pictures, seconds: the median; none for fewer than two.
+    /// Returns the median time between pictures, in seconds; `None` for fewer than two.
     pub(crate) fn interval_s(&self) -> Option<f64> {
         let mut steps: Vec<f64> =
             self.shots.array_windows().map(|[a, b]| b.time_s - a.time_s).collect();

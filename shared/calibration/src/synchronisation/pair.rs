@@ -1,38 +1,38 @@
-//! How far a joint that two cameras see is from fulfilling their epipolar constraint.
+//! Deviation of a joint that two cameras see from their epipolar constraint.
 
 use geometry::Camera;
 use geometry::epipolar::fundamental;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Expected error of a joint in a picture, sizes of the person: 4 pixels of a person of 400.
+/// Expected error of a joint in a picture, in sizes of the person: 4 pixels for a person of 400.
 pub(crate) const NOISE: f64 = 0.01;
 
 /// The epipolar geometry of two cameras.
 #[derive(Debug, Clone)]
 pub(crate) struct Epipolar {
-    /// From ideal pixels of the first to lines of the second.
+    /// Map from ideal pixels of the first camera to lines of the second.
     b_from_a: Matrix3<f64>,
 }
 
-/// A residual with its derivatives.
+/// A residual, with its scale.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual {
-    /// Expected errors of the joints.
+    /// Value, in expected errors of the joints.
     pub(crate) value: f64,
-    /// Ideal pixels per expected error.
+    /// Number of ideal pixels per expected error.
     pub(crate) px: f64,
 }
 
 impl Epipolar {
-    /// None for cameras in one place, which have no epipolar constraint.
+    /// Returns the epipolar geometry; `None` for cameras in one place, which have no epipolar constraint.
     pub(crate) fn new(a: &Camera, b: &Camera) -> Option<Self> {
         let b_from_a = fundamental(a, b);
         (b_from_a.norm() > 0.0).then_some(Self { b_from_a })
     }
 
-    /// The residual of Sampson, in units of what the errors of both places make of it.
+    /// Returns the Sampson residual, in units of its expected error from the errors of both positions.
     ///
-    /// * `sizes`: of the person in both cameras, ideal pixels.
+    /// * `sizes`: sizes of the person in both cameras, in ideal pixels.
     pub(crate) fn residual(&self, a: [f64; 2], b: [f64; 2], sizes: [f64; 2]) -> Option<Residual> {
         let (a, b) = (Vector3::new(a[0], a[1], 1.0), Vector3::new(b[0], b[1], 1.0));
         let in_b = self.b_from_a * a;
@@ -51,7 +51,7 @@ impl Epipolar {
     }
 }
 
-/// The robust cost of a residual.
+/// Returns the robust cost of a residual.
 pub(crate) fn cost(residual: f64) -> f64 {
     (residual * residual).ln_1p()
 }

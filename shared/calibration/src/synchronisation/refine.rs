@@ -1,4 +1,4 @@
-//! Offsets and drifts to fractions of a frame, with standard errors.
+//! Refinement of offsets and drifts to fractions of a frame, with standard errors.
 
 mod solve;
 
@@ -9,26 +9,26 @@ use solve::{BLOCK_S, HALF, Piece, REACH, Sums};
 use crate::synchronisation::pair::{Epipolar, cost};
 use crate::synchronisation::track::{LEAST_JOINTS, Place, Track};
 
-/// Most times at which a pair is looked at, each way.
+/// Maximum number of times at which a pair is compared, in each direction.
 const MOST_TIMES: usize = 300;
-/// Costs are fitted by parabolas that reach this far to both sides, seconds: far where people move slowly, near where they move
-/// fast. The one with the smallest standard errors counts.
+/// Half-widths of the parabolas that are fitted to the costs, in seconds: wide for slow movement, narrow for fast movement. The one with
+/// the smallest standard errors is used.
 const REACHES_S: [f64; 4] = [0.16, 0.08, 0.04, 0.02];
-/// The farthest that is used, as a share of the footage: joints are to be seen all the way.
+/// Largest half-width as a fraction of the footage, because joints must be visible over the whole width.
 const MOST_REACH: f64 = 0.05;
-/// Costs are looked at again where offsets have moved by more than this, seconds.
+/// Change of offsets above which costs are computed again, in seconds.
 const MOVED_S: f64 = 0.005;
-/// How often, at most.
+/// Maximum number of passes.
 const MOST_PASSES: usize = 4;
-/// Joints of a pair of cameras have one bias over this many seconds: finders of joints put them aside by the direction
-/// that they see a person from.
+/// Time over which joints of a pair of cameras have the same bias, in seconds. The joint detector shifts joints depending on the direction
+/// from which it sees a person.
 const BIAS_S: f64 = 20.0;
-/// Errors of a joint are independent after this many seconds.
+/// Time after which errors of a joint are independent, in seconds.
 const INDEPENDENT_S: f64 = 0.25;
-/// The standard deviation of a normal distribution in medians of its absolute values.
+/// Standard deviation of a normal distribution divided by the median of its absolute values.
 const NORMAL: f64 = 1.4826;
 
-/// The clock of a camera: `t + offset + drift (t - centre)` on the common clock.
+/// Clock of a camera. Its time `t` is `t + offset + drift (t - centre)` on the common clock.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Clock {
     pub(crate) offset_s: f64,
@@ -46,7 +46,7 @@ impl Clock {
         self.centre_s + at_centre / (1.0 + self.drift)
     }
 
-    /// The offset at the beginning of the camera's own clock, seconds.
+    /// Returns the offset at time 0 of the camera's own clock, in seconds.
     pub(crate) fn at_zero_s(&self) -> f64 {
         self.offset_s - self.drift * self.centre_s
     }
@@ -56,11 +56,11 @@ impl Clock {
 pub(crate) struct Problem<'a> {
     /// Tracks of every camera.
     pub(crate) tracks: &'a [Vec<Track>],
-    /// Every pair that has an epipolar constraint, both ways.
+    /// Every pair that has an epipolar constraint, in both directions.
     pub(crate) pairs: Vec<([usize; 2], Epipolar)>,
-    /// The camera whose clock is the common one.
+    /// Index of the camera whose clock is the common one.
     pub(crate) reference: usize,
-    /// The mirror of each joint on the other side, where sides may be exchanged.
+    /// For each joint, the index of its mirror on the other side, if sides may be exchanged.
     pub(crate) mirror: Option<&'a [usize]>,
     pub(crate) n_joints: usize,
 }
@@ -69,9 +69,9 @@ pub(crate) struct Problem<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub(crate) clocks: Vec<Clock>,
-    /// Standard errors of offset (at the centre) and drift.
+    /// Standard errors of the offset (at the centre) and the drift.
     pub(crate) errors: Vec<[f64; 2]>,
-    /// Residuals of every camera: how many, and their median in expected errors and in pixels.
+    /// Residuals of every camera: their number, and their median in expected errors and in pixels.
     pub(crate) residuals: Vec<Residuals>,
 }
 
@@ -88,11 +88,11 @@ struct Row {
     residual: f64,
     px: f64,
     weight: f64,
-    /// Residuals over the delay of the second camera.
+    /// Residuals by delay of the second camera.
     over_delay: Vec<f64>,
 }
 
-/// A row with the times of both cameras since the centres of their clocks, and its block of time.
+/// A row with its block of time, and with the times of both cameras since the centres of their clocks.
 struct Timed {
     row: Row,
     since: [f64; 2],
@@ -102,15 +102,15 @@ struct Timed {
 /// Costs of all pairs near given clocks.
 struct Table {
     pieces: Vec<Piece>,
-    /// Cameras, residual in expected errors, and in pixels.
+    /// Cameras, residual in expected errors, and pixels per expected error.
     residuals: Vec<([usize; 2], f64, f64)>,
 }
 
 impl Problem<'_> {
     /// Refines clocks.
     ///
-    /// * `span`: the part of the common time that is used, seconds.
-    /// * `drifts`: of which cameras the drift is refined as well.
+    /// * `span`: part of the common time to use, in seconds.
+    /// * `drifts`: true for each camera whose drift is refined as well.
     pub(crate) fn refine(&self, start: &[Clock], span: [f64; 2], drifts: &[bool]) -> Fit {
         let mut from = start.to_vec();
         let mut best: Option<(f64, Fit)> = None;
@@ -164,14 +164,14 @@ impl Problem<'_> {
         }
     }
 
-    /// The residuals of all cameras with the clocks as they are.
+    /// Returns the residuals of all cameras with the given clocks.
     pub(crate) fn residuals(&self, clocks: &[Clock], span: [f64; 2]) -> Vec<Residuals> {
         let table = self.table(clocks, span, REACHES_S[3]);
         let each = 0..clocks.len();
         each.map(|camera| residuals(&table.residuals, camera)).collect()
     }
 
-    /// All joints in all pairs, at the times that the clocks give.
+    /// Returns the costs of all joints in all pairs, at times according to the given clocks.
     fn table(&self, clocks: &[Clock], span: [f64; 2], reach_s: f64) -> Table {
         let mut all = Vec::new();
         let mut biased = BTreeMap::<(usize, usize, i64), Vec<Timed>>::new();
@@ -215,7 +215,8 @@ impl Problem<'_> {
         }
     }
 
-    /// The joints of the person in the second camera who costs least; over a range of delays, so that none of them is preferred.
+    /// Returns the joints of the person in the second camera with the lowest cost. The cost is over a range of delays, so that no delay is
+    /// preferred.
     fn nearest(
         &self,
         epipolar: &Epipolar,
@@ -271,7 +272,7 @@ impl Problem<'_> {
         in_a.iter().enumerate().filter_map(row).collect()
     }
 
-    /// Which joint of the second camera is which of the first; none where sides cannot be exchanged.
+    /// Returns the map from joints of the first camera to those of the second; `None` if sides cannot be exchanged.
     fn sides(&self, is_exchanged: bool) -> Option<impl Fn(usize) -> usize + Copy> {
         let mirror = self.mirror.filter(|_| is_exchanged);
         (mirror.is_some() || !is_exchanged)
@@ -284,7 +285,7 @@ fn alive(tracks: &[Track], time_s: f64) -> impl Iterator<Item = &Track> {
     tracks.iter().filter(is_there)
 }
 
-/// The mean cost of the joints that two people have both; none where these are too few.
+/// Returns the mean cost of the joints that two people have in common; `None` if they are too few.
 fn mean_cost(
     epipolar: &Epipolar,
     [in_a, in_b]: [&[Option<Place>]; 2],
@@ -306,7 +307,7 @@ fn mean_cost(
     (n >= LEAST_JOINTS).then(|| sum / weights)
 }
 
-/// Returns for every pair the variance of the biases of its joints: by how much their medians vary more than without bias.
+/// Returns for every pair the variance of the biases of its joints: the excess variance of their medians over that expected without bias.
 fn spreads(n_pairs: usize, biased: &BTreeMap<(usize, usize, i64), Vec<Timed>>) -> Vec<f64> {
     let mut found: Vec<Vec<[f64; 2]>> = vec![Vec::new(); n_pairs];
     for ((pair, ..), rows) in biased {
@@ -322,7 +323,7 @@ fn spreads(n_pairs: usize, biased: &BTreeMap<(usize, usize, i64), Vec<Timed>>) -
     found.iter().map(spread).collect()
 }
 
-/// The variance of the median of residuals that are alike for some time.
+/// Returns the variance of the median of residuals that are correlated in time.
 fn variance_of_median(rows: &[Timed]) -> f64 {
     let middle = median_at(rows, HALF as usize);
     let off = rows.iter().map(|row| (row.row.residual - middle).abs());
@@ -333,9 +334,9 @@ fn variance_of_median(rows: &[Timed]) -> f64 {
     sigma * sigma / n.max(1.0)
 }
 
-/// Returns the bias to subtract from the residuals of a joint of a pair, over the delay of the second camera, expected errors.
+/// Returns the bias to subtract from the residuals of a joint of a pair, by delay of the second camera, in expected errors.
 ///
-/// The mean of the residuals has the variance of their errors and that of biases; what is left of it counts as much as that says.
+/// The median residual contains both errors and the bias. It is multiplied by a factor that follows from the ratio of their variances.
 ///
 /// * `spread`: variance of the biases of the pair.
 fn biases(rows: &[Timed], spread: f64) -> Vec<f64> {
@@ -354,7 +355,7 @@ fn median(mut all: Vec<f64>) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Residuals with those that are missing between the others; none where more than a third is, or an end.
+/// Returns the residuals with missing values interpolated; `None` if more than a third is missing, or if a value at an end is.
 fn filled(costs: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> =
         costs.iter().enumerate().filter_map(|(nth, it)| Some((nth, (*it)?))).collect();

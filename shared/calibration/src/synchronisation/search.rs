@@ -1,44 +1,44 @@
-//! The offsets of all cameras that agree best, and what comes next.
+//! Search for the offsets of all cameras that agree best, and for the second best.
 
 use crate::synchronisation::curve::{Curve, STEP_S};
 
-/// Samples that count as seen without a gain, so that few samples tell little.
+/// Number of extra samples without a gain, so that few samples have a low weight.
 const PRIOR_SAMPLES: f64 = 20.0;
-/// Where the curve has fallen to this share of its best, the basin of the best offset ends.
+/// Fraction of the best value at which the basin of the best offset ends.
 const BASIN: f64 = 0.6;
-/// An entry is a peak if none of this many to each side is higher.
+/// Number of entries to each side; an entry is a peak if none of them is higher.
 const NEAR: usize = 3;
-/// Length of the blocks of time whose gains are taken as independent, seconds.
+/// Length of the blocks of time whose gains are assumed independent, in seconds.
 const BLOCK_S: f64 = 0.5;
-/// Most cameras of which every division into two groups is looked at.
+/// Maximum number of cameras for which every division into two groups is tried.
 const MOST_DIVIDED: usize = 8;
 
-/// A division of the cameras into two groups, and how much better the found offset between these is than any other.
+/// A division of the cameras into two groups. It compares the best offset between the groups with the second best.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
-    /// The cameras of the group without the reference.
+    /// Cameras of the group without the reference.
     pub(crate) group: Vec<usize>,
-    /// The second-best offset of the group, seconds against the best.
+    /// Second-best offset of the group relative to the best, in seconds.
     pub(crate) away_s: f64,
-    /// The second-best gain as a share of the best.
+    /// Second-best gain relative to the best.
     pub(crate) ratio: f64,
-    /// The difference of both gains in units of its standard error.
+    /// Difference of both gains, in standard errors.
     pub(crate) t: f64,
 }
 
 /// Result of the search.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
-    /// Offset of each camera, seconds; 0 for the reference.
+    /// Offset of each camera in seconds; 0 for the reference.
     pub(crate) offsets_s: Vec<f64>,
-    /// One for every division, the most doubtful first.
+    /// One rival for every division, the most doubtful first.
     pub(crate) rivals: Vec<Rival>,
 }
 
 /// Finds the offsets with the largest gain over all pairs.
 ///
 /// * `active`: the cameras that take part; the first is the reference.
-/// * `curves`: of pairs of these.
+/// * `curves`: curves of pairs of these cameras.
 pub(crate) fn search(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Found {
     let groups = groups(active);
     let mut best: Option<(f64, Vec<f64>)> = None;
@@ -75,7 +75,8 @@ pub(crate) fn search(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Fo
     Found { offsets_s, rivals }
 }
 
-/// The groups of cameras that may be moved against the others: all without the reference, or single ones if there are many.
+/// Returns the groups of cameras that are shifted relative to the others: all groups without the reference, or single cameras if there are
+/// many.
 fn groups(active: &[usize]) -> Vec<Vec<usize>> {
     let others = active.get(1..).unwrap_or(&[]);
     if active.len() > MOST_DIVIDED {
@@ -90,7 +91,7 @@ fn groups(active: &[usize]) -> Vec<Vec<usize>> {
     (1..1_usize << others.len()).map(chosen).collect()
 }
 
-/// Offsets from which the search begins: along the pairs with the clearest minima, and from every camera to all others.
+/// Returns offsets from which the search begins: along the pairs with the clearest minima, and from every camera to all others.
 fn starts(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Vec<Vec<f64>> {
     let mut peaks: Vec<(f64, [usize; 2], f64)> = curves
         .iter()
@@ -108,7 +109,7 @@ fn starts(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Vec<Vec<f64>>
     starts
 }
 
-/// Offsets along pairs, the first of which count most.
+/// Returns offsets along pairs; earlier pairs take precedence.
 fn spread(n_cameras: usize, peaks: &[(f64, [usize; 2], f64)]) -> Vec<f64> {
     let mut offsets_s = vec![0.0; n_cameras];
     let mut tree: Vec<usize> = (0..n_cameras).collect();
@@ -117,7 +118,7 @@ fn spread(n_cameras: usize, peaks: &[(f64, [usize; 2], f64)]) -> Vec<f64> {
         if of_a == of_b {
             continue;
         }
-        // The offset of a pair is that of the first camera less that of the second.
+        // The offset of a pair is that of the first camera minus that of the second.
         let by = offsets_s[a] - offset_s - offsets_s[b];
         for camera in 0..n_cameras {
             if tree[camera] == of_b {
@@ -129,14 +130,14 @@ fn spread(n_cameras: usize, peaks: &[(f64, [usize; 2], f64)]) -> Vec<f64> {
     offsets_s
 }
 
-/// The clearest minimum of a pair: its entry, and how clear it is.
+/// Returns the clearest minimum of a pair: its entry, and its clarity.
 pub(crate) fn peak(curve: &Curve) -> (usize, f64) {
     let each = curve.gain.iter().zip(&curve.n).enumerate();
     let each = each.map(|(nth, (gain, n))| (nth, clearness(*gain, *n)));
     each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
 }
 
-/// The second-best minimum of a pair: its entry, and its gain as a share of the best.
+/// Returns the second-best minimum of a pair: its entry, and its gain relative to the best.
 pub(crate) fn second(curve: &Curve) -> Option<(usize, f64)> {
     let (best, _) = peak(curve);
     let each = curve.gain.iter().zip(&curve.n);
@@ -145,8 +146,7 @@ pub(crate) fn second(curve: &Curve) -> Option<(usize, f64)> {
     Some((other, (values[other] / values[best]).max(0.0)))
 }
 
-/// The highest entry outside the basin of another that is higher than all near it; the ends count as such where the basin goes on
-/// up to them.
+/// Returns the highest peak outside the basin of the best entry. If the basin extends to an end, the end counts as a peak.
 fn other_peak(values: &[f64], best: usize) -> Option<usize> {
     let last = values.len().checked_sub(1)?;
     let is_below = |i: &usize| values[*i] < BASIN * values[best];
@@ -154,7 +154,7 @@ fn other_peak(values: &[f64], best: usize) -> Option<usize> {
     let before = (0..=best).rev().find(is_below).unwrap_or(0);
     let is_peak = |i: &usize| {
         let near = i.saturating_sub(NEAR)..=(i + NEAR).min(last);
-        // A flank of the basin is no peak: what is beside it on the way to the best is higher.
+        // A flank of the basin is not a peak, because the neighbour towards the best entry is higher.
         near.clone().all(|other| values[other] <= values[*i])
     };
     let others = (0..=before).chain(after..=last);
@@ -178,9 +178,9 @@ fn total(curves: &[Curve], offsets_s: &[f64]) -> f64 {
     clearness(gain, n)
 }
 
-/// The curves of all pairs between a group and the other cameras, over an offset of the whole group.
+/// Curves of all pairs between a group and the other cameras, as a function of a shift of the whole group.
 struct Joint<'a> {
-    /// The curve, the entry without an offset, and in which direction the offset counts.
+    /// Each curve, its entry without a shift, and the direction in which the shift counts.
     crossing: Vec<(&'a Curve, i64, i64)>,
     half: i64,
 }
@@ -227,7 +227,7 @@ impl<'a> Joint<'a> {
         each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
     }
 
-    /// The gains of the blocks of time, at an offset and at none.
+    /// Returns the gains of the blocks of time, without a shift and with one.
     fn blocks(&self, by: i64) -> Vec<[f64; 2]> {
         let mut blocks = std::collections::BTreeMap::<(usize, i64), [f64; 2]>::new();
         for (number, &(curve, now, sign)) in self.crossing.iter().enumerate() {
@@ -244,7 +244,7 @@ impl<'a> Joint<'a> {
     }
 }
 
-/// The second-best offset of a group.
+/// Returns the second-best offset of a group.
 fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
     let joint = Joint::new(curves, group, offsets_s);
     let values: Vec<f64> = (-joint.half..=joint.half).map(|offset| joint.value(offset)).collect();
@@ -270,7 +270,7 @@ fn rival(curves: &[Curve], group: &[usize], offsets_s: &[f64]) -> Rival {
     }
 }
 
-/// The sum of numbers in units of its standard error, where they are independent.
+/// Returns the sum of independent numbers, in units of its standard error.
 fn sum_in_errors(each: &[f64]) -> f64 {
     let n = each.len() as f64;
     let sum: f64 = each.iter().sum();

@@ -1,7 +1,7 @@
-//! Offsets between clocks from the sounds that all cameras recorded: a second way, where people are not seen well.
+//! Offsets between clocks from the sounds that all cameras recorded. This is an alternative if people are not seen well.
 //!
-//! Sounds begin suddenly, and all microphones hear them begin. The offset between two clocks is where most beginnings fall together.
-//! Sound needs 2.9 ms for a metre, and where its sources were is not known: that is the error.
+//! Sounds begin suddenly, and all microphones record this. The offset between two clocks is the one at which most beginnings coincide.
+//! Sound takes 2.9 ms per metre, and the positions of its sources are unknown; this limits the accuracy.
 
 mod beginnings;
 mod parts;
@@ -18,57 +18,57 @@ use crate::synchronisation::film::FilmError;
 use beginnings::{Beginnings, HOP_S, Match};
 use parts::parts;
 
-/// Speed of sound in air of 20 degrees, metres a second.
+/// Speed of sound in air at 20 degrees Celsius, in metres per second.
 const SPEED_M_S: f64 = 343.0;
-/// How far two cameras are apart at most where that is not known, metres.
+/// Assumed largest distance between two cameras if it is unknown, in metres.
 const FAR_M: f64 = 10.0;
-/// Error of the time at which a sound is heard to begin, seconds.
+/// Error of the time at which a sound begins, in seconds.
 const HEARD_S: f64 = 0.002;
-/// Least beginnings that two cameras share.
+/// Minimum number of beginnings that two cameras share.
 const LEAST: usize = 3;
-/// Least cosine between the beginnings of two cameras.
+/// Smallest accepted cosine between the beginnings of two cameras.
 const LEAST_COSINE: f64 = 0.2;
-/// By how many standard deviations over all offsets the best one is better than their mean, at least.
+/// Minimum difference between the best offset and the mean of all offsets, in standard deviations over all offsets.
 const LEAST_CONTRAST: f64 = 8.0;
-/// How good the second best offset may be, as a share of the best.
+/// Largest accepted quality of the second-best offset relative to the best.
 const MOST_RATIO: f64 = 0.75;
-/// Largest contradiction between pairs beside the way of the sound, seconds.
+/// Largest accepted contradiction between pairs in addition to the travel time of sound, in seconds.
 const SPARE_S: f64 = 0.01;
-/// Length of the part that is searched in full, seconds.
+/// Length of the part that is searched in full, in seconds.
 const SEARCHED_S: f64 = 60.0;
 
-/// Recording of the microphone of a camera.
+/// Recording from the microphone of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sound {
-    /// Samples a second.
+    /// Number of samples per second.
     pub rate_hz: f64,
-    /// Time of the first sample, seconds by the clock of the camera: its first frame is at 0.
+    /// Time of the first sample, in seconds by the clock of the camera; the camera's first frame is at 0.
     pub begins_s: f64,
     /// The samples.
     pub samples: Vec<i16>,
 }
 
-/// How clocks are estimated from sounds.
+/// Settings of the estimation of clocks from sounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SoundSettings {
-    /// The camera whose clock is the common one, by its place in the list.
+    /// Index of the camera whose clock is the common one.
     pub reference: usize,
-    /// Offsets between two cameras are searched up to this, both ways, seconds.
+    /// Largest offset between two cameras to search, in both directions, in seconds.
     pub window_s: f64,
-    /// Where the cameras stand, metres, where that is known.
+    /// Positions of the cameras in metres, if known.
     pub centres: Option<Vec<Point3<f64>>>,
 }
 
-/// Estimates the clocks.
+/// Estimates the clocks from sounds.
 ///
-/// In the [`Outcome`] residuals are not numbers, `n` counts beginnings of sounds that a camera shares with others, and costs are one
-/// less the cosine between the beginnings of two cameras.
+/// In the [`Outcome`], residuals are NaN, and `n` is the number of beginnings of sounds that a camera shares with others. Costs are one
+/// minus the cosine between the beginnings of two cameras.
 ///
-/// * `sounds`: what the cameras recorded, in their order.
+/// * `sounds`: recordings of the cameras, in order.
 ///
 /// # Errors
 ///
-/// [`FilmError`]: fewer than two cameras, a reference that does not exist, a window that makes no sense.
+/// [`FilmError`] for fewer than two cameras, a reference that does not exist, or a window that is out of range.
 pub fn estimate_by_sound(sounds: &[Sound], settings: &SoundSettings) -> Result<Outcome, FilmError> {
     check_settings(sounds.len(), settings.reference, settings.window_s)?;
     let heard: Vec<Beginnings> = sounds.iter().map(Beginnings::of).collect();
@@ -80,7 +80,7 @@ struct Study<'a> {
     settings: &'a SoundSettings,
 }
 
-/// Sounds that two cameras heard together.
+/// Comparison of the sounds of two cameras.
 struct Pair {
     cameras: [usize; 2],
     found: Match,
@@ -153,7 +153,7 @@ impl Study<'_> {
         }
     }
 
-    /// How long sound takes from one camera to another, seconds: by so much the offset of a pair may be wrong.
+    /// Returns the travel time of sound from one camera to another, in seconds. The offset of a pair may be wrong by as much.
     fn way_s(&self, [a, b]: [usize; 2]) -> f64 {
         let far = self.settings.centres.as_ref().and_then(|all| {
             let metres = (all.get(a)? - all.get(b)?).norm();
@@ -162,7 +162,7 @@ impl Study<'_> {
         far.unwrap_or(if a == b { 0.0 } else { FAR_M }) / SPEED_M_S
     }
 
-    /// Standard error of the offset of a camera: any source between the two is as likely.
+    /// Returns the standard error of the offset of a camera; any position of a source between the two is equally likely.
     fn error_s(&self, camera: usize) -> f64 {
         let reference = self.settings.reference;
         if camera == reference {
@@ -171,7 +171,7 @@ impl Study<'_> {
         (self.way_s([camera, reference]) / 3.0_f64.sqrt()).hypot(HEARD_S)
     }
 
-    /// Cameras that heard too little.
+    /// Returns doubts about cameras that recorded too few sounds.
     fn quiet(&self) -> Vec<Doubt> {
         let each = self.heard.iter().enumerate();
         let quiet = each.filter(|(_, it)| it.n() < LEAST);
@@ -183,8 +183,8 @@ impl Study<'_> {
         quiet.map(doubt).collect()
     }
 
-    /// The offsets that fit the pairs best which are sure by themselves; none for a camera that these do not connect with the
-    /// reference.
+    /// Returns the offsets that best fit the pairs with a clear offset of their own; `None` for a camera that these pairs do not connect
+    /// with the reference.
     fn offsets(&self, pairs: &[Pair]) -> Vec<Option<f64>> {
         let n = self.heard.len();
         let sure: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_sure()).collect();
@@ -199,7 +199,7 @@ impl Study<'_> {
                 (is_connected[*a], is_connected[*b]) = (either, either);
             }
         }
-        // The reference is held at 0; a camera that is not connected has an equation of its own.
+        // The reference is held at 0; a camera without connection has an equation of its own.
         let mut normal = DMatrix::<f64>::zeros(n, n);
         let mut right = DVector::<f64>::zeros(n);
         for it in &sure {
@@ -270,19 +270,19 @@ impl Study<'_> {
     }
 }
 
-/// Beginnings that a camera shares with the one with which it shares most.
+/// Returns the largest number of beginnings that a camera shares with another one.
 fn shared(pairs: &[Pair], camera: usize) -> usize {
     let own = pairs.iter().filter(|pair| pair.cameras.contains(&camera));
     own.map(|pair| pair.found.n).max().unwrap_or(0)
 }
 
-/// The pair of a camera that fits best.
+/// Returns the pair of a camera that fits best.
 fn best(pairs: &[Pair], camera: usize) -> Option<&Pair> {
     let own = pairs.iter().filter(|pair| pair.cameras.contains(&camera));
     own.max_by(|a, b| a.found.cosine.total_cmp(&b.found.cosine))
 }
 
-/// The curve of a pair, for a plot.
+/// Returns the curve of a pair, for a plot.
 fn curve(pair: &Pair) -> Curve {
     let cosines = &pair.found.cosines;
     let known = cosines.iter().filter(|cosine| cosine.is_finite());

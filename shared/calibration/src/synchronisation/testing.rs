@@ -1,4 +1,4 @@
-//! People who move, and what cameras with clocks of their own see of them.
+//! Simulated people who move, as seen by cameras with clocks of their own.
 
 use geometry::{Camera, Intrinsics, Lens, LensModel};
 use nalgebra::{
@@ -7,13 +7,13 @@ use nalgebra::{
 
 use crate::synchronisation::{Film, Joint, Person, Settings, Shot};
 
-/// Number of joints of the people here, as of `skeleton::PARSE14`.
+/// Number of joints of the simulated people, as in `skeleton::PARSE14`.
 pub(crate) const N_JOINTS: usize = 14;
 
-/// Where the joints of all people are at a time, metres.
+/// Positions of the joints of all people at a time, in metres.
 pub(crate) type Movement = dyn Fn(f64) -> Vec<[[f64; 3]; N_JOINTS]>;
 
-/// `n` cameras of 1000 x 1000 pixels around the origin, five metres away and 1.6 m high.
+/// Returns `n` cameras of 1000 x 1000 pixels around the origin, five metres away and 1.6 m high.
 pub(crate) fn ring(n: usize) -> Vec<Camera> {
     let camera = |nth: usize| {
         let angle = (0.3 + nth as f64) / n as f64 * core::f64::consts::TAU;
@@ -44,7 +44,7 @@ pub(crate) fn ring(n: usize) -> Vec<Camera> {
     (0..n).map(camera).collect()
 }
 
-/// Someone at a place, turned, in a phase of a step.
+/// Returns a person at a position, facing a direction, in a phase of a step.
 pub(crate) fn stepping(
     [x, y]: [f64; 2],
     turn: f64,
@@ -53,7 +53,7 @@ pub(crate) fn stepping(
 ) -> [[f64; 3]; N_JOINTS] {
     let swing = stride * phase.sin();
     let lift = 0.03 * stride * (2.0 * phase).cos();
-    // Forwards, to the left, up.
+    // The axes are forwards, left, and up.
     let body = [
         [
             -0.35 * swing,
@@ -88,7 +88,7 @@ pub(crate) fn stepping(
     })
 }
 
-/// Someone who walks a figure of eight about the origin, at a speed that changes.
+/// Returns a person who walks a figure of eight around the origin, at a varying speed.
 pub(crate) fn walker(time_s: f64) -> [[f64; 3]; N_JOINTS] {
     let way = |time_s: f64| time_s + 0.25 * (0.7 * time_s).sin();
     let place = |way: f64| [1.2 * (0.7 * way).sin(), 0.8 * (1.4 * way).sin()];
@@ -97,16 +97,16 @@ pub(crate) fn walker(time_s: f64) -> [[f64; 3]; N_JOINTS] {
     stepping(now, turn, core::f64::consts::TAU * 0.95 * way(time_s), 1.0)
 }
 
-/// Effects of the cameras on the scene.
+/// Simulated recording of the scene by the cameras.
 #[derive(Debug, Clone)]
 pub(crate) struct Recording {
     pub(crate) rates_hz: Vec<f64>,
     pub(crate) offsets_s: Vec<f64>,
     pub(crate) drifts: Vec<f64>,
-    /// From when to when on the common clock.
+    /// Start and end on the common clock.
     pub(crate) span: [f64; 2],
     pub(crate) noise_px: f64,
-    /// Shares of joints that are missing, that are elsewhere, and of pictures whose sides are exchanged.
+    /// Fractions of joints that are missing, of joints that are displaced, and of pictures whose sides are exchanged.
     pub(crate) missing: f64,
     pub(crate) outliers: f64,
     pub(crate) exchanged: f64,
@@ -114,7 +114,7 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// 30 pictures per second for some seconds, without flaws.
+    /// Returns a recording with 30 pictures per second for some seconds, without flaws.
     pub(crate) fn of(n: usize, seconds: f64) -> Self {
         Self {
             rates_hz: vec![30.0; n],
@@ -129,7 +129,7 @@ impl Recording {
         }
     }
 
-    /// The flaws that finders of joints have.
+    /// Adds the typical flaws of joint detectors.
     pub(crate) fn flawed(self, seed: u64) -> Self {
         Self {
             noise_px: 2.5,
@@ -141,7 +141,7 @@ impl Recording {
         }
     }
 
-    /// The films; every camera begins at its own time 0 as it can see the span.
+    /// Returns the films. Every camera begins at its own time 0 and covers the span.
     pub(crate) fn films(&self, cameras: &[Camera], movement: &Movement) -> Vec<Film> {
         let mut random = fastrand::Rng::with_seed(self.seed);
         let mut normal = move || -> f64 {
@@ -194,12 +194,12 @@ impl Recording {
     }
 }
 
-/// Returns the mirror of each joint on the other side of the body.
+/// Returns, for each joint, the index of its mirror on the other side of the body.
 pub(crate) fn mirror() -> [usize; N_JOINTS] {
     [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13]
 }
 
-/// The usual settings.
+/// Returns the usual settings.
 pub(crate) fn settings(window_s: f64) -> Settings {
     Settings {
         reference: 0,

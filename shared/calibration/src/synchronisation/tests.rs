@@ -1,4 +1,4 @@
-//! Offsets that are known, and footage that does not tell any.
+//! Tests with known offsets, and with footage that does not determine any.
 
 use std::f64::consts::TAU;
 
@@ -66,7 +66,7 @@ fn a_finder_that_puts_joints_aside_by_the_direction_of_view_moves_no_clock() {
             for (joint, found) in person.joints.iter_mut().enumerate() {
                 let around = 2.0 * camera as f64 + 1.7 * joint as f64;
                 if let Some(found) = found {
-                    // As far off as half a joint is wide.
+                    // The displacement is half the width of a joint.
                     found.at[0] += 8.0 * around.cos();
                     found.at[1] += 8.0 * around.sin();
                 }
@@ -122,7 +122,7 @@ fn a_drift_is_told_where_the_footage_is_long_enough() {
     assert_eq!(outcome.cameras[1].drift_error, None);
 }
 
-/// Two people who work in place: slow arms, and hardly a step.
+/// Returns two people who work in place, with slow arms and hardly a step.
 fn working(time_s: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
     let person = |of: f64, [x, y]: [f64; 2]| {
         let place = [

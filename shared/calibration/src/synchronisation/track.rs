@@ -1,35 +1,35 @@
-//! People linked from picture to picture, and where their joints are at any time.
+//! Tracks of people from picture to picture, with the positions of their joints at any time.
 
 use geometry::Camera;
 use nalgebra::Point2;
 
 use crate::synchronisation::film::{Film, Person};
 
-/// The longest time over which a person is linked, seconds.
+/// Longest gap over which a person is linked, in seconds.
 const LONGEST_GAP_S: f64 = 0.25;
-/// How far the joints of a person may move from one picture to the next, sizes of the person, and per second besides.
+/// Largest movement of a person's joints between two pictures, in sizes of the person: a constant, and an amount per second.
 const FARTHEST: [f64; 2] = [0.15, 4.0];
-/// A joint farther from where its neighbours in time say than this, sizes of the person, is an outlier; where it moves, by this
-/// share of the way between them more.
+/// Distance from the prediction of its neighbours in time beyond which a joint is an outlier, in sizes of the person. For a moving joint, a
+/// fraction of the distance between the neighbours is added.
 const OUTLIER: f64 = 0.03;
 const TURNING: f64 = 0.25;
-/// Neighbours to each side.
+/// Number of neighbours on each side.
 const NEIGHBOURS: usize = 3;
-/// Joints of lower score are not used.
+/// Minimum score of a joint.
 const LEAST_SCORE: f64 = 0.05;
-/// The kernel of the smoothing ends at this many standard deviations.
+/// Extent of the smoothing kernel, in standard deviations.
 const KERNEL_END: f64 = 2.5;
-/// The fewest joints of a person that is used.
+/// Minimum number of joints of a person.
 pub(crate) const LEAST_JOINTS: usize = 3;
 
 /// A joint at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Ideal pixels.
+    /// Position, in ideal pixels.
     pub at: [f64; 2],
-    /// Ideal pixels per second.
+    /// Speed, in ideal pixels per second.
     pub speed: [f64; 2],
-    /// Share of the score.
+    /// Weight, from the scores of the samples.
     pub weight: f64,
 }
 
@@ -44,35 +44,35 @@ struct Sample {
 /// One person over time, in one camera.
 #[derive(Debug, Clone)]
 pub struct Track {
-    /// First and last time, seconds by the clock of the camera.
+    /// First and last time, in seconds by the clock of the camera.
     pub(crate) span: [f64; 2],
-    /// Size of the person, ideal pixels.
+    /// Size of the person, in ideal pixels.
     pub(crate) size: f64,
-    /// Samples of each joint, in the order of time.
+    /// Samples of each joint, in order of time.
     joints: Vec<Vec<Sample>>,
-    /// Standard deviation of the kernel, seconds.
+    /// Standard deviation of the kernel, in seconds.
     sigma_s: f64,
 }
 
 impl Track {
-    /// First and last time, seconds by the clock of the camera.
+    /// Returns the first and last time, in seconds by the clock of the camera.
     pub fn span(&self) -> [f64; 2] {
         self.span
     }
 
-    /// Size of the person, ideal pixels.
+    /// Returns the size of the person, in ideal pixels.
     pub fn size(&self) -> f64 {
         self.size
     }
 
-    /// The mean score of its joints; 0 without any.
+    /// Returns the mean score of the joints; 0 without any.
     pub fn score(&self) -> f64 {
         let scores = self.joints.iter().flatten().map(|joint| joint.score);
         let n = self.joints.iter().map(Vec::len).sum::<usize>();
         scores.sum::<f64>() / n.max(1) as f64
     }
 
-    /// Where a joint is at a time: a line through its samples nearby, weighted by a Gaussian in time.
+    /// Returns the position of a joint at a time, from a line through its nearby samples, weighted by a Gaussian in time.
     pub fn place(&self, joint: usize, time_s: f64) -> Option<Place> {
         let samples = &self.joints[joint];
         let reach = KERNEL_END * self.sigma_s;
@@ -113,20 +113,20 @@ impl Track {
     }
 }
 
-/// A person of a picture, ideal pixels.
+/// A person in a picture, in ideal pixels.
 struct Seen {
     joints: Vec<Option<([f64; 2], f64)>>,
     size: f64,
 }
 
-/// A track while it is made.
+/// A track under construction.
 struct Open {
     samples: Vec<(f64, Seen)>,
 }
 
-/// The tracks of a film.
+/// Returns the tracks of a film.
 ///
-/// * `sigma_s`: standard deviation of the kernel that smooths them, seconds.
+/// * `sigma_s`: standard deviation of the kernel that smooths the tracks, in seconds.
 pub fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Vec<Track> {
     let [width, height] = camera.intrinsics.size;
     let least_size = 0.03 * f64::from(width.max(height));
@@ -150,7 +150,7 @@ pub fn tracks(film: &Film, camera: &Camera, n_joints: usize, sigma_s: f64) -> Ve
     tracks.filter_map(|track| track.finish(n_joints, sigma_s)).collect()
 }
 
-/// Gives people to the tracks whose last pictures they are nearest to, the nearest first.
+/// Assigns people to the tracks with the nearest last picture, in order of distance.
 fn link(time_s: f64, people: &mut [Option<Seen>], open: &mut [Open]) {
     let mut ties = Vec::new();
     for (track, it) in open.iter().enumerate() {
@@ -175,7 +175,7 @@ fn link(time_s: f64, people: &mut [Option<Seen>], open: &mut [Open]) {
     }
 }
 
-/// The median distance of the joints of two people, sizes of the larger one.
+/// Returns the median distance of the joints of two people, in sizes of the larger one.
 fn apart(a: &Seen, b: &Seen) -> Option<f64> {
     let both = a.joints.iter().zip(&b.joints);
     let mut each: Vec<f64> = both
@@ -226,7 +226,7 @@ impl Open {
         }
         let mut sizes: Vec<f64> = self.samples.iter().map(|sample| sample.1.size).collect();
         sizes.sort_by(f64::total_cmp);
-        // Bent people and people cut off look smaller than they are.
+        // People who bend or are cut off look smaller than they are.
         let size = sizes[sizes.len() * 3 / 4];
         let of_joint = |joint: usize| {
             let each = self.samples.iter();
@@ -249,7 +249,7 @@ impl Open {
     }
 }
 
-/// Leaves out samples that are far from where those before and after them say: the line between the medians of both.
+/// Leaves out samples far from the line between the medians of the samples before and after.
 fn without_outliers(samples: &[Sample], limit: f64) -> Vec<Sample> {
     let is_good = |nth: usize| {
         let before = &samples[nth.saturating_sub(NEIGHBOURS)..nth];
@@ -269,7 +269,7 @@ fn without_outliers(samples: &[Sample], limit: f64) -> Vec<Sample> {
     kept.map(|i| samples[i]).collect()
 }
 
-/// The median of samples, each number for itself.
+/// Returns the median of samples, separately for each number.
 fn middle(samples: &[Sample]) -> Option<Sample> {
     let median = |of: fn(&Sample) -> f64| {
         let mut each: Vec<f64> = samples.iter().map(of).collect();

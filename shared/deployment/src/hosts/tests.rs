@@ -1,4 +1,4 @@
-//! Tests of what a deployment of several hosts may say.
+//! Tests of deployments with several hosts.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Every numeric key of a deployment with values that cannot be: the message that each gets.
+//! Tests every numeric key of a deployment with values that are not allowed, and the message for each.
 
 mod others;
 
@@ -19,7 +19,7 @@ fn read(set: &str) -> Result<Loaded, ConfigError> {
     Loaded::parse(SHORT, file, &set, &AnyMachine)
 }
 
-/// Key, values that are refused with what the message says; values that are taken.
+/// A key, its refused values with parts of their messages, and its accepted values.
 type Row = (
     &'static str,
     &'static [(&'static str, &'static str)],
@@ -232,7 +232,7 @@ fn every_key_with_a_number_says_what_it_may_be() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     let keys = keys();
     for key in keys.iter().map(|key| key.name.as_str()) {
-        // Those are asked in `hosts/tests.rs`.
+        // Keys of hosts are tested in `hosts/tests.rs`.
         let of_hosts = key == "host" || key.starts_with("link.");
         let is_asked = of_hosts || ROWS.iter().any(|row| row.0 == key) || OTHERS.contains(&key);
         assert!(is_asked, "{key} stands in no table: what may it be?");

@@ -1,4 +1,4 @@
-//! Deployment files that are read, and those that are refused.
+//! Tests of deployment files that are accepted or refused.
 
 use proptest::prelude::*;
 
@@ -167,7 +167,7 @@ fn text_that_is_not_toml_is_refused_with_its_line() {
     assert!(got.starts_with("deployment.toml:15: "), "{got}");
 }
 
-/// Returns true if a text and an option are taken; checks that a refusal names its place.
+/// Returns true if a text with an option is accepted. Checks that a refusal names its place.
 fn is_taken(text: &str, set: &str) -> bool {
     let file = Path::new("deployment.toml");
     match Loaded::parse(text, file, &[set.to_owned()], &AnyMachine) {
@@ -263,10 +263,10 @@ fn a_number_larger_than_any_is_refused_as_its_key_asks() {
     );
 }
 
-/// Internal words that no user should have to read.
+/// Internal terms that must not appear in a message to the user.
 const NEVER: [&str; 5] = ["u64", "usize", "f64", "invalid type", "invalid value:"];
 
-/// Lines of `[capture]`, and what is said of them.
+/// Lines of `[capture]`, and parts of the messages about them.
 const LINES: &[(&str, &[&str])] = &[
     (
         "n_frames = \"many\"",
@@ -323,7 +323,7 @@ const LINES: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// Replacements in the file, and what is said of them.
+/// Replacements in the file, and parts of the messages about them.
 const EDITS: &[(&str, &str, &[&str])] = &[
     (
         "[[camera]]\nname = \"a\"",

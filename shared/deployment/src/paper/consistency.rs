@@ -1,35 +1,35 @@
-//! The file of what was learned about views that belong together.
+//! The file with learned consistency of views.
 
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Learned consistency of views that belong together.
+/// Learned consistency between views.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
     expecting = "expected \"shipped\", a file, or { file = \"...\", rig = \"...\" }"
 )]
 pub enum Consistency {
-    /// A file, whose part-type tables go by the angle between two cameras.
+    /// A file whose part-type tables are chosen by the angle between two cameras.
     File(PathBuf),
-    /// A file, and the rig whose cameras these are.
+    /// A file, and the rig in it that has the cameras of this deployment.
     Rig(RigConsistency),
 }
 
-/// A file and a rig that it was learned with.
+/// A file, and a rig that it was trained with.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RigConsistency {
-    /// The file.
+    /// File with the learned consistency.
     pub file: PathBuf,
     /// Name of the rig in the file.
     pub rig: String,
 }
 
 impl Consistency {
-    /// The file.
+    /// Returns the file.
     pub fn file(&self) -> &PathBuf {
         match self {
             Self::File(file) => file,
@@ -37,7 +37,7 @@ impl Consistency {
         }
     }
 
-    /// The name of the rig whose cameras these are, if it is given.
+    /// Returns the name of the rig that has these cameras, if it is given.
     pub fn rig(&self) -> Option<&str> {
         match self {
             Self::File(_) => None,

@@ -1,4 +1,4 @@
-//! Where the expected errors of the parts come from.
+//! Source of the expected errors of the parts.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Expected errors of the parts of every view.
+/// Source of the expected errors of the parts in every view.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
@@ -14,23 +14,23 @@ use serde::{Deserialize, Serialize};
                  views = { CAMERA = \"...\" }, frame_offset = 0, frame_step = 1 }"
 )]
 pub enum Errors {
-    /// A network predicts them from the frames.
+    /// A network that predicts the errors from the frames.
     Network(PathBuf),
-    /// A table has them.
+    /// A table that contains the errors.
     Table(ErrorTable),
 }
 
-/// A table of expected errors: subject, action, frame, camera, then one error for each part, pixels.
+/// A table of expected errors. Its columns are subject, action, frame, camera, then one error in pixels for each part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorTable {
-    /// The file.
+    /// File with the table.
     pub table: PathBuf,
-    /// Subject in the table; not set where it names none.
+    /// Subject in the table; not set if the table has none.
     pub subject: Option<String>,
-    /// Action in the table; not set where it names none.
+    /// Action in the table; not set if the table has none.
     pub action: Option<String>,
-    /// Names of cameras in the table, by their names in the deployment; those that are left out have the same.
+    /// Names of cameras in the table, by their names in the deployment. A camera that is not listed has the same name in both.
     #[serde(default)]
     pub views: BTreeMap<String, String>,
     /// Number of the footage's frame 0 in the table.
@@ -46,7 +46,7 @@ fn one() -> u32 {
 }
 
 impl Errors {
-    /// The network, unless a table has them.
+    /// Returns the network, if one predicts the errors.
     pub fn network(&self) -> Option<&PathBuf> {
         match self {
             Self::Network(file) => Some(file),
@@ -54,7 +54,7 @@ impl Errors {
         }
     }
 
-    /// The table, unless a network predicts them.
+    /// Returns the table, if one contains the errors.
     pub fn table(&self) -> Option<&ErrorTable> {
         match self {
             Self::Table(table) => Some(table),
@@ -64,7 +64,7 @@ impl Errors {
 }
 
 impl ErrorTable {
-    /// The name of a camera in the table.
+    /// Returns the name of a camera in the table.
     pub fn name_of<'a>(&'a self, camera: &'a str) -> &'a str {
         self.views.get(camera).map_or(camera, String::as_str)
     }

@@ -7,10 +7,12 @@ use crate::Deployment;
 use crate::hosts::{Carry, Host};
 
 impl Topology {
-    /// The processes that run on a host, of a topology of the whole deployment. A bridge takes the place of those that run on the
-    /// others: on the host that fuses it publishes what they would, on the others it subscribes to what they publish.
+    /// Returns the processes that run on a host, from the topology of the whole deployment.
     ///
-    /// * `host`: one of the deployment's.
+    /// A bridge replaces the processes of the other hosts. On the fusing host, it publishes the topics of those processes. On the other
+    /// hosts, it subscribes to the topics that they publish.
+    ///
+    /// * `host`: a host of the deployment.
     #[must_use]
     pub fn on_host(mut self, deployment: &Deployment, host: &Host) -> Self {
         let own = deployment.views_of(host);
@@ -24,7 +26,7 @@ impl Topology {
                 view.is_none() || !is_at_camera(process.service, carry)
             };
             self.processes.retain(is_here);
-            // Views that are here go on without it; two can be triangulated.
+            // If this host has two or more views of its own, they can be triangulated without the bridge.
             let role = if own.len() > 1 {
                 Role::Optional
             } else {
@@ -53,7 +55,7 @@ impl Topology {
 }
 
 impl Topology {
-    /// Topics that none of these processes publishes: on a host of several, what stays on the others.
+    /// Returns the topics that none of these processes publishes. With several hosts, these topics stay on the other hosts.
     pub fn topics_elsewhere(&self) -> Vec<String> {
         let of_views = (0..self.n_views).flat_map(|view| {
             let small = [topic::view_pose(view), topic::view_quality(view)];
@@ -75,13 +77,13 @@ impl Topology {
     }
 }
 
-/// Returns true if a service runs where the camera is.
+/// Returns true if a service runs on the host of the camera.
 fn is_at_camera(service: &str, carry: Carry) -> bool {
     let with_poses = [Stage::Pose, Stage::Quality].map(Stage::name);
     service == Stage::Capture.name() || (carry == Carry::Poses && with_poses.contains(&service))
 }
 
-/// The topics of a view that cross from its host to the one that fuses.
+/// Returns the topics of a view that are sent from its host to the fusing host.
 fn crossing(view: usize, deployment: &Deployment) -> Vec<String> {
     match deployment.link.carry {
         Carry::Frames => vec![topic::frame(view)],
@@ -160,7 +162,7 @@ mod tests {
             let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
             assert_eq!(desk.process(BRIDGE).unwrap().outputs, topics);
             assert_eq!(far.process(BRIDGE).unwrap().inputs, topics);
-            // Who receives a topic on the host that fuses has not changed.
+            // The fusing host has the same receivers of a topic as before.
             for topic in topics {
                 assert_eq!(desk.receivers_of(topic), whole.receivers_of(topic));
                 assert_eq!(far.receivers_of(topic), 1);

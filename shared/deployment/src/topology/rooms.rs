@@ -1,28 +1,27 @@
-//! How much room the topics between the processes have: numbers that follow from who sends to whom.
+//! Capacity of the topics between the processes, which follows from their senders and receivers.
 
 use messages::topic;
 
 use super::Topology;
 use crate::capture::Mode;
 
-/// Queue of small messages of one receiver where the latest message wins.
+/// Queue length of small messages for one receiver if the latest message wins.
 const SMALL_QUEUE_REALTIME: usize = 4;
-/// Queue of small messages of one receiver where nothing is dropped.
+/// Queue length of small messages for one receiver if nothing is dropped.
 const SMALL_QUEUE_LOSSLESS: usize = 16;
-/// Queue of results of one receiver: with room for eight people each is as large as a picture.
+/// Queue length of results for one receiver. With space for eight people, each result is as large as a picture.
 const SKELETONS_QUEUE: usize = 4;
-/// Queue of images or response maps of one receiver.
+/// Queue length of images or response maps for one receiver.
 const LARGE_QUEUE: usize = 1;
-/// Queue of pictures of live cameras, as they came: a second or less, which costs memory only where the recording lags.
+/// Queue length of original pictures of live cameras. It holds at most a second, and needs memory only if the recording falls behind.
 const PICTURE_QUEUE: usize = 16;
 /// Small messages that one receiver may borrow at the same time.
 const SMALL_BORROWED: usize = 2;
 /// Response maps of one view that one process may borrow at the same time.
 const EVIDENCE_BORROWED: usize = 1;
-/// Receivers of small messages beyond those of the deployment, which no sender waits for: a page, what it records, other
-/// programs.
+/// Number of extra receivers of small messages, such as a web page, its recorder or other programs. No sender waits for them.
 const ONLOOKERS: usize = 4;
-/// The same of images: fewer, as each costs memory for two.
+/// Number of extra receivers of images. It is lower because each needs memory for two images.
 const ONLOOKERS_OF_IMAGES: usize = 3;
 
 /// Content of a topic between processes.
@@ -30,61 +29,61 @@ const ONLOOKERS_OF_IMAGES: usize = 3;
 pub enum Content {
     /// Pixels of a view, with their header.
     Frame,
-    /// Pictures of a live camera as they came, with their header.
+    /// Original pictures of a live camera, with their header.
     Picture,
     /// Response maps of a view, with their header.
     Evidence,
-    /// Single-view candidates of a view.
+    /// Pose candidates of a single view.
     ViewPose,
     /// Expected errors of a view.
     ViewQuality,
     /// Results of one fusion worker.
     PairPose,
-    /// Who is in a frame.
+    /// The people in a frame.
     People,
-    /// The result.
+    /// The resulting skeletons.
     Skeletons,
 }
 
-/// The room of one topic, which has one sender.
+/// Capacity of one topic, which has one sender.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Room {
-    /// Its name.
+    /// Name of the topic.
     pub topic: String,
     /// Content of the topic.
     pub content: Content,
-    /// Processes that may receive it at the same time, at least those of the deployment.
+    /// Number of processes that may receive the topic at the same time; at least those of the deployment.
     pub receivers: usize,
-    /// Onlookers that may receive it besides; no sender waits for them.
+    /// Number of extra receivers of the topic; no sender waits for them.
     pub onlookers: usize,
-    /// Messages that wait for one receiver.
+    /// Number of messages that may wait for one receiver.
     pub queued: usize,
-    /// Messages that one receiver may borrow at the same time.
+    /// Number of messages that one receiver may borrow at the same time.
     pub borrowed: usize,
-    /// Longest array, elements; 1 where messages are no arrays.
+    /// Maximum number of elements of an array; 1 if messages are not arrays.
     pub longest: usize,
-    /// Messages that usually exist at the same time, where that is fewer than all that may be queued and borrowed.
+    /// Number of messages that usually exist at the same time, if it is lower than the number that may be queued and borrowed.
     pub usual: Option<usize>,
 }
 
-/// The largest arrays of one view.
+/// Sizes of the largest arrays of one view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ViewSize {
-    /// Largest image, bytes.
+    /// Size of the largest image, in bytes.
     pub frame_bytes: usize,
-    /// Longest response maps, values.
+    /// Maximum number of values in response maps.
     pub evidence_values: usize,
-    /// Largest picture as it came from a live camera, bytes; 0 where none is recorded.
+    /// Size of the largest original picture of a live camera, in bytes; 0 if none is recorded.
     pub picture_bytes: usize,
 }
 
 impl Topology {
-    /// The room of all topics between processes: those of every view, of every worker, and of the result. Topics of expected
-    /// errors are there whether or not a process sends any.
+    /// Returns the capacity of all topics between processes: those of every view, of every worker, and of the result. Topics of expected
+    /// errors are included even if no process publishes any.
     ///
-    /// * `mode`: what happens when a stage is slower than its input.
-    /// * `views`: as many as the deployment has.
-    /// * `held_frames`: images that one process may borrow at the same time.
+    /// * `mode`: behaviour of a stage that is slower than its input.
+    /// * `views`: sizes of every view of the deployment.
+    /// * `held_frames`: number of images that one process may borrow at the same time.
     pub fn rooms(&self, mode: Mode, views: &[ViewSize], held_frames: usize) -> Vec<Room> {
         let n_recorders = self.n_recorders();
         let small = |topic: String, content, receivers| Room {
@@ -105,7 +104,7 @@ impl Topology {
             rooms.push(Room {
                 topic: topic::frame(view),
                 content: Content::Frame,
-                // Pose, quality and the recorders.
+                // The receivers are pose, quality and the recorders.
                 receivers: 2 + n_recorders,
                 onlookers: ONLOOKERS_OF_IMAGES,
                 queued: LARGE_QUEUE,
@@ -117,7 +116,7 @@ impl Topology {
                 rooms.push(picture(view, size.picture_bytes));
             }
             rooms.push(self.evidence(view, size.evidence_values));
-            // Quality, triangulate, fusion and the recorders.
+            // The receivers are quality, triangulate, fusion and the recorders.
             let receivers = 2 + self.n_workers + n_recorders;
             let pose = topic::view_pose(view);
             rooms.push(small(pose, Content::ViewPose, receivers));
@@ -130,7 +129,7 @@ impl Topology {
         for worker in (0..self.n_workers).filter(|_| !self.has_maps) {
             let room = small(topic::pair_pose(worker), Content::PairPose, 1 + n_recorders);
             rooms.push(Room {
-                // Fusion of all views at once sends a message for every view but one at a time.
+                // If all views are solved at once, fusion sends one message fewer than there are views at the same time.
                 queued: room.queued.max(views.len()),
                 ..room
             });
@@ -152,7 +151,7 @@ impl Topology {
             queued: LARGE_QUEUE,
             borrowed: EVIDENCE_BORROWED,
             longest,
-            // One to write while others are read. These are by far the largest messages: a queued one would cost as much
+            // One message is written while others are read. These are by far the largest messages. Queueing one more would need as much
             // memory again without saving time.
             usual: Some(1 + EVIDENCE_BORROWED),
         }
@@ -168,7 +167,7 @@ fn picture(view: usize, longest: usize) -> Room {
         queued: PICTURE_QUEUE,
         borrowed: 1,
         longest,
-        // One to write while another is read.
+        // One message is written while another is read.
         usual: Some(2),
     }
 }

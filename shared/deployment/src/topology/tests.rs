@@ -1,4 +1,4 @@
-//! Properties that hold for the processes of any deployment.
+//! Tests of properties that the processes of every deployment have.
 
 use core::fmt::Write as _;
 use std::path::Path;
@@ -9,7 +9,7 @@ use super::*;
 use crate::capture::Mode;
 use crate::{AnyMachine, Loaded};
 
-/// A deployment of so many cameras.
+/// Returns a deployment with a given number of cameras.
 fn deployment(n_views: usize, settings: &str) -> Deployment {
     let mut text = "name = 'a'\nrig = 'r'\noutput = 'o'\n".to_owned();
     if settings.contains("[paper]") {
@@ -73,7 +73,7 @@ fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed(
         assert_eq!(fused.outputs, [topic::pair_pose(0)]);
         assert_eq!(recorded.receivers_of(&topic::pair_pose(0)), 3);
         assert_eq!(replayed.receivers_of(&topic::pair_pose(0)), 2);
-        // What stands in for a pose process sends to nobody but those that run.
+        // A replayed pose process sends only to processes that run.
         assert_eq!(recorded.receivers_of(&topic::view_pose(0)), 4);
         assert_eq!(replayed.receivers_of(&topic::view_pose(0)), 2);
     }
@@ -91,7 +91,7 @@ fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
         6,
         "quality, fuse twice, triangulate, results, record"
     );
-    // Pairs 0-1 and 1-2 are the first worker's, 0-2 the second's.
+    // Pairs 0-1 and 1-2 belong to the first worker, pair 0-2 to the second.
     assert_eq!([0, 1, 2].map(|view| n(topic::evidence(view))), [3, 2, 3]);
     assert_eq!(n(topic::view_quality(1)), 4, "fuse twice, results, record");
     assert_eq!(n(topic::pair_pose(1)), 3, "triangulate, results, record");
@@ -153,7 +153,7 @@ fn topics_have_this_room() {
     ];
     assert_eq!(numbers(&rooms[8..]), of_last_view_and_later);
 
-    // Recorded, and nothing may be dropped.
+    // The run is recorded, and nothing may be dropped.
     let recording = recording(false);
     let topology = Topology::new(&deployment(3, settings), Some(&recording), None);
     let rooms = topology.rooms(Mode::Lossless, &[SIZE; 3], 1);
@@ -245,7 +245,7 @@ proptest! {
         let topology = Topology::new(&deployment, recording.as_ref(), replay.as_ref());
         let all = topology.processes();
 
-        // A topic has one sender, and a receiver nothing twice.
+        // Every topic has one sender, and a receiver gets no topic twice.
         let mut outputs: Vec<&String> = all.iter().flat_map(|process| &process.outputs).collect();
         let n_outputs = outputs.len();
         outputs.sort();
@@ -265,7 +265,7 @@ proptest! {
             prop_assert_eq!(topology.receivers_of(topic), lists);
         }
 
-        // Every topic has room for all of its receivers, and a name of its own.
+        // Every topic has capacity for all of its receivers, and a unique name.
         let rooms = topology.rooms(Mode::Realtime, &vec![SIZE; n_views], 1);
         for topic in &outputs {
             let mut its = rooms.iter().filter(|room| room.topic == **topic);
@@ -280,7 +280,7 @@ proptest! {
             prop_assert!(sender.outputs.iter().all(before), "{}", sender.name);
         }
 
-        // Everybody knows the same workers.
+        // All processes have the same list of workers.
         let n_workers = of_service(&topology, "fuse").len();
         prop_assert_eq!(n_workers, topology.n_workers());
         for service in ["triangulate", "results", "record"] {
@@ -292,7 +292,7 @@ proptest! {
             }
         }
 
-        // A worker reads the evidence of the views of its pairs, and of no others.
+        // A worker reads the evidence of the views of its pairs only.
         for worker in of_service(&topology, "fuse").into_iter().filter(|process| !process.is_replayed) {
             let pairs = topology.pairs_of(worker.index.unwrap());
             prop_assert!(!pairs.is_empty());
@@ -302,7 +302,7 @@ proptest! {
             }
         }
 
-        // What stands in for a process sends the same, and takes nothing.
+        // A replayed process sends the same messages, and receives none.
         let whole = Topology::new(&deployment, recording.as_ref(), None);
         for (it, real) in all.iter().zip(whole.processes()) {
             let stage = Stage::of_name(it.service);

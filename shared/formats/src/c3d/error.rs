@@ -1,25 +1,25 @@
 //! Errors of C3D files.
 
-/// Why a C3D file was refused.
+/// Reason why a C3D file was refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum C3dError {
     /// The file ends before required or declared data.
     #[error("the file has {got} bytes, {what} would end at byte {needed}")]
     Short {
-        /// Item that is cut off.
+        /// Name of the item that is cut off.
         what: &'static str,
-        /// Where it would end.
+        /// Position at which the item would end.
         needed: u64,
-        /// Bytes of the file.
+        /// Number of bytes in the file.
         got: u64,
     },
     /// The second byte is not the mark of the format.
     #[error("not a C3D file: its second byte is {got:#04x}, not 0x50")]
     NotC3d {
-        /// The byte.
+        /// Value of the second byte.
         got: u8,
     },
-    /// The processor type is not one of the three.
+    /// The processor type is not one of the three known types.
     #[error("processor {code} is not 84 (Intel), 85 (DEC) or 86 (MIPS)")]
     Processor {
         /// The code in the file.
@@ -28,15 +28,15 @@ pub enum C3dError {
     /// A parameter cannot be read.
     #[error("byte {at}: {what}")]
     Parameter {
-        /// Where it begins.
+        /// Position at which the parameter begins.
         at: usize,
         /// Reason why the parameter is wrong.
         what: &'static str,
     },
-    /// The scale is zero or not a number.
+    /// The scale is zero or NaN.
     #[error("the scale of the points is {value}")]
     Scale {
-        /// The scale.
+        /// Value of the scale.
         value: f64,
     },
     /// The last frame is before the first.

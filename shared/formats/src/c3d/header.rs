@@ -1,4 +1,4 @@
-//! The header, and the points that it locates.
+//! The header, and the points whose position it gives.
 
 use crate::c3d::C3dError;
 use crate::c3d::numbers::{BLOCK, Bytes};
@@ -11,19 +11,19 @@ pub(crate) struct Header {
     pub(crate) first_frame: u32,
     pub(crate) n_frames: usize,
     pub(crate) rate_hz: f64,
-    /// Units per step of an integer; negative where the points are reals.
+    /// Units per step of an integer; negative if the points are reals.
     scale: f32,
-    /// Where the points begin.
+    /// Position at which the points begin.
     data: usize,
-    /// Analog values that follow the points of a frame.
+    /// Number of analog values that follow the points of a frame.
     n_analog: usize,
 }
 
 impl Header {
     /// Reads the first block.
     ///
-    /// Frames are numbered with 16 bits; at the largest number, parameters may have more: `POINT:LONG_FRAMES`, `POINT:FRAMES` as
-    /// a real, or the two words of `TRIAL:ACTUAL_END_FIELD`.
+    /// Frame numbers have 16 bits. If the last frame has the largest such number, parameters may give a larger one: `POINT:LONG_FRAMES`,
+    /// `POINT:FRAMES` as a real, or the two words of `TRIAL:ACTUAL_END_FIELD`.
     pub(crate) fn read(bytes: Bytes<'_>, parameters: &Parameters<'_>) -> Result<Self, C3dError> {
         const WHAT: &str = "the header";
         let word = |nth: usize| bytes.u16(2 * (nth - 1), WHAT);
@@ -63,7 +63,7 @@ impl Header {
         })
     }
 
-    /// All points, frame by frame.
+    /// Returns all points, frame by frame.
     pub(crate) fn points(&self, bytes: Bytes<'_>) -> Result<Vec<Option<[f64; 3]>>, C3dError> {
         let width = if self.scale < 0.0 { 4 } else { 2 };
         let of_points = 4 * width * self.n_points;
@@ -82,7 +82,7 @@ impl Header {
         Ok(points)
     }
 
-    /// A point; `None` if its fourth value is negative, or its position not finite.
+    /// Returns a point; `None` if its fourth value is negative, or if its position is not finite.
     fn point(&self, bytes: Bytes<'_>, point: &[u8]) -> Option<[f64; 3]> {
         let (place, residual) = if self.scale < 0.0 {
             let [x, y, z, w] = *point.as_chunks().0.first_chunk()?;

@@ -2,7 +2,7 @@
 
 use crate::c3d::C3dError;
 
-/// Bytes of a block; positions in the file are given in blocks, from 1.
+/// Number of bytes in a block; positions in the file are given in blocks, from 1.
 pub(crate) const BLOCK: usize = 512;
 
 /// The number format of a processor.
@@ -21,7 +21,7 @@ pub(crate) struct Bytes<'a> {
 }
 
 impl<'a> Bytes<'a> {
-    /// Reads the format mark and the processor; also returns where the parameters begin.
+    /// Reads the format mark and the processor; also returns the position at which the parameters begin.
     pub(crate) fn of_file(bytes: &'a [u8]) -> Result<(Self, usize), C3dError> {
         let mut file = Self {
             bytes,
@@ -82,7 +82,7 @@ impl<'a> Bytes<'a> {
         }
     }
 
-    /// A real; DEC's F format has its two words exchanged, and an exponent that is 2 larger.
+    /// Decodes a real. DEC's F format has its two words exchanged, and an exponent that is larger by 2.
     pub(crate) fn f32_of(&self, bytes: [u8; 4]) -> f32 {
         match self.processor {
             Processor::Intel => f32::from_le_bytes(bytes),

@@ -3,15 +3,15 @@
 use crate::c3d::C3dError;
 use crate::c3d::numbers::{BLOCK, Bytes};
 
-/// One value, its bytes still in the file.
+/// A parameter, whose value is still encoded.
 #[derive(Debug, Clone)]
 struct Parameter<'a> {
-    /// Number of its group.
+    /// Number of the parameter's group.
     id: u8,
     name: String,
-    /// -1: characters; 1, 2 and 4: bytes of a number.
+    /// Kind of value: -1 for characters; 1, 2 or 4 for numbers with as many bytes.
     kind: i8,
-    /// The first runs fastest.
+    /// Sizes of the value; the first index varies fastest.
     sizes: &'a [u8],
     data: &'a [u8],
 }
@@ -20,19 +20,19 @@ struct Parameter<'a> {
 #[derive(Debug)]
 pub(crate) struct Parameters<'a> {
     bytes: Bytes<'a>,
-    /// Number and name.
+    /// Number and name of each group.
     groups: Vec<(u8, String)>,
     entries: Vec<Parameter<'a>>,
 }
 
-/// Bytes of the header of the section.
+/// Number of bytes in the header of the section.
 const HEAD: usize = 4;
 
 impl<'a> Parameters<'a> {
     /// Reads the section that begins at byte `section`.
     ///
-    /// A link that points out of the section is ignored, because the length of an entry also follows from its
-    /// content: samples of c3d.org have a link with exchanged bytes.
+    /// A link that points outside the section is ignored, because the length of an entry also follows from its content. Samples of c3d.org
+    /// have a link with exchanged bytes.
     pub(crate) fn read(bytes: Bytes<'a>, section: usize) -> Result<Self, C3dError> {
         const WHAT: &str = "a parameter";
         let mut parameters = Self {
@@ -43,7 +43,7 @@ impl<'a> Parameters<'a> {
         let n_blocks = usize::from(bytes.u8(section + 2, WHAT)?);
         let end = section + n_blocks * BLOCK;
         let mut at = section + HEAD;
-        // A file whose last parameter reaches its last byte has no end mark.
+        // A file whose last parameter extends to the last byte has no end mark.
         while let (Ok(length), Ok(id)) = (bytes.u8(at, WHAT), bytes.u8(at + 1, WHAT)) {
             let (length, id) = (length as i8, id as i8);
             if length == 0 || id == 0 {
@@ -68,14 +68,14 @@ impl<'a> Parameters<'a> {
             }
             at = link + offset;
             if n_blocks > 0 && at >= end {
-                // After the value: the length of a description, and the description.
+                // The length of a description and the description follow the value.
                 at = own_end + 1 + usize::from(bytes.u8(own_end, WHAT)?);
             }
         }
         Ok(parameters)
     }
 
-    /// Reads the value of a parameter; returns where it ends.
+    /// Reads the value of a parameter; returns the position at which it ends.
     fn parameter(
         &mut self,
         at: usize,
@@ -113,13 +113,13 @@ impl<'a> Parameters<'a> {
         all.find(|parameter| parameter.id == id && parameter.name == name)
     }
 
-    /// A text, without surrounding blanks.
+    /// Returns a text, without surrounding blanks.
     pub(crate) fn text(&self, group: &str, name: &str) -> Option<String> {
         let parameter = self.get(group, name)?;
         (parameter.kind == -1).then(|| text(parameter.data))
     }
 
-    /// A list of texts, the first `most` of them; empty if there is no such parameter.
+    /// Returns the first `most` texts of a list; empty if there is no such parameter.
     pub(crate) fn texts(&self, group: &str, name: &str, most: usize) -> Vec<String> {
         let Some(parameter) = self.get(group, name).filter(|parameter| parameter.kind == -1) else {
             return Vec::new();
@@ -133,7 +133,7 @@ impl<'a> Parameters<'a> {
         }
     }
 
-    /// The first number of a parameter, whatever its kind; whole numbers are unsigned.
+    /// Returns the first number of a parameter of any kind; whole numbers are unsigned.
     pub(crate) fn number(&self, group: &str, name: &str) -> Option<f64> {
         let parameter = self.get(group, name)?;
         match (parameter.kind, parameter.data) {
@@ -144,7 +144,7 @@ impl<'a> Parameters<'a> {
         }
     }
 
-    /// A whole number of 32 bits, as two words, the lower first; none for a parameter of any other form.
+    /// Returns a 32-bit whole number stored as two words, the lower first; `None` for a parameter of any other form.
     pub(crate) fn double_word(&self, group: &str, name: &str) -> Option<f64> {
         let parameter = self.get(group, name).filter(|parameter| parameter.kind == 2)?;
         let &[a, b, c, d] = parameter.data else {
@@ -155,7 +155,7 @@ impl<'a> Parameters<'a> {
     }
 }
 
-/// Latin-1 text, without surrounding blanks.
+/// Decodes Latin-1 text, without surrounding blanks.
 fn text(bytes: &[u8]) -> String {
     let all: String = bytes.iter().map(|&byte| char::from(byte)).collect();
     all.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace())

@@ -22,7 +22,7 @@ fn trial() -> Trial {
     }
 }
 
-/// The six encodings of a trial.
+/// Returns the six encodings of a trial.
 fn encodings(trial: &Trial) -> Vec<Vec<u8>> {
     let of = |processor| [Some(0.5), None].map(|scale| write(trial, processor, scale));
     PROCESSORS.into_iter().flat_map(of).collect()
@@ -94,7 +94,7 @@ fn another_format_is_named() {
     assert_eq!(got, Err(C3dError::NotC3d { got: b'I' }));
 }
 
-/// A valid file with some bytes replaced.
+/// Parses a valid file with some bytes replaced.
 fn with(at: usize, bytes: &[u8]) -> Result<C3d, C3dError> {
     let mut file = write(&trial(), Processor::Intel, None);
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -129,14 +129,14 @@ fn missing_frames_are_an_error() {
 
 #[test]
 fn a_parameter_of_an_unknown_kind_is_refused() {
-    // After the header and the group (2 + 5 + 2 + 1 bytes): the name and the link of USED.
+    // The name and the link of USED follow the header and the group (2 + 5 + 2 + 1 bytes).
     let got = with(512 + 4 + 10 + 8, &[3]);
     assert!(matches!(got, Err(C3dError::Parameter { .. })), "{got:?}");
 }
 
 #[test]
 fn a_link_out_of_the_section_is_ignored() {
-    // The link of USED, after the header, the group and its own name.
+    // The link of USED follows the header, the group and its own name.
     let got = with(512 + 4 + 10 + 6, &[0xff, 0x7f]).unwrap();
     assert_eq!(got.labels(), trial().labels);
 }

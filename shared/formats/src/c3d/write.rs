@@ -1,16 +1,16 @@
-//! Writes points over time: Intel numbers as reals, one block of parameters after the other.
+//! Writing of points over time, as Intel reals with a section of parameters.
 
 use std::io::{self, Write};
 
 use crate::c3d::numbers::BLOCK;
 
-/// Longest name or description of a point, characters: one byte holds the length.
+/// Maximum number of characters in the name or description of a point; one byte holds the length.
 const MAX_TEXT: usize = 127;
-/// Names in one parameter: one byte counts them.
+/// Maximum number of names in one parameter; one byte holds the number.
 const MAX_TEXTS: usize = 255;
-/// Blocks of parameters: one byte counts them.
+/// Maximum number of blocks of parameters; one byte holds the number.
 const MAX_BLOCKS: usize = 255;
-/// Steps of a residual: one byte holds it.
+/// Maximum number of steps of a residual; one byte holds it.
 const MAX_RESIDUAL: f64 = 255.0;
 
 /// Header of a file, before its points; see [`write()`].
@@ -20,34 +20,34 @@ pub struct Heading<'a> {
     pub rate_hz: f64,
     /// Unit of the positions: `mm` or `m`.
     pub units: &'a str,
-    /// Which axis is up, such as `+Z` (`POINT:Y_SCREEN`).
+    /// Axis that points up, such as `+Z` (`POINT:Y_SCREEN`).
     pub up: &'a str,
-    /// Names of the points; characters beyond Latin-1 become question marks, and what is longer than 127 is cut.
+    /// Names of the points. Characters beyond Latin-1 become question marks, and names are cut after 127 characters.
     pub labels: &'a [String],
-    /// Description of each point, in the order of the names. May be empty.
+    /// Description of each point, in the order of the names. The list may be empty.
     pub descriptions: &'a [String],
-    /// Frames that follow.
+    /// Number of frames that follow.
     pub n_frames: u32,
-    /// Number of the first frame, from 1. Files with frames beyond number 65535 begin at 1, whatever this says.
+    /// Number of the first frame, counted from 1. It is ignored for files with frames beyond number 65535, which begin at 1.
     pub first_frame: u32,
-    /// Smallest difference of residuals, in the unit; a residual has 255 steps at most.
+    /// Size of a step of a residual, in the unit of the file; a residual has at most 255 steps.
     pub residual_step: f64,
-    /// Name and version of the program that writes.
+    /// Name and version of the program that writes the file.
     pub software: [&'a str; 2],
 }
 
 /// A point that was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
-    /// In the unit of the file.
+    /// Position, in the unit of the file.
     pub position: [f64; 3],
-    /// How uncertain it is, in the unit of the file; 0 where that is not known.
+    /// Uncertainty of the position, in the unit of the file; 0 if it is not known.
     pub residual: f64,
-    /// Bit `c` is set if camera `c` of the first seven saw it.
+    /// Bit mask of the cameras: bit `c` is set if camera `c` of the first seven saw the point.
     pub cameras: u8,
 }
 
-/// Writes a file. A point that is `None` is written as the format says: at 0, with residual -1.
+/// Writes a file. A point that is `None` is written at 0 with residual -1, as the format specifies.
 ///
 /// ```
 /// use formats::c3d::{C3d, Heading, Marker};
@@ -73,7 +73,8 @@ pub struct Marker {
 ///
 /// # Errors
 ///
-/// Those of `out`; names that do not fit into the format; another number of frames or points than announced.
+/// Fails if writing to `out` fails, if the names do not fit into the format, or if the number of frames or points differs from the
+/// announced one.
 pub fn write(
     out: &mut impl Write,
     heading: &Heading<'_>,
@@ -100,7 +101,7 @@ pub fn write(
         return Err(refused(&format!("{n_frames} frames, {due} were announced")));
     }
     if heading.n_frames > u32::from(u16::MAX) {
-        // Readers such as `ezc3d` count the frames of long files to the end: what fills the last block would be more of them.
+        // The last block is not filled up, because readers such as `ezc3d` would count the padding of long files as more frames.
         return Ok(());
     }
     out.write_all(&vec![0; n_bytes.next_multiple_of(BLOCK) - n_bytes])
@@ -110,12 +111,12 @@ fn refused(why: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, format!("C3D: {why}"))
 }
 
-/// The four reals of a point; the fourth holds cameras and residual.
+/// Returns the four reals of a point; the fourth contains cameras and residual.
 fn numbers(point: Option<&Marker>, step: f64) -> [u8; 16] {
     let values = point.map_or([0.0, 0.0, 0.0, -1.0], |point| {
         let [x, y, z] = point.position.map(|value| value as f32);
         let steps = (point.residual / step).round().clamp(0.0, MAX_RESIDUAL);
-        // Of a residual that is not a number, nothing is known.
+        // A residual that is NaN is unknown.
         let steps = if steps.is_nan() { 0.0 } else { steps };
         let cameras = f32::from(point.cameras & 0x7f);
         [x, y, z, cameras * 256.0 + steps as f32]
@@ -128,7 +129,7 @@ fn numbers(point: Option<&Marker>, step: f64) -> [u8; 16] {
 }
 
 impl Heading<'_> {
-    /// Numbers of the first and the last frame.
+    /// Returns the numbers of the first and the last frame.
     fn range(&self) -> [u32; 2] {
         let first = self.first_frame.max(1);
         let last = first.saturating_add(self.n_frames).saturating_sub(1);
@@ -160,7 +161,7 @@ fn clamped(number: u32) -> u16 {
     u16::try_from(number).unwrap_or(u16::MAX)
 }
 
-/// The block where the points begin, from 1.
+/// Returns the block at which the points begin, from 1.
 fn data_block(parameters: &[u8]) -> u16 {
     (2 + parameters.len() / BLOCK) as u16
 }
@@ -185,8 +186,10 @@ impl Section {
         self.bytes.extend(body);
     }
 
-    /// * `kind`: -1 for characters, else the bytes of a number.
-    /// * `sizes`: the first runs fastest.
+    /// Adds a parameter.
+    ///
+    /// * `kind`: -1 for characters, otherwise the number of bytes of a number.
+    /// * `sizes`: sizes of the value; the first index varies fastest.
     fn parameter(&mut self, name: &str, kind: i8, sizes: &[u8], data: &[u8]) {
         let mut body = vec![kind as u8, sizes.len() as u8];
         body.extend(sizes);
@@ -208,7 +211,7 @@ impl Section {
         self.parameter(name, -1, &[text.len() as u8], &text);
     }
 
-    /// `NAME`, then `NAME2` and so on: one parameter holds 255 texts at most.
+    /// Adds texts as `NAME`, then `NAME2` and so on, because one parameter has at most 255 texts.
     fn texts(&mut self, name: &str, values: &[String]) {
         for (nth, values) in values.chunks(MAX_TEXTS).enumerate() {
             let texts: Vec<Vec<u8>> = values.iter().map(|value| latin(value)).collect();
@@ -227,14 +230,14 @@ impl Section {
     }
 }
 
-/// Latin-1, which is what readers expect at most.
+/// Encodes a text as Latin-1, the largest character set that readers expect.
 fn latin(text: &str) -> Vec<u8> {
     let bytes = text.chars().map(|c| u8::try_from(c).unwrap_or(b'?'));
     bytes.take(MAX_TEXT).collect()
 }
 
 fn parameters(heading: &Heading<'_>) -> io::Result<Vec<u8>> {
-    // Where the points begin is one of the parameters; its value does not change their length.
+    // One parameter is the position at which the points begin; its value does not change the length of the section.
     let n_bytes = section(heading, 0).len();
     if n_bytes / BLOCK > MAX_BLOCKS {
         let n = heading.labels.len();
@@ -245,7 +248,7 @@ fn parameters(heading: &Heading<'_>) -> io::Result<Vec<u8>> {
     Ok(section(heading, (2 + n_bytes / BLOCK) as u16))
 }
 
-/// The whole section, filled up to whole blocks.
+/// Returns the whole section, padded to whole blocks.
 fn section(heading: &Heading<'_>, data_block: u16) -> Vec<u8> {
     let mut all = Section::default();
     let [first, last] = heading.range();
@@ -254,7 +257,7 @@ fn section(heading: &Heading<'_>, data_block: u16) -> Vec<u8> {
     all.real("SCALE", -heading.residual_step);
     all.real("RATE", heading.rate_hz);
     all.word("DATA_START", data_block);
-    // A whole number, which some readers insist on; longer files have their number in LONG_FRAMES and in TRIAL.
+    // Some readers require a whole number here; longer files have their number in LONG_FRAMES and in TRIAL.
     all.word("FRAMES", clamped(heading.n_frames));
     if heading.n_frames > u32::from(u16::MAX) {
         all.real("LONG_FRAMES", f64::from(heading.n_frames));
@@ -266,12 +269,12 @@ fn section(heading: &Heading<'_>, data_block: u16) -> Vec<u8> {
     all.text("UNITS", heading.units);
     all.text("X_SCREEN", "+X");
     all.text("Y_SCREEN", heading.up);
-    // Others expect these groups, also of files without anything but points.
+    // Other programs expect these groups even in files with points only.
     all.group("ANALOG");
     all.word("USED", 0);
     all.parameter("LABELS", -1, &[0, 0], &[]);
     all.real("GEN_SCALE", 1.0);
-    // No samples for each frame, as the header says: one of the two alone is refused by some readers.
+    // The number of samples per frame is 0 here and in the header, because some readers refuse a file with only one of the two.
     all.real("RATE", 0.0);
     all.parameter("SCALE", 4, &[0], &[]);
     all.parameter("OFFSET", 2, &[0], &[]);

@@ -2,17 +2,17 @@
 
 use crate::checksum::fnv1a;
 
-/// Bytes of the header.
+/// Number of bytes in the header.
 pub const HEADER_BYTES: usize = 28;
 
-/// The header of one kind of file.
+/// Header of one kind of file.
 ///
-/// | bytes | what |
+/// | bytes | content |
 /// |---|---|
 /// | 0..8 | the kind of file, eight letters |
 /// | 8..12 | version, u32, little-endian |
 /// | 12..20 | length of the payload, u64, little-endian |
-/// | 20..28 | [`fnv1a`] of the payload, little-endian; it tells every change within one byte |
+/// | 20..28 | [`fnv1a`] of the payload, little-endian; it detects every change within one byte |
 /// | 28.. | payload |
 ///
 /// ```
@@ -23,49 +23,49 @@ pub const HEADER_BYTES: usize = 28;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Envelope {
-    /// How files of this kind begin.
+    /// First bytes of files of this kind.
     pub magic: [u8; 8],
-    /// The version that is written, and the only one that is read.
+    /// Version that is written, which is also the only one that can be read.
     pub version: u32,
 }
 
-/// Why bytes are not a file of one kind.
+/// Reason why bytes are not a file of the expected kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum EnvelopeError {
-    /// Another kind of file.
+    /// The file is of another kind.
     #[error("the file does not begin with `{}`", String::from_utf8_lossy(.expected))]
     Magic {
-        /// How it should begin.
+        /// Expected first bytes.
         expected: [u8; 8],
     },
-    /// Another Parallax made it.
+    /// The file was written by another version of Parallax.
     #[error("the file has version {got}, this Parallax reads version {expected}")]
     Version {
-        /// The file's version.
+        /// Version of the file.
         got: u32,
-        /// The version that is read.
+        /// Version that can be read.
         expected: u32,
     },
     /// The file is truncated, or something was appended.
     #[error("the file has {got} bytes, its header says {expected}")]
     Length {
-        /// Bytes there are.
+        /// Actual number of bytes.
         got: u64,
-        /// Bytes that there should be.
+        /// Expected number of bytes.
         expected: u64,
     },
     /// The file is damaged.
     #[error("the file is damaged: its checksum is {got:016x}, its header says {expected:016x}")]
     Checksum {
-        /// Checksum of what is there.
+        /// Checksum of the payload.
         got: u64,
-        /// Checksum that the header holds.
+        /// Checksum in the header.
         expected: u64,
     },
 }
 
 impl Envelope {
-    /// The bytes of a file with this payload.
+    /// Returns the bytes of a file with this payload.
     pub fn seal(&self, payload: &[u8]) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(HEADER_BYTES + payload.len());
         bytes.extend(self.magic);
@@ -76,11 +76,11 @@ impl Envelope {
         bytes
     }
 
-    /// The payload of a file.
+    /// Returns the payload of a file.
     ///
     /// # Errors
     ///
-    /// [`EnvelopeError`]; truncated bytes and bytes with a changed one are always refused.
+    /// [`EnvelopeError`]. A truncated file, or one with a single changed byte, is always refused.
     pub fn open<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], EnvelopeError> {
         let expected = self.magic;
         let rest = bytes.strip_prefix(&expected).ok_or(EnvelopeError::Magic { expected })?;

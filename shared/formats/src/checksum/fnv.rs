@@ -1,9 +1,9 @@
-//! The hash of Fowler, Noll and Vo, variant 1a.
+//! Hash function of Fowler, Noll and Vo, variant 1a.
 
-/// FNV-1a, 64 bits.
+/// Computes the 64-bit FNV-1a hash.
 ///
-/// Distinguishes files and settings; it does not protect against forgery. Every step is a bijection
-/// of the state, so two inputs of one length that differ in one byte never agree.
+/// The hash distinguishes files and settings; it does not protect against forgery. Every step is a bijection of the state, so two inputs of
+/// the same length that differ in one byte never have the same hash.
 ///
 /// ```
 /// assert_eq!(formats::checksum::fnv1a(b"foobar"), 0x8594_4171_f739_67e8);
@@ -12,7 +12,7 @@ pub fn fnv1a(bytes: &[u8]) -> u64 {
     fnv1a_of(bytes.iter().copied())
 }
 
-/// [`fnv1a`] of bytes that do not lie together.
+/// Computes [`fnv1a`] of bytes that are not contiguous in memory.
 ///
 /// ```
 /// let parts = b"foo".iter().chain(b"bar").copied();
@@ -24,7 +24,7 @@ pub fn fnv1a_of(bytes: impl IntoIterator<Item = u8>) -> u64 {
     })
 }
 
-/// FNV-1a, 32 bits: for fields of messages that have no room for 64.
+/// Computes the 32-bit FNV-1a hash, for fields of messages that have no space for 64 bits.
 ///
 /// ```
 /// assert_eq!(formats::checksum::fnv1a_32(b"foobar"), 0xbf9c_f968);

@@ -2,52 +2,52 @@
 
 use std::io;
 
-/// Why bytes are not a MATLAB level 5 file.
+/// Reason why bytes are not a MATLAB level 5 file.
 #[derive(Debug, thiserror::Error)]
 pub enum ContainerError {
-    /// HDF5, which MATLAB calls version 7.3.
+    /// The file is HDF5, which MATLAB calls version 7.3.
     #[error("the file is of MATLAB version 7.3: save it again with `save -v7`")]
     Version73,
-    /// Written on a big-endian machine, or not a MATLAB file.
+    /// The file was written on a big-endian machine, or is not a MATLAB file.
     #[error("the header's endian mark is {got:?}, expected \"IM\" (little-endian)")]
     Endian {
-        /// The two characters.
+        /// The two characters that were found.
         got: String,
     },
     /// The file ends too early.
     #[error("the file ends within {what}: {got} bytes left, {expected} needed")]
     Ended {
-        /// Item that was being read.
+        /// Name of the item that was being read.
         what: &'static str,
-        /// Bytes left.
+        /// Number of bytes left.
         got: usize,
-        /// Bytes needed.
+        /// Number of bytes needed.
         expected: usize,
     },
     /// A tag has an unexpected type.
     #[error("{what} has type {got}, expected {expected}")]
     Type {
-        /// Item that was being read.
+        /// Name of the item that was being read.
         what: &'static str,
-        /// The type's number.
+        /// Number of the type.
         got: u32,
-        /// The types accepted.
+        /// Accepted types.
         expected: &'static str,
     },
-    /// An array's sizes and its values disagree.
+    /// The sizes of an array and its number of values disagree.
     #[error("an array of {sizes:?} holds {got} values")]
     Size {
-        /// Its sizes.
+        /// Sizes of the array.
         sizes: Vec<i32>,
-        /// Values found.
+        /// Number of values found.
         got: usize,
     },
-    /// The file exceeds a limit that models and annotations do not reach.
+    /// The file exceeds a limit that no model or annotation reaches.
     #[error("the file holds more than {limit} {what}")]
     TooMuch {
-        /// Item that is counted.
+        /// Name of the items that are counted.
         what: &'static str,
-        /// The number accepted.
+        /// Maximum number of items.
         limit: usize,
     },
     /// A compressed variable is damaged.

@@ -1,4 +1,4 @@
-//! Written values are read back.
+//! Tests that written values are read back.
 
 use super::*;
 

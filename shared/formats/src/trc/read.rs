@@ -1,4 +1,4 @@
-//! The text of a file to markers over time.
+//! Parser from the text of a file to markers over time.
 
 /// Markers over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,39 +9,39 @@ pub struct Trc {
     pub units: String,
     /// Names of the markers.
     pub markers: Vec<String>,
-    /// `[frame][marker]`: position in the file's own frame of reference and unit; `None` where missing.
+    /// Positions as `[frame][marker]`, in the file's own frame of reference and unit; `None` for a missing marker.
     pub frames: Vec<Vec<Option<[f64; 3]>>>,
 }
 
-/// Why a TRC file was refused.
+/// Reason why a TRC file was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TrcError {
     /// A header line is missing or malformed.
     #[error("line {line}: expected {expected}")]
     Header {
-        /// 1-based line.
+        /// Number of the line, from 1.
         line: usize,
-        /// Text that is expected.
+        /// Expected text.
         expected: &'static str,
     },
-    /// A row has another number of columns than the header announces.
+    /// A row has a different number of columns than the header announces.
     #[error("line {line}: {got} columns, the header announces {markers} markers")]
     Columns {
-        /// 1-based line.
+        /// Number of the line, from 1.
         line: usize,
-        /// Columns found.
+        /// Number of columns found.
         got: usize,
-        /// Markers announced.
+        /// Number of markers announced.
         markers: usize,
     },
     /// A cell is not a number.
     #[error("line {line}, column {column}: {text:?} is not a number")]
     Number {
-        /// 1-based line.
+        /// Number of the line, from 1.
         line: usize,
-        /// 1-based column.
+        /// Number of the column, from 1.
         column: usize,
-        /// The cell.
+        /// Text of the cell.
         text: String,
     },
 }
@@ -49,7 +49,7 @@ pub enum TrcError {
 impl Trc {
     /// Parses the text of a TRC file.
     ///
-    /// Empty cells, and NaN, are missing markers; rows may end in a tab.
+    /// Empty cells and NaN are missing markers. Rows may end in a tab.
     ///
     /// # Errors
     ///
@@ -94,7 +94,7 @@ impl Trc {
         })
     }
 
-    /// Index of a marker.
+    /// Returns the index of a marker.
     pub fn marker(&self, name: &str) -> Option<usize> {
         self.markers.iter().position(|marker| marker == name)
     }

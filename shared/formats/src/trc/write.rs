@@ -1,4 +1,4 @@
-//! Markers over time to the text of a file, row by row.
+//! Writer from markers over time to the text of a file, row by row.
 
 use core::fmt::{self, Write as _};
 
@@ -19,7 +19,7 @@ use core::fmt::{self, Write as _};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading<'a> {
-    /// The file's own name.
+    /// Name of the file itself.
     pub file_name: &'a str,
     /// Frames per second.
     pub rate_hz: f64,
@@ -27,7 +27,7 @@ pub struct Heading<'a> {
     pub units: &'a str,
     /// Names of the markers, without tabs.
     pub markers: &'a [&'a str],
-    /// Rows that follow.
+    /// Number of rows that follow.
     pub n_rows: u64,
 }
 
@@ -49,12 +49,10 @@ impl fmt::Display for Heading<'_> {
     }
 }
 
-/// One row, with its end; the three cells of a missing marker are `NaN`.
+/// Returns one row with its line break. The three cells of a missing marker are `NaN`, not empty: `OpenSim` (4.6) drops an empty cell after
+/// the last tab of a line, and then refuses the row.
 ///
-/// `OpenSim` (4.6) drops what follows the last tab of a line if it is empty, and refuses a row whose last marker left its cells
-/// empty.
-///
-/// * `number`: of the row, from 1.
+/// * `number`: number of the row, from 1.
 /// * `markers`: positions in the file's unit.
 pub fn row(
     number: u64,

@@ -1,4 +1,4 @@
-//! The cameras of a problem: which of their parameters are free, and the terms of their observations.
+//! Cameras of a problem: their free parameters, and the terms of their observations.
 
 use nalgebra::{
     Isometry3, Matrix2, Matrix2x3, Point2, Point3, Translation3, UnitQuaternion, Vector3,
@@ -7,30 +7,30 @@ use nalgebra::{
 use super::{Loss, Term};
 use crate::{Camera, Lens, LensModel};
 
-/// The residual, standard deviations, of a point that has no image: behind the camera, or beyond its lens.
+/// Residual in standard deviations of a point without an image, which is behind the camera or beyond its lens.
 const NO_IMAGE: f64 = 1e3;
 
-/// Which numbers of a camera are free; the others are held.
+/// The parameters of a camera that are free; the others are held.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each number is free or held by itself"
 )]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Free {
-    /// Rotation (radians about the axes of the camera) and centre (metres in the world).
+    /// True if the rotation (radians about the axes of the camera) and the centre (metres in the world) are free.
     pub pose: bool,
-    /// The focal length: both of them in their ratio.
+    /// True if the focal length is free; fx and fy keep their ratio.
     pub focal: bool,
-    /// The ratio of the two: fy by itself. Without `focal` fy alone is free.
+    /// True if the ratio of fy to fx is free. Without `focal`, only fy is free.
     pub aspect: bool,
-    /// The principal point.
+    /// True if the principal point is free.
     pub centre: bool,
-    /// The coefficients of the lens, in the order of [`LensModel::coefficients`]: k1 to k6, p1, p2, or k1 to k4.
+    /// True for each free coefficient of the lens, in the order of [`LensModel::coefficients`]: k1 to k6, p1, p2, or k1 to k4.
     pub lens: [bool; 8],
 }
 
 impl Free {
-    /// The pose alone.
+    /// Only the pose is free.
     pub const POSE: Self = Self {
         pose: true,
         focal: false,
@@ -40,7 +40,7 @@ impl Free {
     };
 }
 
-/// A number of a camera.
+/// A parameter of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Number {
     Rotation(usize),
@@ -51,32 +51,32 @@ enum Number {
     Lens(usize),
 }
 
-/// Cameras, and which of their numbers are the shared parameters from 0 on.
+/// Cameras, and the assignment of their free parameters to the shared parameters from index 0.
 #[expect(clippy::struct_field_names, reason = "a list of cameras is that")]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cameras {
     cameras: Vec<Camera>,
-    /// The camera and the number of each parameter.
+    /// Camera and kind of each parameter.
     numbers: Vec<(usize, Number)>,
-    /// The first parameter of each camera, and the end.
+    /// Index of the first parameter of each camera, then the number of parameters.
     first: Vec<usize>,
 }
 
-/// Derivatives of a term by its point.
+/// Derivatives of a term with respect to its point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observed {
-    /// Derivative of the residuals (in standard deviations) by the point in the world (metres).
+    /// Derivative of the residuals (in standard deviations) with respect to the point in the world (metres).
     pub by_point: Matrix2x3<f64>,
     /// True if the point has an image; if not, the derivatives are 0.
     pub has_image: bool,
 }
 
 impl Cameras {
-    /// Cameras, each with what is free of it.
+    /// Creates a set of cameras with their free parameters.
     ///
     /// # Panics
     ///
-    /// If there is not one [`Free`] a camera.
+    /// Panics if there is not one [`Free`] for each camera.
     pub fn new(cameras: Vec<Camera>, free: &[Free]) -> Self {
         assert_eq!(cameras.len(), free.len(), "one a camera");
         let (mut numbers, mut first) = (Vec::new(), vec![0]);
@@ -91,17 +91,17 @@ impl Cameras {
         }
     }
 
-    /// The cameras as they are now.
+    /// Returns the cameras with their current values.
     pub fn cameras(&self) -> &[Camera] {
         &self.cameras
     }
 
-    /// Number of parameters.
+    /// Returns the number of parameters.
     pub fn n_parameters(&self) -> usize {
         self.numbers.len()
     }
 
-    /// The name of a parameter, such as `cam02: centre x`.
+    /// Returns the name of a parameter, such as `cam02: centre x`.
     pub fn name(&self, parameter: usize) -> String {
         let Some((camera, number)) = self.numbers.get(parameter) else {
             return format!("parameter {parameter}");
@@ -122,7 +122,7 @@ impl Cameras {
         format!("{}: {number}", camera.name)
     }
 
-    /// The parameters of a camera's rotation and centre, in this order; none where its pose is held.
+    /// Returns the parameters of a camera's rotation and centre, in this order; `None` if its pose is held.
     pub fn pose_parameters(&self, camera: usize) -> Option<[usize; 6]> {
         let first = self.first[camera];
         let is_pose =
@@ -130,21 +130,22 @@ impl Cameras {
         is_pose.then(|| core::array::from_fn(|nth| first + nth))
     }
 
-    /// The parameter of a camera's focal length; none where it is held.
+    /// Returns the parameter of a camera's focal length; `None` if it is held.
     pub fn focal_parameter(&self, camera: usize) -> Option<usize> {
         let own = self.first[camera]..self.first[camera + 1];
         own.into_iter().find(|i| self.numbers[*i].1 == Number::Focal)
     }
 
-    /// The parameters of a camera.
+    /// Returns the parameters of a camera.
     pub fn parameters(&self, camera: usize) -> core::ops::Range<usize> {
         self.first[camera]..self.first[camera + 1]
     }
 
-    /// Begins a term with what a camera sees of a point: (image - seen) / sigma, by the parameters of the camera.
+    /// Begins a term with the observation of a point by a camera: (image - seen) / sigma, with its derivatives with respect to the
+    /// parameters of the camera.
     ///
-    /// * `seen`: pixels of the recorded picture; `sigma_px`: standard deviation along each axis.
-    /// * Returns the derivative by the point, for the caller to hand on by the coordinates of its local block.
+    /// * `seen`: position in pixels of the recorded picture; `sigma_px`: standard deviation along each axis.
+    /// * Returns the derivative with respect to the point. The caller converts it to the coordinates of its local block.
     #[expect(
         clippy::too_many_arguments,
         reason = "what is seen, by whom, and where it goes"
@@ -176,7 +177,7 @@ impl Cameras {
         }
     }
 
-    /// The cameras after a step of the parameters; more numbers than parameters may be given.
+    /// Returns the cameras after a step of the parameters; `step` may have more numbers than there are parameters.
     #[must_use]
     pub fn moved(&self, step: &[f64]) -> Self {
         let mut cameras = self.cameras.clone();
@@ -259,13 +260,13 @@ fn move_lens(model: &mut LensModel, nth: usize, by: f64) {
     }
 }
 
-/// A point's image, and what its derivatives are made of.
+/// The image of a point, and the values from which its derivatives are computed.
 struct Image {
     pixel: Point2<f64>,
     in_camera: Point3<f64>,
     normalised: Point2<f64>,
     distorted: Point2<f64>,
-    /// By the point in the frame of the camera, and in the world.
+    /// Derivative with respect to the point in camera coordinates, then in world coordinates.
     by_camera: Matrix2x3<f64>,
     by_world: Matrix2x3<f64>,
 }
@@ -286,11 +287,11 @@ impl Image {
         })
     }
 
-    /// The derivative of the pixel by a number of the camera.
+    /// Returns the derivative of the pixel with respect to a parameter of the camera.
     fn by(&self, camera: &Camera, number: Number) -> [f64; 2] {
         let intrinsics = &camera.intrinsics;
         let column = match number {
-            // A turn w moves the point by w x point.
+            // A rotation w moves the point by w x point.
             Number::Rotation(nth) => {
                 let axis = Vector3::ith(nth, 1.0);
                 self.by_camera * axis.cross(&self.in_camera.coords)

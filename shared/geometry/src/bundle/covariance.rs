@@ -1,40 +1,40 @@
-//! How well the shared parameters are known.
+//! Uncertainty of the shared parameters.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::Problem;
 use super::equations::Equations;
 
-/// An eigenvalue of the information, every parameter measured by what is known of it alone, that is less than this share of
-/// the largest: the data do not determine that direction.
+/// Smallest eigenvalue of the information matrix relative to the largest, after each parameter is scaled by its own information. Below it,
+/// the data do not determine the direction.
 const LEAST_EIGENVALUE: f64 = 1e-11;
-/// A parameter is named where it has at least this share of the largest part of such a direction.
+/// A parameter is named if its part in such a direction is at least this fraction of the largest part.
 const NAMED: f64 = 0.2;
 
-/// The covariance of the shared parameters, where the residuals of terms have the variance 1.
+/// Covariance of the shared parameters, if the residuals of terms have variance 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
-    /// In the order of the parameters, in the coordinates of a step.
+    /// Covariance matrix in the order of the parameters, in the coordinates of a step.
     pub matrix: DMatrix<f64>,
 }
 
 impl Covariance {
-    /// The standard deviation of a parameter.
+    /// Returns the standard deviation of a parameter.
     pub fn sd(&self, parameter: usize) -> f64 {
         self.matrix[(parameter, parameter)].max(0.0).sqrt()
     }
 }
 
-/// The data do not determine the shared parameters.
+/// Error if the data do not determine the shared parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Undetermined {
-    /// Some directions cost nothing.
+    /// Movement along some directions does not change the cost.
     #[error("the data do not determine {}", listed(.directions))]
     Directions {
-        /// For each direction the names of the parameters that move in it.
+        /// For each direction, the names of the parameters that move in it.
         directions: Vec<Vec<String>>,
     },
-    /// Values that are not finite.
+    /// Some values are not finite.
     #[error("the values are not finite, so the parameters cannot be determined")]
     NotFinite,
 }
@@ -44,33 +44,33 @@ fn listed(directions: &[Vec<String>]) -> String {
     each.collect::<Vec<_>>().join("; nor ")
 }
 
-/// The covariance of the shared parameters at the present values, all local blocks being unknown.
+/// Returns the covariance of the shared parameters at the current values, with all local blocks unknown.
 ///
-/// Weights of losses count as they are there.
+/// The weights of losses are those at the current values.
 ///
 /// # Errors
 ///
-/// [`Undetermined`] names the parameters that the terms do not tell.
+/// [`Undetermined`] names the parameters that the terms do not determine.
 pub fn covariance<P: Problem>(problem: &P) -> Result<Covariance, Undetermined> {
     let information = information(problem).ok_or(Undetermined::NotFinite)?;
     let matrix = inverse(problem, &information)?;
     Ok(Covariance { matrix })
 }
 
-/// The covariance of the shared parameters by how clusters of local blocks differ, whatever the errors within a cluster have in
-/// common: that of successive frames, of all joints of a picture. The standard deviations of terms count as weights only.
+/// Returns the covariance of the shared parameters from the differences between clusters of local blocks. Errors within a cluster may be
+/// correlated, such as those of successive frames or of all joints of a picture. The standard deviations of terms are used as weights only.
 ///
-/// Each cluster is left out in turns (jackknife), by one step of Newton's from the minimum; Cameron, Gelbach & Miller, Review of
-/// Economics and Statistics 90, 2008, call it CR3. What is known beforehand errs as much as it says. The curvature of the losses,
-/// not their weights, tells how far a step leads. With m clusters a standard deviation is known to about 1 / √(2 (m - 1)) of it.
-/// Where residuals are about as large as the width of a loss, deviations come out too small, by a third.
+/// Each cluster is left out in turn (jackknife), by one Newton step from the minimum; Cameron, Gelbach & Miller, Review of Economics and
+/// Statistics 90, 2008, call this CR3. The errors of priors are assumed to be as stated. The length of a step is computed from the
+/// curvature of the losses, not from their weights. With m clusters, a standard deviation is known to a relative accuracy of about 1 / √(2
+/// (m - 1)). If residuals are about as large as the width of a loss, the deviations come out too small by a third.
 ///
-/// * `cluster_of`: of every local block; they are counted from 0.
-/// * Returns none where there are fewer than two clusters, or where the others do not determine what one of them is left out from.
+/// * `cluster_of`: cluster of every local block, counted from 0.
+/// * Returns `None` if there are fewer than two clusters, or if the parameters are not determined without one of the clusters.
 ///
 /// # Errors
 ///
-/// [`Undetermined`] names the parameters that the terms do not tell.
+/// [`Undetermined`] names the parameters that the terms do not determine.
 pub fn clustered<P: Problem>(
     problem: &P,
     cluster_of: &[usize],
@@ -106,7 +106,7 @@ pub fn clustered<P: Problem>(
     Ok(is_finite.then_some(Covariance { matrix }))
 }
 
-/// The inverse of the information.
+/// Returns the inverse of the information matrix.
 fn inverse<P: Problem>(
     problem: &P,
     information: &DMatrix<f64>,
@@ -138,7 +138,7 @@ fn inverse<P: Problem>(
     }))
 }
 
-/// Returns the information of the terms on the shared parameters, all local blocks being unknown: the inverse of the covariance.
+/// Returns the information of the terms on the shared parameters, with all local blocks unknown: the inverse of the covariance.
 fn information<P: Problem>(problem: &P) -> Option<DMatrix<f64>> {
     let reduced = Equations::new(problem).reduced(0.0)?;
     let is_finite = reduced.matrix.iter().all(|value| value.is_finite());

@@ -1,9 +1,9 @@
-//! Derivatives of a problem beside numeric ones.
+//! Comparison of a problem's derivatives with numeric ones.
 
 use super::{Problem, Step, Term};
 
-/// The largest difference between a derivative that a problem hands over and the central difference, each as a share of
-/// 1 + its size. For tests: takes as long as two evaluations for every unknown.
+/// Returns the largest difference between a derivative of the problem and the central difference, relative to 1 + its size. This is for
+/// tests: it takes as long as two evaluations for every unknown.
 pub fn derivative_error<P: Problem>(problem: &P, step: f64) -> f64 {
     let locals = problem.locals();
     let none = Step {
@@ -40,7 +40,7 @@ pub fn derivative_error<P: Problem>(problem: &P, step: f64) -> f64 {
     worst
 }
 
-/// The sum of the columns of one unknown.
+/// Returns the sum of the columns of one unknown.
 fn sum(columns: &mut dyn Iterator<Item = (usize, &[f64])>, wanted: usize, rows: usize) -> Vec<f64> {
     let mut sum = vec![0.0; rows];
     for (_, column) in columns.filter(|column| column.0 == wanted) {
@@ -79,7 +79,7 @@ fn compared<P: Problem>(
     .fold(0.0, f64::max)
 }
 
-/// Numbers of all terms, or of those of one block.
+/// Returns the values of all terms, or of those of one block.
 fn terms<P: Problem>(
     problem: &P,
     local: Option<usize>,

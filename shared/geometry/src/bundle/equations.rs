@@ -1,30 +1,29 @@
-//! The normal equations of a problem, and the elimination of its local blocks.
+//! Normal equations of a problem, and elimination of its local blocks.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::{Problem, Step, Term};
 
-/// A diagonal entry counts as at least this share of the largest one of its block where it is damped, so that a
-/// parameter that nothing determines stays where it is.
+/// Smallest diagonal entry for damping, relative to the largest of its block. It keeps undetermined parameters in place.
 const LEAST_DIAGONAL: f64 = 1e-12;
 
-/// The equations of one local block.
+/// Equations of one local block.
 struct Block {
-    /// The shared parameters that it touches.
+    /// Shared parameters on which the block depends.
     shared: Vec<usize>,
     /// Product of the block with itself.
     own: DMatrix<f64>,
-    /// Row = coordinate of the block, column = shared parameter.
+    /// Mixed part: row = coordinate of the block, column = shared parameter.
     across: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
-/// Half the second derivatives (Gauss and Newton's) and half the gradient of the cost.
+/// Half the second derivatives (Gauss-Newton) and half the gradient of the cost.
 pub(super) struct Equations {
     blocks: Vec<Block>,
     shared: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// The cost.
+    /// Cost at the current values.
     pub(super) cost: f64,
     /// Number of residuals.
     pub(super) n_residuals: usize,
@@ -32,14 +31,14 @@ pub(super) struct Equations {
     pub(super) weights: [f64; 2],
 }
 
-/// The system that is left of the shared parameters, and what is needed to come back to the local blocks.
+/// Reduced system for the shared parameters, with the data needed to recover the local blocks.
 pub(super) struct Reduced {
     pub(super) matrix: DMatrix<f64>,
     pub(super) gradient: DVector<f64>,
     factors: Vec<Cholesky<f64, Dyn>>,
 }
 
-/// The cost alone.
+/// Returns the cost alone.
 pub(super) fn cost<P: Problem>(problem: &P) -> f64 {
     let mut sum = 0.0;
     let mut take = |term: &Term| sum += term.cost().0;
@@ -59,7 +58,7 @@ impl Equations {
         all
     }
 
-    /// Those of some of the local blocks, without what is known beforehand.
+    /// Returns the equations of some of the local blocks, without priors.
     pub(super) fn of<P: Problem>(problem: &P, is_wanted: impl Fn(usize) -> bool) -> Self {
         let n = problem.n_shared();
         let mut all = Self {
@@ -70,7 +69,7 @@ impl Equations {
             n_residuals: 0,
             weights: [0.0; 2],
         };
-        // Where each shared parameter is among those of the block; n: nowhere.
+        // Position of each shared parameter among those of the block; n if it is not among them.
         let mut places = vec![n; n];
         let each = problem.locals().into_iter().enumerate();
         for (local, size) in each.filter(|block| is_wanted(block.0)) {
@@ -83,7 +82,7 @@ impl Equations {
         all
     }
 
-    /// Those of what is known beforehand alone.
+    /// Returns the equations of the priors alone.
     pub(super) fn known<P: Problem>(problem: &P) -> Self {
         let mut all = Self::of(problem, |_| false);
         problem.priors(&mut |term| {
@@ -134,7 +133,7 @@ impl Equations {
         }
     }
 
-    /// Adds what a term says of the shared parameters among themselves; returns its weight.
+    /// Adds the part of a term that concerns only shared parameters; returns its weight.
     fn add_shared(&mut self, term: &Term) -> f64 {
         let (cost, weight) = term.cost();
         self.cost += cost;
@@ -151,7 +150,7 @@ impl Equations {
         weight
     }
 
-    /// Eliminates the local blocks. None where a block is not finite.
+    /// Eliminates the local blocks. Returns `None` if a block is not finite.
     pub(super) fn reduced(&self, damping: f64) -> Option<Reduced> {
         let mut matrix = damped(&self.shared, damping);
         let mut gradient = self.gradient.clone();
@@ -163,7 +162,7 @@ impl Equations {
             let lower = factor.l_dirty();
             lower.solve_lower_triangular_mut(&mut half);
             lower.solve_lower_triangular_mut(&mut of_gradient);
-            // The product of the half with itself: one triangle, which is the other as well.
+            // The product of the half with itself is symmetric, so only one triangle is computed.
             for (i, row) in block.shared.iter().enumerate() {
                 let of_row = half.column(i);
                 gradient[*row] -= of_row.dot(&of_gradient);
@@ -183,7 +182,7 @@ impl Equations {
         })
     }
 
-    /// The step to the least of the quadratic that the equations describe. None where there is none.
+    /// Returns the step to the minimum of the quadratic that the equations describe; `None` if there is no minimum.
     pub(super) fn step(&self, damping: f64) -> Option<Step> {
         let reduced = self.reduced(damping)?;
         let shared = if reduced.matrix.is_empty() {
@@ -204,7 +203,7 @@ impl Equations {
         all.all(|value| value.is_finite()).then_some(Step { shared, locals })
     }
 
-    /// Amount by which the quadratic says that a step lowers the cost.
+    /// Returns the decrease of the cost that the quadratic predicts for a step.
     pub(super) fn gain(&self, step: &Step) -> f64 {
         let shared = DVector::from_column_slice(&step.shared);
         let mut gain = -2.0 * self.gradient.dot(&shared) - shared.dot(&(&self.shared * &shared));
@@ -224,7 +223,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Marquardt's damping: every entry of the diagonal grows by a share of itself.
+/// Applies Marquardt's damping: every entry of the diagonal grows by a fraction of itself.
 fn damped(matrix: &DMatrix<f64>, damping: f64) -> DMatrix<f64> {
     let mut matrix = matrix.clone();
     let largest = matrix.diagonal().amax();

@@ -1,19 +1,19 @@
-//! The least cost, by Levenberg and Marquardt's method.
+//! Minimisation of the cost, by the Levenberg-Marquardt method.
 
 use super::equations::{Equations, cost};
 use super::{Problem, Step};
 
-/// Damping at the start, and the most.
+/// Initial and maximum damping.
 const DAMPING: [f64; 2] = [1e-4, 1e12];
-/// The least damping, so that what is not determined stays near.
+/// Minimum damping, which keeps undetermined parameters near their values.
 const LEAST_DAMPING: f64 = 1e-12;
 
-/// When the search ends.
+/// Conditions that end the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The most iterations.
+    /// Maximum number of iterations.
     pub max_iterations: usize,
-    /// It ends where an iteration lowers the cost by less than this share of it.
+    /// Minimum decrease of the cost in an iteration, as a fraction; the search ends below it.
     pub least_gain: f64,
 }
 
@@ -26,33 +26,33 @@ impl Default for Settings {
     }
 }
 
-/// Why the search ended.
+/// Reason why the search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stopped {
-    /// The cost does not become less any more.
+    /// The cost no longer decreases.
     Converged,
-    /// No step, however short, lowers the cost: at a minimum to working precision.
+    /// No step, however short, lowers the cost: the minimum is reached to working precision.
     NoDescent,
-    /// So many iterations were not enough.
+    /// The maximum number of iterations was reached.
     Iterations,
     /// The cost at the start is not finite.
     NotFinite,
 }
 
-/// How the search went.
+/// Report of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Report {
-    /// Steps that were taken.
+    /// Number of steps taken.
     pub iterations: usize,
-    /// The cost at the start.
+    /// Cost at the start.
     pub cost_before: f64,
-    /// The cost at the end.
+    /// Cost at the end.
     pub cost_after: f64,
-    /// Number of residuals, priors among them.
+    /// Number of residuals, including priors.
     pub n_residuals: usize,
     /// Number of unknowns, shared and local.
     pub n_unknowns: usize,
-    /// Why it ended.
+    /// Reason why the search ended.
     pub stopped: Stopped,
 }
 
@@ -62,18 +62,18 @@ impl Report {
         matches!(self.stopped, Stopped::Converged | Stopped::NoDescent)
     }
 
-    /// Variance of a residual, if all terms of the problem are believed to be right about their shares of it: cost over
-    /// degrees of freedom. 1 where the standard deviations of the terms are true.
+    /// Returns the variance of a residual, if the standard deviations of all terms are correct relative to each other: cost divided by
+    /// degrees of freedom. It is 1 if the standard deviations are correct.
     pub fn variance(&self) -> f64 {
         let freedom = self.n_residuals.saturating_sub(self.n_unknowns).max(1);
         self.cost_after / freedom as f64
     }
 }
 
-/// Finds the least cost near the present values (Levenberg and Marquardt's method, damping after Nielsen 1999).
+/// Minimises the cost near the current values (Levenberg-Marquardt method, damping after Nielsen 1999).
 ///
-/// Losses that are not squares are weighted anew at every step. Where something is not determined, it stays about where it
-/// was: ask [`covariance`](super::covariance) whether all is.
+/// Losses other than squares get new weights at every step. A parameter that is not determined stays near its value; use
+/// [`covariance`](super::covariance) to find out whether all are determined.
 pub fn solve<P: Problem>(start: P, settings: &Settings) -> (P, Report) {
     let mut at = start;
     let mut equations = Equations::new(&at);
@@ -117,13 +117,13 @@ pub fn solve<P: Problem>(start: P, settings: &Settings) -> (P, Report) {
     (at, report)
 }
 
-/// A step that lowers the cost: where it leads, the cost there, and the share of the gain that was promised.
+/// Returns a step that lowers the cost: the resulting problem, its cost, and the gain relative to the prediction.
 fn tried<P: Problem>(at: &P, equations: &Equations, damping: f64) -> Option<(P, f64, f64)> {
     let step: Step = equations.step(damping)?;
     let promised = equations.gain(&step);
     let moved = at.moved(&step);
     let after = cost(&moved);
-    // Comparison with NaN is false.
+    // A comparison with NaN is false.
     let is_better = after < equations.cost;
     is_better.then(|| {
         let agreement = (equations.cost - after) / promised.max(f64::MIN_POSITIVE);

@@ -1,19 +1,19 @@
-//! One term of the sum: residuals, their derivatives, and a loss.
+//! A term of the sum: residuals, their derivatives, and a loss.
 
-/// Cost of a residual, by s, the squared length of a term's residuals (which are in standard deviations).
+/// Loss: the cost as a function of s, the squared length of a term's residuals (in standard deviations).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Loss {
-    /// s: least squares.
+    /// Least squares: s.
     #[default]
     Square,
-    /// Loss of width k: s up to k², from there on 2 k √s - k² (Huber 1964).
+    /// Loss of width k: s up to k², beyond that 2 k √s - k² (Huber 1964).
     Huber(f64),
-    /// Loss of width k: k² ln(1 + s / k²) (Cauchy). Outliers have next to no weight.
+    /// Loss of width k: k² ln(1 + s / k²) (Cauchy). Outliers have almost no weight.
     Cauchy(f64),
 }
 
 impl Loss {
-    /// The cost, and its derivative by s, which is the weight of the term.
+    /// Returns the cost, and its derivative with respect to s, which is the weight of the term.
     pub fn of(self, s: f64) -> (f64, f64) {
         match self {
             Self::Square => (s, 1.0),
@@ -26,8 +26,8 @@ impl Loss {
         }
     }
 
-    /// The mean second derivative of half the cost along each of so many residuals: what tells how far a small push moves the
-    /// minimum. The weight overstates it where residuals are large.
+    /// Returns the mean second derivative of half the cost along each of `n_residuals` residuals. It determines how far a small change
+    /// moves the minimum. The weight overstates this for large residuals.
     pub fn curvature(self, s: f64, n_residuals: usize) -> f64 {
         let weight = self.of(s).1;
         let by_s = match self {
@@ -40,25 +40,25 @@ impl Loss {
     }
 }
 
-/// A term: residuals in standard deviations, with their derivatives by a few parameters.
+/// A term: residuals in standard deviations, with their derivatives with respect to a few parameters.
 ///
-/// Made to be filled again and again: [`begin`](Self::begin), then everything else.
+/// A term is meant to be reused: call [`begin`](Self::begin) first, then the other methods.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Term {
     pub(super) residuals: Vec<f64>,
     pub(super) loss: Loss,
-    /// Its weight.
+    /// Weight of the term.
     share: f64,
-    /// Shared parameters, and their columns one after the other.
+    /// Indices of shared parameters; the next field has their columns one after another.
     pub(super) shared: Vec<usize>,
     pub(super) by_shared: Vec<f64>,
-    /// Coordinates of the local block, and their columns one after the other.
+    /// Coordinates of the local block; the next field has their columns one after another.
     pub(super) local: Vec<usize>,
     pub(super) by_local: Vec<f64>,
 }
 
 impl Term {
-    /// Begins anew with these residuals, and without derivatives.
+    /// Resets the term to these residuals, without derivatives.
     pub fn begin(&mut self, residuals: &[f64], loss: Loss) {
         self.residuals.clear();
         self.residuals.extend_from_slice(residuals);
@@ -70,50 +70,50 @@ impl Term {
         self.by_local.clear();
     }
 
-    /// Lets the term count as this share of one: where several err alike, each has a part. The loss knows nothing of it.
+    /// Sets the weight of the term as a fraction of one, for several terms with the same error. The loss does not depend on it.
     pub fn counts(&mut self, share: f64) {
         self.share = share;
     }
 
-    /// The derivative of all residuals by a shared parameter. A parameter that is given twice counts with the sum.
+    /// Adds the derivative of all residuals with respect to a shared parameter. Derivatives for the same parameter are summed.
     ///
     /// # Panics
     ///
-    /// If there are not as many numbers as residuals.
+    /// Panics if the number of values differs from the number of residuals.
     pub fn by_shared(&mut self, parameter: usize, column: &[f64]) {
         assert_eq!(column.len(), self.residuals.len(), "one number a residual");
         self.shared.push(parameter);
         self.by_shared.extend_from_slice(column);
     }
 
-    /// The derivative of all residuals by a coordinate of the local block.
+    /// Adds the derivative of all residuals with respect to a coordinate of the local block.
     ///
     /// # Panics
     ///
-    /// If there are not as many numbers as residuals.
+    /// Panics if the number of values differs from the number of residuals.
     pub fn by_local(&mut self, coordinate: usize, column: &[f64]) {
         assert_eq!(column.len(), self.residuals.len(), "one number a residual");
         self.local.push(coordinate);
         self.by_local.extend_from_slice(column);
     }
 
-    /// The residuals, in standard deviations.
+    /// Returns the residuals, in standard deviations.
     pub fn residuals(&self) -> &[f64] {
         &self.residuals
     }
 
-    /// The squared length of the residuals.
+    /// Returns the squared length of the residuals.
     pub fn square(&self) -> f64 {
         self.residuals.iter().map(|residual| residual * residual).sum()
     }
 
-    /// The cost, and the weight, by the loss and by what the term counts as.
+    /// Returns the cost and the weight, including the loss and the weight of the term.
     pub fn cost(&self) -> (f64, f64) {
         let (cost, weight) = self.loss.of(self.square());
         (self.share * cost, self.share * weight)
     }
 
-    /// The curvature of the loss, by what the term counts as.
+    /// Returns the curvature of the loss, including the weight of the term.
     pub(super) fn curvature(&self) -> f64 {
         self.share * self.loss.curvature(self.square(), self.residuals.len())
     }

@@ -1,4 +1,4 @@
-//! Rings of cameras and points that are known, and what the adjustment makes of them.
+//! Tests of the adjustment with rings of known cameras and points.
 
 use nalgebra::{
     Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3,
@@ -22,7 +22,7 @@ const ALL: Free = Free {
     lens: [true; 8],
 };
 
-/// A camera 4 m from the origin, at an angle of the ring.
+/// Returns a camera 4 m from the origin, at an angle of the ring.
 fn camera(nth: usize, of: usize, lens: LensModel) -> Camera {
     let angle = (0.2 + nth as f64) / of as f64 * core::f64::consts::TAU;
     let centre = Vector3::new(4.0 * angle.cos(), 4.0 * angle.sin(), 1.5 + 0.2 * nth as f64);
@@ -46,7 +46,7 @@ fn camera(nth: usize, of: usize, lens: LensModel) -> Camera {
     }
 }
 
-/// Points that cameras see; the distance of the first two is known, and so is the first camera.
+/// Points that cameras see. The first camera and the distance between the first two are known.
 #[derive(Clone)]
 struct Cloud {
     cameras: Cameras,
@@ -75,7 +75,7 @@ impl Cloud {
         }
     }
 
-    /// Everything that is free somewhat elsewhere.
+    /// Returns the problem with all free values disturbed.
     fn disturbed(&self) -> Self {
         let mut random = fastrand_like(3);
         let mut by = |size: f64| size * (random() - 0.5);
@@ -100,7 +100,7 @@ impl Cloud {
     }
 }
 
-/// Numbers from 0 to 1.
+/// Returns a generator of numbers from 0 to 1.
 fn fastrand_like(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
@@ -238,7 +238,7 @@ fn the_covariance_is_how_answers_spread() {
         let [a, b] = [&truth, &found].map(|cloud| cloud.cameras.cameras()[2].centre_in_world());
         spread += (a.y - b.y).powi(2) / f64::from(n);
     }
-    // A variance of 60 is known to 18 %, three of which are allowed for.
+    // A variance from 60 samples is known to 18 %; three times that is accepted.
     let ratio = spread / covariance.sd(place).powi(2);
     assert!((0.5..1.7).contains(&ratio), "{ratio}");
 }
@@ -272,7 +272,7 @@ fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
         by_residuals += covariance(&found).unwrap().sd(place).powi(2);
     }
     assert!(spread > 2.5 * by_residuals, "{spread} {by_residuals}");
-    // A variance of 60 is known to 18 %, three of which are allowed for.
+    // A variance from 60 samples is known to 18 %; three times that is accepted.
     let ratio = spread / by_clusters;
     assert!((0.5..1.7).contains(&ratio), "{ratio}");
     assert_eq!(clustered(&truth, &[0; 60]), Ok(None));
@@ -315,7 +315,7 @@ fn losses_have_the_derivatives_that_they_say() {
         for s in [0.1, 1.0, 5.0, 100.0] {
             let numeric = (loss.of(s + 1e-5).0 - loss.of(s - 1e-5).0) / 2e-5;
             assert!((numeric - loss.of(s).1).abs() < 1e-6, "{loss:?} at {s}");
-            // Along one residual: the derivative of half the derivative of the cost.
+            // The curvature along one residual is the derivative of half the derivative of the cost.
             let slope = |at: f64| at * loss.of(at * at).1;
             let numeric = (slope(s.sqrt() + 1e-5) - slope(s.sqrt() - 1e-5)) / 2e-5;
             let found = loss.curvature(s, 1);

@@ -1,4 +1,4 @@
-//! Projection, its derivative and its inverse agree.
+//! Tests that projection, its derivative and its inverse agree.
 
 use proptest::prelude::*;
 

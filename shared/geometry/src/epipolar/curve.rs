@@ -1,19 +1,19 @@
-//! The image of a viewing ray in another, distorted view.
+//! Image of a viewing ray in another, distorted view.
 
 use nalgebra::{Point2, Vector2, Vector3};
 
 use crate::Camera;
 
-/// Samples of the scan for the visible part.
+/// Number of samples of the scan for the visible part.
 const SCAN: usize = 512;
 
-/// The curve in the recorded image of B on which the point seen in a pixel of A must lie.
+/// Returns the curve in the recorded image of B that contains the point seen at a pixel of A.
 ///
-/// Follows the viewing ray of A from its camera to infinity as the lens of B shows it, clipped to the
-/// image of B. Made for drawing; distances are better measured on ideal pixels ([`super::epipolar_line`]).
+/// The curve follows the viewing ray of A from its camera to infinity, as distorted by the lens of B and clipped to the image of B. It is
+/// meant for drawing; distances are better measured on ideal pixels ([`super::epipolar_line`]).
 ///
 /// * `point_in_a`: pixel of the recorded image of A.
-/// * Returns `n` pixels in order along the ray, or none if no part of the ray is in the image of B or `n` < 2.
+/// * Returns `n` pixels in order along the ray. The list is empty if no part of the ray is in the image of B, or if `n` < 2.
 pub fn epipolar_curve(
     a: &Camera,
     b: &Camera,
@@ -52,7 +52,7 @@ pub fn epipolar_curve(
         .collect()
 }
 
-/// The part of the ray that the lens of B can show, as a segment of its normalised plane.
+/// Returns the part of the ray that the lens of B can show, as a segment of its normalised plane.
 fn visible_line(a: &Camera, b: &Camera, point: &Point2<f64>) -> Option<(Point2<f64>, Point2<f64>)> {
     let ray = a.ray(point)?;
     let origin = (b.camera_from_world * ray.origin).coords;
@@ -60,8 +60,8 @@ fn visible_line(a: &Camera, b: &Camera, point: &Point2<f64>) -> Option<(Point2<f
         return None;
     }
     let direction = b.camera_from_world.rotation * ray.direction.into_inner();
-    // A point of the ray is `origin + d direction`, d in [0, ∞): as s runs through [0, 1], the
-    // homogeneous point (1 - s) origin + s direction runs through all of its images.
+    // A point of the ray is `origin + d direction`, d in [0, ∞). As s goes from 0 to 1, the homogeneous point (1 - s) origin + s direction
+    // covers all of its images.
     let at = |s: f64| origin * (1.0 - s) + direction * s;
     let (z0, z1) = (origin.z, direction.z);
     let crossing = z0 / (z0 - z1);
@@ -84,7 +84,7 @@ fn normalised(v: &Vector3<f64>) -> Option<Vector2<f64>> {
         .filter(|p| p.iter().all(|c| c.is_finite()))
 }
 
-/// A radius of the normalised plane that holds every ray of the image.
+/// Returns a radius of the normalised plane that contains every ray of the image.
 fn image_radius(camera: &Camera) -> f64 {
     let [width, height] = camera.intrinsics.size.map(f64::from);
     let limit = camera.intrinsics.lens.max_radius();
@@ -118,7 +118,7 @@ fn inside(camera: &Camera, pixel: &Point2<f64>) -> bool {
     (-0.5..=width - 0.5).contains(&pixel.x) && (-0.5..=height - 0.5).contains(&pixel.y)
 }
 
-/// First and last index of the longest run of the scan for which `holds`.
+/// Returns the first and last index of the longest run of the scan for which `holds` is true.
 fn longest_run(holds: impl Fn(usize) -> bool) -> Option<(usize, usize)> {
     let mut best: Option<(usize, usize)> = None;
     let mut begin = None;
@@ -133,7 +133,7 @@ fn longest_run(holds: impl Fn(usize) -> bool) -> Option<(usize, usize)> {
     best
 }
 
-/// The last parameter, from `inside` towards `outside`, for which the point is seen.
+/// Returns the last parameter, from `inside` towards `outside`, for which the point is seen.
 fn border(seen: impl Fn(f64) -> bool, mut inside: f64, mut outside: f64) -> f64 {
     for _ in 0..40 {
         let middle = 0.5 * (inside + outside);

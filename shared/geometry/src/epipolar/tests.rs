@@ -1,4 +1,4 @@
-//! Images of one point lie on the lines and curves of each other.
+//! Tests that images of one point are on each other's epipolar lines and curves.
 
 use proptest::prelude::*;
 

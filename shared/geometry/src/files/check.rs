@@ -10,12 +10,12 @@ use crate::{Camera, Rig, upright_roll};
 pub use agreement::{CameraError, EpipolarReport, PairError, epipolar_check};
 pub use finding::{Finding, Severity};
 
-/// Cameras whose distances are all smaller are at one place, metres.
+/// Cameras count as being in one place if all distances between them are below this, in metres.
 const ONE_PLACE: f64 = 0.01;
-/// Distance from the origin beyond which a camera is far away, metres.
+/// Distance from the origin beyond which a camera is reported as far away, in metres.
 const FAR_AWAY: f64 = 10_000.0;
 
-/// Looks for implausible values in a rig. An empty list means that nothing was found, not that the rig is right.
+/// Looks for implausible values in a rig. An empty list means that nothing was found, not that the rig is correct.
 pub fn check(rig: &Rig) -> Vec<Finding> {
     let mut findings = Vec::new();
     let cameras = rig.cameras();
@@ -78,7 +78,7 @@ fn check_intrinsics(camera: &Camera, findings: &mut Vec<Finding>) {
     findings.extend(lens_range(camera).or_else(|| lens_strength(camera)));
 }
 
-/// Finds a pixel without a ray: checked on a grid and in the corners.
+/// Finds pixels without a ray, on a grid and in the corners.
 fn lens_range(camera: &Camera) -> Option<Finding> {
     const STEPS: usize = 16;
     let [width, height] = camera.intrinsics.size.map(f64::from);
@@ -152,7 +152,7 @@ fn one_place(cameras: &[Camera]) -> Option<Finding> {
     })
 }
 
-/// Finds a rig in which no two cameras see a common place, up to twenty times its size away.
+/// Finds a rig in which no two cameras see a common place within twenty times its size.
 fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
     const STEPS: usize = 8;
     const DEPTHS: usize = 40;

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::{Format, own, panoptic, pose2sim};
 
-/// Detects the format by content, and by extension where the content is only numbers.
+/// Detects the format by content, and by extension if the content is only numbers.
 ///
-/// `None` for anything that no reader accepts.
+/// Returns `None` for anything that no reader accepts.
 pub fn detect(path: &Path, text: &str) -> Option<Format> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let start = text.trim_start_matches('\u{feff}').trim_start();

@@ -1,4 +1,4 @@
-//! Entry of a calibration file for one camera, and the rig of those that have a place.
+//! Entry of a calibration file for one camera, and the rig of the cameras that have a pose.
 
 use nalgebra::{Isometry3, UnitVector3};
 
@@ -6,21 +6,21 @@ use super::{ParseError, ReadOptions};
 use crate::rig::LeftOut;
 use crate::{Camera, Intrinsics, Rig};
 
-/// Why a camera with a lens is left out.
-const NO_PLACE: &str = "its file has a lens and no place";
+/// Reason why a camera with a lens is left out.
+const NO_PLACE: &str = "its file has a lens but no pose";
 
 /// A camera of a file.
 pub(super) enum Entry {
-    /// Its lens and its place.
+    /// A camera with its lens and pose.
     Placed(Camera),
-    /// Its lens alone; it stands at the origin.
+    /// A camera with its lens alone, at the origin.
     Lens(Camera),
-    /// Its name alone, and why.
+    /// The name of a camera alone, and the reason.
     Name(LeftOut),
 }
 
 impl Entry {
-    /// A camera whose place is not known.
+    /// Returns a camera without a known pose.
     pub(super) fn lens(name: &str, intrinsics: Intrinsics) -> Self {
         Self::Lens(Camera {
             name: name.to_owned(),
@@ -29,7 +29,7 @@ impl Entry {
         })
     }
 
-    /// A camera of which nothing is known.
+    /// Returns a camera of which only the name is known.
     pub(super) fn name(name: &str, why: &'static str) -> Self {
         Self::Name(LeftOut {
             camera: name.to_owned(),
@@ -38,7 +38,7 @@ impl Entry {
     }
 }
 
-/// The rig of the cameras that have a place; where lenses are enough, of those too that have none.
+/// Returns the rig of the cameras that have a pose, and if lenses suffice, also of those that have none.
 pub(super) fn rig(
     entries: Vec<Entry>,
     up: Option<UnitVector3<f64>>,

@@ -1,10 +1,10 @@
-//! Why a calibration file could not be read or written.
+//! Errors of reading or writing calibration files.
 
 use std::path::PathBuf;
 
 use crate::{Camera, NotARotation, RigError};
 
-/// Why a calibration file could not be read or written.
+/// Reason why a calibration file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum RigFileError {
     /// No file was given.
@@ -13,33 +13,33 @@ pub enum RigFileError {
     /// The file could not be read.
     #[error("cannot read {path}", path = .path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause of the failure.
         source: std::io::Error,
     },
     /// The file is too large for a calibration.
     #[error("{path} is too large for a calibration: {bytes} bytes, limit {limit}", path = .path.display())]
     TooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its size.
+        /// Size of the file.
         bytes: u64,
-        /// The largest size that is read.
+        /// Maximum size of a file.
         limit: u64,
     },
-    /// Neither content nor extension identify the format.
+    /// Neither the content nor the extension identifies the format.
     #[error("{path} is not a calibration file of a known format (Parallax, Pose2Sim or anipose TOML, Qualisys XML, OpenCV YAML, HumanEva .cal, UMPM .ini, Panoptic JSON)", path = .path.display())]
     UnknownFormat {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// Files of several formats cannot make one rig.
+    /// The files have different formats, so that they cannot form one rig.
     #[error("{path} is a {format} file, but the first one is a {first} file", path = .path.display())]
     Mixed {
-        /// The file that differs.
+        /// Path of the file with the different format.
         path: PathBuf,
-        /// Its format.
+        /// Format of this file.
         format: &'static str,
         /// Format of the first file.
         first: &'static str,
@@ -47,25 +47,25 @@ pub enum RigFileError {
     /// The content is invalid.
     #[error("{path}", path = .path.display())]
     Parse {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Fault of its text.
+        /// Fault in the text of the file.
         source: ParseError,
     },
     /// The format cannot describe the rig.
     #[error("cannot write {path}", path = .path.display())]
     Unwritable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Part that it cannot describe.
+        /// Part of the rig that the format cannot describe.
         source: UnwritableRig,
     },
     /// The file could not be written.
     #[error("cannot write {path}", path = .path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause of the failure.
         source: std::io::Error,
     },
 }
@@ -73,46 +73,46 @@ pub enum RigFileError {
 /// Fault in the text of a calibration file. Fields are named as in the file.
 #[derive(Debug, thiserror::Error)]
 pub enum ParseError {
-    /// The text is not of its format.
+    /// The text does not have the syntax of its format.
     #[error("not valid {format}")]
     Syntax {
         /// Name of the format.
         format: &'static str,
-        /// The error of its parser, with line and column.
+        /// Error of the parser, with line and column.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// A field that must be there is not.
+    /// A required field is missing.
     #[error("{field} is missing")]
     Missing {
-        /// The field.
+        /// Name of the field.
         field: String,
     },
-    /// A field of the wrong type or length.
+    /// A field has the wrong type or length.
     #[error("{field}: expected {expected}, found {found}")]
     Shape {
-        /// The field.
+        /// Name of the field.
         field: String,
-        /// Expected contents.
+        /// Expected content.
         expected: &'static str,
-        /// Contents found.
+        /// Content that was found.
         found: String,
     },
-    /// A number that is invalid in the format, or not supported.
+    /// A number is invalid in the format, or not supported.
     #[error("{field} is {value}, but {requirement}")]
     Value {
-        /// The field.
+        /// Name of the field.
         field: String,
-        /// The number.
+        /// Value of the field.
         value: f64,
-        /// Requirement on it.
+        /// Requirement on the value.
         requirement: &'static str,
     },
-    /// Nine numbers that are not a rotation.
+    /// Nine numbers do not form a rotation matrix.
     #[error("{field}")]
     Rotation {
-        /// The field.
+        /// Name of the field.
         field: String,
-        /// How far they are from one.
+        /// Deviation from a rotation.
         source: NotARotation,
     },
     /// The file has no camera.
@@ -121,21 +121,21 @@ pub enum ParseError {
         /// Description of a camera in this format.
         expected: &'static str,
     },
-    /// No camera of the file has a place.
+    /// No camera of the file has a pose.
     #[error(
         "camera {camera:?}: {why}{}",
         if *.has_lens {
-            ": `parallax calibrate board` with `--known` and this file, or `parallax calibrate people`, finds where the cameras stand"
+            ": `parallax calibrate board` with `--known` and this file, or `parallax calibrate people`, finds the poses of the cameras"
         } else {
             ""
         }
     )]
     NoPlace {
-        /// The first of them.
+        /// Name of the first camera.
         camera: String,
-        /// Why it has none.
+        /// Reason why it has no pose.
         why: &'static str,
-        /// True if the file has the lens of a camera.
+        /// True if the file has a lens for any camera.
         has_lens: bool,
     },
     /// The cameras cannot be combined into a rig.
@@ -146,10 +146,10 @@ pub enum ParseError {
 /// Part of a rig that a format cannot describe.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnwritableRig {
-    /// This format is only read.
+    /// The format can only be read.
     #[error("{format} files can be read, but not written")]
     ReadOnly {
-        /// The format.
+        /// Name of the format.
         format: &'static str,
     },
     /// The format has no such lens model.
@@ -157,22 +157,22 @@ pub enum UnwritableRig {
     Lens {
         /// Name of the camera.
         camera: String,
-        /// The format.
+        /// Name of the format.
         format: &'static str,
-        /// The lens, as text.
+        /// Description of the lens.
         lens: String,
     },
-    /// The name cannot be used as a file name or a key.
+    /// The name of a camera cannot be used as a file name or a key.
     #[error("camera {camera:?}: the name cannot be written in a {format} file")]
     Name {
         /// Name of the camera.
         camera: String,
-        /// The format.
+        /// Name of the format.
         format: &'static str,
     },
 }
 
-/// Refuses names that would leave the folder.
+/// Refuses camera names that would lead to a file outside the folder.
 pub(super) fn check_file_name(camera: &Camera) -> Result<(), UnwritableRig> {
     if camera.name.contains(['/', '\\', '\0']) || camera.name.starts_with('.') {
         return Err(UnwritableRig::Name {

@@ -1,10 +1,9 @@
-//! `.cal` files of `HumanEva`: 22 numbers, one camera, millimetres.
+//! `.cal` files of `HumanEva`: 22 numbers for one camera, in millimetres.
 //!
-//! In this order, separated by blanks or lines: fc (2), cc (2), alpha (1), kc (5: k1 k2 p1 p2 k3), R (9,
-//! row by row, world to camera), T (3, mm). Pixels count from the centre of the first one, as in
-//! Bouguet's toolbox. The file does not name its camera nor say how large its image is: 640x480 for
-//! the colour cameras unless [`ReadOptions::size`] says otherwise. The world of `HumanEva` has z up,
-//! which is for [`ReadOptions::up`] to say.
+//! The numbers are separated by blanks or line breaks, in this order: fc (2), cc (2), alpha (1), kc (5: k1 k2 p1 p2 k3), R (9, row by row,
+//! world to camera), T (3, mm). Pixels are counted from the centre of the first pixel, as in Bouguet's toolbox. The file has neither the
+//! name of its camera nor the image size, which is 640x480 for the colour cameras unless [`ReadOptions::size`] gives another. The world of
+//! `HumanEva` has z up; the caller must set [`ReadOptions::up`].
 
 use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers};
 use crate::{Camera, LensModel, Rig};
@@ -12,7 +11,7 @@ use crate::{Camera, LensModel, Rig};
 /// Image size of the colour cameras.
 const SIZE: [u32; 2] = [640, 480];
 
-/// Reads a camera, to be named `name`.
+/// Reads a camera and gives it the name `name`.
 ///
 /// # Errors
 ///
@@ -55,7 +54,7 @@ fn count(found: usize) -> ParseError {
     }
 }
 
-/// Writes a camera, in millimetres. Its name, image size and what is up are lost.
+/// Writes a camera, in millimetres. Its name, the image size and the up direction are lost.
 ///
 /// # Errors
 ///

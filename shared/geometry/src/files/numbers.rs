@@ -1,4 +1,4 @@
-//! Shared by the calibration formats: matrices, distortion lists, rotations and translations.
+//! Functions shared by the calibration formats: matrices, distortion lists, rotations and translations.
 
 use std::fmt::Debug;
 
@@ -20,7 +20,7 @@ pub(super) fn finite(field: &str, value: f64) -> Result<f64, ParseError> {
     })
 }
 
-/// A whole number of pixels, however it was written.
+/// Returns a whole number of pixels, also if it is written as a float.
 pub(super) fn pixels(field: &str, value: f64) -> Result<u32, ParseError> {
     if value.fract() == 0.0 && (1.0..=1e6).contains(&value) {
         return Ok(value as u32);
@@ -33,7 +33,7 @@ pub(super) fn pixels(field: &str, value: f64) -> Result<u32, ParseError> {
     })
 }
 
-/// The unit vector along three numbers.
+/// Returns the unit vector along three numbers.
 pub(super) fn direction(
     field: &str,
     v: [f64; 3],
@@ -59,7 +59,7 @@ pub(super) fn intrinsics(
         finite(field, entry)?;
     }
     let place = |row: usize, column: usize| format!("{field}[{row}][{column}]");
-    // Skew is not modelled. Refuse it where it would move a point at the border by a hundredth of a pixel.
+    // Skew is not modelled. It is refused if it would move a point at the border by a hundredth of a pixel.
     if k[(0, 1)].abs() > 1e-5 * k[(0, 0)].abs() {
         let requirement = "skew is not supported: it must be 0";
         return Err(ParseError::Value {
@@ -90,7 +90,7 @@ pub(super) fn intrinsics(
     })
 }
 
-/// The model behind a distortion list in `OpenCV`'s order, k1 k2 p1 p2 k3 k4 k5 k6.
+/// Returns the lens model for a distortion list in `OpenCV`'s order, k1 k2 p1 p2 k3 k4 k5 k6.
 pub(super) fn lens(field: &str, list: &[f64], fisheye: bool) -> Result<LensModel, ParseError> {
     for &value in list {
         finite(field, value)?;
@@ -108,7 +108,7 @@ pub(super) fn lens(field: &str, list: &[f64], fisheye: bool) -> Result<LensModel
             }),
         };
     }
-    // Beyond the eighth are the thin prism and the tilted sensor, which we do not model.
+    // Coefficients after the eighth describe a thin prism and a tilted sensor, which are not modelled.
     let known = matches!(list.len(), 0 | 2 | 4 | 5 | 8 | 12 | 14);
     if !known || list.iter().skip(8).any(|&value| value != 0.0) {
         return Err(ParseError::Shape {
@@ -128,7 +128,7 @@ pub(super) fn lens(field: &str, list: &[f64], fisheye: bool) -> Result<LensModel
     })
 }
 
-/// A distortion list in `OpenCV`'s order: 4, 5 or 8 numbers, and whether it is a fisheye's.
+/// Returns a distortion list of 4, 5 or 8 numbers in `OpenCV`'s order, and true if the lens is a fisheye.
 pub(super) fn distortion(lens: &LensModel) -> (Vec<f64>, bool) {
     match *lens {
         LensModel::Pinhole => (vec![0.0; 4], false),
@@ -143,7 +143,7 @@ pub(super) fn distortion(lens: &LensModel) -> (Vec<f64>, bool) {
     }
 }
 
-/// The rotation of nine numbers.
+/// Returns the rotation for a matrix of nine numbers.
 pub(super) fn rotation(field: &str, m: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, ParseError> {
     rotation_from_matrix(m).map_err(|source| ParseError::Rotation {
         field: field.to_owned(),
@@ -151,7 +151,7 @@ pub(super) fn rotation(field: &str, m: &Matrix3<f64>) -> Result<UnitQuaternion<f
     })
 }
 
-/// The rotation of Rodrigues' vector: its direction is the axis, its length the angle in radians.
+/// Returns the rotation for a Rodrigues vector: its direction is the axis, and its length is the angle in radians.
 pub(super) fn rodrigues(field: &str, v: [f64; 3]) -> Result<UnitQuaternion<f64>, ParseError> {
     for value in v {
         finite(field, value)?;
@@ -167,7 +167,7 @@ pub(super) fn rodrigues(field: &str, v: [f64; 3]) -> Result<UnitQuaternion<f64>,
     Ok(UnitQuaternion::from_scaled_axis(Vector3::from(v)))
 }
 
-/// World to camera, from a translation in the file's unit.
+/// Returns the world-to-camera pose, with a translation in the file's unit.
 pub(super) fn pose(
     field: &str,
     rotation: UnitQuaternion<f64>,
@@ -181,7 +181,7 @@ pub(super) fn pose(
     Ok(Isometry3::from_parts(Translation3::from(metres), rotation))
 }
 
-/// Numbers separated by blanks.
+/// Parses numbers separated by blanks.
 pub(super) fn blank_separated(text: &str) -> Result<Vec<f64>, ParseError> {
     let number = |(line, word): (usize, &str)| {
         let Ok(value) = word.parse::<f64>() else {
@@ -200,23 +200,23 @@ pub(super) fn blank_separated(text: &str) -> Result<Vec<f64>, ParseError> {
         .collect()
 }
 
-/// Numbers with the fewest digits that parse back to the same value, separated by `between`.
+/// Writes numbers with the fewest digits that parse back to the same value, separated by `between`.
 pub(super) fn joined(numbers: impl IntoIterator<Item = impl Debug>, between: &str) -> String {
     let words: Vec<String> = numbers.into_iter().map(|number| format!("{number:?}")).collect();
     words.join(between)
 }
 
-/// The numbers of a matrix, row by row.
+/// Returns the numbers of a matrix, row by row.
 pub(super) fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|row| [0, 1, 2].map(|column| matrix[(row, column)]))
 }
 
-/// The matrix of three rows.
+/// Returns the matrix with three given rows.
 pub(super) fn matrix(rows: [[f64; 3]; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|row, column| rows[row][column])
 }
 
-/// The matrix of nine numbers, row by row.
+/// Returns the matrix of nine numbers, row by row.
 pub(super) fn matrix_of_nine(numbers: &[f64; 9]) -> Matrix3<f64> {
     Matrix3::from_row_slice(numbers)
 }

@@ -1,10 +1,14 @@
 //! YAML storage of `OpenCV`, and the pair `intri.yml` + `extri.yml` of `EasyMocap`.
 //!
-//! One camera in a file: `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`, `R`
-//! (matrix or Rodrigues) and `T`; without these two, as `OpenCV`'s calibration program and ROS's `camera_info` leave them out, it has a lens
-//! and no place. `fisheye_model: 1` of that program, and `distortion_model: equidistant` of ROS, are fisheye lenses. Several, after `EasyMocap`: a list `names`, and for each name `K_n`,
-//! `dist_n`, `Rot_n` (or `R_n`, Rodrigues), `T_n`; sizes as `W_n`, `H_n`, which `EasyMocap` itself may
-//! leave out: then [`ReadOptions::size`] must say. Metres, unless [`ReadOptions::unit`] says otherwise.
+//! A file with one camera has `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`, `R` (matrix or Rodrigues) and `T`.
+//! The calibration program of `OpenCV` and ROS's `camera_info` leave out `R` and `T`; the camera then has a lens but no pose. Fisheye
+//! lenses have `fisheye_model: 1` (`OpenCV`'s program) or `distortion_model: equidistant` (ROS).
+//!
+//! A file with several cameras has the form of `EasyMocap`: a list `names`, and for each name `K_n`, `dist_n`, `Rot_n` (or `R_n`,
+//! Rodrigues) and `T_n`. The sizes are `W_n` and `H_n`. `EasyMocap` itself may leave them out, and [`ReadOptions::size`] must then give
+//! them.
+//!
+//! Lengths are in metres, unless [`ReadOptions::unit`] gives another unit.
 
 use nalgebra::UnitQuaternion;
 
@@ -15,9 +19,9 @@ mod storage;
 
 use storage::Storage;
 
-/// Reads cameras from one or more files; each has a name for a camera without one.
+/// Reads cameras from one or more files. Each file has a name, which is used for a camera without one.
 ///
-/// Files after `EasyMocap` are read as one; every other file is a camera.
+/// Files in the form of `EasyMocap` are read together; every other file is one camera.
 ///
 /// # Errors
 ///
@@ -44,7 +48,7 @@ pub fn parse(files: &[(&str, &str)], options: &ReadOptions) -> Result<Rig, Parse
     super::entry::rig(cameras, options.up, "", options)
 }
 
-/// The possible names of the entries of a camera.
+/// Possible names of the entries of a camera.
 struct Keys {
     matrix: Vec<String>,
     distortion: Vec<String>,
@@ -114,7 +118,7 @@ fn camera(
     };
     let size = size(storage, keys, options)?;
     let intrinsics = numbers::intrinsics(matrix_key, &numbers::matrix_of_nine(&k), size, lens)?;
-    // The `R` of ROS's `camera_info` rectifies stereo pictures, and stands beside `P`.
+    // The `R` of ROS's `camera_info` rectifies stereo pictures, and occurs together with `P`.
     let is_rectification = storage.find(&keys.translation).is_none()
         && ["P", "p", "projection_matrix"]
             .iter()
@@ -140,7 +144,7 @@ fn camera(
 ///
 /// # Errors
 ///
-/// The file names a model that is neither.
+/// Fails if the file names an unknown model.
 fn is_fisheye(storage: &Storage, keys: &Keys) -> Result<bool, ParseError> {
     for key in &keys.fisheye {
         if storage.number(key)?.is_some_and(|flag| flag != 0.0) {
@@ -203,8 +207,7 @@ fn sized<const N: usize>(
 ///
 /// # Errors
 ///
-/// [`UnwritableRig::Name`] for a name with other characters than letters, digits, `_` and `-`, of
-/// which keys are made.
+/// [`UnwritableRig::Name`] for a name with characters other than letters, digits, `_` and `-`, because names are part of the keys.
 pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
     let mut lines = vec![
         "%YAML:1.0".to_owned(),

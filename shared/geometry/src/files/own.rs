@@ -70,8 +70,8 @@ pub(super) fn is_own(text: &str) -> bool {
         || text.lines().any(|line| line.starts_with("format = \"parallax-rig\""))
 }
 
-/// Reads a rig file. The image size of `options` is ignored: the file has it. A unit in `options` overrides metres,
-/// for a file that was written in a wrong unit.
+/// Reads a rig file. The image size of `options` is ignored, because the file has it. A unit in `options` overrides metres, for a file that
+/// was written in a wrong unit.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! JSON of CMU Panoptic: a list `cameras`, centimetres, y down.
+//! JSON of CMU Panoptic: a list `cameras`, in centimetres, with y down.
 //!
 //! ```json
 //! { "calibDataSource": "...", "cameras": [
@@ -7,9 +7,9 @@
 //!     "R": [[..], [..], [..]], "t": [[x], [y], [z]] } ] }
 //! ```
 //!
-//! `R` and `t` take a point of the world to the camera, as `OpenCV` has it. The world's y points down, so
-//! that up is -y. `t` may be a column or a plain list. A file of the data set has 31 HD cameras, 480 VGA
-//! cameras and 10 Kinects; all of them are cameras here, and a deployment names those that it uses.
+//! `R` and `t` take a point of the world to the camera, as in `OpenCV`. The world's y points down, so that up is -y. `t` may be a column or
+//! a plain list. A file of the data set has 31 HD cameras, 480 VGA cameras and 10 Kinects. All of them are read as cameras, and a
+//! deployment names those that it uses.
 
 use nalgebra::{UnitVector3, Vector3};
 use serde::Deserialize;

@@ -1,10 +1,9 @@
-//! Camera tables in TOML, as Pose2Sim, anipose, Caliscope and `FreeMoCap` write them.
+//! Camera tables in TOML, as written by Pose2Sim, anipose, Caliscope and `FreeMoCap`.
 //!
-//! A table with a `matrix` is a camera, at the top level (`[cam_01]`) or under `cameras`
-//! (`[cameras.0]`, Caliscope, named `cam_0` if it has no `name`); the order of the file is kept.
-//! `rotation` is Rodrigues' vector or a 3x3 matrix, world to camera; `translation` is in metres for
-//! Pose2Sim and Caliscope but in the unit of the board for anipose and `FreeMoCap` (millimetres as a
-//! rule): ask for it with [`ReadOptions::unit`]. The files do not say which way is up (Pose2Sim: z).
+//! A table with a `matrix` is a camera, at the top level (`[cam_01]`) or under `cameras` (`[cameras.0]`, Caliscope, named `cam_0` if it has
+//! no `name`). The order of the file is kept. `rotation` is a Rodrigues vector or a 3x3 matrix, world to camera. `translation` is in metres
+//! for Pose2Sim and Caliscope, but in the unit of the board (usually millimetres) for anipose and `FreeMoCap`; set [`ReadOptions::unit`]
+//! for these. The files do not state the up direction, which is z for Pose2Sim.
 
 use toml::{Table, Value};
 
@@ -20,10 +19,12 @@ pub(super) fn is_pose2sim(text: &str) -> bool {
 
 /// Reads a camera file.
 ///
+/// Tables with `ignore = true` are not cameras. Cameras without rotation and translation, as Caliscope writes those that it could not
+/// place, are left out.
+///
 /// # Errors
 ///
-/// See [`ParseError`]. Tables with `ignore = true` are no cameras; cameras without rotation and translation, as Caliscope leaves those that
-/// it could not place, are left out.
+/// See [`ParseError`].
 pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     let table: Table = text.parse().map_err(|error: toml::de::Error| ParseError::Syntax {
         format: "TOML",
@@ -41,7 +42,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     super::entry::rig(cameras, options.up, "", options)
 }
 
-/// The tables that are cameras, each with its default name.
+/// Returns the tables that are cameras, each with its default name.
 fn camera_tables(table: &Table) -> Vec<(String, Fields<'_>)> {
     let top = table.iter().map(|(key, value)| (key.clone(), key.clone(), value));
     let nested = table.get("cameras").and_then(Value::as_table).into_iter().flatten();
@@ -76,10 +77,7 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Ent
         }
     };
     if !fields.has("matrix") {
-        return Ok(Entry::name(
-            &name,
-            "its file has neither its lens nor its place",
-        ));
+        return Ok(Entry::name(&name, "its file has neither a lens nor a pose"));
     }
     let [width, height] = fields.array::<2>("size")?;
     let size_field = fields.field("size");
@@ -120,7 +118,7 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Ent
 ///
 /// # Errors
 ///
-/// [`UnwritableRig::Name`] for a camera named `metadata` or `cameras`, which mean something else here.
+/// [`UnwritableRig::Name`] for a camera named `metadata` or `cameras`, because these names have another meaning in the format.
 pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
     let table = |camera| camera_table(camera, Unit::Metres);
     let tables: Result<String, _> = rig.cameras().iter().map(table).collect();
@@ -131,7 +129,7 @@ pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
 ///
 /// # Errors
 ///
-/// As [`write()`].
+/// Fails like [`write()`].
 pub fn write_anipose(rig: &Rig) -> Result<String, UnwritableRig> {
     let table = |camera| camera_table(camera, Unit::Millimetres);
     let tables: Result<String, _> = rig.cameras().iter().map(table).collect();
@@ -152,7 +150,7 @@ fn camera_table(camera: &Camera, unit: Unit) -> Result<String, UnwritableRig> {
     let (coefficients, fisheye) = numbers::distortion(intrinsics.lens.model());
     let pose = &camera.camera_from_world;
     let translation = pose.translation.vector * unit.per_metre();
-    // Pose2Sim writes floats; anipose takes the size of an image only as whole numbers.
+    // Pose2Sim writes floats; anipose accepts only whole numbers for the image size.
     let size = match unit {
         Unit::Metres => format!("{width}.0, {height}.0"),
         _ => format!("{width}, {height}"),
@@ -170,7 +168,7 @@ fn camera_table(camera: &Camera, unit: Unit) -> Result<String, UnwritableRig> {
     ))
 }
 
-/// A name as the key of a table: bare where it can be, else a basic string.
+/// Returns a name as the key of a table: bare if possible, otherwise as a basic string.
 fn quoted_key(name: &str) -> String {
     let bare = name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
     if bare && !name.is_empty() {

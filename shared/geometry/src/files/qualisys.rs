@@ -1,11 +1,13 @@
 //! Calibration files of Qualisys (`.qca.txt`, XML): millimetres, and pixels in 64ths.
 //!
-//! The conventions, established on a file whose cameras are also known in `OpenCV` terms:
-//! `x y z` is the centre of the camera and `r11..r33`, row by row, takes the world to a frame with x
-//! to the right, y up and z backward, so y and z change sign; focal lengths and principal point are in
-//! 1/64 px, from the top-left of the sensor, of which `fov_video` is the part in the image; the
-//! distortion coefficients are those of `OpenCV`, not divided. (Pose2Sim divides them by 64 too, so
-//! files that it converted have lost their distortion.)
+//! The conventions were established with a file whose cameras are also known in `OpenCV` terms:
+//!
+//! - `x y z` is the centre of the camera.
+//! - `r11..r33`, row by row, takes the world to coordinates with x to the right, y up and z backward, so y and z change sign.
+//! - Focal lengths and the principal point are in 1/64 px from the top-left of the sensor. `fov_video` is the part of the sensor in the
+//!   image.
+//! - The distortion coefficients are those of `OpenCV`, without division. Pose2Sim divides them by 64 as well, so files that it converted
+//!   have lost their distortion.
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
@@ -13,15 +15,14 @@ use roxmltree::{Document, Node};
 use super::{ParseError, ReadOptions, Unit, entry::Entry, numbers};
 use crate::{Camera, Rig};
 
-/// Units of the file per pixel.
+/// Number of file units per pixel.
 const SUBPIXELS: f64 = 64.0;
 
-/// Reads a calibration.
+/// Reads a calibration. A camera that was not calibrated is left out.
 ///
 /// # Errors
 ///
-/// See [`ParseError`]. A camera that was not calibrated is left out. A camera that is turned in the viewer (`viewrotation`) is refused: its pixel
-/// convention is not documented.
+/// See [`ParseError`]. A camera that is rotated in the viewer (`viewrotation`) is refused, because its pixel convention is not documented.
 pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     // Files of older versions start with a byte order mark.
     let document = Document::parse(text.trim_start_matches('\u{feff}')).map_err(|error| {
@@ -52,7 +53,7 @@ fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Entry, ParseError
     if ["false", "0"].contains(&&*calibrated.trim().to_ascii_lowercase()) {
         return Ok(Entry::name(
             name,
-            "its file says that it was not calibrated",
+            "its file says that the camera was not calibrated",
         ));
     }
     let child = |tag: &str| {
@@ -69,7 +70,7 @@ fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Entry, ParseError
     };
     turned.zero_if_present(
         "viewrotation",
-        "a turned view is not supported: it must be 0",
+        "a rotated view is not supported: it must be 0",
     )?;
     let intrinsics = intrinsics(&child("intrinsic")?, &child("fov_video")?)?;
     let camera_from_world = pose(
@@ -111,7 +112,7 @@ fn intrinsics(
         "radialDistortion3",
     ]
     .map(|key| inside.number(key));
-    // Spelt like this in the files.
+    // The files use this spelling.
     let [p1, p2] = ["tangentalDistortion1", "tangentalDistortion2"].map(|key| inside.number(key));
     let lens = numbers::lens(&inside.field, &[k1?, k2?, p1?, p2?, k3?], false)?;
     numbers::intrinsics(&inside.field, &k, size, lens)
@@ -141,7 +142,7 @@ fn pose(transform: &Element<'_, '_>, unit: Unit) -> Result<nalgebra::Isometry3<f
     )
 }
 
-/// An element and its name in errors.
+/// An element, and its name in errors.
 struct Element<'a, 'input> {
     node: Node<'a, 'input>,
     field: String,

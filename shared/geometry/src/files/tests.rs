@@ -1,4 +1,4 @@
-//! Every format reads back what it wrote, and refuses invalid files.
+//! Tests that every format reads back its own output, and refuses invalid files.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -51,7 +51,7 @@ fn panoptic_is_in_centimetres_with_y_down() {
     assert_eq!(*b.intrinsics.lens.model(), LensModel::Pinhole);
     let at = Vector3::new(0.5, 1.2, 3.0);
     assert!((a.camera_from_world.translation.vector - at).norm() < 1e-12);
-    // R turns the world's x into the camera's z: a plain list of three does for t.
+    // R maps the world's x axis to the camera's z axis; t may be a plain list of three.
     let x = b.camera_from_world * nalgebra::Point3::new(1.0, 0.0, 0.0);
     assert!(
         (x.coords - Vector3::new(-0.205, 1.1, 3.8)).norm() < 1e-12,
@@ -68,11 +68,11 @@ fn panoptic_is_in_centimetres_with_y_down() {
     assert_eq!(rig.cameras()[0].camera_from_world.translation.x, 50.0);
 }
 
-/// One to four cameras with names that any format can write.
+/// Generates one to four cameras with names that any format can write.
 fn rig() -> impl Strategy<Value = Rig> {
     prop::collection::vec((camera(), 1_u32..5000, 1_u32..5000), 1..4).prop_map(|cameras| {
         let named = |(i, (mut camera, width, height)): (usize, (Camera, u32, u32))| {
-            // Descending, so that a reader that sorts fails.
+            // The names are descending, so that a reader that sorts them fails.
             camera.name = format!("cam_{:02}", 10 - i);
             camera.intrinsics.size = [width.max(400), height.max(300)];
             camera
@@ -105,7 +105,7 @@ fn assert_same_cameras(read: &Rig, written: &Rig) {
     }
 }
 
-/// The camera with at most `n` radial coefficients.
+/// Returns the camera with at most `n` radial coefficients.
 fn with_simpler_lens(mut camera: Camera, n: usize) -> Camera {
     let lens = match *camera.intrinsics.lens.model() {
         LensModel::BrownConrady { mut k, p } => {
@@ -297,7 +297,7 @@ fn qualisys_lengths_are_in_64ths_of_a_pixel_but_distortion_is_not() {
     assert_eq!(intrinsics.lens.model(), &lens);
     let centre = camera.centre_in_world();
     assert!((centre.coords - Vector3::new(1.0, -2.0, 0.5)).norm() < 1e-12);
-    // Right is x, the picture's up is the world's z, and so it looks along y.
+    // The right is x, and the picture's up is the world's z, so the camera looks along y.
     assert!((camera.axis_in_world().into_inner() - Vector3::y()).norm() < 1e-12);
     let above = camera.project(&nalgebra::Point3::new(1.0, 3.0, 0.6)).expect("in front");
     assert!(above.y < 960.0);
@@ -356,7 +356,7 @@ fn a_moved_camera_has_the_largest_epipolar_error() {
     assert_eq!(worst.map(|worst| worst.camera), Some(2));
 }
 
-/// The findings where the second of three cameras is changed by `spoil`.
+/// Returns the findings after `spoil` changed the second of three cameras.
 fn findings(spoil: impl FnOnce(&mut Camera)) -> Vec<Finding> {
     let mut cameras = ring_rig(3, BARREL).cameras().to_vec();
     spoil(&mut cameras[1]);

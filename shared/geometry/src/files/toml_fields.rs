@@ -5,7 +5,7 @@ use toml::{Table, Value};
 
 use super::{ParseError, numbers};
 
-/// A table and the path that leads to it.
+/// A table, and the path to it.
 pub(super) struct Fields<'a> {
     pub(super) table: &'a Table,
     pub(super) path: String,
@@ -16,7 +16,7 @@ impl<'a> Fields<'a> {
         format!("{}.{key}", self.path)
     }
 
-    /// Returns true if a key is there; Caliscope writes `"null"` for unknown values.
+    /// Returns true if a key is present; Caliscope writes `"null"` for unknown values.
     pub(super) fn has(&self, key: &str) -> bool {
         let value = self.table.get(key);
         value.is_some_and(|value| value.as_str() != Some("null"))
@@ -28,18 +28,18 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// A list of numbers of any length.
+    /// Returns a list of numbers of any length.
     pub(super) fn list(&self, key: &str) -> Result<Vec<f64>, ParseError> {
         list(&self.field(key), self.get(key)?)
     }
 
-    /// A list of `N` numbers.
+    /// Returns a list of `N` numbers.
     pub(super) fn array<const N: usize>(&self, key: &str) -> Result<[f64; N], ParseError> {
         let list = self.list(key)?;
         exactly(&self.field(key), &list)
     }
 
-    /// A matrix of three rows of three.
+    /// Returns a 3x3 matrix.
     pub(super) fn matrix(&self, key: &str) -> Result<Matrix3<f64>, ParseError> {
         matrix(&self.field(key), self.get(key)?)
     }
@@ -69,7 +69,7 @@ fn exactly<const N: usize>(field: &str, list: &[f64]) -> Result<[f64; N], ParseE
             expected: match N {
                 2 => "2 numbers",
                 3 => "3 numbers",
-                _ => "another count of numbers",
+                _ => "a different number of values",
             },
             found: format!("{} numbers", list.len()),
         });

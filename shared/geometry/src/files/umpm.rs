@@ -1,8 +1,7 @@
-//! `.ini` files of UMPM (not in INI syntax): 19 numbers on 6 lines, one camera, millimetres.
+//! `.ini` files of UMPM (not in INI syntax): 19 numbers on 6 lines for one camera, in millimetres.
 //!
-//! Three rows of K, then k1 k2 p1 p2, then Rodrigues' vector and the translation, both world to
-//! camera. Line breaks do not matter. The file does not name its camera nor say how large its image
-//! is: 644x486 unless [`ReadOptions::size`] says otherwise.
+//! The numbers are three rows of K, then k1 k2 p1 p2, then the Rodrigues vector and the translation, both world to camera. Line breaks do
+//! not matter. The file has neither the name of its camera nor the image size, which is 644x486 unless [`ReadOptions::size`] gives another.
 
 use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers};
 use crate::{Camera, LensModel, Rig};
@@ -10,7 +9,7 @@ use crate::{Camera, LensModel, Rig};
 /// Image size of the data set.
 const SIZE: [u32; 2] = [644, 486];
 
-/// Reads a camera, to be named `name`.
+/// Reads a camera and gives it the name `name`.
 ///
 /// # Errors
 ///
@@ -39,11 +38,11 @@ pub fn parse(name: &str, text: &str, options: &ReadOptions) -> Result<Rig, Parse
     Rig::new(vec![camera], options.up, "").map_err(ParseError::Rig)
 }
 
-/// Writes a camera, in millimetres. Its name, image size and what is up are lost.
+/// Writes a camera, in millimetres. Its name, the image size and the up direction are lost.
 ///
 /// # Errors
 ///
-/// [`UnwritableRig::Lens`] for any lens with more than k1 k2 p1 p2.
+/// [`UnwritableRig::Lens`] for any lens with coefficients other than k1 k2 p1 p2.
 pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
     let intrinsics = &camera.intrinsics;
     let distortion = match *intrinsics.lens.model() {

@@ -1,4 +1,4 @@
-//! The framed camera and the framed picture agree, whatever the lens and the roll.
+//! Tests that the framed camera and the framed picture agree, for any lens and roll.
 
 use nalgebra::Point2;
 use proptest::prelude::*;
@@ -104,7 +104,7 @@ fn another_aspect_pads_evenly() {
     let camera = ring(1, LensModel::Pinhole).remove(0);
     let framing = Framing::new(&camera, [640, 480], None, OutSize::Exact([320, 320]), 0.0)
         .expect("sizes fit");
-    // 480 rows at half size are 240: 40 rows of padding above and below.
+    // Half of 480 rows is 240, so 40 rows of padding are above and below.
     assert_eq!(framing.source_from_output()[1], [0.0, 2.0, -79.5]);
 }
 

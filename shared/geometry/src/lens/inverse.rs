@@ -1,13 +1,13 @@
-//! The inverse of a distortion: first the radius within a bracket, then Newton's method in the plane.
+//! Inverse of a distortion: first the radius within a bracket, then Newton's method in the plane.
 
 use nalgebra::{Point2, Vector2};
 
 use super::{Lens, LensModel};
 
-/// The residual (normalised coordinates) at which an inverse counts as found; 2e-7 px at a focal length of 2000 px.
+/// Largest residual of a successful inverse, in normalised coordinates; 2e-7 px at a focal length of 2000 px.
 const TOLERANCE: f64 = 1e-10;
 
-/// See [`Lens::undistort`].
+/// Inverts the distortion; see [`Lens::undistort`].
 pub(super) fn undistort(lens: &Lens, distorted: &Point2<f64>) -> Option<Point2<f64>> {
     let target = distorted.coords;
     if !target.iter().all(|c| c.is_finite()) {
@@ -22,7 +22,7 @@ pub(super) fn undistort(lens: &Lens, distorted: &Point2<f64>) -> Option<Point2<f
     ((reached.coords - target).norm() <= tolerance).then_some(point.into())
 }
 
-/// Inverts the radial part, which is monotonic over the valid range, by Newton's method kept inside a bracket.
+/// Inverts the radial part, which is monotonic over the valid range, by Newton's method within a bracket.
 fn start(lens: &Lens, target: Vector2<f64>) -> Vector2<f64> {
     let wanted = target.norm();
     if wanted < 1e-14 {
@@ -51,7 +51,7 @@ fn start(lens: &Lens, target: Vector2<f64>) -> Vector2<f64> {
     target * (r / wanted)
 }
 
-/// Takes Newton steps, halved where they overshoot, for as long as they help.
+/// Takes Newton steps while they reduce the residual; steps that overshoot are halved.
 fn polish(lens: &Lens, target: Vector2<f64>, mut point: Vector2<f64>) -> Vector2<f64> {
     let (mut reached, mut jacobian) = lens.model.distort(point);
     for _ in 0..30 {

@@ -1,14 +1,14 @@
-//! The radius up to which a distortion model is monotonic.
+//! Radius up to which a distortion model is monotonic.
 
 use super::LensModel;
 
-/// Rays further off the axis than this (tangent of 87 degrees) are refused by every lens.
+/// Tangent of the largest angle to the axis that a lens accepts, 87 degrees.
 const WIDEST: f64 = 19.0;
 
-/// Steps of the scan for the first turning point; the last step is bisected.
+/// Number of steps of the scan for the first turning point; the last step is bisected.
 const STEPS: u32 = 1900;
 
-/// The largest undistorted radius up to which the distorted radius grows all the way.
+/// Returns the largest undistorted radius up to which the distorted radius increases.
 pub(super) fn max_radius(model: &LensModel) -> f64 {
     let mut inside = 0.0;
     for i in 1..=STEPS {
@@ -21,7 +21,7 @@ pub(super) fn max_radius(model: &LensModel) -> f64 {
     WIDEST
 }
 
-/// Returns true if the distorted radius is finite, positive and growing at `r`, and above its value at `before`.
+/// Returns true if the distorted radius is finite, positive and increasing at `r`, and above its value at `before`.
 fn grows(model: &LensModel, before: f64, r: f64) -> bool {
     let (distorted, slope) = model.radius(r);
     slope > 0.0 && distorted.is_finite() && distorted > model.radius(before).0

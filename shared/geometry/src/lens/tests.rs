@@ -1,4 +1,4 @@
-//! Distorting and undistorting are inverse within the valid range of a lens, and refused outside it.
+//! Tests that distorting and undistorting are inverse within the valid range of a lens, and refused outside it.
 
 use proptest::prelude::*;
 
@@ -16,7 +16,7 @@ proptest! {
     #[test]
     fn undistorting_inverts_distorting(lens in lens(), radius in 0.0..1.2, bearing in 0.0..6.3) {
         let point = Point2::new(radius * f64::cos(bearing), radius * f64::sin(bearing));
-        // Close to the turning point the inverse is ill-conditioned: stay 1 % inside.
+        // Close to the turning point the inverse is ill-conditioned, so the test stays 1 % inside.
         prop_assume!(radius < 0.99 * lens.max_radius());
         let Some(distorted) = lens.distort(&point) else { return Ok(()) };
         let back = lens.undistort(&distorted).expect("a distorted point can be undistorted");
@@ -99,7 +99,7 @@ fn a_pole_of_the_rational_model_ends_its_range() {
 
 #[test]
 fn brown_conrady_equals_the_formula_of_opencv() {
-    // The formula of cv::projectPoints, written out at (0.3, -0.2).
+    // The expected values follow the formula of `cv::projectPoints` at (0.3, -0.2).
     let lens = Lens::new(LensModel::BrownConrady {
         k: [0.1, -0.2, 0.3, 0.0, 0.0, 0.0],
         p: [0.01, 0.02],

@@ -1,4 +1,4 @@
-//! Which cameras a rig refuses, and where its optical axes meet.
+//! Tests of the cameras that a rig refuses, and of the point where its optical axes meet.
 
 use nalgebra::Quaternion;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use crate::{
 
 use super::*;
 
-/// The error of a rig whose second camera is changed by `spoil`.
+/// Returns the error of a rig after `spoil` changed its second camera.
 fn refusal(spoil: impl FnOnce(&mut Camera)) -> RigError {
     let mut cameras = ring(2, LensModel::Pinhole);
     spoil(&mut cameras[1]);

@@ -5,49 +5,49 @@ use nalgebra::{Matrix3, Point2, Point3, UnitVector3, Vector3};
 use super::median;
 use crate::{Framing, Ray};
 
-/// Frames that are examined: footage is exchanged from the beginning, or not at all.
+/// Maximum number of frames to examine; footage is exchanged from the beginning, or not at all.
 const MAX_FRAMES: usize = 60;
-/// The fewest frames for a result.
+/// Minimum number of frames for a result.
 const MIN_FRAMES: usize = 12;
-/// The fewest points of a usable frame.
+/// Minimum number of points of a usable frame.
 const MIN_POINTS: usize = 5;
-/// With more cameras, exchanged left and right are not tried: it would take too long.
+/// Maximum number of cameras for which exchanged left and right are tried; with more, it would take too long.
 const MAX_TO_MIRROR: usize = 8;
-/// Two cameras were exchanged if the angular residual is at least `MIN_DEGREES` as configured, and with the two
-/// exchanged at most `MAX_DEGREES` and smaller by `FACTOR`. The exchanged pair is certain if every other exchange leaves
-/// a residual larger by the factor `LEAD`.
+/// Two cameras were exchanged if the angular residual is at least `MIN_DEGREES` as configured. With the two exchanged, it must be at most
+/// `MAX_DEGREES` and smaller by `FACTOR`. The exchanged pair is certain if every other exchange leaves a residual larger by the factor
+/// `LEAD`.
 const MIN_DEGREES: f64 = 0.75;
 const MAX_DEGREES: f64 = 1.5;
 const FACTOR: f64 = 2.5;
 const LEAD: f64 = 1.5;
-/// With a larger angular residual, the cameras do not see one person at the place that the rig gives.
+/// Angular residual above which the cameras do not see one person at the position that the rig gives.
 const CONTRADICTION_DEGREES: f64 = 2.5;
-/// With a residual larger than this, a few frames are enough to say so: no detection of a person is as far off.
+/// Angular residual that is reported after a few frames, because no detection of a person is so far off.
 const IMPOSSIBLE_DEGREES: f64 = 5.0;
 
 /// Computes, frame by frame, the angular residual of the rays with the footage of two cameras exchanged.
 ///
-/// For every point the rays of all views are intersected in the least-squares sense; the residual is the angle between
-/// a ray and the direction to that point, and for a frame its median over views and points. Every pair of cameras is
-/// tried: if exchanging a pair lowers the residual from far above the usual detection error to the usual, the two were
-/// exchanged. Any view may have left and right exchanged.
+/// For every point, the rays of all views are intersected in the least-squares sense. The residual is the angle between a ray and the
+/// direction to that point; the residual of a frame is the median over views and points. Every pair of cameras is tried. Two cameras were
+/// exchanged if exchanging them lowers the residual from far above the usual detection error to the usual value. Any view may have left and
+/// right exchanged.
 #[derive(Debug, Clone)]
 pub struct SwapWatch {
     framings: Vec<Framing>,
-    /// By point, the point on the other side of the body.
+    /// For each point, the point on the other side of the body.
     mirror: Option<Vec<usize>>,
-    /// By pair of views: of every frame the residual as configured, and with the two exchanged, degrees.
+    /// For each pair of views, the residuals of every frame as configured and with the two exchanged, in degrees.
     tried: Vec<([usize; 2], Vec<[f64; 2]>)>,
-    /// Residual of every frame as configured, degrees.
+    /// Residual of every frame as configured, in degrees.
     configured: Vec<f64>,
 }
 
-/// The cameras do not see one person where the rig says, whatever the reason.
+/// Evidence that the cameras do not see one person where the rig predicts, for any reason.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contradiction {
-    /// Median angular residual of the rays to the same part, degrees.
+    /// Median angular residual of the rays to the same part, in degrees.
     pub degrees: f64,
-    /// The largest usual residual, degrees.
+    /// Largest usual residual, in degrees.
     pub usual_degrees: f64,
     /// The two views whose exchange fits best, if it fits better than the configuration.
     pub likely: Option<[usize; 2]>,
@@ -56,22 +56,21 @@ pub struct Contradiction {
 /// Two cameras whose footage was exchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Swap {
-    /// The two views.
+    /// Indices of the two views.
     pub views: [usize; 2],
-    /// Angular residual as configured, degrees.
+    /// Angular residual as configured, in degrees.
     pub degrees: f64,
-    /// Angular residual with the two exchanged, degrees.
+    /// Angular residual with the two exchanged, in degrees.
     pub exchanged_degrees: f64,
-    /// True if it is certainly these two. With three cameras at equal angles around people, exchanging any two fits
-    /// almost equally well.
+    /// True if the pair is certain. With three cameras at equal angles around people, exchanging any two fits almost equally well.
     pub is_sure: bool,
 }
 
 impl SwapWatch {
-    /// Starts without observations.
+    /// Creates a watch without observations.
     ///
-    /// * `framings`: of the views.
-    /// * `mirror`: by point, the one on the other side of the body.
+    /// * `framings`: framings of the views.
+    /// * `mirror`: for each point, the point on the other side of the body.
     pub fn new(framings: Vec<Framing>, mirror: Option<Vec<usize>>) -> Self {
         let n = framings.len();
         let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
@@ -85,7 +84,7 @@ impl SwapWatch {
 
     /// Adds the observations of one frame.
     ///
-    /// * `points_px`: one entry per view, `None` without a detection; the same points of the world in the same order,
+    /// * `points_px`: one entry per view, `None` without a detection. All views list the same points of the world in the same order, in
     ///   pixels of the frame.
     pub fn note(&mut self, points_px: &[Option<Vec<[f64; 2]>>]) {
         let n_views = points_px.iter().flatten().count();
@@ -114,7 +113,7 @@ impl SwapWatch {
         }
     }
 
-    /// The two cameras that were exchanged.
+    /// Returns the two cameras that were exchanged, if any.
     pub fn swap(&self) -> Option<Swap> {
         let all = self.best(MIN_FRAMES);
         let best = *all.first()?;
@@ -126,11 +125,11 @@ impl SwapWatch {
         is_swap.then_some(Swap { is_sure, ..best })
     }
 
-    /// Observations that contradict the rig: exchanged footage, the rig of other footage, unsynchronised views, or
+    /// Returns evidence that the observations contradict the rig: exchanged footage, the rig of other footage, unsynchronised views, or
     /// wrong detections in every view.
     ///
-    /// An impossible residual is reported from the first frame on. An exchange that is not clear enough for [`Self::swap`] is reported, too: frames
-    /// that were turned upright for another camera show people tilted, and the detections in them fit no camera.
+    /// An impossible residual is reported from the first frame on. An exchange that is not clear enough for [`Self::swap`] is also
+    /// reported. The reason is that frames rotated upright for another camera show tilted people, and the detections in them fit no camera.
     pub fn contradiction(&self) -> Option<Contradiction> {
         let least = if self.configured.len() >= MIN_FRAMES {
             CONTRADICTION_DEGREES
@@ -147,7 +146,7 @@ impl SwapWatch {
         })
     }
 
-    /// All pairs with so many frames, those first that fit best if they are exchanged.
+    /// Returns all pairs with at least `n_frames` frames, those whose exchange fits best first.
     pub(super) fn best(&self, n_frames: usize) -> Vec<Swap> {
         let usable = self.tried.iter().filter(|(_, frames)| frames.len() >= n_frames);
         let mut all: Vec<Swap> = usable
@@ -165,7 +164,7 @@ impl SwapWatch {
         all
     }
 
-    /// `[view][camera][point]`: the ray of a view's observation, if its footage is that of a camera.
+    /// Returns `[view][camera][point]`: the ray of a view's observation, if its footage is that of a camera.
     fn rays(&self, points_px: &[Option<Vec<[f64; 2]>>]) -> Vec<Vec<Vec<Option<Ray>>>> {
         let of_view = |(view, points): (usize, &Option<Vec<[f64; 2]>>)| {
             let points = points.as_deref().unwrap_or_default();
@@ -178,7 +177,7 @@ impl SwapWatch {
         points_px.iter().enumerate().map(of_view).collect()
     }
 
-    /// Where a point of a view's frame lies in the frame that another camera would have made of the same footage.
+    /// Returns the position of a point of a view's frame in the frame that another camera would have produced from the same footage.
     fn seen_by(&self, view: usize, camera: &Framing, [x, y]: [f64; 2]) -> Option<Point2<f64>> {
         let in_source = self.framings[view].source_from_output();
         let source = in_source.map(|row| row[0] * x + row[1] * y + row[2]);
@@ -189,8 +188,8 @@ impl SwapWatch {
         at.iter().all(|value| value.is_finite()).then_some(at)
     }
 
-    /// Angular residual, degrees, if the footage of view `i` is that of camera `camera_of[i]`; with left and right as
-    /// they fit best.
+    /// Returns the angular residual in degrees if the footage of view `i` is that of camera `camera_of[i]`, with left and right as they fit
+    /// best.
     fn residual_degrees(&self, rays: &[Vec<Vec<Option<Ray>>>], camera_of: &[usize]) -> Option<f64> {
         let mut is_mirrored = vec![false; rays.len()];
         let mut best = self.residual_mirrored(rays, camera_of, &is_mirrored)?;
@@ -237,7 +236,7 @@ impl SwapWatch {
     }
 }
 
-/// The point nearest to rays, least squares; `None` for fewer than two rays, and for parallel ones.
+/// Returns the point nearest to the rays (least squares); `None` for fewer than two rays, or for parallel rays.
 fn nearest(rays: &[&Ray]) -> Option<Point3<f64>> {
     let first = rays.first()?.origin;
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -256,7 +255,7 @@ fn across(direction: &UnitVector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() - direction.into_inner() * direction.transpose()
 }
 
-/// The angle between a ray and the direction from its origin to a point, degrees.
+/// Returns the angle between a ray and the direction from its origin to a point, in degrees.
 fn angle_degrees(ray: &Ray, at: &Point3<f64>) -> f64 {
     ray.direction.angle(&(at - ray.origin)).to_degrees()
 }

@@ -1,4 +1,4 @@
-//! Correct rigs, and rigs with one camera moved after the calibration.
+//! Tests with correct rigs, and with one camera moved after the calibration.
 
 mod people;
 
@@ -9,7 +9,7 @@ use super::*;
 use crate::LensModel;
 use crate::testing::{looking_at_origin, ring};
 
-/// Pseudo-random numbers in -1..1.
+/// Returns a generator of pseudo-random numbers in -1..1.
 fn chance(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     move || {
@@ -20,7 +20,7 @@ fn chance(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Cameras at equal angles around the origin that look down at it from different heights.
+/// Returns cameras at equal angles around the origin, looking down at it from different heights.
 fn around(n: usize) -> Vec<Camera> {
     let cameras = ring(n, LensModel::Pinhole).into_iter().enumerate();
     let place = |(nth, camera): (usize, Camera)| Camera {
@@ -43,8 +43,7 @@ fn turned(camera: &Camera, axis: Vector3<f64>, degrees: f64) -> Camera {
     }
 }
 
-/// A watch after frames of 20 points of a walking person, with errors of at most `noise_px`, and of 60 px in every
-/// eighth point.
+/// Returns a watch after frames of 20 points of a walking person. Errors are at most `noise_px`, and 60 px in every eighth point.
 fn watch(
     real: &[Camera],
     believed: Vec<Camera>,
@@ -98,7 +97,7 @@ proptest! {
         let cameras = around(n);
         let moved = moved.index(n);
         let mut believed = cameras.clone();
-        // Not about the optical axis: that hardly moves points in the middle of the image.
+        // The rotation is not about the optical axis, which would hardly move points in the middle of the image.
         believed[moved] = turned(&cameras[moved], Vector3::new(f64::cos(bearing), f64::sin(bearing), 0.0), 2.0);
         let watch = watch(&cameras, believed, noise_px, seed, 30);
         prop_assert_eq!(suspected(&watch), [moved], "{:?}", watch.suspects());
@@ -121,7 +120,7 @@ fn one_tilted_camera_of_three_is_suspected() {
 fn an_offset_of_half_a_grid_cell_is_no_moved_camera() {
     let cameras = around(4);
     let mut believed = cameras.clone();
-    // A constant offset of two pixels.
+    // The camera has a constant offset of two pixels.
     believed[1].intrinsics.cx += 2.0;
     let watch = watch(&cameras, believed, 0.0, 5, 30);
     assert!(watch.residual_px(1) > watch.without_px(1).map(|px| FACTOR * px));
@@ -159,7 +158,7 @@ fn a_camera_that_is_moved_back_is_no_longer_suspected() {
     believed[3] = turned(&cameras[3], Vector3::y(), 3.0);
     let mut first = watch(&cameras, believed.clone(), 1.0, 2, WINDOW);
     assert_eq!(suspected(&first), [3]);
-    // The real camera is turned back to where the calibration says.
+    // The real camera is moved back to its calibrated pose.
     let right = watch(&believed, believed.clone(), 1.0, 3, WINDOW);
     let groups = first.groups.iter_mut().zip(&right.groups);
     for (group, right) in groups {

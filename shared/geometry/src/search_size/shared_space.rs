@@ -1,65 +1,64 @@
-//! The space that cameras share, and how high a standing person is seen there.
+//! Space that cameras share, and the height at which a standing person is seen there.
 
 use nalgebra::{Point2, Point3, UnitVector3, Vector3};
 use statistics::Sorted;
 
 use crate::{Camera, Rig};
 
-/// Height of a standing person, metres.
+/// Height of a standing person, in metres.
 pub const PERSON_METRES: f64 = 1.7;
-/// Sample points on the rays of a camera: cells of its image in either direction, and depths.
+/// Number of sample points on the rays of a camera: cells of its image in either direction, and depths.
 const CELLS: usize = 9;
 const DEPTHS: usize = 24;
-/// Largest height of a person who must be in the image whole, and of one who need not be: shares of the image's side
-/// along the person.
+/// Maximum height of a person who must be entirely in the image, and of one who may be cut off, relative to the image's side along the
+/// person.
 const MAX_SHARE_WHOLE: f64 = 1.25;
 const MAX_SHARE_PARTIAL: f64 = 4.0;
-/// Smallest height of a person, the same share.
+/// Minimum height of a person, relative to the same side.
 const MIN_SHARE: f64 = 0.0625;
-/// Parts of space, in order of preference: the first that as many cameras share as any other is used. People are near
-/// the point at which cameras are aimed; the space that parallel cameras share has no end.
+/// Parts of space in order of preference. The first part that is shared by as many cameras as any other is used. People are near the point
+/// at which cameras are aimed; the space that parallel cameras share has no end.
 const BOUNDS: [Bound; 4] = [
     Bound::NearFocus,
     Bound::MinShare(0.25),
     Bound::MinShare(0.125),
     Bound::MinShare(MIN_SHARE),
 ];
-/// Depths within this factor of the focus's are near it.
+/// Largest ratio between a depth and that of the focus for the depth to be near it.
 const NEAR_FACTOR: f64 = 1.6;
-/// Optical axes that differ by less have no common focus, radians (4 degrees).
+/// Minimum angle between optical axes that have a common focus, in radians (4 degrees).
 const MIN_AXIS_ANGLE: f64 = 0.07;
-/// Smallest share of the space of two cameras that counts as shared by more cameras.
+/// Minimum size of a space shared by more than two cameras, relative to the space shared by two.
 const MIN_SPACE_SHARE: f64 = 0.03;
-/// Smallest height of a person seen from above, as a share of the height seen from the side: the size of the parts does
-/// not change.
+/// Minimum height of a person seen from above, relative to the height seen from the side, because the size of the parts does not change.
 const MIN_FORESHORTENING: f64 = 0.7;
 
-/// How tall a standing person appears in each camera, in the space which that camera shares with others.
+/// Height of a standing person in each camera, in the space which that camera shares with others.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heights {
-    /// Median height of every camera, pixels of the calibrated image; `None` for a camera that shares no space.
+    /// Median height in every camera, in pixels of the calibrated image; `None` for a camera that shares no space.
     pub(super) median_px: Vec<Option<f64>>,
-    /// The most cameras that share a space worth the name; 0 if no two do.
+    /// Maximum number of cameras that share a sufficiently large space; 0 if no two cameras do.
     pub(super) n_sharing: usize,
 }
 
 /// A part of space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Bound {
-    /// About as far from the camera as what the cameras are aimed at.
+    /// The part at about the same distance from the camera as the focus of the rig.
     NearFocus,
-    /// Where the height of a person is at least this share of the image's side along the person.
+    /// The part in which the height of a person is at least this fraction of the image's side along the person.
     MinShare(f64),
 }
 
 /// The image of a person in one camera.
 #[derive(Debug, Clone, Copy)]
 struct Projection {
-    /// Height, pixels of the calibrated image.
+    /// Height, in pixels of the calibrated image.
     px: f64,
-    /// Height as a share of the image's side along the person.
+    /// Height relative to the image's side along the person.
     share: f64,
-    /// Depth over that of the focus, or the inverse, whichever is larger; infinite without a focus.
+    /// Ratio between the depth and that of the focus, or its inverse, whichever is larger; infinite without a focus.
     from_focus: f64,
 }
 
@@ -72,7 +71,7 @@ impl Projection {
     }
 }
 
-/// A place where a person may stand, with the image of the person in every camera.
+/// A position where a person may stand, with the image of the person in every camera.
 struct Place {
     seen: Vec<Option<Projection>>,
 }
@@ -88,10 +87,10 @@ impl Place {
     }
 }
 
-/// Finds the heights of a standing person in the space that the cameras share: where the whole person is in the images, or
-/// else the middle of the person.
+/// Finds the heights of a standing person in the space that the cameras share. Positions with the whole person in the images are preferred
+/// over those with only the middle of the person in the images.
 ///
-/// Without an up direction the height is that seen from the side.
+/// Without an up direction, the height is that seen from the side.
 pub(super) fn heights(rig: &Rig) -> Heights {
     let n = rig.cameras().len();
     for is_whole in [true, false] {
@@ -113,7 +112,7 @@ pub(super) fn heights(rig: &Rig) -> Heights {
     }
 }
 
-/// The most cameras that share enough of the space that two cameras share; 0 if there is none.
+/// Returns the maximum number of cameras that share enough of the space that two cameras share; 0 if there is none.
 fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
     let n_of: Vec<usize> = places.iter().map(|place| place.n_seen(bound)).collect();
     let shared_by = |n: usize| n_of.iter().filter(|value| **value >= n).count();
@@ -123,7 +122,7 @@ fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
     found.unwrap_or(0)
 }
 
-/// The median height in a camera, over the places that it shares with as many others as it can.
+/// Returns the median height in a camera, over the positions that it shares with as many others as possible.
 fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) -> Option<f64> {
     let of = |n: usize, bound: Bound| {
         let shared = places.iter().filter(|place| place.n_seen(bound) >= n);
@@ -133,11 +132,11 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
     };
     let fewer = (2..=n_sharing).rev();
     let found = fewer.clone().find_map(|n| of(n, bound));
-    // For a camera that is aimed elsewhere than the others.
+    // This is for a camera that is aimed elsewhere than the others.
     found.or_else(|| BOUNDS.iter().find_map(|bound| fewer.clone().find_map(|n| of(n, *bound))))
 }
 
-/// Places on the rays of all cameras that at least two of them see.
+/// Returns positions on the rays of all cameras that at least two of them see.
 fn places(rig: &Rig, is_whole: bool) -> Vec<Place> {
     let (up, focus) = (rig.up_in_world(), aim(rig));
     let viewpoint = |camera| Viewpoint::new(camera, up, focus, is_whole);
@@ -150,25 +149,25 @@ fn places(rig: &Rig, is_whole: bool) -> Vec<Place> {
     points.map(place).filter(is_shared).collect()
 }
 
-/// The point at which cameras are aimed; none if their axes are nearly parallel.
+/// Returns the point at which cameras are aimed; `None` if their axes are nearly parallel.
 fn aim(rig: &Rig) -> Option<Point3<f64>> {
     let axes: Vec<_> = rig.cameras().iter().map(Camera::axis_in_world).collect();
     let differ = |a: &UnitVector3<f64>| axes.iter().any(|b| a.angle(b) > MIN_AXIS_ANGLE);
     rig.focus().filter(|_| axes.iter().any(differ))
 }
 
-/// A camera, with what the heights of people in it depend on.
+/// A camera, with the values that determine the height of people in it.
 struct Viewpoint<'a> {
     camera: &'a Camera,
     up: Option<UnitVector3<f64>>,
-    /// Largest height of a person, as a share of `side`.
+    /// Maximum height of a person, relative to `side`.
     max_share: f64,
     is_whole: bool,
-    /// Depth of the point at which the cameras are aimed, metres.
+    /// Depth of the point at which the cameras are aimed, in metres.
     focus_depth: Option<f64>,
-    /// Focal length, pixels: the mean of both.
+    /// Mean focal length, in pixels.
     focal: f64,
-    /// Side of the image along a standing person, pixels.
+    /// Side of the image along a standing person, in pixels.
     side: f64,
 }
 
@@ -183,7 +182,7 @@ impl<'a> Viewpoint<'a> {
         let [width, height] = intrinsics.size.map(f64::from);
         let up_in_camera = up.map(|up| camera.camera_from_world.rotation * up.into_inner());
         let across = up_in_camera.map_or(0.0, |up_in_camera| up_in_camera.xy().norm());
-        // Projection from above, or with nobody to say what is up, a person may lie any way in the picture.
+        // Seen from above, or without a known up direction, a person may have any orientation in the picture.
         let side = match up_in_camera.filter(|_| across > 0.3) {
             Some(up) => (width * across / up.x.abs()).min(height * across / up.y.abs()),
             None => (width * height).sqrt(),
@@ -205,8 +204,8 @@ impl<'a> Viewpoint<'a> {
         }
     }
 
-    /// Points on its rays, from where a person fills the image to where a person is small in it; every doubling of the depth has
-    /// as many.
+    /// Returns points on the camera's rays, from depths at which a person fills the image to those at which a person is small in it. Every
+    /// doubling of the depth has the same number of points.
     fn points(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
         let middle = |nth: usize, n: usize| (nth as f64 + 0.5) / n as f64;
@@ -226,7 +225,7 @@ impl<'a> Viewpoint<'a> {
         })
     }
 
-    /// The image of a person whose middle is at a point.
+    /// Returns the image of a person whose middle is at a point.
     fn person(&self, middle: &Point3<f64>) -> Option<Projection> {
         let centre = self.inside(middle)?;
         let depth = (self.camera.camera_from_world * middle).z;
@@ -250,10 +249,10 @@ impl<'a> Viewpoint<'a> {
         })
     }
 
-    /// Distance from head to feet, pixels; none if they must be in the image and are not.
+    /// Returns the distance from head to feet in pixels; `None` if they must be in the image and are not.
     ///
-    /// * `half`: from the middle to the head.
-    /// * `otherwise`: the result where the lens model has no image of head or feet.
+    /// * `half`: vector from the middle to the head.
+    /// * `otherwise`: result if the lens model has no image of the head or the feet.
     fn between_ends(
         &self,
         middle: &Point3<f64>,
@@ -278,7 +277,7 @@ impl<'a> Viewpoint<'a> {
         2.0 * across.max(upright) >= px
     }
 
-    /// The pixel of a point, if it is in the picture.
+    /// Returns the pixel of a point, if it is in the picture.
     fn inside(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
         let pixel = self.camera.project(point)?;

@@ -1,4 +1,4 @@
-//! Rigs of all kinds, and the sizes that follow from them.
+//! Tests of the sizes that follow from many kinds of rigs.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ fn camera(name: &str, size: [u32; 2], focal: f64, pose: Isometry3<f64>) -> Camer
     }
 }
 
-/// Cameras evenly on a circle, level with the middle of a person or above it, which they look at.
+/// Returns cameras evenly spaced on a circle, level with the middle of a person or above it, looking at the person.
 fn ring(n: usize, size: [u32; 2], focal: f64, radius: f64, height: f64) -> Vec<Camera> {
     let cameras = (0..n).map(|nth| {
         let bearing = core::f64::consts::TAU * nth as f64 / n as f64;
@@ -39,7 +39,7 @@ fn rig(cameras: Vec<Camera>) -> Rig {
     Rig::new(cameras, Some(z_up()), "planted").unwrap()
 }
 
-/// How high a person in the middle of the world is in the frames that are chosen, pixels.
+/// Returns the heights of a person at the origin in frames of the chosen sizes, in pixels.
 fn in_the_middle(rig: &Rig) -> Vec<f64> {
     let chosen = search_sizes(rig).cameras.into_iter().zip(rig.cameras());
     let px = chosen.map(|(size, camera)| {
@@ -57,7 +57,7 @@ fn shipped(name: &str) -> SearchSizes {
 
 #[test]
 fn a_person_amid_a_ring_has_a_good_height_whatever_the_cameras() {
-    // Size, focal length, and distance from the middle.
+    // Image size, focal length, and distance from the origin.
     for (size, focal, radius) in [
         ([1920, 1080], 1400.0, 3.0),
         ([1920, 1080], 1000.0, 3.0),
@@ -213,7 +213,7 @@ fn people_far_from_large_cameras_are_smaller_than_is_good_and_that_is_known() {
             "{it:?}"
         );
     }
-    // A small picture costs little, and is not enlarged.
+    // A small picture has a low cost, and is not enlarged.
     let got = search_sizes(&rig(ring(4, [640, 480], 350.0, 5.0, 2.0)));
     assert!(got.cameras.iter().all(|camera| camera.scale == 1.0 && !camera.is_limited()));
 }

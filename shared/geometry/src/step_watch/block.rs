@@ -1,4 +1,4 @@
-//! The samples of some frames, and the offsets of the cameras that follow from them.
+//! Samples of some frames, and the resulting offsets of the cameras.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2};
 
@@ -6,28 +6,28 @@ use super::{MIN_POINTS, MOST_MISS, Moving, Seen};
 use crate::Camera;
 use crate::rig_watch::median;
 
-/// The least movement along the normals of epipolar lines, root mean square, per second: as a share of the longer side of the
-/// person in the picture. Our choice.
+/// Minimum movement along the normals of epipolar lines, as root mean square per second, relative to the longer side of the person in the
+/// picture. The value is our choice.
 const MIN_MOVEMENT: f64 = 0.08;
-/// The fewest samples of a pair of views.
+/// Minimum number of samples of a pair of views.
 const MIN_SAMPLES: f64 = 100.0;
 
-/// The sums of every pair of views.
+/// Sums of every pair of views.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     n_views: usize,
     pairs: Vec<Pair>,
     n_frames: usize,
-    /// By view: the sum of its known skews, and how many there are.
+    /// For each view, the sum of its known skews, and their number.
     skews: Vec<(f64, usize)>,
 }
 
 #[derive(Debug, Clone)]
 struct Pair {
     views: [usize; 2],
-    /// The essential matrix; `None` of cameras in one place.
+    /// Essential matrix; `None` for cameras in one place.
     essential: Option<Matrix3<f64>>,
-    /// Over all samples, and of every point.
+    /// Sums over all samples, then those of every point.
     all: Sums,
     points: Vec<Sums>,
     /// Sum of the squared longer sides.
@@ -66,12 +66,12 @@ struct Sample {
     along: [f64; 2],
 }
 
-/// The offset of a camera by the samples of a block.
+/// Offset of a camera from the samples of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Estimate {
-    /// Delay of its pictures with respect to the times that it states, against the median of all, seconds.
+    /// Delay of the camera's pictures relative to the stated times, compared with the median of all cameras, in seconds.
     pub(super) offset_s: f64,
-    /// Its variance, as far as the samples tell.
+    /// Variance of the offset, according to the samples.
     pub(super) variance: f64,
 }
 
@@ -94,14 +94,14 @@ impl Block {
         }
     }
 
-    /// Frames in which a pair had samples.
+    /// Returns the number of frames in which a pair had samples.
     pub(super) fn n_frames(&self) -> usize {
         self.n_frames
     }
 
     /// Adds a frame.
     ///
-    /// * `views`: in the order of the cameras.
+    /// * `views`: views in the order of the cameras.
     pub(super) fn add(&mut self, views: &[Option<Seen>]) {
         let mut is_used = false;
         for pair in &mut self.pairs {
@@ -122,13 +122,13 @@ impl Block {
         }
     }
 
-    /// The offset of every camera; `None` for one without enough movement, and `None` at all if that are all, or if some cameras
-    /// cannot be compared with the others.
+    /// Returns the offset of every camera; `None` for a camera without enough movement. Returns no list at all if no camera has enough
+    /// movement, or if some cameras cannot be compared with the others.
     pub(super) fn estimates(&self) -> Option<Vec<Option<Estimate>>> {
         let slopes = self.pairs.iter().filter_map(|pair| Some((pair.views, pair.slope()?)));
         let slopes: Vec<([usize; 2], Slope)> = slopes.collect();
         let linked = linked(self.n_views, slopes.iter().map(|slope| slope.0))?;
-        // Every pair says the difference of its two offsets. What no pair says is kept at 0.
+        // Every pair gives the difference of its two offsets. Offsets without a pair are held at 0.
         let all: f64 = slopes.iter().map(|slope| slope.1.weight).sum();
         let mut normal = DMatrix::identity(self.n_views, self.n_views) * (1e-9 * all);
         let mut right = DVector::zeros(self.n_views);
@@ -150,7 +150,7 @@ impl Block {
         let middle = middle(unknown.iter().flatten().copied().collect())?;
         let of_view = |(view, it): (usize, Option<f64>)| {
             let offset_s = it? - middle;
-            // As if the others were exact.
+            // The variance assumes that the other offsets are exact.
             let variance = 1.0 / normal[(view, view)];
             let is_number = offset_s.is_finite() && variance.is_finite();
             is_number.then_some(Estimate { offset_s, variance })
@@ -159,14 +159,14 @@ impl Block {
     }
 }
 
-/// Amount by which the second view of a pair is later than the first, and the reciprocal of the variance of that.
+/// Delay of the second view of a pair relative to the first, and the reciprocal of its variance.
 #[derive(Debug, Clone, Copy)]
 struct Slope {
     offset_s: f64,
     weight: f64,
 }
 
-/// Which views are in a pair; `None` if not all of them are linked with each other by pairs.
+/// Returns true for each view that is in a pair; `None` if these views are not all connected by pairs.
 fn linked(n_views: usize, pairs: impl Iterator<Item = [usize; 2]> + Clone) -> Option<Vec<bool>> {
     let mut reached = vec![false; n_views];
     reached[pairs.clone().next()?[0]] = true;
@@ -180,14 +180,14 @@ fn linked(n_views: usize, pairs: impl Iterator<Item = [usize; 2]> + Clone) -> Op
     all.all(|[a, _]| reached[a]).then_some(reached)
 }
 
-/// The median; of an even number the mean of the two in the middle, so that neither of two cameras counts as the right one.
+/// Returns the median. For an even number of values, it is the mean of the middle two, so that neither of two cameras counts as correct.
 fn middle(all: Vec<f64>) -> Option<f64> {
     let turned = all.iter().map(|value| -value).collect();
     Some(0.5 * (median(all)? - median(turned)?))
 }
 
 impl Pair {
-    /// Adds the points of a frame; whether there were enough.
+    /// Adds the points of a frame. Returns true if there were enough of them.
     fn add(&mut self, points: [&[Option<Moving>]; 2], side: f64) -> bool {
         let Some(essential) = self.essential else {
             return false;
@@ -220,8 +220,8 @@ impl Pair {
         true
     }
 
-    /// The slope of the residuals over the velocities, without what is the same for a point in all frames; `None` without enough
-    /// movement.
+    /// Returns the slope of the residuals over the velocities, without the part that is constant for a point over all frames. Returns
+    /// `None` without enough movement.
     fn slope(&self) -> Option<Slope> {
         let mut rest = self.all;
         let mut n_points = 0.0;
@@ -241,7 +241,7 @@ impl Pair {
     }
 }
 
-/// The residual of a point in two views, and what its velocities say about it.
+/// Returns the residual of a point in two views, and the velocities along the epipolar normals.
 fn sample(point: usize, essential: &Matrix3<f64>, a: Moving, b: Moving) -> Option<Sample> {
     let (in_a, in_b) = (a.0.to_homogeneous(), b.0.to_homogeneous());
     let (line_in_b, line_in_a) = (essential * in_a, essential.transpose() * in_b);
@@ -256,7 +256,7 @@ fn sample(point: usize, essential: &Matrix3<f64>, a: Moving, b: Moving) -> Optio
     })
 }
 
-/// Takes normalised points of A to lines of B.
+/// Returns the essential matrix, which takes normalised points of A to lines of B.
 fn essential(a: &Camera, b: &Camera) -> Option<Matrix3<f64>> {
     let b_from_a = b.camera_from_world * a.camera_from_world.inverse();
     let rotation = b_from_a.rotation.to_rotation_matrix();

@@ -1,4 +1,4 @@
-//! The linear start: the point that satisfies the projection equations best.
+//! Linear initial solution: the point that satisfies the projection equations best.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -7,12 +7,11 @@ use super::{
     views::{Subset, Views},
 };
 
-/// Solves `(x r₃ - r₁) · X = t₁ - x t₃` and the same for y, all views together, for a finite point.
+/// Solves `(x r₃ - r₁) · X = t₁ - x t₃` and the same for y, over all views together, for a finite point.
 ///
-/// The direct linear transform with the point's last coordinate set to 1 (Hartley & Sturm 1997,
-/// "Linear-LS"), so that the result does not depend on the origin of the world. The second
-/// round divides every equation by the depth and multiplies it by f / σ: pixels instead of metres.
-/// The point may lie behind a camera; the refinement refuses that.
+/// This is the direct linear transform with the point's last coordinate set to 1 (Hartley & Sturm 1997, "Linear-LS"), so that the result
+/// does not depend on the origin of the world. The second round divides every equation by the depth and multiplies it by f / σ, to get
+/// pixels instead of metres. The point may be behind a camera; the refinement refuses that.
 pub(super) fn triangulate(
     views: &Views<'_>,
     used: Subset,
@@ -33,7 +32,7 @@ pub(super) fn triangulate(
     Ok(solve(views, used, Some(&rough)).unwrap_or(rough))
 }
 
-/// The widest angle between two viewing rays, radians in [0, π].
+/// Returns the widest angle between two viewing rays, in radians in [0, π].
 fn widest_angle(views: &Views<'_>, used: Subset) -> f64 {
     let direction = |view: usize| {
         let (_, seen, normalised) = views.iter(used).find(|&(v, _, _)| v == view)?;
@@ -44,7 +43,7 @@ fn widest_angle(views: &Views<'_>, used: Subset) -> f64 {
     for a in used.iter() {
         for b in used.iter().take_while(|&b| b < a) {
             if let (Some(a), Some(b)) = (direction(a), direction(b)) {
-                // The smaller of the angle and its supplement: opposite rays are as useless as equal ones.
+                // The angle or its supplement is used, whichever is smaller, because opposite rays are as useless as equal ones.
                 widest = a.cross(&b).norm().atan2(a.dot(&b).abs()).max(widest);
             }
         }

@@ -1,4 +1,4 @@
-//! The refinement: least robust reprojection error, by Levenberg's and Marquardt's method.
+//! Refinement: minimum of the robust reprojection error, by the Levenberg-Marquardt method.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -7,20 +7,20 @@ use super::{
     views::{Subset, Views},
 };
 
-/// Steps tried for one width of the loss.
+/// Maximum number of steps to try for one width of the loss.
 const MAX_ITERATIONS: usize = 100;
 
 /// A refined point.
 pub(super) struct Fit {
     pub(super) in_world: Point3<f64>,
-    /// `Σ ρ' Jᵀ J / σ²`.
+    /// Normal matrix `Σ ρ' Jᵀ J / σ²`.
     pub(super) normal: Matrix3<f64>,
     pub(super) rms_px: f64,
     pub(super) worst_px: f64,
     pub(super) iterations: usize,
 }
 
-/// The objective at a point: its value, gradient, normal matrix and plain errors.
+/// Objective at a point: its value, gradient, normal matrix and plain errors.
 struct Objective {
     cost: f64,
     gradient: Vector3<f64>,
@@ -29,7 +29,7 @@ struct Objective {
     worst_px: f64,
 }
 
-/// Refines `start` with a loss that narrows from the worst error at the start down to `loss_px`.
+/// Refines `start` with a loss that narrows from the worst initial error down to `loss_px`.
 pub(super) fn refine(
     views: &Views<'_>,
     used: Subset,
@@ -86,7 +86,7 @@ fn descend(
         };
         let step = factor.solve(&here.gradient);
         let candidate = *point - step;
-        // A step behind a camera, or outside the range of its lens, is rejected.
+        // A step to a point behind a camera, or outside the range of its lens, is rejected.
         match evaluate(views, used, &candidate, loss_px) {
             Ok(there) if there.cost < here.cost => {
                 *point = candidate;
@@ -139,7 +139,7 @@ fn evaluate(
     Ok(sum)
 }
 
-/// The Cauchy loss of a squared error and its derivative; an infinite width gives plain squares.
+/// Returns the Cauchy loss of a squared error and its derivative; an infinite width gives plain squares.
 fn cauchy(square: f64, width: f64) -> (f64, f64) {
     if width.is_infinite() {
         return (square, 1.0);

@@ -1,4 +1,4 @@
-//! Which views to use: all, or the largest subset found that agrees.
+//! Selection of the views to use: all, or the largest subset found that agrees.
 
 use super::{
     Settings, TriangulateError, linear,
@@ -6,7 +6,7 @@ use super::{
     views::{Subset, Views},
 };
 
-/// Fits all views, then leaves out one after the other until the rest agree.
+/// Fits all views, then leaves out one after another until the rest agree.
 pub(super) fn search(
     views: &Views<'_>,
     all: Subset,
@@ -38,7 +38,7 @@ pub(super) fn search(
     }
 }
 
-/// The fit with one view fewer whose worst error is least; the first of several equal ones.
+/// Returns the fit without one view that has the smallest worst error; the first of several equal ones.
 fn leave_one_out(views: &Views<'_>, used: Subset, settings: &Settings) -> Option<(Subset, Fit)> {
     let mut best: Option<(Subset, Fit)> = None;
     for view in used.iter() {

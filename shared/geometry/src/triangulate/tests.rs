@@ -1,4 +1,4 @@
-//! Triangulation inverts projection, rejects outliers, and reports why it fails.
+//! Tests that triangulation inverts projection, rejects outliers, and reports why it fails.
 
 use nalgebra::{Isometry3, Vector2, Vector3};
 use proptest::prelude::*;
@@ -15,7 +15,7 @@ const BARREL: LensModel = LensModel::BrownConrady {
     p: [0.001, -0.001],
 };
 
-/// Each camera's image of `point`, moved by `noise` pixels.
+/// Returns each camera's image of `point`, moved by `noise` pixels.
 fn observe<'a>(
     cameras: &'a [Camera],
     point: &Point3<f64>,
@@ -49,7 +49,7 @@ proptest! {
         prop_assume!((a.centre_in_world() - b.centre_in_world()).norm() > 0.5);
         let cameras = [a, b, c];
         prop_assume!(cameras.iter().all(|camera| camera.project(&point).is_some()));
-        // Opposite cameras and a point between them have parallel rays; the third may stand beside one of them.
+        // Opposite cameras and a point between them have parallel rays; the third camera may be beside one of them.
         let Ok(got) = triangulate(&observe(&cameras, &point, &[]), &Settings { min_angle: 0.05, ..Settings::default() }) else { return Ok(()) };
         prop_assert!((got.in_world - point).norm() < 1e-6, "{} is not {point}", got.in_world);
         prop_assert!(got.views_used == 0b111 && got.reprojection_px < 1e-5);
@@ -103,7 +103,7 @@ proptest! {
         let mut noise = [Vector2::new(0.5, -0.4); 4];
         noise[outlier] = Vector2::new(dx, dy);
         let seen = observe(&cameras, &point, &noise);
-        // An error along the view's own epipolar lines could not be detected; in a ring there is none.
+        // An error along the view's own epipolar lines could not be detected, but in a ring no direction is along all of them.
         let got = triangulate(&seen, &strict(10.0)).expect("three views agree");
         prop_assert!(!got.uses(outlier), "{got:?}");
         prop_assert_eq!(got.views_used.count_ones(), 3);
@@ -121,7 +121,7 @@ fn the_covariance_is_that_of_the_triangulated_points() {
         ..Settings::default()
     };
     let sigma = [0.5, 1.0, 2.0];
-    // Scaled to unit variance.
+    // The numbers are scaled to unit variance.
     let mut uniform = uniform();
     let mut noise = || uniform() * 12.0_f64.sqrt();
     let mut spread = Matrix3::zeros();
@@ -142,7 +142,7 @@ fn the_covariance_is_that_of_the_triangulated_points() {
     );
 }
 
-/// Numbers in [-0.5, 0.5) that are the same in every run.
+/// Returns a generator of numbers in [-0.5, 0.5), the same in every run.
 fn uniform() -> impl FnMut() -> f64 {
     let mut state = 1_u64;
     move || {
@@ -166,7 +166,7 @@ fn a_narrow_loss_finds_the_right_minimum_with_two_outliers_of_six() {
         let scale = [100.0, 100.0, 2.0, 2.0, 2.0, 2.0];
         let offsets = scale.map(|scale| Vector2::new(noise(), noise()) * scale);
         let got = triangulate(&observe(&cameras, &point, &offsets), &settings).expect("a point");
-        // Started at its final width the loss finds another minimum in 7 of these 500.
+        // If it starts at its final width, the loss finds another minimum in 7 of these 500 cases.
         assert!(
             (got.in_world - point).norm() < 0.03,
             "{} is not {point}",
@@ -276,7 +276,7 @@ fn refuses_rays_that_meet_behind_a_camera() {
     let mut beside = camera.clone();
     beside.camera_from_world.translation.x -= 0.5;
     let cameras = [camera, beside];
-    // The right camera sees the point further right: the rays spread.
+    // The right camera sees the point further right, so the rays diverge.
     let seen: Vec<_> = cameras
         .iter()
         .zip([300.0, 340.0])

@@ -1,10 +1,10 @@
-//! The observations of one point, undistorted once, and sets of them.
+//! Observations of one point, undistorted once, and sets of observations.
 
 use nalgebra::{Point2, Point3, Vector2};
 
 use super::{MAX_VIEWS, Observation, TriangulateError};
 
-/// A set of observations by position.
+/// A set of observations, given by their indices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Subset(u32);
 
@@ -21,7 +21,7 @@ impl Subset {
         Self(self.0 & !(1 << view))
     }
 
-    /// The positions in ascending order.
+    /// Returns the indices in ascending order.
     pub(super) fn iter(self) -> impl Iterator<Item = usize> {
         (0..MAX_VIEWS).filter(move |view| self.0 & (1 << view) != 0)
     }
@@ -65,13 +65,13 @@ impl<'a> Views<'a> {
         })
     }
 
-    /// The observations whose pixel is in the valid range of the lens.
+    /// Returns the observations whose pixels are in the valid range of the lens.
     pub(super) fn usable(&self) -> Subset {
         let bits = self.normalised.iter().enumerate();
         Subset(bits.fold(0, |bits, (view, n)| bits | (u32::from(n.is_some()) << view)))
     }
 
-    /// The observations of a subset with their undistorted normalised points.
+    /// Returns the observations of a subset with their undistorted normalised points.
     pub(super) fn iter(
         &self,
         used: Subset,
@@ -82,7 +82,7 @@ impl<'a> Views<'a> {
         })
     }
 
-    /// Distances between image and observation, NaN where there is no image.
+    /// Returns the distances between image and observation; NaN if there is no image.
     pub(super) fn residuals(&self, in_world: &Point3<f64>) -> [f64; MAX_VIEWS] {
         let mut residuals = [f64::NAN; MAX_VIEWS];
         for (seen, slot) in self.observations.iter().zip(&mut residuals) {

@@ -7,14 +7,14 @@ use skeleton::PARSE14;
 
 use crate::pictures::Picture;
 
-/// Tiles of a row.
+/// Number of tiles in a row.
 const N_COLUMNS: usize = 5;
-/// Height of a tile, pixels.
+/// Height of a tile, in pixels.
 const HEIGHT: usize = 256;
-/// The colour of a map where it is 1.
+/// Colour of a map at value 1.
 const HOT: [f64; 3] = [255.0, 40.0, 40.0];
 
-/// The lines between the joints of `skeleton::PARSE14`.
+/// Returns the lines between the joints of `skeleton::PARSE14`.
 pub fn limbs() -> Vec<Limb> {
     let side = |joint: usize| match PARSE14.joints[joint].name {
         name if name.starts_with("left") => Side::Left,
@@ -32,12 +32,13 @@ pub fn limbs() -> Vec<Limb> {
     PARSE14.limbs.iter().map(limb).collect()
 }
 
-/// Draws what a network sees in its window of a picture: first the joints, then for each of them its map over the window,
-/// under its name and its score from 0 to 1. Maps are drawn relative to their highest value, so that weak ones show.
+/// Draws the output of a network for its window of a picture. The first tile has the joints. Each further tile has the map of one joint
+/// over the window, with the joint's name and its score from 0 to 1. Maps are drawn relative to their highest value, so that weak ones are
+/// visible.
 ///
 /// # Errors
 ///
-/// [`LookError::Output`]; never, once the network has looked.
+/// [`LookError::Output`]; this cannot happen after the network has run.
 pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> {
     let settings = MapSettings::default();
     let mut maps = JointMaps::default();
@@ -91,7 +92,7 @@ fn caption(name: &str, peak: &Keypoint) -> String {
     format!("{name} {:.2}", peak.score)
 }
 
-/// The picture with a map over it.
+/// Returns the picture with a map over it.
 fn heated(plain: &[[u8; 3]], heat: &[f64]) -> Vec<[u8; 3]> {
     let most = heat.iter().copied().fold(1e-3, f64::max);
     let mixed = |(colour, heat): (&[u8; 3], &f64)| {
@@ -102,7 +103,7 @@ fn heated(plain: &[[u8; 3]], heat: &[f64]) -> Vec<[u8; 3]> {
     plain.iter().zip(heat).map(mixed).collect()
 }
 
-/// The pixel at a point; black beyond the picture.
+/// Returns the pixel at a point; black outside the picture.
 fn colour(picture: &Picture, [x, y]: [f64; 2]) -> [u8; 3] {
     let (x, y) = (x.round(), y.round());
     let size = picture.size;

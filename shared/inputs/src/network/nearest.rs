@@ -1,10 +1,10 @@
-//! Which of the cards that ship a network comes nearest to.
+//! Search for the shipped cards that are most similar to a network.
 
 use inference::{Description, Port, Side};
 use keypoints::{Boxes, Card, Codec, DetectorCard, Input, Layout, SHIPPED, SHIPPED_DETECTORS};
 
-/// The cards of `configs/networks` that agree best with what a network takes and gives, by sides and names; several where
-/// they agree equally well, none where nothing agrees.
+/// Returns the cards of `configs/networks` that agree best with the inputs and outputs of a network, by sides and names. There are several
+/// if they agree equally well, and none if nothing agrees.
 pub fn nearest(description: &Description) -> Vec<&'static str> {
     let rated = SHIPPED.iter().filter_map(|(name, text)| {
         let card = Card::parse(text).ok()?;
@@ -14,7 +14,7 @@ pub fn nearest(description: &Description) -> Vec<&'static str> {
     best(&rated.collect::<Vec<_>>())
 }
 
-/// As [`nearest`], of the cards of `configs/detectors`: those whose input and output can be the network's.
+/// Works like [`nearest`] for the cards of `configs/detectors` whose input and output can be those of the network.
 pub fn nearest_detectors(description: &Description) -> Vec<&'static str> {
     let rated = SHIPPED_DETECTORS.iter().filter_map(|(name, text)| {
         let card = DetectorCard::parse(text).ok()?;
@@ -30,12 +30,12 @@ fn best(rated: &[(&'static str, usize)]) -> Vec<&'static str> {
     best.map(|rated| rated.0).collect()
 }
 
-/// How well the card of a detector agrees; `None` unless the output does.
+/// Returns a score for the agreement of a detector's card; `None` if the output does not agree.
 fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<usize> {
     let input = of_input(&card.input, description);
     let outputs = description.outputs.iter();
     let output = match &card.output {
-        // Of the network's own input, which may be larger than the card's.
+        // The cells are those of the network's own input, which may be larger than the card's.
         Boxes::Yolox {
             person, strides, ..
         } => {
@@ -50,7 +50,7 @@ fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<
             };
             outputs.filter(|output| many(output)).map(|_| 2).max()
         }
-        // Its files carry their card.
+        // Files of this kind contain their card.
         Boxes::Centres { .. } => None,
         Boxes::List { boxes } => {
             let five = |port: &Port| match &port.sides[..] {
@@ -64,7 +64,7 @@ fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<
     Some(input.unwrap_or(0) + 2 * output?)
 }
 
-/// The cells of grids of these strides over an input.
+/// Returns the number of cells in grids of these strides over an input.
 fn cells(input: &Port, strides: &[usize]) -> Option<usize> {
     let &[_, _, Side::Fixed(height), Side::Fixed(width)] = &input.sides[..] else {
         return None;
@@ -72,7 +72,7 @@ fn cells(input: &Port, strides: &[usize]) -> Option<usize> {
     Some(strides.iter().map(|stride| (width / stride) * (height / stride)).sum())
 }
 
-/// How many sides of the input are those of a card.
+/// Returns the number of sides of the input that agree with a card.
 fn of_input(card: &Input, description: &Description) -> Option<usize> {
     let [width, height] = [card.width, card.height];
     let sides = match card.layout {
@@ -83,8 +83,8 @@ fn of_input(card: &Input, description: &Description) -> Option<usize> {
     inputs.filter_map(|input| agreeing(input, &sides)).max()
 }
 
-/// How well a card agrees; `None` if no output is of its kind. The kind of output counts most, then the number of keypoints, then the order
-/// of axes, then sides and names.
+/// Returns a score for the agreement of a card; `None` if no output is of its kind. The kind of output counts most, then the number of
+/// keypoints, then the order of axes, then sides and names.
 fn points(card: &Card, description: &Description) -> Option<usize> {
     let [width, height] = [card.input.width, card.input.height];
     let outputs = || description.outputs.iter();
@@ -131,9 +131,9 @@ fn points(card: &Card, description: &Description) -> Option<usize> {
     Some(2 * output? + input + names + usize::from(named_input))
 }
 
-/// How well an output agrees with maps of keypoints; `None` if it has no maps.
+/// Returns a score for the agreement of an output with maps of keypoints; `None` if it has no maps.
 fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<usize> {
-    /// Fewest rows and columns of maps.
+    /// Minimum number of rows and columns of maps.
     const LEAST_SIDE: usize = 8;
     let [_, second, third, fourth] = &output.sides[..] else {
         return None;
@@ -164,7 +164,7 @@ fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<us
     rated.max()
 }
 
-/// How many sides are these, if all of them can be.
+/// Returns the number of sides with these exact values, if no side contradicts them.
 fn agreeing(port: &Port, sides: &[usize]) -> Option<usize> {
     let fits = port.sides.len() == sides.len()
         && port.sides.iter().zip(sides).all(|(side, n)| side.may_be(*n));

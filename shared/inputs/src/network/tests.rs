@@ -1,4 +1,4 @@
-//! Networks of the test's own making.
+//! Tests with networks that the tests create.
 
 use std::fs;
 
@@ -21,7 +21,7 @@ codec = "heat-map"
 names = ["head top", "neck", "left hip"]
 "#;
 
-/// Gives its input back: three maps.
+/// Returns a network that outputs its input: three maps.
 fn network() -> Network {
     let mut net = Network::default();
     let sides = [1, 3, 16, 12].map(Side::Fixed).to_vec();
@@ -124,7 +124,7 @@ fn the_nearest_card_has_the_networks_sides() {
         near(&[1, 256, 256, 3], &[("y", &[1, 195])]),
         ["blazepose-landmarks"]
     );
-    // Maps of LSP's 14 joints and of the background, in either order of axes; never a card of lists.
+    // Maps of LSP's 14 joints and of the background match in either order of axes, but never a card of lists.
     for (input, output) in [
         ([1, 3, 368, 368], [1, 15, 46, 46]),
         ([1, 368, 368, 3], [1, 46, 46, 15]),
@@ -163,7 +163,7 @@ output = { codec = "yolox" }
         refused.contains("net.toml") && refused.contains("expected [1, 2, 6 or more]"),
         "{refused}"
     );
-    // Neither: what is missing of the card of a network is said.
+    // For a file that is neither kind of card, the error names its format and version.
     let refused = opened("format = \"other\"\nversion = 1").unwrap_err();
     assert!(refused.to_string().contains("`other` version 1"));
 }
@@ -180,7 +180,7 @@ fn the_nearest_card_of_a_detector_has_its_kind_of_output() {
         net.node("Relu", &["boxes"], "dets", vec![]);
         nearest_detectors(Session::parse(net.file()).unwrap().description())
     };
-    // Grids of 8x8, 4x4 and 2x2 cells; the card's own input is larger.
+    // The grids have 8x8, 4x4 and 2x2 cells; the card's own input is larger.
     assert_eq!(near(64, [1, 84, 85]), ["yolox"]);
     assert!(near(96, [1, 84, 85]).is_empty());
     assert_eq!(near(320, [1, 100, 5]), ["rtmdet-person"]);

@@ -6,25 +6,25 @@ use crate::synchronisation::doubt::Doubt;
 use crate::synchronisation::refine::{Fit, Problem};
 use crate::synchronisation::search::{Found, Rival, peak, second};
 
-/// Joints that a camera has to see together with others, both ways.
+/// Minimum number of joints that a camera must see together with others, in both directions.
 const LEAST_JOINTS: usize = 200;
-/// Doubts: the second best as a share of the best, and by how many standard errors it is worse.
+/// Limits of the second-best offset: its gain relative to the best, and its distance in standard errors.
 const MOST_RATIO: f64 = 0.8;
-/// A second best worse than this share of the best is no rival, however short the footage.
+/// Gain relative to the best below which a second-best offset is never a rival, even for short footage.
 const NO_RIVAL: f64 = 0.3;
 const LEAST_T: f64 = 4.0;
-/// The largest standard error of an offset, seconds, and intervals between pictures.
+/// Largest standard error of an offset, in seconds and in intervals between pictures.
 const MOST_ERROR: [f64; 2] = [0.006, 0.2];
-/// Amount by which the best offset costs less than the mean, as a share.
+/// Minimum decrease of the cost at the best offset relative to the mean, as a fraction.
 const LEAST_GAIN: f64 = 0.08;
-/// The largest median residual, expected errors.
+/// Largest median residual, in expected errors.
 const MOST_RESIDUAL: f64 = 3.0;
-/// A pair that is sure by itself (its second best is worse than this share) agrees if the common offset has this share of its
-/// best gain.
+/// A pair has a clear offset if the gain of its second best is below the first value, relative to its best. It agrees with the common
+/// offset if the gain there reaches the second value.
 const SURE_PAIR: [f64; 2] = [0.6, 0.5];
-/// How far offsets of parts of the footage may be apart beyond their errors, seconds, and standard errors.
+/// Largest difference between offsets of parts of the footage, in seconds and in standard errors.
 const MOST_APART: [f64; 2] = [0.02, 4.0];
-/// The largest drift of a clock.
+/// Largest drift of a clock.
 const MOST_DRIFT: f64 = 0.01;
 
 impl Study<'_> {
@@ -128,7 +128,7 @@ impl Study<'_> {
         self.doubt_parts(problem, fit, span, doubts);
     }
 
-    /// Adds a doubt if both halves of the footage differ.
+    /// Adds a doubt if the halves of the footage differ.
     fn doubt_parts(
         &self,
         problem: &Problem<'_>,
@@ -162,7 +162,7 @@ fn is_close(rival: &Rival) -> bool {
     ratio.is_nan() || *ratio > MOST_RATIO || (*ratio > NO_RIVAL && (t.is_nan() || *t < LEAST_T))
 }
 
-/// Returns a doubt if a pair that is sure alone contradicts the offsets of all.
+/// Returns a doubt if a pair with a clear offset contradicts the common offsets.
 fn doubt_pair(curve: &Curve, offsets_s: &[f64]) -> Option<Doubt> {
     let [a, b] = curve.cameras;
     let (best, value) = peak(curve);

@@ -1,25 +1,25 @@
-//! Offsets and drifts that cost least, and their standard errors.
+//! Offsets and drifts with the lowest cost, and their standard errors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 
-/// Delays to each side that a parabola is fitted to, and at which costs are known.
+/// Number of delays to each side for which costs are known and a parabola is fitted.
 pub(super) const REACH: i64 = 4;
 pub(super) const HALF: i64 = REACH + 3;
-/// Length of the blocks of time whose errors are taken as independent, seconds.
+/// Length of the blocks of time whose errors are assumed independent, in seconds.
 pub(super) const BLOCK_S: f64 = 0.5;
-/// Errors are alike over joints and longer than a block: how much larger the variance is.
+/// Factor on the variance, because errors are correlated between joints and over more than a block.
 const ALIKE: f64 = 2.0;
-/// Parts of the footage that are left out one after the other: the fewest that tell an error, and the most.
+/// Minimum and maximum number of parts of the footage that are left out in turn to estimate an error.
 const PARTS: [usize; 2] = [4, 12];
-/// The variance of the parts counts this much more, because parts next to each other are alike.
+/// Factor on the variance between parts, because adjacent parts are correlated.
 const ALIKE_PARTS: f64 = 1.5;
 const MOST_STEPS: usize = 20;
-/// The most that offsets change in a step, and the least, seconds.
+/// Largest and smallest change of offsets in a step, in seconds.
 const STEPS_S: [f64; 2] = [0.02, 1e-5];
 
-/// The cost of a joint in two cameras over the delay of the second, in a block of time.
+/// Cost of a joint in two cameras by delay of the second, in a block of time.
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
     cameras: [usize; 2],
@@ -27,7 +27,7 @@ pub(super) struct Piece {
     block: i64,
     n: f64,
     costs: Vec<f64>,
-    /// Sums of the times of both cameras from their centres.
+    /// Sums of the times of both cameras relative to their centres.
     since: [f64; 2],
 }
 
@@ -54,9 +54,9 @@ impl Piece {
         }
     }
 
-    /// Slope and curvature of the parabola that fits the costs about a delay.
+    /// Returns the slope and curvature of the parabola that fits the costs around a delay.
     ///
-    /// * `delay`, `step_s`: the delay in steps, and the length of one.
+    /// * `delay`, `step_s`: the delay in steps, and the length of a step.
     fn parabola(&self, delay: f64, step_s: f64) -> [f64; 2] {
         let most = (HALF - REACH) as f64;
         let at = delay.clamp(-most, most);
@@ -81,13 +81,13 @@ impl Piece {
     }
 }
 
-/// All that costs. Unknowns are offset, and drift times half the length, of every camera.
+/// Sums of all costs. The unknowns of every camera are its offset, and its drift times half the length.
 pub(super) struct Sums<'a> {
     pieces: &'a [Piece],
-    /// Which unknowns stay 0.
+    /// True for unknowns that stay 0.
     fixed: Vec<bool>,
     scale_s: f64,
-    /// Distance of the delays, seconds.
+    /// Step between delays, in seconds.
     step_s: f64,
 }
 
@@ -115,7 +115,7 @@ impl<'a> Sums<'a> {
         }
     }
 
-    /// The unknowns that cost least over some blocks; zeros where there is no minimum.
+    /// Returns the unknowns with the lowest cost over some blocks; zeros if there is no minimum.
     pub(super) fn solve(&self, uses: &dyn Fn(i64) -> bool) -> DVector<f64> {
         self.solve_from(DVector::zeros(self.fixed.len()), uses)
     }
@@ -170,7 +170,7 @@ impl<'a> Sums<'a> {
         (normal, gradient, blocks)
     }
 
-    /// Standard errors of offset and drift of every camera; infinite where nothing determines them.
+    /// Returns the standard errors of offset and drift of every camera; infinite if nothing determines them.
     pub(super) fn errors(&self, found: &DVector<f64>) -> Vec<[f64; 2]> {
         let size = self.fixed.len();
         let (normal, _, blocks) = self.equations(found, &|_| true);
@@ -194,7 +194,7 @@ impl<'a> Sums<'a> {
             if !self.knows(camera) || is_flat(offset) {
                 return [f64::INFINITY; 2];
             }
-            // The reference is what the others are measured against.
+            // The other cameras are measured relative to the reference.
             let has_drift = self.fixed[offset] || !self.fixed[drift];
             let of_drift = if has_drift {
                 error(drift) / self.scale_s
@@ -210,7 +210,7 @@ impl<'a> Sums<'a> {
         self.pieces.iter().any(|piece| piece.cameras.contains(&camera))
     }
 
-    /// The variances from what is found when parts of the footage are left out (jackknife); none where it is too short.
+    /// Returns the variances of the results when parts of the footage are left out in turn (jackknife); `None` if the footage is too short.
     fn parts(&self, found: &DVector<f64>) -> Option<DVector<f64>> {
         let blocks: BTreeSet<i64> = self.pieces.iter().map(|piece| piece.block).collect();
         let blocks: Vec<i64> = blocks.into_iter().collect();
@@ -228,7 +228,7 @@ impl<'a> Sums<'a> {
         let mean = each.iter().fold(DVector::zeros(found.len()), |sum, it| sum + it) / n;
         let squares = each.iter().map(|solution| (solution - &mean).map(|value| value * value));
         let sum = squares.fold(DVector::zeros(found.len()), |sum, it| sum + it);
-        // So few parts tell a variance badly.
+        // The factor corrects for the poor estimate of a variance from so few parts.
         Some(sum * ((n - 1.0) / n * (1.0 + 2.0 / n)))
     }
 }

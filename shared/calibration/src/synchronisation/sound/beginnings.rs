@@ -1,60 +1,60 @@
-//! When sounds begin, and at which offset the beginnings of two recordings fall together.
+//! Beginnings of sounds, and the offset at which the beginnings in two recordings coincide.
 
 use super::Sound;
 
-/// Distance of the times that are looked at, seconds.
+/// Time step (hop) of the analysis, in seconds.
 pub(super) const HOP_S: f64 = 0.002;
-/// Share of the last sample that is taken from each: hum and rumble go.
+/// Fraction of the previous sample to subtract from each sample, which removes hum and rumble.
 const EMPHASIS: f64 = 0.95;
-/// The loudness of this many hops after a time is compared with that of this many before it.
+/// Number of hops after a time whose loudness is compared with that of the hops before.
 const AFTER: usize = 4;
 const BEFORE: usize = 12;
-/// A sound begins where the logarithm of the energy grows by more than this, and growth beyond the second does not count.
+/// Minimum growth of the logarithm of the energy at which a sound begins, and the value at which the growth is capped.
 const GROWTH: [f64; 2] = [0.5, 3.5];
-/// Hops between two beginnings that are counted.
+/// Minimum number of hops between two beginnings.
 const APART: usize = 25;
-/// Beginnings at most this many hops apart are of one sound.
+/// Largest number of hops between two beginnings of the same sound.
 const TOGETHER: i64 = 6;
-/// Half the width of the kernel that makes peaks of the cosine smooth, hops: sources at different distances.
+/// Half the width of the kernel that smooths the peaks of the cosine, in hops; it allows for sources at different distances.
 const SMOOTH: i64 = 4;
-/// Another offset is at least this many hops from the best.
+/// Minimum number of hops between the best offset and another.
 const OTHER: usize = 30;
-/// Both recordings have at least this share of their energy where they overlap.
+/// Minimum fraction of each recording's energy within the overlap.
 const LEAST_SHARE: f64 = 0.15;
 
-/// How suddenly sounds begin, over time.
+/// Suddenness of sounds over time.
 #[derive(Debug)]
 pub(super) struct Beginnings {
-    /// The time of the first entry, hops of the camera's clock.
+    /// Time of the first entry, in hops of the camera's clock.
     first: i64,
-    /// 0 where nothing begins.
+    /// Suddenness by time; 0 if nothing begins.
     values: Vec<f64>,
-    /// Where sounds begin: the local maxima.
+    /// Times at which sounds begin: the local maxima.
     peaks: Vec<i64>,
 }
 
-/// How the beginnings of two recordings fall together.
+/// Comparison of the beginnings in two recordings.
 #[derive(Debug)]
 pub(super) struct Match {
-    /// The offset of the first of `cosines`, seconds.
+    /// Offset of the first of `cosines`, in seconds.
     pub(super) first_s: f64,
-    /// The cosine between both by offset, smooth; not a number where they hardly overlap.
+    /// Smoothed cosine between both recordings by offset; NaN if they hardly overlap.
     pub(super) cosines: Vec<f64>,
-    /// The best offset, seconds: what is added to a time of the first to have that of the second.
+    /// Best offset in seconds. It is added to a time of the first recording to get that of the second.
     pub(super) offset_s: f64,
-    /// Its cosine.
+    /// Cosine at the best offset.
     pub(super) cosine: f64,
-    /// By how many standard deviations over all offsets it is better than their mean.
+    /// Difference between the best cosine and the mean of all offsets, in standard deviations over all offsets.
     pub(super) contrast: f64,
-    /// The best of the other offsets, and its cosine.
+    /// Second-best offset in seconds, followed by its cosine.
     pub(super) second_s: f64,
     pub(super) second: f64,
-    /// Beginnings that fall together.
+    /// Number of beginnings that coincide.
     pub(super) n: usize,
 }
 
 impl Match {
-    /// How good the second best offset is, as a share of the best.
+    /// Returns the quality of the second-best offset relative to the best.
     pub(super) fn ratio(&self) -> f64 {
         if self.cosine > 0.0 {
             self.second / self.cosine
@@ -71,7 +71,7 @@ impl Beginnings {
         let mut sorted: Vec<f64> =
             energies.iter().copied().filter(|energy| *energy > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
-        // One step of the converter in every sample, where it is quieter than that.
+        // The floor is at least the energy of one converter step in every sample.
         let floor = sorted.get(sorted.len() / 2).map_or(1.0, |sorted| sorted.max(1.0));
         let mut sums = vec![0.0];
         for energy in &energies {
@@ -95,7 +95,7 @@ impl Beginnings {
         }
     }
 
-    /// How many sounds begin.
+    /// Returns the number of sounds that begin.
     pub(super) fn n(&self) -> usize {
         self.peaks.len()
     }
@@ -109,12 +109,12 @@ impl Beginnings {
         nth.and_then(|nth| self.values.get(nth)).map_or(0.0, |value| *value)
     }
 
-    /// From when to when something is recorded, hops.
+    /// Returns the start and end of the recording, in hops.
     pub(super) fn span(&self) -> [i64; 2] {
         [self.first, self.first + self.values.len() as i64]
     }
 
-    /// The part of a length in which most begins in both, hops; all of it if it is shorter.
+    /// Returns the part with the given length in which most sounds begin in both recordings, in hops; the whole recording if it is shorter.
     pub(super) fn loudest(&self, other: &Self, length_s: f64) -> [i64; 2] {
         let length = (length_s / HOP_S) as i64;
         let [from, to] = self.span();
@@ -131,10 +131,10 @@ impl Beginnings {
         best.unwrap_or([from, to])
     }
 
-    /// The full search.
+    /// Searches all offsets.
     ///
-    /// * `span`: the part of this recording that is compared, hops.
-    /// * `around_s`: offsets around the first, up to the second both ways, seconds.
+    /// * `span`: part of this recording to compare, in hops.
+    /// * `around_s`: centre of the offsets and their largest deviation in both directions, in seconds.
     pub(super) fn compare(&self, other: &Self, span: [i64; 2], around_s: [f64; 2]) -> Match {
         let [centre, half] = around_s.map(|around_s| (around_s / HOP_S).round() as i64);
         let own: Vec<(i64, f64)> = (span[0]..span[1])
@@ -177,7 +177,7 @@ impl Beginnings {
         found
     }
 
-    /// How many beginnings fall together at an offset, hops.
+    /// Returns the number of beginnings that coincide at an offset, in hops.
     fn together(&self, other: &Self, span: [i64; 2], offset: i64) -> usize {
         let is_shared = |hop: &&i64| {
             let of_other = other.peaks.iter();
@@ -233,7 +233,7 @@ impl Match {
     }
 }
 
-/// The energy of every hop, from one on.
+/// Returns the energy of every hop from the given one.
 fn energies(sound: &Sound, first: i64) -> Vec<f64> {
     let at = |hop: i64| {
         let sample = (hop as f64 * HOP_S - sound.begins_s) * sound.rate_hz;
@@ -253,7 +253,7 @@ fn energies(sound: &Sound, first: i64) -> Vec<f64> {
     energies
 }
 
-/// Local maxima that are far enough apart.
+/// Returns the local maxima that are far enough apart.
 fn peaks(values: &[f64]) -> Vec<usize> {
     let mut peaks: Vec<usize> = Vec::new();
     for (nth, value) in values.iter().enumerate() {
@@ -272,7 +272,7 @@ fn peaks(values: &[f64]) -> Vec<usize> {
     peaks
 }
 
-/// Means over neighbours, with weights that fall to both sides.
+/// Returns weighted means over neighbours, with weights that decrease on both sides.
 fn smooth(cosines: &[f64]) -> Vec<f64> {
     let at = |nth: i64| usize::try_from(nth).ok().and_then(|value| cosines.get(value));
     let each = (0..cosines.len() as i64).map(|nth| {

@@ -1,31 +1,31 @@
-//! Parts of long recordings one after another: whether the offset stays what it is, or drifts.
+//! Comparison of successive parts of long recordings: whether the offset is constant or drifts.
 
 use super::beginnings::{Beginnings, HOP_S};
 use super::{HEARD_S, LEAST, LEAST_COSINE, MOST_RATIO, SPARE_S};
 use crate::synchronisation::doubt::Doubt;
 
-/// Length of a part, seconds.
+/// Length of a part, in seconds.
 const PART_S: f64 = 20.0;
-/// Least number of parts with an offset for an estimate of the drift.
+/// Minimum number of parts with an offset for an estimate of the drift.
 const LEAST_PARTS: usize = 5;
-/// How far from the offset of all it is searched in a part, seconds.
+/// Range of the search in a part around the common offset, in seconds.
 const AROUND_S: f64 = 0.5;
-/// A drift is determined where its error makes less than this over the recording, seconds.
+/// Largest accepted error of a drift, accumulated over the recording, in seconds.
 const MOST_ERROR_S: f64 = 0.01;
-/// A drift is taken as such if it is this many standard errors away from none.
+/// Minimum size of a drift to be used, in standard errors.
 const SURE: f64 = 4.0;
-/// Largest share of parts that contradict the others.
+/// Largest accepted fraction of parts that contradict the others.
 const MOST_AWAY: f64 = 0.25;
 
-/// The offset of a camera over time.
+/// Offset of a camera over time.
 #[derive(Debug)]
 pub(super) struct Drift {
     line: Option<Line>,
-    /// By how much parts contradict the line, seconds, and the most that is accepted, where too many do.
+    /// If too many parts contradict the line: their deviation from it, and the largest accepted deviation, in seconds.
     contradiction_s: Option<[f64; 2]>,
 }
 
-/// Offset = `at_zero_s + slope * time`, of the clock of the camera.
+/// The offset is `at_zero_s + slope * time`, with time by the clock of the camera.
 #[derive(Debug, Clone, Copy)]
 struct Line {
     at_zero_s: f64,
@@ -39,7 +39,7 @@ impl Drift {
         self.line.filter(|line| line.error * line.length_s <= MOST_ERROR_S)
     }
 
-    /// Its standard error, where it is determined.
+    /// Returns the standard error of the drift, if it is determined.
     pub(super) fn error(&self) -> Option<f64> {
         self.determined().map(|determined| determined.error)
     }
@@ -49,14 +49,14 @@ impl Drift {
         line.filter(|line| line.slope.abs() >= SURE * line.error)
     }
 
-    /// Amount by which a second of the camera is longer than one of the reference; 0 if it cannot be distinguished from 0.
+    /// Returns the amount by which a second of the camera is longer than one of the reference; 0 if it cannot be distinguished from 0.
     pub(super) fn sure(&self) -> f64 {
         self.line().map_or(0.0, |line| line.slope)
     }
 
-    /// The offset at time 0 of the camera.
+    /// Returns the offset at time 0 of the camera.
     ///
-    /// * `constant_s`: the offset if there is no drift.
+    /// * `constant_s`: offset if there is no drift.
     pub(super) fn offset_s(&self, constant_s: f64) -> f64 {
         self.line().map_or(constant_s, |line| line.at_zero_s)
     }
@@ -73,8 +73,8 @@ impl Drift {
 
 /// Compares the parts of a recording with those of another.
 ///
-/// * `offset_s`: of all, added to times of the reference to have those of the camera.
-/// * `way_s`: how long sound takes from one to the other.
+/// * `offset_s`: common offset, to add to times of the reference to get those of the camera.
+/// * `way_s`: travel time of sound from one camera to the other.
 pub(super) fn parts(
     reference: &Beginnings,
     camera: &Beginnings,
@@ -113,7 +113,7 @@ pub(super) fn parts(
     }
 }
 
-/// Slopes between all pairs of points.
+/// Returns the slopes between all pairs of points.
 fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
     let mut slopes = Vec::new();
     for (nth, a) in points.iter().enumerate() {
@@ -127,7 +127,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The line of least squares.
+/// Fits a line by least squares.
 fn fitted(points: &[[f64; 2]]) -> Option<Line> {
     if points.len() < LEAST_PARTS {
         return None;

@@ -1,20 +1,21 @@
-//! Rooms with sources of sound at random places, whose way to each camera takes time; what is found against what was made.
+//! Tests in simulated rooms with sound sources at random positions, including the travel time to each camera. Results are compared with the
+//! simulated clocks.
 
 use super::*;
 
 const RATE_HZ: f64 = 8000.0;
 
-/// A room that was recorded by all cameras.
+/// A simulated room that all cameras record.
 struct Room {
     centres: Vec<Point3<f64>>,
-    /// When each camera began, seconds.
+    /// Start time of each camera, in seconds.
     begins_s: Vec<f64>,
-    /// Amount by which a second of each is longer.
+    /// Amount by which a second of each camera is longer.
     drifts: Vec<f64>,
     length_s: f64,
-    /// Times of sounds.
+    /// Times of the sounds.
     sounds_s: Vec<f64>,
-    /// Level of noise, against sounds of 1000 to 8000 a metre away.
+    /// Level of the noise; sounds have 1000 to 8000 at a distance of one metre.
     noise: f64,
 }
 
@@ -35,7 +36,7 @@ impl Room {
         (room, random)
     }
 
-    /// Returns the recordings of the cameras: every sound rises at once and dies away, with an echo, from its own place.
+    /// Returns the recordings of the cameras. Every sound has its own position, begins suddenly, and fades with an echo.
     fn record(&self, random: &mut fastrand::Rng) -> Vec<Sound> {
         let sources: Vec<(f64, Point3<f64>, f64, u64)> = self
             .sounds_s
@@ -145,25 +146,25 @@ fn what_tells_nothing_is_refused() {
             ..
         }]
     ));
-    // Of another room.
+    // This recording is from another room.
     sounds[2] = other.record(&mut other_random).swap_remove(2);
     let doubts = refused(&sounds);
     assert!(
         matches!(&doubts[..], [Doubt::Unheard { cameras, .. }] if cameras.contains(&2)),
         "{doubts:?}"
     );
-    // A metronome.
+    // The sound is a metronome.
     let (mut beats, mut random) = Room::drawn(7, 30.0, 0);
     beats.sounds_s = (0..40).map(|i| 8.0 + 0.5 * f64::from(i)).collect();
     let doubts = refused(&beats.record(&mut random));
     assert!(!doubts.is_empty());
-    // Beyond the window.
+    // The offset is beyond the window.
     let far = SoundSettings {
         window_s: 0.1,
         ..settings.clone()
     };
     assert!(!estimate_by_sound(&good, &far).unwrap().doubts.is_empty());
-    // Seconds that are missing in the middle.
+    // Some seconds are missing in the middle.
     let (long, mut random) = Room::drawn(8, 240.0, 240);
     let mut sounds = long.record(&mut random);
     let n = sounds[1].samples.len();

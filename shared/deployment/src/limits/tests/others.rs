@@ -1,6 +1,6 @@
-//! Keys without a number.
+//! Keys without a numeric value.
 
-/// Keys without a number.
+/// Keys without a numeric value.
 pub(super) const OTHERS: &[&str] = &[
     "data",
     "name",

@@ -1,47 +1,47 @@
-//! The epipolar errors of a rig on points seen by several cameras.
+//! Epipolar errors of a rig on points seen by several cameras.
 
 use nalgebra::Point2;
 use statistics::Sorted;
 
 use crate::{Camera, Rig, epipolar};
 
-/// The epipolar error of a pair of cameras on the points that both saw.
+/// Epipolar error of a pair of cameras on the points that both saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairError {
-    /// Positions of the two in the rig.
+    /// Indices of the two cameras in the rig.
     pub cameras: [usize; 2],
-    /// Points that both saw.
+    /// Number of points that both cameras saw.
     pub n_points: usize,
-    /// Median over the points of the distance to the epipolar line, mean of both directions, ideal pixels.
+    /// Median over the points of the distance to the epipolar line, as the mean of both directions, in ideal pixels.
     pub median_px: f64,
 }
 
-/// The epipolar error of a camera with all others.
+/// Epipolar error of a camera with all others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraError {
-    /// Position in the rig.
+    /// Index of the camera in the rig.
     pub camera: usize,
-    /// Pairs of observations with this camera.
+    /// Number of pairs of observations with this camera.
     pub n_points: usize,
-    /// Median over those, ideal pixels.
+    /// Median error over these pairs, in ideal pixels.
     pub median_px: f64,
 }
 
-/// The epipolar errors of a rig on correspondences.
+/// Epipolar errors of a rig on correspondences.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpipolarReport {
-    /// One for each pair that saw a point.
+    /// Errors of each pair of cameras that saw a common point.
     pub pairs: Vec<PairError>,
-    /// One for each camera that saw a point together with another.
+    /// Errors of each camera that saw a point together with another.
     pub cameras: Vec<CameraError>,
 }
 
 /// Measures the epipolar error of a rig.
 ///
-/// * `points`: for each point the pixel (recorded, distorted) in every camera of the rig, in its
-///   order, `None` where it was not seen. Missing entries at the end count as not seen.
+/// * `points`: for each point, its pixel (recorded, distorted) in every camera, in the order of the rig; `None` if the camera did not see
+///   it. Missing entries at the end count as not seen.
 ///
-/// A camera whose median stands out is the one to calibrate again.
+/// A camera with a much larger median than the others should be calibrated again.
 pub fn epipolar_check(rig: &Rig, points: &[Vec<Option<Point2<f64>>>]) -> EpipolarReport {
     let n = rig.cameras().len();
     let mut of_camera = vec![Vec::new(); n];

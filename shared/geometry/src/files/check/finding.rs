@@ -1,15 +1,15 @@
-//! Likely faults of a rig, in numbers and as text.
+//! Likely faults of a rig, as numbers and as text.
 
 use std::fmt;
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// For information.
+    /// The finding is for information.
     Note,
-    /// Probably a mistake.
+    /// The finding is probably a mistake.
     Warning,
-    /// Nothing can be located in space with this rig: a run refuses it.
+    /// Nothing can be located in space with this rig, and a run refuses it.
     Error,
 }
 
@@ -18,72 +18,72 @@ pub enum Severity {
 pub enum Finding {
     /// Two cameras are so near or far from each other that the unit is probably wrong.
     Distance {
-        /// Names of the two.
+        /// Names of the two cameras.
         cameras: [String; 2],
-        /// How far they are apart.
+        /// Distance between the cameras.
         metres: f64,
     },
-    /// All cameras are at one place, so that nothing can be triangulated.
+    /// All cameras are in one place, so that nothing can be triangulated.
     OnePlace {
-        /// How many.
+        /// Number of cameras.
         n_cameras: usize,
-        /// The largest distance between two of them.
+        /// Largest distance between two cameras.
         metres: f64,
     },
-    /// Two cameras have one place and one direction.
+    /// Two cameras have the same position and direction.
     SamePose {
-        /// Names of the two.
+        /// Names of the two cameras.
         cameras: [String; 2],
     },
     /// A camera is so far from the origin of the world that precision is lost.
     FarAway {
         /// Name of the camera.
         camera: String,
-        /// How far.
+        /// Distance from the origin.
         metres: f64,
     },
-    /// The principal point is far from the middle of the image: was the image cropped or scaled?
+    /// The principal point is far from the centre of the image, perhaps because the image was cropped or scaled.
     PrincipalPoint {
         /// Name of the camera.
         camera: String,
-        /// Where it is, in parts of width and height.
+        /// Position of the principal point, as fractions of width and height.
         fraction: [f64; 2],
     },
     /// Focal lengths along rows and columns differ by more than a tenth.
     Aspect {
         /// Name of the camera.
         camera: String,
-        /// fy / fx.
+        /// Ratio fy / fx.
         ratio: f64,
     },
-    /// The field of view is that of no usual lens: was the image size changed after calibration?
+    /// The field of view is not that of a usual lens, perhaps because the image size was changed after calibration.
     FieldOfView {
         /// Name of the camera.
         camera: String,
-        /// The wider of both angles, degrees.
+        /// The wider of both angles, in degrees.
         degrees: f64,
     },
-    /// The lens model cannot be inverted in some of the image.
+    /// The lens model cannot be inverted in part of the image.
     LensRange {
         /// Name of the camera.
         camera: String,
-        /// The share of the image, 0 to 1; 0 if only corners.
+        /// Fraction of the image, 0 to 1; 0 if only corners are affected.
         share: f64,
     },
-    /// The distortion moves the corner of the image by more than that of any real lens.
+    /// The distortion moves the corner of the image by more than any real lens does.
     LensStrength {
         /// Name of the camera.
         camera: String,
-        /// The angle of the corner to the axis without distortion, degrees.
+        /// Angle of the corner to the axis without distortion, in degrees.
         straight_degrees: f64,
-        /// The same with it.
+        /// Angle of the corner to the axis with distortion, in degrees.
         bent_degrees: f64,
     },
-    /// A camera of the file has no place.
+    /// The file has no pose for a camera.
     LeftOut {
         /// Name of the camera.
         camera: String,
-        /// Why.
+        /// Reason why the pose is not known.
         why: &'static str,
     },
     /// The rig has no up direction, so that pictures cannot be turned upright.
@@ -92,7 +92,7 @@ pub enum Finding {
     UpsideDown {
         /// Name of the camera.
         camera: String,
-        /// The turn that would make it upright, degrees.
+        /// Rotation that would make the camera upright, in degrees.
         degrees: f64,
     },
     /// A camera does not see the place at which the others look.
@@ -100,18 +100,18 @@ pub enum Finding {
         /// Name of the camera.
         camera: String,
     },
-    /// No place in space is seen by two cameras.
+    /// No two cameras see a common place.
     NothingShared {
-        /// How many cameras.
+        /// Number of cameras.
         n_cameras: usize,
     },
 }
 
-/// The fields of view that a camera can have, degrees.
+/// Range of plausible fields of view, in degrees.
 const FIELDS_OF_VIEW: core::ops::RangeInclusive<f64> = 0.3..=170.0;
 
 impl Finding {
-    /// How bad it is.
+    /// Returns the severity of the finding.
     pub fn severity(&self) -> Severity {
         let (error, warning) = match self {
             Self::Distance { metres, .. } => (*metres > 100.0, true),
@@ -141,7 +141,7 @@ impl Finding {
         }
     }
 
-    /// Returns true if a wrong unit of length would explain it.
+    /// Returns true if a wrong unit of length would explain the finding.
     pub fn is_of_unit(&self) -> bool {
         matches!(
             self,
@@ -164,14 +164,11 @@ impl fmt::Display for Finding {
             | Self::LensStrength { .. } => self.fmt_intrinsics(f),
             Self::LeftOut { camera, why } => write!(f, "{camera} is left out: {why}"),
             Self::UpUnknown => {
-                write!(
-                    f,
-                    "the rig does not say which way is up: it has to be found"
-                )
+                write!(f, "the rig has no up direction, so it must be found")
             }
             Self::UpsideDown { camera, degrees } => write!(
                 f,
-                "{camera} would have to be turned by {degrees:.0} degrees to be upright: is up right?"
+                "{camera} would have to be rotated by {degrees:.0} degrees to be upright: is the up direction correct?"
             ),
             Self::LooksElsewhere { camera } => write!(
                 f,
@@ -179,14 +176,14 @@ impl fmt::Display for Finding {
             ),
             Self::NothingShared { n_cameras } => write!(
                 f,
-                "no place in space is seen by two of the {n_cameras} cameras: are the poses world to camera?"
+                "no two of the {n_cameras} cameras see a common place: are the poses world to camera?"
             ),
         }
     }
 }
 
 impl Finding {
-    /// The text of a finding about the places of cameras.
+    /// Writes the text of a finding about the positions of cameras.
     fn fmt_place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Distance {
@@ -196,15 +193,15 @@ impl Finding {
                 let metres = Metres(*metres);
                 write!(
                     f,
-                    "{a} and {b} are {metres} m apart: is the unit right? `unit` is m, cm, mm, ft, in, or the squares of the board such as 30mm"
+                    "{a} and {b} are {metres} m apart: is the unit right? `unit` is m, cm, mm, ft, in, or the side of a square of the board such as 30mm"
                 )
             }
             Self::OnePlace { n_cameras, metres } => write!(
                 f,
-                "the {n_cameras} cameras are at one place (at most {:.1} mm apart), so that nothing can be located in space",
+                "the {n_cameras} cameras are in one place (at most {:.1} mm apart), so that nothing can be located in space",
                 1000.0 * metres
             ),
-            Self::SamePose { cameras: [a, b] } => write!(f, "{a} and {b} have one pose"),
+            Self::SamePose { cameras: [a, b] } => write!(f, "{a} and {b} have the same pose"),
             Self::FarAway { camera, metres } => write!(
                 f,
                 "{camera} is {} m from the origin of the world: is the unit right?",
@@ -214,7 +211,7 @@ impl Finding {
         }
     }
 
-    /// The text of a finding about the intrinsics of a camera.
+    /// Writes the text of a finding about the intrinsics of a camera.
     fn fmt_intrinsics(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PrincipalPoint {
@@ -226,11 +223,11 @@ impl Finding {
             ),
             Self::Aspect { camera, ratio } => write!(
                 f,
-                "{camera}: fy / fx is {ratio:.3}, of pixels that are squares it is 1"
+                "{camera}: fy / fx is {ratio:.3}, but 1 for square pixels"
             ),
             Self::FieldOfView { camera, degrees } => write!(
                 f,
-                "{camera}: the field of view is {degrees:.1} degrees: is the image size that of the calibration?"
+                "{camera}: the field of view is {degrees:.1} degrees: is the image size the same as in the calibration?"
             ),
             Self::LensRange { camera, share } if *share == 0.0 => write!(
                 f,
@@ -254,7 +251,7 @@ impl Finding {
     }
 }
 
-/// Metres with three digits, or with a power of ten from a million on.
+/// A length in metres with three digits, or from a million on, with a power of ten.
 struct Metres(f64);
 
 impl fmt::Display for Metres {

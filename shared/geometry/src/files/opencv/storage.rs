@@ -1,4 +1,4 @@
-//! The top level of an `OpenCV` storage: names and what is stored under them.
+//! Top level of an `OpenCV` storage: names and their values.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub(super) enum Entry {
 }
 
 impl Entry {
-    /// The numbers of a matrix or a list, row by row.
+    /// Returns the numbers of a matrix or a list, row by row.
     pub(super) fn numbers(&self, key: &str) -> Result<Vec<f64>, ParseError> {
         let mut numbers = Vec::new();
         match self {
@@ -47,7 +47,7 @@ impl Entry {
         Ok(numbers)
     }
 
-    /// A single number.
+    /// Returns a single number.
     pub(super) fn number(&self, key: &str) -> Result<f64, ParseError> {
         match self {
             Self::Number(number) => Ok(*number),
@@ -71,7 +71,7 @@ impl Entry {
     }
 }
 
-/// Appends the numbers of a list, and of lists in it, as of the rows of a matrix.
+/// Appends the numbers of a list, including nested lists such as the rows of a matrix.
 fn flatten(key: &str, list: &[Entry], into: &mut Vec<f64>) -> Result<(), ParseError> {
     for entry in list {
         match entry {
@@ -82,7 +82,7 @@ fn flatten(key: &str, list: &[Entry], into: &mut Vec<f64>) -> Result<(), ParseEr
     Ok(())
 }
 
-/// A storage.
+/// Entries of a storage by name.
 #[derive(Debug, Default)]
 pub(super) struct Storage(BTreeMap<String, Entry>);
 
@@ -99,14 +99,14 @@ impl Storage {
         })
     }
 
-    /// Adds the entries of another storage; an entry that exists already is kept.
+    /// Adds the entries of another storage; existing entries are kept.
     pub(super) fn extend(&mut self, other: Self) {
         for (key, entry) in other.0 {
             self.0.entry(key).or_insert(entry);
         }
     }
 
-    /// The list of cameras, if it is there.
+    /// Returns the list of cameras, if present.
     pub(super) fn names(&self) -> Option<&Entry> {
         self.0.get("names")
     }
@@ -116,7 +116,7 @@ impl Storage {
         self.0.keys().any(|key| key.starts_with("K_") || key.starts_with("Rot_"))
     }
 
-    /// The names of the cameras: the list, or what follows `K_`.
+    /// Returns the names of the cameras: the list, or the suffixes of keys that begin with `K_`.
     pub(super) fn camera_names(&self) -> Result<Vec<String>, ParseError> {
         let keys = self.0.keys().filter_map(|key| key.strip_prefix("K_")).map(str::to_owned);
         match self.names() {
@@ -126,12 +126,12 @@ impl Storage {
         }
     }
 
-    /// The first entry that has one of `keys` for its name.
+    /// Returns the first entry whose name is one of `keys`.
     pub(super) fn find<'k>(&self, keys: &'k [String]) -> Option<(&'k str, &Entry)> {
         keys.iter().find_map(|key| Some((key.as_str(), self.0.get(key)?)))
     }
 
-    /// The numbers under one of `keys`.
+    /// Returns the numbers under one of `keys`.
     pub(super) fn numbers<'k>(
         &self,
         keys: &'k [String],
@@ -143,7 +143,7 @@ impl Storage {
         Ok((key, entry.numbers(key)?))
     }
 
-    /// The text under `key`, if it is there.
+    /// Returns the text under `key`, if present.
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         match self.0.get(key)? {
             Entry::Text(text) => Some(text),
@@ -151,13 +151,13 @@ impl Storage {
         }
     }
 
-    /// The number under `key`, if it is there.
+    /// Returns the number under `key`, if present.
     pub(super) fn number(&self, key: &str) -> Result<Option<f64>, ParseError> {
         self.0.get(key).map(|entry| entry.number(key)).transpose()
     }
 }
 
-/// A name of the list; numbers would have lost their leading zeros.
+/// Returns a name of the list. Numbers are refused, because they would have lost their leading zeros.
 fn name(entry: &Entry) -> Result<String, ParseError> {
     match entry {
         Entry::Text(name) => Ok(name.clone()),

@@ -1,16 +1,16 @@
-//! Impossible and implausible values of every number of a calibration are refused or reported.
+//! Tests that impossible and implausible values of every number of a calibration are refused or reported.
 
 use std::error::Error as _;
 
 use super::*;
 use crate::testing::ring;
 
-/// The result of making and checking a rig.
+/// Result of creating and checking a rig.
 #[derive(Debug, PartialEq)]
 enum Outcome {
     /// The rig is refused.
     Refused,
-    /// The rig is made; the severity of the worst finding.
+    /// The rig is created; the value is the severity of the worst finding.
     Checked(Option<Severity>),
 }
 
@@ -19,7 +19,7 @@ const WARNING: Outcome = Outcome::Checked(Some(Severity::Warning));
 const NOTE: Outcome = Outcome::Checked(Some(Severity::Note));
 const FINE: Outcome = Outcome::Checked(None);
 
-/// Makes and checks a rig; with the text of the error or of the findings.
+/// Creates and checks a rig. Returns the outcome with the text of the error or of the findings.
 fn outcome(cameras: Vec<Camera>) -> (Outcome, String) {
     match Rig::new(cameras, Some(z_up()), "") {
         Err(error) => {
@@ -134,7 +134,7 @@ fn impossible_numbers_of_a_camera_are_refused_or_reported() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The outcome of three cameras that are all changed.
+/// Returns the outcome for three cameras that are all changed.
 fn outcome_of_all(change: impl Fn(&mut Camera)) -> (Outcome, String) {
     let mut cameras = ring(3, LensModel::Pinhole);
     cameras.iter_mut().for_each(change);
@@ -152,7 +152,7 @@ fn a_rig_in_another_unit_is_an_error_with_its_distances() {
     let (outcome, text) =
         outcome_of_all(|camera| camera.camera_from_world.translation.vector /= 1000.0);
     assert_eq!(outcome, ERROR, "{text}");
-    assert!(text.contains("at one place"), "{text}");
+    assert!(text.contains("in one place"), "{text}");
 }
 
 #[test]
@@ -167,20 +167,20 @@ fn cameras_at_one_place_are_an_error() {
     let (outcome, text) = outcome((0..3).map(turn).collect());
     assert_eq!(outcome, ERROR, "{text}");
     assert!(
-        text.contains("3 cameras are at one place (at most 0.0 mm apart)"),
+        text.contains("3 cameras are in one place (at most 0.0 mm apart)"),
         "{text}"
     );
 }
 
 #[test]
 fn cameras_that_all_look_away_are_an_error() {
-    // Half a turn about the vertical axis: every camera looks out of the ring.
+    // After half a turn about the vertical axis, every camera looks out of the ring.
     let turn = nalgebra::Isometry3::rotation(Vector3::y() * core::f64::consts::PI);
     let (outcome, text) =
         outcome_of_all(|camera| camera.camera_from_world = turn * camera.camera_from_world);
     assert_eq!(outcome, ERROR, "{text}");
     assert!(
-        text.contains("no place in space is seen by two of the 3 cameras"),
+        text.contains("no two of the 3 cameras see a common place"),
         "{text}"
     );
 }

@@ -1,4 +1,4 @@
-//! No input makes a reader panic: arbitrary text, and valid files with a few bytes changed.
+//! Tests that no input makes a reader panic: arbitrary text, and valid files with a few changed bytes.
 
 use super::*;
 

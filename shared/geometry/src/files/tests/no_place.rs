@@ -1,4 +1,4 @@
-//! Files that have the lens of a camera and not its place, and units that are none of the usual ones.
+//! Tests of files with the lens of a camera but not its pose, and of unusual units.
 
 use super::*;
 
@@ -17,7 +17,7 @@ distortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n   d
 const PLACE: &str = "R: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ 0., 0., 0. ]
 T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ 0., 0., 0. ]\n";
 
-/// ROS's `camera_info`: its `R` rectifies.
+/// A `camera_info` of ROS, whose `R` rectifies.
 const ROS: &str = "image_width: 640\nimage_height: 480\ncamera_name: left\ndistortion_model: equidistant\nD: [-0.33, 0.046, -0.0043, 0.0041]
 K: [500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0]\nR: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 P: [500.0, 0.0, 320.0, 0.0, 0.0, 500.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0]\n";
@@ -35,7 +35,7 @@ const BENT: LensModel = LensModel::BrownConrady {
     p: [-0.0043, 0.0041],
 };
 
-/// The first camera's lens, where lenses are enough; and what is said where they are not.
+/// Returns the first camera's lens, read with lenses that suffice, and the error without that option.
 fn read_lens(name: &str, text: &str) -> (Rig, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -59,10 +59,10 @@ fn a_lens_without_a_place_serves_where_the_lens_is_enough() {
         assert_eq!(*rig.cameras()[0].intrinsics.lens.model(), lens, "{name}");
         assert_eq!(rig.left_out().len(), 1);
         assert!(
-            why.contains("a lens and no place") && why.contains("calibrate board"),
+            why.contains("a lens but no pose") && why.contains("calibrate board"),
             "{why}"
         );
-        // As Parallax's own, too.
+        // The same is true for Parallax's own format.
         let (again, _) = read_lens("rig.toml", &own::write(&rig));
         assert_same_cameras(&again, &rig);
     }
@@ -81,7 +81,7 @@ fn the_keys_of_opencvs_program_and_of_ros_tell_fisheye_lenses() {
     let odd = ROS.replace("equidistant", "omnidirectional");
     let refused = opencv::parse(&[("a", &odd)], &LENSES).unwrap_err();
     assert!(refused.to_string().contains("omnidirectional"), "{refused}");
-    // Half a place is a mistake.
+    // An incomplete pose is a mistake.
     let half = LENS.to_owned() + &PLACE[PLACE.find("T:").unwrap()..];
     let refused = opencv::parse(&[("a", &half)], &LENSES).unwrap_err();
     assert!(refused.to_string().contains("is missing"), "{refused}");
@@ -103,7 +103,7 @@ distortions = [0.0, 0.0, 0.0, 0.0]\n{place}\n"
         assert_eq!(rig.left_out()[0].camera, "cam_1");
         let notes: Vec<String> = check(&rig).iter().map(ToString::to_string).collect();
         assert!(notes[0].contains("cam_1 is left out"), "{notes:?}");
-        assert!(rig.lacks("cam_1").contains("a lens and no place"));
+        assert!(rig.lacks("cam_1").contains("a lens but no pose"));
         assert!(rig.lacks("cam_9").contains("it has cam_0"));
         let both = pose2sim::parse(&text, &LENSES).unwrap();
         assert_eq!(both.cameras().len(), 2);

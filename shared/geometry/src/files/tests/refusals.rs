@@ -1,10 +1,10 @@
-//! Invalid files: every error names the file, the field and the number.
+//! Tests of invalid files: every error names the file, the field and the number.
 
 use std::error::Error as _;
 
 use super::*;
 
-/// Asserts that a text is refused with an error that holds all of `words`.
+/// Asserts that a text is refused with an error that contains all of `words`.
 fn refused(result: Result<Rig, ParseError>, words: &[&str]) {
     let text = failure::wording::in_one_line(&result.expect_err("must be refused"));
     for word in words {
@@ -77,7 +77,7 @@ fn errors_of_the_own_format_name_the_field() {
     );
 }
 
-/// A Pose2Sim file with one line replaced.
+/// Returns a Pose2Sim file with one line replaced.
 fn pose2sim_with(key: &str, line: &str) -> Result<Rig, ParseError> {
     let text = pose2sim::write(&ring_rig(2, BARREL)).expect("writable");
     pose2sim::parse(&edited(&text, key, line), &ReadOptions::default())

@@ -1,14 +1,14 @@
-//! Watches of detections of a person who walks and gestures: which cameras are reported.
+//! Tests with detections of a person who walks and gestures, and the cameras that are reported.
 
 use nalgebra::Rotation3;
 
 use super::*;
 use crate::{Framing, OutSize};
 
-/// Points of one side. Head and neck come before both sides.
+/// Number of points of one side; head and neck precede both sides.
 const SIDE: usize = 12;
 const N: usize = 2 + 2 * SIDE;
-/// The first points of a side are the arm.
+/// Number of points of the arm, which are the first of a side.
 const ARM: usize = 5;
 
 fn mirror() -> Vec<usize> {
@@ -20,7 +20,7 @@ fn mirror() -> Vec<usize> {
     (0..N).map(other).collect()
 }
 
-/// The points of a person at a place, turned about the vertical, with arms raised by an angle.
+/// Returns the points of a person at a position, rotated about the vertical, with arms raised by an angle.
 fn person(at: Vector3<f64>, turn: f64, arms: [f64; 2]) -> Vec<Point3<f64>> {
     let mut points = vec![Vector3::new(0.0, 0.0, 0.7), Vector3::new(0.0, 0.0, 0.5)];
     for (side, raised) in [1.0, -1.0].into_iter().zip(arms) {
@@ -41,9 +41,9 @@ fn person(at: Vector3<f64>, turn: f64, arms: [f64; 2]) -> Vec<Point3<f64>> {
 struct Film {
     cameras: Vec<Camera>,
     chance: Box<dyn FnMut() -> f64>,
-    /// Constant offset of a camera, pixels, as from the grid of its feature cells.
+    /// Constant offset of a camera, as from the grid of its feature cells, in pixels.
     grid: Vec<[f64; 2]>,
-    /// Arms that are detected as hanging, by view and side: for how many frames more.
+    /// Remaining number of frames in which an arm is wrongly detected as hanging, by view and side.
     lost: Vec<[u32; 2]>,
     frame: usize,
     gestures: bool,
@@ -52,7 +52,7 @@ struct Film {
 impl Film {
     fn new(cameras: &[Camera], seed: u64, gestures: bool) -> Self {
         let mut chance = chance(seed);
-        // The first numbers of neighbouring seeds are similar.
+        // The first numbers are skipped, because those of neighbouring seeds are similar.
         (0..20).for_each(|_| {
             chance();
         });
@@ -83,7 +83,8 @@ impl Film {
             .collect()
     }
 
-    /// One view: noise, arms lost for some frames, sometimes left and right exchanged, sometimes a shifted person.
+    /// Detects the person in one view, with noise, arms lost for some frames, and sometimes with left and right exchanged or a shifted
+    /// person.
     fn detect(
         &mut self,
         view: usize,
@@ -121,7 +122,7 @@ impl Film {
     }
 }
 
-/// The cameras that a watch reports after some frames.
+/// Returns the cameras that a watch reports after some frames.
 fn reported(real: &[Camera], believed: Vec<Camera>, seed: u64, n_frames: usize) -> Vec<usize> {
     let mut film = Film::new(real, seed, true);
     let mut watch = RigWatch::new(believed);
@@ -185,7 +186,7 @@ fn framed(cameras: &[Camera]) -> Vec<Framing> {
     cameras.iter().enumerate().map(framing).collect()
 }
 
-/// A watch of views where the footage of view `i` is that of camera `footage[i]`.
+/// Returns a watch of views in which the footage of view `i` is that of camera `footage[i]`.
 fn watched(cameras: &[Camera], footage: &[usize], seed: u64, gestures: bool) -> SwapWatch {
     let mut film = Film::new(cameras, seed, gestures);
     let framings = framed(cameras);
@@ -208,7 +209,7 @@ fn watched(cameras: &[Camera], footage: &[usize], seed: u64, gestures: bool) -> 
     watch
 }
 
-/// Rigs: full rings, a partial ring, and cameras at irregular places.
+/// Returns rigs: full rings, a partial ring, and cameras at irregular positions.
 fn rigs() -> Vec<Vec<Camera>> {
     let mut irregular = around(4);
     for (nth, camera) in irregular.iter_mut().enumerate() {
@@ -237,7 +238,7 @@ fn exchanged_footage_of_two_cameras_is_detected() {
             footage.swap(a, b);
             let watch = watched(&cameras, &footage, seed, seed % 2 == 0);
             let found = watch.swap();
-            // In a ring of three it cannot be told which two, only that some two are exchanged.
+            // In a ring of three, it can only be detected that some two cameras are exchanged, not which.
             let is_right =
                 found.is_some_and(|swap| swap.views == [a.min(b), a.max(b)] && swap.is_sure);
             let is_unsure = rig == 0 && found.is_some_and(|swap| !swap.is_sure);
@@ -268,7 +269,7 @@ fn no_exchange_is_reported_where_none_was_made() {
 
 #[test]
 fn cyclically_exchanged_footage_of_three_cameras_is_detected() {
-    // In a ring this would look like an exchange of two.
+    // In a ring, this would look like an exchange of two cameras.
     let cameras = rigs().pop().expect("cameras at irregular places");
     for seed in 0..8 {
         let watch = watched(&cameras, &[1, 2, 0, 3], seed, seed % 2 == 0);

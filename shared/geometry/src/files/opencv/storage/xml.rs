@@ -1,4 +1,4 @@
-//! The XML form of an `OpenCV` storage.
+//! XML form of an `OpenCV` storage.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,9 @@ pub(super) fn parse(text: &str) -> Result<BTreeMap<String, Entry>, ParseError> {
     Ok(named.collect())
 }
 
-/// * `is_top`: an element below the root; elements in it are named, or a list of `_`.
+/// Converts an element.
+///
+/// * `is_top`: true for an element below the root; its child elements are named, or form a list of `_`.
 fn entry(node: Node<'_, '_>, is_top: bool) -> Entry {
     let children: Vec<Node<'_, '_>> = node.children().filter(Node::is_element).collect();
     if is_top && !children.is_empty() {

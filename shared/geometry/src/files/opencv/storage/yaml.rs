@@ -1,4 +1,4 @@
-//! The YAML form of an `OpenCV` storage, and its JSON form, which is YAML as well.
+//! YAML form of an `OpenCV` storage, and its JSON form, which is also YAML.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -6,25 +6,25 @@ use granit_parser::{Event, Parser, ScalarStyle, ScanError, Span, StrInput};
 
 use super::Entry;
 
-/// How deep lists and tables may be nested in one another.
+/// Maximum depth of nested lists and tables.
 const MAX_DEPTH: usize = 64;
-/// Number of entries that one file may hold; aliases could make any number of them in a few lines.
+/// Maximum number of entries in a file; aliases could create any number of entries in a few lines.
 const MAX_ENTRIES: usize = 1 << 20;
 
-/// The reasons why a text cannot be read.
+/// Reason why a text cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum YamlError {
-    /// It is no YAML.
+    /// The text is not valid YAML.
     #[error(transparent)]
     Scan(#[from] ScanError),
-    /// It is YAML that no storage is.
+    /// The text is YAML, but not a storage.
     #[error("found {found} at line {line}, expected {expected}")]
     Shape {
         found: String,
         line: usize,
         expected: &'static str,
     },
-    /// It holds more than any camera needs.
+    /// The text has too many entries.
     #[error("more than {MAX_ENTRIES} entries up to line {line}")]
     TooLong { line: usize },
 }
@@ -43,7 +43,8 @@ pub(super) fn parse(text: &str) -> Result<BTreeMap<String, Entry>, YamlError> {
     reader.document()
 }
 
-/// Makes entries of the events of a parser. Tags, such as `!!opencv-matrix`, say nothing that the entries do not show.
+/// Builds entries from the events of a parser. Tags such as `!!opencv-matrix` are ignored, because the entries contain the same
+/// information.
 struct Reader<'t> {
     parser: Parser<'t, StrInput<'t>>,
     /// Entries that an alias may repeat.
@@ -91,7 +92,7 @@ impl<'t> Reader<'t> {
             Event::SequenceStart(_, anchor, _) => (Entry::List(self.list()?), anchor),
             Event::MappingStart(_, anchor, _) => (Entry::Map(self.map()?), anchor),
             Event::Alias(anchor) => {
-                // An alias within what it names has no entry yet.
+                // An alias inside its own anchor has no entry yet.
                 let entry = self.anchors.get(&anchor).cloned();
                 let entry =
                     entry.ok_or_else(|| shape("an alias of its own list", at, "an earlier one"))?;
@@ -148,7 +149,7 @@ fn shape(found: &str, at: Span, expected: &'static str) -> YamlError {
     }
 }
 
-/// Number of entries in an entry, itself included.
+/// Returns the number of entries in an entry, including itself.
 fn len(entry: &Entry) -> usize {
     1 + match entry {
         Entry::List(list) => list.iter().map(len).sum(),
@@ -176,7 +177,7 @@ fn number(text: &str) -> Option<f64> {
     if matches!(size, ".inf" | ".Inf" | ".INF") {
         return Some(sign * f64::INFINITY);
     }
-    // Words such as `nan` and `infinity` are texts in YAML.
+    // Words such as `nan` and `infinity` are text in YAML.
     size.starts_with(|first: char| first.is_ascii_digit() || first == '.')
         .then(|| text.parse().ok())?
 }
