@@ -8,7 +8,7 @@ use crate::people::tests::camera;
 const RATE_HZ: f64 = 30.0;
 const N_VIEWS: usize = 4;
 
-/// The 14 joints of a person who stands at the origin, metres.
+/// The 14 joints of a person who stands at the origin, in metres.
 const JOINTS: [[f64; 3]; 14] = [
     [0.1, -0.12, 0.08],
     [0.05, -0.11, 0.5],
