@@ -8,7 +8,7 @@ use crate::{MIRROR, N};
 
 /// Minimum number of joints that two detections must share to be compared.
 pub(crate) const LEAST_JOINTS: usize = 4;
-/// One joint in this many, the farthest ones, is ignored: a limb may be covered, or belong to another person.
+/// One in this many joints is ignored, farthest first: a limb may be covered, or belong to another person.
 const TRIMMED: usize = 4;
 
 /// How well a detection fits a person or another detection.

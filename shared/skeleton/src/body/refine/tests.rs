@@ -24,7 +24,7 @@ fn errors(body: impl Fn(&Joints) -> Joints, tall: f64, lengths: Option<&Lengths>
     sum.map(|sum| sum / (60.0 * POSTURES.len() as f64))
 }
 
-/// Legs longer and arms shorter than the mean, by two standard deviations among people.
+/// Returns a body whose legs are longer and whose arms are shorter than the mean, by two standard deviations among people.
 fn unusual(joints: &Joints) -> Joints {
     let mut it = *joints;
     let stretch = |stretched: &mut Joints, from: usize, to: &[usize], by: f64| {
@@ -158,7 +158,7 @@ fn the_result_is_a_minimum() {
     );
     let mut state = problem.measured;
     state.joints = found.joints.map(|joint| joint.unwrap().coords);
-    // The stature is not in the result: the best one for these joints.
+    // The result does not contain the stature; use the best one for these joints.
     let cost = |state: &State| {
         let of = |mm: i32| State {
             stature: 1.2 + f64::from(mm) / 1000.0,
