@@ -8,22 +8,22 @@ use crate::learned::JointWeights;
 /// One person in one picture: the detected parts, named by the side of the body, and a true joint.
 #[derive(Debug, Clone, Copy)]
 pub struct JointSample<'a> {
-    /// Centres of the 26 parts, pixels.
+    /// Centres of the 26 parts, in pixels.
     pub centres: &'a [[f64; 2]],
-    /// The true joint, pixels.
+    /// The true joint, in pixels.
     pub joint: [f64; 2],
-    /// The parts whose mean it is by default (`skeleton::Joint::parts`).
+    /// The parts whose mean is the joint by default (`skeleton::Joint::parts`).
     pub parts: &'static [usize],
-    /// Size of the person, pixels.
+    /// Size of the person, in pixels.
     pub size: f64,
 }
 
 /// Ridge regression for every known joint.
 ///
-/// A joint is the mean of its own parts, plus a weighted sum of all parts relative to it. So the map is
+/// A joint is the mean of its own parts, plus a weighted sum of the offsets of all parts from that mean. So the map is
 /// invariant to translation, rotation and scale. The weights minimise the squared error in units of the
-/// person's size plus `ridge` per sample times their squares, so that rare joints stay close to the default.
-/// Every person counts as its mirror image too.
+/// person's size, plus `ridge` per sample times the squared weights, so that rare joints stay close to the default.
+/// The mirror image of every person is added as well.
 #[derive(Debug, Clone, Default)]
 pub struct JointFit {
     joints: Vec<Normal>,
@@ -93,7 +93,7 @@ impl JointFit {
 
     fn row(&self, parts: &[usize], ridge: f64) -> Vec<f64> {
         let Some(joint) = self.joints.iter().find(|joint| joint.parts == parts) else {
-            // The mean of joints that may have samples of their own.
+            // The joint is the mean of joints that may have samples of their own.
             let n = parts.len() as f64;
             return match parts {
                 [part] => unit(*part),

@@ -93,7 +93,7 @@ fn views_from_behind_have_tables_of_their_own() {
     let learned = learned(&learner);
     let joint = learned.by_angle(Appearance::Joint);
     let joint = joint.at(PI * 0.98).unwrap();
-    // Part 5 of the front is part 17 of the back.
+    // Part 5 of the front view is part 17 of the back view.
     assert!(joint.exchanged.as_ref().unwrap().value(5, 1, 2) > 0.8);
     let lift = learned.by_angle(Appearance::Lift);
     let same = &lift.at(PI * 0.98).unwrap().joint;
@@ -111,7 +111,7 @@ fn views_far_from_the_truth_count_for_tau_but_not_for_types() {
     add_views(&mut learner, [&bad, &good], 50.0, 3);
     let learned = learned(&learner);
     assert_eq!(learned.rigs[0].pairs[0].counts.total(), 2 * N_PARTS as u64);
-    // 7 good views and 3 bad ones.
+    // There are 7 good views and 3 bad ones.
     assert_eq!(learned.tau_tenths, vec![0.1; N_PARTS]);
 }
 

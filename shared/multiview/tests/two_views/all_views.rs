@@ -11,7 +11,7 @@ use crate::oracle;
 use crate::paper::{ROUNDING, SIZES, TINY, all_poses};
 use crate::planted::{Scene, settings};
 
-/// The parameters of a problem, besides its seed.
+/// The parameters of a problem, without its seed.
 #[derive(Debug, Clone)]
 struct Start {
     candidates: Vec<usize>,

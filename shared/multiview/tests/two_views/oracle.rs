@@ -65,7 +65,7 @@ fn is_usable(scene: &Scene, settings: &Settings, view: usize, part: usize) -> bo
     }
 }
 
-/// Eq. 4: squared distances to the lines of each other, in the cells of either view.
+/// Eq. 4: the squared distance of each point from the other's line, in the cells of its own view.
 fn distance2(
     scene: &Scene,
     settings: &Settings,
@@ -124,7 +124,7 @@ pub(crate) fn released(
 
 /// Returns true if a part of the support is on: it is good enough, or both are bad but it is clearly better.
 ///
-/// * `parts`: of the support and of the target.
+/// * `parts`: indices of the part in the support and in the target.
 fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usize; 2]) -> bool {
     let views = [support, 1 - support];
     let [here, there] = [0, 1].map(|side| is_usable(scene, settings, views[side], parts[side]));

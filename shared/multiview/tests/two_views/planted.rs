@@ -1,4 +1,4 @@
-//! Small artificial scenes: a root with two arms that mirror each other, seen by cameras on a
+//! Small synthetic scenes: a root with two arms that mirror each other, seen by cameras on a
 //! circle.
 
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 pub(crate) const N_PARTS: usize = 3;
 pub(crate) const N_TYPES: usize = 2;
-/// The arms exchange sides.
+/// Mirror image of the parts: the arms exchange sides.
 pub(crate) const MIRROR: [usize; N_PARTS] = [0, 2, 1];
 
 /// A deterministic generator of pseudorandom numbers.
@@ -112,7 +112,7 @@ pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
 pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensModel) -> Camera {
     let eye = Point3::new(4.0 * bearing.cos(), 4.0 * bearing.sin(), height);
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-    // `look_at_rh` is x right, y up, z backward; half a turn about x gives OpenCV's axes.
+    // `look_at_rh` has x right, y up, z backward; a rotation by 180 degrees about x gives OpenCV's axes.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     let [width, rows] = size.map(|size| size as f64);
     Camera {
@@ -129,7 +129,7 @@ pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensMode
     }
 }
 
-/// No distortion, a mild one, a fisheye, and one without solution in the corners.
+/// Lenses with no distortion, a mild distortion, a fisheye, and a lens without a solution in the corners.
 pub(crate) fn lenses() -> [LensModel; 4] {
     let radial = |k1: f64, k2: f64| LensModel::BrownConrady {
         k: [k1, k2, 0.0, 0.0, 0.0, 0.0],
@@ -265,7 +265,7 @@ impl Scene {
         self.fuse_evidence(settings, views, start, evidence.each_ref())
     }
 
-    /// As [`Self::fuse`], on given evidence of these views.
+    /// Like [`Self::fuse`], with the given evidence of these views.
     pub(crate) fn fuse_evidence(
         &self,
         settings: &Settings,
