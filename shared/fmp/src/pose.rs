@@ -1,4 +1,4 @@
-//! A pose in one image: where every part is, and which of its types.
+//! A pose in one image: the place and the type of every part.
 
 use crate::{Layout, Model, Placement};
 
@@ -7,14 +7,14 @@ use crate::{Layout, Model, Placement};
 pub struct Pose {
     /// Value of the maximised energy (eq. 1 of the paper, or eq. 3 as seen from this view).
     pub score: f32,
-    /// Level of the pyramid, from 0 (full resolution).
+    /// Level of the pyramid, counted from 0 (full resolution).
     pub level: u16,
     /// One placement per part of the model.
     pub parts: Vec<Placement>,
 }
 
 impl Pose {
-    /// Centre of a part's box, pixels of the image; the centre of its top-left pixel is (0, 0).
+    /// Centre of a part's box, in pixels of the image; the centre of the top-left pixel is (0, 0).
     pub fn centre(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -38,7 +38,7 @@ impl Pose {
         (0..self.parts.len()).map(|part| self.centre(model, layout, part)).collect()
     }
 
-    /// Box `[x1, y1, x2, y2]` of a part, pixels of the image, both corners inside the box.
+    /// Box `[x1, y1, x2, y2]` of a part, in pixels of the image; both corners belong to the box.
     pub fn part_box(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 4] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -63,9 +63,9 @@ impl Pose {
             })
             .unwrap_or_default()
     }
-    /// Returns whether the pose is far enough from all others.
+    /// Returns true if the pose is far enough from all others.
     ///
-    /// * `min_separation`: least mean distance between the part centres of two poses, in units of the mean side of the boxes of
+    /// * `min_separation`: minimum mean distance between the part centres of two poses, in units of the mean side of the boxes of
     ///   both.
     pub fn is_apart(
         &self,

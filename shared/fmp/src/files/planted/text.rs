@@ -32,7 +32,7 @@ pub(crate) fn as_text(spec: &ModelSpec) -> String {
     .concat()
 }
 
-/// Entries that the parts of a model own, and their indices.
+/// Entries owned by the parts of a model, and their indices.
 struct Owned {
     biases: Vec<f64>,
     bias_ids: Vec<usize>,

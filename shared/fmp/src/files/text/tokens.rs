@@ -78,13 +78,13 @@ impl<'a> Tokens<'a> {
         Ok(value)
     }
 
-    /// Upper bound of the number of remaining tokens: limits what is reserved for a count in the
+    /// Upper bound of the number of remaining tokens; limits the memory reserved for a count in the
     /// file.
     pub(super) fn at_most(&self) -> usize {
         self.rest.len().div_ceil(2)
     }
 
-    /// Consumes `bytes` of the next token, which is all of it, and the following white space.
+    /// Consumes the next token, which has `bytes` bytes, and the following white space.
     fn advance(&mut self, bytes: usize) {
         let behind = &self.rest[bytes..];
         self.rest = behind.trim_start();
@@ -94,7 +94,7 @@ impl<'a> Tokens<'a> {
     }
 }
 
-/// At most 24 characters of a token, for an error.
+/// At most 24 characters of a token, for an error message.
 pub(super) fn shortened(token: &str) -> String {
     token.chars().take(24).collect()
 }
