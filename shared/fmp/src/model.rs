@@ -160,7 +160,7 @@ pub enum ModelError {
     },
     /// The mirror does not exchange parts in pairs, or does not preserve the tree.
     #[error(
-        "part {part} mirrors part {other}, but not the other way round or not on the same tree"
+        "part {part} mirrors part {other}, but part {other} does not mirror it, or the tree differs"
     )]
     Mirror {
         /// Part, counted from 1.

@@ -183,17 +183,17 @@ fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
         doubts.push(NOTHING_MEASURED.to_owned());
     } else if n_rejected * 5 > n_measured {
         doubts.push(format!(
-            "{n_rejected} measurements contradict those before and after, {n_measured} do not: look at what was measured first"
+            "{n_rejected} measurements contradict those before and after, {n_measured} do not: check the measurements first"
         ));
     }
     let n_unsure = person.unsure.kept + person.unsure.exchanged + person.unsure.left_out;
     if n_unsure > 0 && n_unsure == n_frames {
         doubts.push(
-            "left and right are not certain in any frame, and were taken as they are".to_owned(),
+            "left and right are uncertain in every frame, and were kept as measured".to_owned(),
         );
     } else if person.unsure.left_out * 5 > n_frames {
         doubts.push(format!(
-            "left and right are not certain in {} of {n_frames} frames, nor decided by those before and after",
+            "left and right are uncertain in {} of {n_frames} frames, and the frames before and after do not decide them",
             person.unsure.left_out
         ));
     }

@@ -100,8 +100,10 @@ impl Track {
         all
     }
 
-    /// Sets the estimate at an instant. If the covariances exceed the observed variation, the remaining error may vary too slowly to be observed. Smoothing does not reduce
-    /// it.
+    /// Sets the estimate at an instant.
+    ///
+    /// If the covariances exceed the observed variation, the remaining error may vary too slowly to be observed. Smoothing does not
+    /// reduce it.
     ///
     /// * `measured`: the instant of the measurement with this covariance.
     fn put(&self, place: &mut Smoothed, [at, measured]: [usize; 2], state: State) {

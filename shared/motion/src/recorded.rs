@@ -58,7 +58,7 @@ pub struct Recorded {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TimesError {
     /// An instant is not after the one before.
-    #[error("instant {at} is at {time_s} s, not after the one before it at {before_s} s")]
+    #[error("instant {at} at {time_s} s is not after the instant before, which is at {before_s} s")]
     Order {
         /// Index of the instant, counted from 0.
         at: usize,

@@ -11,14 +11,14 @@ use crate::room::Block;
 #[derive(Debug)]
 pub(crate) struct Performance {
     pub(crate) bones: Bones,
-    /// Standing height of the person, metres.
+    /// Standing height of the person, in metres.
     pub(crate) height: f64,
-    /// Its name in the ground truth.
+    /// Name of the action in the ground truth.
     pub(crate) name: String,
     pub(crate) course: Course,
 }
 
-/// How the person moves.
+/// Source of the person's motion.
 #[derive(Debug)]
 pub(crate) enum Course {
     Acted(Box<Motion>),

@@ -42,7 +42,7 @@ impl fmt::Display for Reason {
                 let [low, high] = limits;
                 write!(
                     f,
-                    "it would be {metres:.2} m tall; {low:.2} to {high:.2} m are possible"
+                    "the person would be {metres:.2} m tall; {low:.2} to {high:.2} m are possible"
                 )
             }
             Self::Impossible { impossible, bones } => {

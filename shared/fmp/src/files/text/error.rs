@@ -82,7 +82,7 @@ pub enum TextError {
     },
     /// A part is anchored at another level than its parent.
     #[error(
-        "{place}: `defs_anchor` puts spring {spring} {got} octaves from its parent, expected 0"
+        "{place}: `defs_anchor` puts spring {spring} at {got} octaves from its parent, expected 0"
     )]
     OtherLevel {
         /// Start of the array in the text.
