@@ -19,8 +19,7 @@ pub struct Extractor {
     bank: FilterBank,
     workspaces: Pool<Features>,
     /// One workspace per thread. This is a stack instead of a [`Pool`]: the last workspace put back is taken first, while it is still in
-    /// the
-    /// cache.
+    /// the cache.
     buffers: Mutex<Vec<CorrelateWorkspace>>,
 }
 

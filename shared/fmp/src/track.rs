@@ -61,12 +61,10 @@ impl Default for TrackSettings {
 
 /// Tracks the best pose from frame to frame and chooses where to search the next frame.
 ///
-/// The first frame is searched in full. A full search is also made if no pose was found, if frames were skipped, if
-/// the last full search is too long ago (in frames, or in seconds if a frame rate is known), or if
-/// frames are too far apart in time; see [`TrackSettings`]. Otherwise, only the surroundings of the
-/// last pose are searched; a better pose elsewhere is found at the next full search. A frame
-/// without a pose, or with a score that has dropped, is searched again in full
-/// ([`Self::needs_full_search`]).
+/// The first frame is searched in full. A full search is also made if no pose was found, if frames were skipped, if the last full search is
+/// too long ago (in frames, or in seconds if a frame rate is known), or if frames are too far apart in time; see [`TrackSettings`].
+/// Otherwise, only the surroundings of the last pose are searched; a better pose elsewhere is found at the next full search. A frame
+/// without a pose, or with a score that has dropped, is searched again in full ([`Self::needs_full_search`]).
 ///
 /// The tracker uses no clock and no image: the same frames and poses give the same decisions.
 #[derive(Debug, Clone, PartialEq, Default)]

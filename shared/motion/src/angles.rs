@@ -1,8 +1,8 @@
 //! Angles between the segments of a body, computed from the positions of its joints, with deviations from their covariances.
 //!
-//! Definitions follow the recommendations of the International Society of Biomechanics where points suffice:
-//! Wu et al. 2002 (hip, ankle; *J. Biomech.* 35:543) and Wu et al. 2005 (shoulder, elbow; *J. Biomech.* 38:981). A table in
-//! `docs/guide/smooth.md` lists the angles, the joints they are computed from, and the angles that a skeleton of points cannot provide.
+//! Definitions follow the recommendations of the International Society of Biomechanics where points suffice: Wu et al. 2002 (hip, ankle;
+//! *J. Biomech.* 35:543) and Wu et al. 2005 (shoulder, elbow; *J. Biomech.* 38:981). A table in `docs/guide/smooth.md` lists the angles,
+//! the joints they are computed from, and the angles that a skeleton of points cannot provide.
 
 mod body;
 mod define;

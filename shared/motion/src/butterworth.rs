@@ -35,10 +35,8 @@ fn needed_hz(cutoff_hz: f64) -> f64 {
 /// and passes half of the power at the cutoff.
 ///
 /// Gaps between measurements up to `fill_s` are first filled by cubic curves. Longer gaps split a track into pieces that are filtered
-/// separately. Non-uniform instants are interpolated (cubic) to a uniform grid and back;
-/// [`Report::resampled_s`] is the largest difference from the grid. Only joints with a side are rejected, at instants with uncertain sides.
-/// The
-/// result has no covariances.
+/// separately. Non-uniform instants are interpolated (cubic) to a uniform grid and back; [`Report::resampled_s`] is the largest difference
+/// from the grid. Only joints with a side are rejected, at instants with uncertain sides. The result has no covariances.
 ///
 /// The times must be [checked](Recorded::check).
 ///

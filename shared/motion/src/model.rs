@@ -2,8 +2,8 @@
 //!
 //! The state consists of position, velocity and acceleration in three axes, which the covariances of measurements couple. Between two
 //! instants `dt` apart, the acceleration follows a random walk: the Wiener-process acceleration model (Bar-Shalom, Li & Kirubarajan,
-//! *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.3). Its spectral density, here
-//! called the jerk density, has the unit m²/s⁵.
+//! *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.3). Its spectral density, here called the jerk density, has
+//! the unit m²/s⁵.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 

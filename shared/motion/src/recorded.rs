@@ -64,7 +64,7 @@ pub enum TimesError {
         at: usize,
         /// Time of the instant, in seconds.
         time_s: f64,
-        /// Time of the instant before, in seconds.
+        /// Time of the previous instant, in seconds.
         before_s: f64,
     },
     /// A time is not a number.

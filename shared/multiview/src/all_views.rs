@@ -47,15 +47,14 @@ pub struct AllViewsEstimate {
 
 /// Maximises one energy over all views, from a given start.
 ///
-/// The energy is the paper's eq. 3 with a sum over all views and all pairs of views,
-/// `sum_v S(v) + weight sum_{v<u} (alpha xi + beta lambda)(v, u)`;
-/// the paper leaves this for later work. One view is solved exactly while all others are fixed.
-/// Its terms are the sums of the terms that each other view alone would add, so the graph remains a
-/// tree. Views take turns, the least trusted first. A solution is accepted only if the energy
-/// rises, so the energy never falls and a cycle is impossible (except with
-/// [`SwitchBy::Support`](crate::SwitchBy::Support)). The loop ends when no view alone can raise the
-/// energy (up to the tolerance of `epsilon_px`), or after `max_iterations / 2` solutions of every
-/// view.
+/// The energy is the paper's eq. 3 with a sum over all views and all pairs of views, `sum_v S(v) +
+/// weight sum_{v<u} (alpha xi + beta lambda)(v, u)`; the paper leaves this for later work. One view
+/// is solved exactly while all others are fixed. Its terms are the sums of the terms that each
+/// other view alone would add, so the graph remains a tree. Views take turns, the least trusted
+/// first. A solution is accepted only if the energy rises, so the energy never falls and a cycle is
+/// impossible (except with [`SwitchBy::Support`](crate::SwitchBy::Support)). The loop ends when no
+/// view alone can raise the energy (up to the tolerance of `epsilon_px`), or after `max_iterations
+/// / 2` solutions of every view.
 ///
 /// The benefit was measured as PCP3D of `parallax-lab eval` on 134 instants (three views, 14 of them four; see the
 /// documentation of the crate). The mean of the terms (weight `1 / (n - 1)`) with two starts is

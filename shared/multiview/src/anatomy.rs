@@ -23,10 +23,9 @@ const HEAD: usize = 13;
 
 /// Evidence that left and right of a labelled skeleton are correct, in trunk lengths.
 ///
-/// The evidence is the sum of these distances: the head in front of the neck, the knees in front of the line from
-/// hip to ankle, the elbows behind the line from shoulder to wrist and, if the up direction is
-/// known, the neck in front of the pelvis. Exchanging left and right negates it exactly. This rule
-/// is our own, for a question that the paper leaves open.
+/// The evidence is the sum of these distances: the head in front of the neck, the knees in front of the line from hip to ankle, the elbows
+/// behind the line from shoulder to wrist and, if the up direction is known, the neck in front of the pelvis. Exchanging left and right
+/// negates it exactly. This rule is our own, for a question that the paper leaves open.
 ///
 /// * `joints`: the 14 joints of `skeleton::PARSE14` in the world; a missing joint contributes 0.
 /// * Returns 0 if the trunk or both sides are missing.

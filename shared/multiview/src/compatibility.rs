@@ -71,10 +71,9 @@ pub enum CompatibilityError {
 impl Compatibility {
     /// Reads a table in the authors' format: conditional probabilities, without a header.
     ///
-    /// The table has one line per part and type of the *first*-named view, ordered by part, then by type. A line contains
-    /// the 1-based part, then `p(type in second view | type in first view)` for every type of the
-    /// second view, separated by commas. A type of the first view that did not occur in training
-    /// has a line of NaN or of zeros. Such a line is read as zeros, which add nothing to any score, and
+    /// The table has one line per part and type of the *first*-named view, ordered by part, then by type. A line contains the 1-based part,
+    /// then `p(type in second view | type in first view)` for every type of the second view, separated by commas. A type of the first view
+    /// that did not occur in training has a line of NaN or of zeros. Such a line is read as zeros, which add nothing to any score, and
     /// counted by [`Self::n_unseen`].
     ///
     /// * `n_types`: number of types of every part.

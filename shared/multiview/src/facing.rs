@@ -73,7 +73,7 @@ pub struct FacingHypothesis {
     pub energy: f64,
 }
 
-/// How strongly the facing of a frame depends on the frame before.
+/// How strongly the facing of a frame depends on the previous frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingSettings {
     /// Energy cost of exchanging one view from one frame to the next.
@@ -108,7 +108,7 @@ pub struct Facing {
 /// decides between them.
 ///
 /// The score of an assignment is its score in this frame plus the best score of a path from the
-/// frame before; every view that changes adds a cost. The first frame is decided by its own
+/// previous frame; every view that changes adds a cost. The first frame is decided by its own
 /// energies alone.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FacingFilter {

@@ -61,8 +61,7 @@ pub fn front_log_ratio(in_view: [f64; 2], evidence: FrontEvidence) -> f64 {
 }
 
 /// Logarithm of the likelihood ratio of the direction in which a skeleton faces over its opposite, given the evidence of all views, in
-/// nats;
-/// 0 without a trunk.
+/// nats; 0 without a trunk.
 ///
 /// * `joints`: the same joints as for [`front`], in metres in the world.
 /// * `views`: the camera and the evidence of every view.

@@ -14,9 +14,9 @@ const DIAGONAL: f32 = 1.3693;
 
 /// Heat of an epipolar line, as in the released program: 1 on the line, 0 in the farthest cell.
 ///
-/// The heat is `1 - sqrt(d / d_max)`, where `d` is the chamfer distance of a cell from the line and `d_max` the
-/// largest one of the map. All values are zero if the line misses the image. The function is public for comparison with the program;
-/// the terms of [`EnergyKind::Released`](crate::EnergyKind::Released) use it.
+/// The heat is `1 - sqrt(d / d_max)`, where `d` is the chamfer distance of a cell from the line and `d_max` the largest one of the map. All
+/// values are zero if the line misses the image. The function is public for comparison with the program; the terms of
+/// [`EnergyKind::Released`](crate::EnergyKind::Released) use it.
 ///
 /// * `ends`: the line's intersections with the image's border, `[x, y]` as the program counts
 ///   pixels (from 1); rounded half to even, then used as if counted from 0.

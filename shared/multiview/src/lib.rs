@@ -1,9 +1,8 @@
 //! One energy over several views, maximised by alternating exact single-view solutions.
 //!
-//! The crate implements the paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewInput`], the
-//! data of a view; [`choose_start`], which selects the candidate of every view that shows the person;
-//! [`estimate_pair`], the optimiser of a pair, and [`estimate_all_views`], that of all views at
-//! once; [`rank_facing`], [`FacingFilter`], [`average`] and [`consensus()`], which combine the
+//! The crate implements the paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewInput`], the data of a view;
+//! [`choose_start`], which selects the candidate of every view that shows the person; [`estimate_pair`], the optimiser of a pair, and
+//! [`estimate_all_views`], that of all views at once; [`rank_facing`], [`FacingFilter`], [`average`] and [`consensus()`], which combine the
 //! pairs into one pose per view.
 //!
 //! # The appearance term
@@ -21,13 +20,12 @@
 //! Pairs with one such view have tables of their own here ([`TypeTables::exchanged`]). Without
 //! these tables, they have no appearance term, as with the authors' files.
 //!
-//! The benefit was measured with three person models, with pairs averaged. The table shows PCP3D / MPJPE in mm. The
-//! first model confused left and right: one sixth of its training people were labelled the wrong
-//! way round. Its tables were made from 95 instants before rings of 3, 5, 6 and 8 cameras (walking,
-//! boxing, gestures, sitting, grabbing). The tables of the other two models were made from 900
-//! instants before rings of 3 to 9 cameras; the third model is the one that ships. The test sets are:
+//! The benefit was measured with three person models, with pairs averaged. The table shows PCP3D / MPJPE in mm. The first model confused
+//! left and right: one sixth of its training people were labelled the wrong way round. Its tables were made from 95 instants in front of
+//! rings of 3, 5, 6 and 8 cameras (walking, boxing, gestures, sitting, grabbing). The tables of the other two models were made from 900
+//! instants in front of rings of 3 to 9 cameras; the third model is the one that ships. The test sets are:
 //!
-//! * A: 24 instants of other people who jog and throw before
+//! * A: 24 instants of other people who jog and throw in front of
 //!   the three cameras of `HumanEva-I`, 320 x 240.
 //! * B: 30 instants of other people in five actions,
 //!   the same cameras, 640 x 480.
@@ -59,13 +57,11 @@
 //!
 //! # Why adaptive selection with true errors can reduce the result
 //!
-//! Eq. 6 switches a part off if *either* view is off. A wrong view is then left uncorrected,
-//! although the terms exist to correct it. With the true errors, and their medians as thresholds
-//! (the paper's tau, learned), more than half of the terms are switched off, and A falls from 76.4
-//! to 66.0. The authors' program uses the error of the *support* alone, so that a good view
-//! continues to correct a bad one ([`SwitchBy::Support`]): 76.7 / 120, with consensus 78.1 / 117.
-//! So the rule of eq. 6 costs ten points. Even without this rule, the benefit of knowing all errors is small here: B
-//! 62.2 / 189, with consensus 65.8 / 181.
+//! Eq. 6 switches a part off if *either* view is off. A wrong view is then left uncorrected, although the terms exist to correct it. With
+//! the true errors, and their medians as thresholds (the paper's tau, learned), more than half of the terms are switched off, and A falls
+//! from 76.4 to 66.0. The authors' program uses the error of the *support* alone, so that a good view continues to correct a bad one
+//! ([`SwitchBy::Support`]): 76.7 / 120, with consensus 78.1 / 117. So the rule of eq. 6 costs ten points. Even without this rule, the
+//! benefit of knowing all errors is small here: B 62.2 / 189, with consensus 65.8 / 181.
 //!
 //! With [`SwitchBy::Worse`], the better of two bad views continues to support the other. Errors that
 //! are expected everywhere then do not separate all views. A network that expects too many errors needs
@@ -74,12 +70,11 @@
 //!
 //! # The same on more instants
 //!
-//! These instants were made after all choices above, with the third model and its file: 60 instants
-//! of ten people who jog and throw (`parallax-lab synth --rig humaneva --subjects 501-510 --actions
-//! jogging,throw-catch --frames 3 --rate 2 --seed 4711`, evaluated at 320 x 240), 60 of six people
-//! in five actions (`--subjects 601-606 --actions walking,boxing,gestures,chair,grab --frames 2
-//! --rate 2 --seed 991`, 640 x 480), and the 14 frames of C. The table shows PCP3D for pairs averaged, pairs in consensus,
-//! and all views at once (the mean of their terms), in this order.
+//! These instants were made after all choices above, with the third model and its file: 60 instants of ten people who jog and throw
+//! (`parallax-lab synth --rig humaneva --subjects 501-510 --actions jogging,throw-catch --frames 3 --rate 2 --seed 4711`, evaluated at 320
+//! x 240), 60 of six people in five actions (`--subjects 601-606 --actions walking,boxing,gestures,chair,grab --frames 2 --rate 2 --seed
+//! 991`, 640 x 480), and the 14 frames of C. The table shows PCP3D for pairs averaged, pairs in consensus, and all views at once (the mean
+//! of their terms), in this order.
 //!
 //! | | jog, throw | five actions | C | all 134 |
 //! |---|---|---|---|---|
@@ -107,7 +102,7 @@
 //! # A cap on distances
 //!
 //! `max_distance_cells` 4 or 8 changes little on synthetic people: 43.2 and 43.8 against 43.4 on 44
-//! instants before the cameras of `HumanEva-I` and UMPM. On the 14 frames of the balancing person, 4
+//! instants in front of the cameras of `HumanEva-I` and UMPM. On the 14 frames of the balancing person, 4
 //! reduces the result (68.5 against 73.2). The default is no cap, which is the paper's form; a
 //! deployment can set one.
 #![forbid(unsafe_code)]

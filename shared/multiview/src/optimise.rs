@@ -40,8 +40,7 @@ pub struct PairEstimate {
     /// True if the poses had converged at the end.
     pub converged: bool,
     /// For each part of the first view, true if its consistency terms were switched on. For `Released`, these are the switches while the
-    /// first
-    /// view was the support; those of the second view as a support are not included.
+    /// first view was the support; those of the second view as a support are not included.
     pub active: Vec<bool>,
     /// The pose in the first and in the second view; parts are named by the model, not exchanged.
     pub poses: [Pose; 2],

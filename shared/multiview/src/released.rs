@@ -2,12 +2,11 @@
 //!
 //! Three points that the description calls bugs are corrected:
 //!
-//! * A support outside its table adds
-//!   nothing (the program draws a line around the top-left corner).
-//! * The rescue of a part that both
-//!   views would switch off checks that part (the program checks part 1).
-//! * A type that did not occur
-//!   in training adds nothing (the program's table holds NaN).
+//! * A support outside its table adds nothing (the program draws a line around the top-left
+//!   corner).
+//! * The rescue of a part that both views would switch off checks that part (the program checks
+//!   part 1).
+//! * A type that did not occur in training adds nothing (the program's table holds NaN).
 
 use fmp::{ExtraTerms, Pose};
 use nalgebra::{Matrix3, Vector3};

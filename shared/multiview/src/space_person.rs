@@ -16,19 +16,18 @@ pub struct SolvedPerson {
     /// The joints.
     pub pose: SpacePose,
     /// For every view, whether the names of left and right were exchanged, for the arms and for the legs. `None` for a view that was left
-    /// out
-    /// because it contradicts all others.
+    /// out because it contradicts all others.
     pub views: Vec<Option<[bool; 2]>>,
 }
 
 /// Solves for a person about whom nothing is known.
 ///
 /// 1. The places suggested by pairs of views, and the bones of people of any stature, give a first solution.
-/// 2. If it does not fit every view, left and right are exchanged in one view out of at least three, if that gives a better first solution.
-///    If left and right follow the picture ([`SpaceSettings::as_seen`]), every view may be exchanged
-///    relative to the first; then the views' evidence of the direction in which the person faces counts as well.
+/// 2. Unless the first solution fits every view: with three views or more, exchanging left and right in one view is tried. It is kept if it
+///    gives a better first solution. If left and right follow the picture ([`SpaceSettings::as_seen`]), every view may be exchanged
+///    relative to the first. Then the views' evidence of the direction in which the person faces counts as well.
 /// 3. The arms or the legs of a view are exchanged if they fit better that way.
-/// 4. If the first solution does not fit every view, views out of at least four are left out if they contradict all others: their camera
+/// 4. Unless the first solution fits every view: with four views or more, views that contradict all others are left out. Their camera
 ///    was moved, or they look at another person.
 /// 5. The bones of a person of the first solution's stature, and finer and finer grids, give the second solution.
 ///
@@ -131,8 +130,7 @@ impl<'a> FirstSolver<'a> {
     }
 
     /// The best first solution with any of the views except the first exchanged. With few views, all combinations are tried; otherwise,
-    /// views
-    /// are exchanged one after the other as long as that helps.
+    /// views are exchanged one after the other as long as that helps.
     ///
     /// * `best`: the solution with no view exchanged.
     fn as_seen(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {

@@ -6,8 +6,7 @@
 //! limits apply to every rig.
 //!
 //! The same input gives bit-identical results. The order of views and of detections has no effect: views are processed in the order of
-//! their
-//! cameras' names, and detections in the order of their pixel positions. The crate does not read the clock or any file.
+//! their cameras' names, and detections in the order of their pixel positions. The crate does not read the clock or any file.
 #![forbid(unsafe_code)]
 
 mod assignment;

@@ -129,7 +129,7 @@ const OUTLYING: f64 = 3.0;
 
 /// Triangulates the joint on which most of the rays agree, each weighted by its deviation and heat.
 ///
-/// Every two rays propose a place. The place with the most support from the other rays is chosen, then moved to minimise the squared
+/// Each pair of rays proposes a place. The place with the most support from the other rays is chosen, then moved to minimise the squared
 /// distances to the rays that agree with it.
 ///
 /// * `sights`: one for each view.

@@ -44,7 +44,7 @@ pub struct Solved {
     pub n_views: [usize; N],
 }
 
-/// State of a joint after the frames before.
+/// State of a joint after the earlier frames.
 #[derive(Debug, Clone, Copy)]
 struct Past {
     point: Point3<f64>,
@@ -54,7 +54,7 @@ struct Past {
     seen_s: f64,
 }
 
-/// State of a person after the frames before.
+/// State of a person after the earlier frames.
 #[derive(Debug, Clone, Default)]
 struct Knowledge {
     joints: [Option<Past>; N],

@@ -80,7 +80,7 @@ impl Track {
 
     /// Maximum distance of a matching detection, in metres.
     ///
-    /// * `gap_s`: time since the frame before, in seconds.
+    /// * `gap_s`: time since the previous frame, in seconds.
     pub(crate) fn reach(&self, time_s: f64, gap_s: f64) -> f64 {
         let unseen_s = (time_s - self.placed_s).clamp(0.0, LONGEST_S);
         let rare_s = (gap_s - SOON_S).clamp(0.0, LONGEST_S);

@@ -44,9 +44,8 @@ const VIEWS_AT_ONCE: usize = 3;
 /// 3. It groups the remaining detections: detections of different views whose rays pass close to each other are one person.
 /// 4. A detection that contradicts its person goes back to step 3, once. A group without the bone lengths of a person is rejected.
 /// 5. A new person must be seen by three views, or by all views if there are fewer. The person is confirmed after three of five frames, or
-///    at
-///    once if no known person is seen. A person who was not seen for a second is dropped. Within a minute, the tracker can recognise this
-///    person by the bones and the colour of the trunk.
+///    at once if no known person is seen. A person who was not seen for a second is dropped. Within a minute, the tracker can recognise
+///    this person by the bones and the colour of the trunk.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     cameras: Vec<Camera>,
@@ -64,7 +63,7 @@ pub struct Tracker {
 struct Now<'a> {
     frame: &'a Frame,
     time_s: f64,
-    /// Time since the frame before, in seconds.
+    /// Time since the previous frame, in seconds.
     gap_s: f64,
     expected: &'a [Joints],
 }

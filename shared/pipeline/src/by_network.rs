@@ -96,10 +96,10 @@ impl NetworkEstimator {
         }
     }
 
-    /// Estimates a frame. The result depends on the frames before. Views run in parallel on the current rayon pool; the result
+    /// Estimates a frame. The result depends on the earlier frames. Views run in parallel on the current rayon pool; the result
     /// does not depend on the number of threads.
     ///
-    /// * `frame`: number of the frame; larger than that of the frame before.
+    /// * `frame`: number of the frame; larger than that of the previous frame.
     /// * `frames`: one per view; `None` for a missing view.
     ///
     /// # Errors

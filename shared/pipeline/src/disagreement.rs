@@ -37,9 +37,8 @@ pub(crate) struct FoundByViews<'a> {
 ///
 /// Each view is represented by its nearest candidate, with sides as labelled or exchanged. A view that did not contribute also counts if it
 /// sees a person clearly. Views that show another person are ignored if at least two other views agree. The function sets the residuals of
-/// every
-/// joint and their root mean square. It also adds the disagreement of the two views that agree best on a joint to the joint's covariance
-/// (docs/method/three-d.md).
+/// every joint and their root mean square. It also adds the disagreement of the two views that agree best on a joint to the joint's
+/// covariance (docs/method/three-d.md).
 ///
 /// * `motion`: motion of the solution in the views.
 pub(crate) fn measure(

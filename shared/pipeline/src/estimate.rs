@@ -110,7 +110,7 @@ impl Estimator {
         &self.plans
     }
 
-    /// Estimates the next frame. If poses are tracked, the result depends on the frames before.
+    /// Estimates the next frame. If poses are tracked, the result depends on the earlier frames.
     /// Views and pairs run in parallel on the current rayon pool; the result does not depend on the
     /// number of threads.
     ///

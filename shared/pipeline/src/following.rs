@@ -12,7 +12,7 @@ use crate::view_result::ViewResult;
 /// Rule for choosing which of several people to follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Follow {
-    /// The person nearest to the followed person of the frame before; in the first frame, the clearest person.
+    /// The person nearest to the followed person of the previous frame; in the first frame, the clearest person.
     #[default]
     Last,
     /// The person who is largest in the pictures.
@@ -21,7 +21,7 @@ pub enum Follow {
     Clearest,
 }
 
-/// Maximum distance of the followed person from the place in the frame before, in metres, and its growth for every frame
+/// Maximum distance of the followed person from the place in the previous frame, in metres, and its growth for every frame
 /// without the person.
 const REACH_M: f64 = 1.0;
 const REACH_PER_FRAME_M: f64 = 0.1;

@@ -60,7 +60,7 @@ fn best_box(outlines: &[[f64; 4]], outline: [f64; 4]) -> Option<usize> {
     best.filter(|best| best.1 > SAME).map(|best| best.0)
 }
 
-/// Returns the pace of a person of the frame before, updated by another look.
+/// Returns the pace of a person of the previous frame, updated by another look.
 ///
 /// * `n_frames`: number of frames from the last look to this one.
 fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>) -> Option<Pace> {
@@ -69,11 +69,10 @@ fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>
 }
 
 impl Looks<'_> {
-    /// Holds the people of the frame before who stand still: their last sight is reused. The first person is looked at in every frame, and
-    /// so
-    /// is a person behind a larger one.
+    /// Holds the people of the previous frame who stand still: their last sight is reused. The first person is looked at in every frame,
+    /// and so is a person behind a larger one.
     ///
-    /// * `before`: the people of the frame before; the entries of held people are overwritten.
+    /// * `before`: the people of the previous frame; the entries of held people are overwritten.
     pub(crate) fn hold_still(
         &self,
         tracks: &mut [Track],
@@ -99,11 +98,10 @@ impl Looks<'_> {
         }
     }
 
-    /// Looks at a person of the frame before who has not been seen yet in this frame. If a search ran in this frame, only the last box is
-    /// used.
-    /// Otherwise, the box is enlarged if the last frame is long ago, or if the last pose was doubtful.
+    /// Looks at a person of the previous frame who has not been seen yet in this frame. If a search ran in this frame, only the last box is
+    /// used. Otherwise, the box is enlarged if the last frame is long ago, or if the last pose was doubtful.
     ///
-    /// * `before`: the people of the frame before.
+    /// * `before`: the people of the previous frame.
     pub(crate) fn see_once_more(
         &self,
         track: &Track,
@@ -123,8 +121,7 @@ impl Looks<'_> {
     }
 
     /// Looks into the boxes of a detector, each of which shows one person. A single box may fit badly, so the step looks closer into it.
-    /// With
-    /// several boxes, a closer look would end at the person in front.
+    /// With several boxes, a closer look would end at the person in front.
     ///
     /// * `outlines`: the boxes, nearest person first.
     pub(crate) fn see_boxes(
@@ -179,7 +176,7 @@ impl Looks<'_> {
 
     /// Looks at the person in a box behind known people, who are painted over.
     ///
-    /// * `usual_score`: usual score of the person, if known from the frame before.
+    /// * `usual_score`: usual score of the person, if known from the previous frame.
     fn see_behind(
         &self,
         boxed: ([f64; 4], Turn),
@@ -226,10 +223,10 @@ impl Looks<'_> {
         Ok(Some(best))
     }
 
-    /// Reuses the last sight of a person of the frame before who has hardly moved; returns true if the person was added.
+    /// Reuses the last sight of a person of the previous frame who has hardly moved; returns true if the person was added.
     ///
     /// * `n_held`: number of frames since the last look.
-    /// * `before`: the sight of the person in the frame before; overwritten.
+    /// * `before`: the sight of the person in the previous frame; overwritten.
     fn hold(
         &self,
         track: &Track,
@@ -253,7 +250,7 @@ impl Looks<'_> {
         is_new
     }
 
-    /// Looks at a person of the frame before in the same box and in a wider box, unless somebody is already known there. Keeps
+    /// Looks at a person of the previous frame in the same box and in a wider box, unless somebody is already known there. Keeps
     /// the best sight if it is good.
     fn see_wider(&self, track: &Track, memory: &mut NetworkMemory) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
@@ -269,8 +266,7 @@ impl Looks<'_> {
     }
 
     /// Looks around the old box of a person last seen many frames ago, unless somebody is already known there. Keeps a person who is seen
-    /// well
-    /// and whose score is not much below the usual one.
+    /// well and whose score is not much below the usual one.
     ///
     /// * `around`: the box, enlarged for the time that has passed.
     fn see_later(
@@ -292,11 +288,10 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at a person of the frame before, unless somebody is already known there. If the person has moved far, looks closer, which
-    /// takes
-    /// some time. If the person lies down or gets up, looks with the picture rotated. Keeps a person who is seen well.
+    /// Looks at a person of the previous frame, unless somebody is already known there. If the person has moved far, looks closer, which
+    /// takes some time. If the person lies down or gets up, looks with the picture rotated. Keeps a person who is seen well.
     ///
-    /// * `before`: the sight of the person in the frame before.
+    /// * `before`: the sight of the person in the previous frame.
     fn see_again(
         &self,
         track: &Track,

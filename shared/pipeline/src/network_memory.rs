@@ -33,7 +33,7 @@ pub struct NetworkMemory {
     /// The people of this frame; entries beyond `n_seen` are spare memory.
     pub(crate) seen: Vec<Seen>,
     pub(crate) n_seen: usize,
-    /// The people of the frame before.
+    /// The people of the previous frame.
     pub(crate) before: Vec<Seen>,
     /// Boxes of the detector in which nobody was seen.
     pub(crate) empty: Vec<Empty>,
@@ -84,7 +84,7 @@ pub(crate) struct Seen {
     pub(crate) outline: [f64; 4],
     /// Rotation of the picture for the network.
     pub(crate) turn: Turn,
-    /// Usual score of the person's poses in the frames before; `None` for a new person.
+    /// Usual score of the person's poses in the earlier frames; `None` for a new person.
     pub(crate) usual_score: Option<f32>,
     /// Mean heat of the joints at their peaks, 0 to 1.
     pub(crate) heat: f64,
@@ -134,7 +134,7 @@ impl NetworkMemory {
 
     /// Notes whether people are near each other in this frame, or their number changed.
     ///
-    /// * `n_before`: number of people in the frame before.
+    /// * `n_before`: number of people in the previous frame.
     /// * `n_frames`: number of frames with frequent searches after such an event.
     pub(crate) fn note_company(&mut self, n_before: usize, n_frames: u64) {
         let people = self.people();
@@ -161,10 +161,8 @@ impl NetworkMemory {
     }
 
     /// Begins a frame. If the last frame is long ago, because frames were dropped or lost, people are first looked for around their old
-    /// boxes.
-    /// If it is very long ago, the whole picture is searched, unless the last frame was searched as well. Otherwise, a slow search could
-    /// cause
-    /// a search in every frame.
+    /// boxes. If it is very long ago, the whole picture is searched, unless the last frame was searched as well. Otherwise, a slow search
+    /// could cause a search in every frame.
     ///
     /// * `frame`: number of the frame.
     /// * `most_apart`: maximum number of frames after which people can still be expected in their boxes.

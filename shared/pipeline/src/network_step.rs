@@ -109,12 +109,10 @@ impl NetworkStep {
 
     /// Looks at a frame, and stores the result in the memory ([`Self::sightings`], [`Self::evidence`]).
     ///
-    /// People who stand still are held. In a frame with a search, the detector's boxes come before the boxes of the frame before, so that
-    /// no box
-    /// shrinks or drifts unnoticed. A person whose pose was much worse than usual is also looked at in a wider box, and the better sight is
-    /// kept.
-    /// The step looks at up to twice as many people as it keeps, and keeps the largest. While somebody is seen, empty boxes are skipped in
-    /// some searches.
+    /// People who stand still are held. In a frame with a search, the detector's boxes come before the boxes of the previous frame, so that
+    /// no box shrinks or drifts unnoticed. A person whose pose was much worse than usual is also looked at in a wider box, and the better
+    /// sight is kept. The step looks at up to twice as many people as it keeps, and keeps the largest. While somebody is seen, empty boxes
+    /// are skipped in some searches.
     ///
     /// # Errors
     ///

@@ -45,8 +45,7 @@ pub(crate) struct Person {
     /// Middle of the trunk, metres in the world.
     pub place: Point3<f64>,
     /// Sum over the views of how clearly they see the person. A view counts the score of its candidate above the weakest third, reduced
-    /// with
-    /// the distance from the projected person.
+    /// with the distance from the projected person.
     pub strength: f64,
     /// Size in the pictures, in pixels of the frame: longer side of the rectangle around the parts, averaged over the views
     /// that see the person.
@@ -156,11 +155,10 @@ impl Found {
 
 /// Finds the people of a frame; the person whom most views see most clearly comes first.
 ///
-/// Every two candidates of two views are placed in space by their midlines. A plausible person is searched for in the other views until
+/// Each pair of candidates of two views is placed in space by the midlines. A plausible person is searched for in the other views until
 /// nothing changes. The strongest group is the first person. Each other group is a person if it is apart from all earlier ones in space,
-/// and
-/// in all pictures but one. A person must be seen by three views, or by both views of two, and be at least 0.28 times as strong as
-/// the first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this method is our own.
+/// and in all pictures but one. A person must be seen by three views, or by both views of two, and be at least 0.28 times as strong as the
+/// first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this method is our own.
 ///
 /// * `cameras`, `views`: the cameras of the views, and the candidates of each view.
 pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {

@@ -23,7 +23,7 @@ use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
 /// Minimum number of joints of a person that two views must see well; half of a person is often hidden. Measured: in six empty rooms, the
-/// seventh best joint had a heat of at most 0.41 in two views. With people who stood, sat or ran before three or four cameras, it had
+/// seventh best joint had a heat of at most 0.41 in two views. With people who stood, sat or ran in front of three or four cameras, it had
 /// at least 0.58.
 const WELL_SEEN: usize = 7;
 /// Minimum number of a person's joints that a view must see to contribute.
@@ -47,7 +47,7 @@ pub(crate) struct FrameViews<'f, 'a> {
     pub(crate) people: &'f FramePeople,
 }
 
-/// The step for one person; remembers sides, bone lengths and motion from the frames before.
+/// The step for one person; remembers sides, bone lengths and motion from the earlier frames.
 #[derive(Debug)]
 pub(crate) struct PersonStep {
     rig: Arc<Rig>,
@@ -309,8 +309,7 @@ fn front_seen(sighting: &Sighting) -> FrontEvidence {
         return FrontEvidence::default();
     }
     // A person in a handstand was upright for the network. For a lying person, the network's evidence says nothing about up and down in
-    // the
-    // picture.
+    // the picture.
     let weight = sighting.trunk_upward().unwrap_or(1.0).powi(2) as f32;
     sighting.front.map(|told| weight * told)
 }

@@ -22,7 +22,7 @@ pub struct BodySettings {
     pub check: bool,
     /// Move joints so that the bones have the lengths of people: a prior in triangulation.
     pub prior: bool,
-    /// Let the prior learn this person's bone lengths from the frames before.
+    /// Let the prior learn this person's bone lengths from the earlier frames.
     pub learn: bool,
     /// Weight of a skeleton's deviation from a person in the choice among assumptions: score per squared standard
     /// deviation ([`skeleton::body::deviation`]).

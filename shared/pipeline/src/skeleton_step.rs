@@ -63,7 +63,7 @@ struct Frame<'a> {
     is_alone: bool,
 }
 
-/// The skeleton step for a rig; remembers the facing of the frame before.
+/// The skeleton step for a rig; remembers the facing of the previous frame.
 #[derive(Debug)]
 pub struct SkeletonStep {
     space: Space,

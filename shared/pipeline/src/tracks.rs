@@ -79,8 +79,7 @@ impl Track {
     /// Returns where to look for a person next.
     ///
     /// The result is the box around the pose, but sides move inward step by step. So if a pose leaves out the head or a leg in one frame,
-    /// the
-    /// next box still contains it. A pose that is much worse than usual moves no side.
+    /// the next box still contains it. A pose that is much worse than usual moves no side.
     ///
     /// * `looked_at`: the box of this frame, and the rotation of the picture; `usual_score`: usual score of the person's poses; `None` for
     ///   a new person.
@@ -122,7 +121,7 @@ impl Track {
     }
 }
 
-/// Returns a box that shows more around a person of the frame before.
+/// Returns a box that shows more around a person of the previous frame.
 pub(crate) fn wider(outline: [f64; 4]) -> [f64; 4] {
     enlarged(outline, WIDER)
 }

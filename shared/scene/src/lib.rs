@@ -10,10 +10,10 @@
 //!
 //! # How it works
 //!
-//! A person is a union of some forty smooth solids on the bones of an anatomical skeleton. The surface is
-//! created once and follows the bones. Every corner of its small triangles is projected by the camera itself,
-//! including distortion. A z-buffer with four samples per pixel determines the visible surface. The room is rendered by casting rays
-//! through the same camera; it does not move, so this is done once per camera. One lamp casts soft shadows.
+//! A person is a union of some forty smooth solids on the bones of an anatomical skeleton. The surface is created once and follows the
+//! bones. Every corner of its small triangles is projected by the camera itself, including distortion. A z-buffer with four samples per
+//! pixel determines the visible surface. The room is rendered by casting rays through the same camera; it does not move, so this is done
+//! once per camera. One lamp casts soft shadows.
 //!
 //! Published software renderers (`euc`, `retrofire`) do not support lens distortion and are larger than `raster`.
 #![forbid(unsafe_code)]

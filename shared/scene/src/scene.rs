@@ -60,8 +60,7 @@ pub struct Scene {
 }
 
 /// Thickness of the body around a joint. A surface that is nearer to the camera by more than this occludes the joint. In metres for a
-/// person
-/// of 1.75 m, in the order of `skeleton::PARSE14`.
+/// person of 1.75 m, in the order of `skeleton::PARSE14`.
 const TISSUE: [f64; N_JOINTS] = [
     0.07, 0.085, 0.16, 0.16, 0.085, 0.07, 0.055, 0.07, 0.10, 0.10, 0.07, 0.055, 0.10, 0.13,
 ];

@@ -18,10 +18,9 @@
 //!
 //! # What is published, and what is our own choice
 //!
-//! Published: the shares of the stature and their spread among adults, and the statures of adults and children. Our own choice:
-//! the shares of a small child (derived from published data, see [`Kind::proportion`]), the differences between detectors
-//! and data sets in placing a joint ([`Proportion::place`]), the effect of posture ([`Proportion::posture`]), and the
-//! error of a measured length ([`MEASUREMENT_SD`]).
+//! Published: the shares of the stature and their spread among adults, and the statures of adults and children. Our own choice: the shares
+//! of a small child (derived from published data, see [`Kind::proportion`]), the differences between detectors and data sets in placing a
+//! joint ([`Proportion::place`]), the effect of posture ([`Proportion::posture`]), and the error of a measured length ([`MEASUREMENT_SD`]).
 //! The limits are deliberately wide: the detector's error is 5 to 15 cm, and joints that count as impossible are removed.
 
 mod bone;

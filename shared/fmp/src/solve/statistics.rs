@@ -18,7 +18,7 @@ pub struct SolveStatistics {
     pub entries_offered: u64,
     /// Number of message entries on the levels that bounds could not rule out.
     pub entries_solved: u64,
-    /// Number of message entries that were computed because they could not be kept from the solution before.
+    /// Number of message entries that were computed because they could not be kept from the previous solution.
     pub entries_computed: u64,
 }
 

@@ -9,10 +9,10 @@ const MOST: usize = 1000;
 impl Solver {
     /// Every pose whose root scores at least the threshold, without those that overlap a better pose.
     ///
-    /// This is the reference programs' rule: of the 1000 best candidates, a candidate is dropped if it overlaps a
-    /// picked one by more than `overlap`. The overlap of two candidates is the largest share
-    /// of a box of the picked candidate that the same box of the other covers. It is taken over all parts and the rectangle
-    /// around all parts. The result is sorted best first; ties are resolved as in [`Self::best`].
+    /// This is the reference programs' rule: of the 1000 best candidates, a candidate is dropped if it overlaps a picked one by more than
+    /// `overlap`. The overlap of two candidates is the largest share of a box of the picked candidate that the same box of the other
+    /// covers. It is taken over all parts and the rectangle around all parts. The result is sorted best first; ties are resolved as in
+    /// [`Self::best`].
     ///
     /// # Panics
     ///

@@ -33,9 +33,8 @@ pub enum Angle {
     ShoulderElevation(Side),
     /// Plane of elevation: 0 sideways (abduction), 90 forwards (flexion).
     ShoulderPlane(Side),
-    /// Inward rotation of the elbow's bending axis about the upper arm, relative to its position after the first two rotations. It is 0
-    /// for an arm held out sideways with the forearm forwards. For hanging arms, neither the plane of elevation
-    /// nor this angle is defined.
+    /// Inward rotation of the elbow's bending axis about the upper arm, relative to its position after the first two rotations. It is 0 for
+    /// an arm held out sideways with the forearm forwards. For hanging arms, neither the plane of elevation nor this angle is defined.
     ShoulderRotation(Side),
     /// Angle between upper arm and forearm, 0 if straight.
     ElbowFlexion(Side),
@@ -238,8 +237,7 @@ fn shoulder_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
     // After mirroring, the left arm equals the right one. A hanging arm bends forwards about an axis that points outwards.
     let hinge = arm.cross(&forearm).try_normalize(LEAST_BEND)?;
     // The arm is elevated about x for abduction (plane 0), and about -z for flexion (plane 90). Without a third rotation, the elbow's
-    // bending
-    // axis stays perpendicular to this axis.
+    // bending axis stays perpendicular to this axis.
     let (sin, cos) = arm.x.atan2(arm.z).sin_cos();
     let neutral = arm.cross(&Vector3::new(cos, 0.0, -sin));
     let turn = arm.dot(&neutral.cross(&hinge)).atan2(neutral.dot(&hinge));

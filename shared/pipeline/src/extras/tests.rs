@@ -1,4 +1,4 @@
-//! A person with a nose and toes before cameras on a circle.
+//! A person with a nose and toes in front of cameras on a circle.
 
 use geometry::TriangulateError;
 use multiview::FusedPose;

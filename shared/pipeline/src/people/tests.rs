@@ -1,4 +1,4 @@
-//! Simulated people before cameras on a circle.
+//! Simulated people in front of cameras on a circle.
 
 use geometry::{Intrinsics, Lens, LensModel};
 use nalgebra::Isometry3;

@@ -1,4 +1,4 @@
-//! People who stand before cameras on a circle.
+//! People who stand in front of cameras on a circle.
 
 use nalgebra::Point3;
 

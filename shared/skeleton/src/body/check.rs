@@ -29,11 +29,16 @@ const MOST: f64 = 10.0;
 
 /// Judges a skeleton.
 ///
-/// A skeleton is not a person's in any of these cases: it has fewer than [`MIN_BONES`] bones; its stature is outside [`STATURES`], or more
-/// than
-/// 28 % from that of the learned lengths; more than half of its bones are impossible. Otherwise, every impossible
-/// bone loses its worst joint, until the rest is possible. The worst joint is the one that also makes other bones impossible. In a tie,
-/// it is the one farther from the trunk, and then the one with the larger covariance. These are impossible:
+/// A skeleton is not a person's if
+///
+/// * it has fewer than [`MIN_BONES`] bones,
+/// * its stature is outside [`STATURES`], or more than 28 % from that of the learned lengths, or
+/// * more than half of its bones are impossible.
+///
+/// Otherwise, every impossible bone loses its worst joint, until the rest is possible. The worst joint is the one that also makes other
+/// bones impossible. In a tie, it is the one farther from the trunk, and then the one with the larger covariance.
+///
+/// These are impossible:
 ///
 /// * a bone whose length is more than [`LIMIT`] standard deviations from the length expected for the stature, or from the
 ///   learned length;

@@ -20,8 +20,7 @@ pub struct Learned {
     /// The length, in metres; a median over frames.
     pub metres: f64,
     /// Standard deviation of that median, in metres. It is the deviation of single frames (from the median absolute deviation) divided by
-    /// the
-    /// square root of their effective number; [`MAX_FRAMES`] frames count as 16.
+    /// the square root of their effective number; [`MAX_FRAMES`] frames count as 16.
     pub sd: f64,
 }
 

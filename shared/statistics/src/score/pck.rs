@@ -14,9 +14,9 @@ pub const PCK_GROUPS: [(&str, [usize; 2]); 7] = [
 
 /// Returns which joints are found: those at most `share` of the person's size from the truth.
 ///
-/// The size is the longer side of the rectangle around the true joints plus 1 px, since the pixels
-/// at both ends belong to it (Yang & Ramanan 2013, section 6.2, and their released code). They use a `share` of 0.1 for
-/// PARSE and 0.2 for BUFFY. A joint that is NaN in `found` is not found.
+/// The size is the longer side of the rectangle around the true joints plus 1 px, since the pixels at both ends belong to it (Yang &
+/// Ramanan 2013, section 6.2, and their released code). They use a `share` of 0.1 for PARSE and 0.2 for BUFFY. A joint that is NaN in
+/// `found` is not found.
 ///
 /// * `found`, `truth`: the same joints, in pixels.
 pub fn joints_found<const N: usize>(
