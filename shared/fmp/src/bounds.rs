@@ -43,17 +43,17 @@ impl Bounds {
         Self(of_levels)
     }
 
-    /// The bound of every level, offered or not.
+    /// Returns the bound of every level, offered or not.
     pub fn levels(&self) -> &[Bound] {
         &self.0
     }
 
-    /// Number of levels, offered or not.
+    /// Returns the number of levels, offered or not.
     pub fn n_levels(&self) -> usize {
         self.0.len()
     }
 
-    /// Upper bound of the score of a pose on a level under terms that add at most `gain` (the sum
+    /// Returns the upper bound of the score of a pose on a level under terms that add at most `gain` (the sum
     /// over the parts, and the sum of its absolute values), for poses that score at least `lowest`.
     /// Not finite if unknown.
     ///
@@ -95,7 +95,7 @@ impl Upper {
         self.most < f64::from(lowest)
     }
 
-    /// Maximum loss of a pose against the bound without scoring less than `lowest`.
+    /// Returns the maximum loss of a pose against the bound without scoring less than `lowest`.
     ///
     /// If one term of a pose has a given value, the bound of the pose is [`Self::most`], minus that
     /// term's bound, plus the value. The value itself can be as large as the loss, and adds as much

@@ -185,7 +185,7 @@ impl Extractor {
         lock(&self.buffers).push(buffers);
     }
 
-    /// Number of responses.
+    /// Returns the number of responses.
     fn work(&self, source: &Source<'_>, part: &Part) -> usize {
         let windows = part.levels.clone();
         let windows = windows.map(|level| source.layout.window(source.scope, level));

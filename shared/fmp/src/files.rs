@@ -159,7 +159,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
     Ok(spec)
 }
 
-/// The first characters of a file; unprintable characters become dots.
+/// Returns the first characters of a file; unprintable characters become dots.
 fn beginning(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(16)]);
     let shown = |letter: char| {

@@ -121,27 +121,27 @@ impl Layout {
         })
     }
 
-    /// Number of response values of all levels and filters.
+    /// Returns the number of response values of all levels and filters.
     pub fn n_responses(&self) -> usize {
         self.levels.last().map_or(0, |level| {
             level.offset + level.rows * level.cols * self.n_filters
         })
     }
 
-    /// The position of a filter's response map in the array of responses.
+    /// Returns the position of a filter's response map in the array of responses.
     pub fn map_range(&self, level: usize, filter: usize) -> Range<usize> {
         let it = &self.levels[level];
         let start = it.offset + filter * it.rows * it.cols;
         start..start + it.rows * it.cols
     }
 
-    /// Centre of a filter placed on a level, in pixels of the image; the centre of the top-left pixel is (0, 0).
+    /// Returns the centre of a filter placed on a level, in pixels of the image; the centre of the top-left pixel is (0, 0).
     pub fn centre(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 2] {
         let [x1, y1, x2, y2] = self.part_box(level, filter, at);
         [f64::midpoint(x1, x2), f64::midpoint(y1, y2)]
     }
 
-    /// Box `[x1, y1, x2, y2]` of a filter placed on a level; see [`Self::centre`].
+    /// Returns the box `[x1, y1, x2, y2]` of a filter placed on a level; see [`Self::centre`].
     ///
     /// `x1 = (x - pad) s`, `x2 = x1 + cols s - 1`, where `s` is the level's scale. These are the reference
     /// programs' boxes minus 1, since the programs count pixels from 1.
@@ -153,7 +153,7 @@ impl Layout {
         [x1, y1, x1 + cols - 1.0, y1 + rows - 1.0]
     }
 
-    /// Centre of a filter placed on a level, in pixels counted from 1. It uses the reference programs' order
+    /// Returns the centre of a filter placed on a level, in pixels counted from 1. It uses the reference programs' order
     /// of operations, for code that must round a centre as they do.
     pub fn centre_from_one(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 2] {
         let scale = self.levels[level].scale;

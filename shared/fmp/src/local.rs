@@ -63,7 +63,7 @@ mod tests {
         Springs,
     };
 
-    /// A model with a root of two types, and a child of one type.
+    /// Returns a model with a root of two types, and a child of one type.
     fn model() -> Model {
         let filter = Filter {
             rows: 3,

@@ -209,27 +209,27 @@ impl Model {
         &self.0
     }
 
-    /// Number of parts.
+    /// Returns the number of parts.
     pub fn n_parts(&self) -> usize {
         self.0.parts.len()
     }
 
-    /// Number of types of a part.
+    /// Returns the number of types of a part.
     pub fn n_types(&self, part: usize) -> usize {
         self.0.parts[part].filter_of_type.len()
     }
 
-    /// Number of filters.
+    /// Returns the number of filters.
     pub fn n_filters(&self) -> usize {
         self.0.filters.len()
     }
 
-    /// The filter of a part's type.
+    /// Returns the filter of a part's type.
     pub fn filter(&self, part: usize, mixture: usize) -> &Filter {
         &self.0.filters[self.0.parts[part].filter_of_type[mixture]]
     }
 
-    /// Largest `[rows, cols]` over all filters, cells.
+    /// Returns the largest `[rows, cols]` over all filters, cells.
     pub fn max_filter(&self) -> [usize; 2] {
         let largest = |side: fn(&Filter) -> usize| self.0.filters.iter().map(side).max();
         [

@@ -14,7 +14,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Centre of a part's box, in pixels of the image; the centre of the top-left pixel is (0, 0).
+    /// Returns the centre of a part's box, in pixels of the image; the centre of the top-left pixel is (0, 0).
     pub fn centre(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -25,7 +25,7 @@ impl Pose {
         )
     }
 
-    /// Centre of a part, pixels counted from 1; see [`Layout::centre_from_one`].
+    /// Returns the centre of a part, pixels counted from 1; see [`Layout::centre_from_one`].
     pub fn centre_from_one(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -33,12 +33,12 @@ impl Pose {
         layout.centre_from_one(usize::from(self.level), filter, placement)
     }
 
-    /// Centres of all parts; see [`Self::centre`].
+    /// Returns the centres of all parts; see [`Self::centre`].
     pub fn centres(&self, model: &Model, layout: &Layout) -> Vec<[f64; 2]> {
         (0..self.parts.len()).map(|part| self.centre(model, layout, part)).collect()
     }
 
-    /// Box `[x1, y1, x2, y2]` of a part, in pixels of the image; both corners belong to the box.
+    /// Returns the box `[x1, y1, x2, y2]` of a part, in pixels of the image; both corners belong to the box.
     pub fn part_box(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 4] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -49,7 +49,7 @@ impl Pose {
         )
     }
 
-    /// The smallest box `[x1, y1, x2, y2]` around the boxes of all parts; see [`Self::part_box`].
+    /// Returns the smallest box `[x1, y1, x2, y2]` around the boxes of all parts; see [`Self::part_box`].
     pub fn bounding_box(&self, model: &Model, layout: &Layout) -> [f64; 4] {
         let boxes = (0..self.parts.len()).map(|part| self.part_box(model, layout, part));
         boxes

@@ -43,7 +43,7 @@ impl<'a> FeaturePyramid<'a> {
         pyramid
     }
 
-    /// The padded features of a level. The response of a filter at `(x, y)` is the sum of its
+    /// Returns the padded features of a level. The response of a filter at `(x, y)` is the sum of its
     /// products with the cells starting at row `y` and column `x`.
     ///
     /// # Panics

@@ -73,27 +73,27 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// The bounds that came with the responses.
+    /// Returns the bounds that came with the responses.
     pub fn bounds(&self) -> Option<&'a Bounds> {
         self.bounds
     }
 
-    /// The layout of the cells.
+    /// Returns the layout of the cells.
     pub fn layout(&self) -> &'a Layout {
         self.layout
     }
 
-    /// The levels with valid values, in ascending order.
+    /// Returns the levels with valid values, in ascending order.
     pub fn levels(&self) -> &'a [u16] {
         self.levels
     }
 
-    /// The part of the layout that the values cover.
+    /// Returns the part of the layout that the values cover.
     pub fn scope(&self) -> &Scope {
         &self.scope
     }
 
-    /// The cells of a level that have values.
+    /// Returns the cells of a level that have values.
     pub fn window(&self, level: usize) -> Window {
         self.layout.window(&self.scope, level)
     }
@@ -104,13 +104,13 @@ impl<'a> Responses<'a> {
             && self.window(usize::from(pose.level)).contains_all(pose)
     }
 
-    /// The response maps of all filters of a level, one after the other, each with the size of the window,
+    /// Returns the response maps of all filters of a level, one after the other, each with the size of the window,
     /// row major.
     pub fn maps(&self, level: usize) -> &'a [f32] {
         &self.values[self.layout.maps_in(&self.scope, level)]
     }
 
-    /// The response map of a filter: the rows and columns of [`Self::window`], row major.
+    /// Returns the response map of a filter: the rows and columns of [`Self::window`], row major.
     pub fn map(&self, level: usize, filter: usize) -> &'a [f32] {
         let maps = self.maps(level);
         let area = maps.len() / self.layout.n_filters;

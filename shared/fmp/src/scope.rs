@@ -93,7 +93,7 @@ impl Scope {
         })
     }
 
-    /// All levels and the whole image.
+    /// Returns all levels and the whole image.
     pub fn whole(layout: &Layout) -> Self {
         let [width, height] = layout.image_size.map(|image_size| image_size as u32);
         Self {
@@ -106,19 +106,19 @@ impl Scope {
         }
     }
 
-    /// The levels.
+    /// Returns the levels.
     pub fn levels(&self) -> Range<u16> {
         self.levels[0]..self.levels[1]
     }
 
-    /// The region.
+    /// Returns the region.
     pub fn region(&self) -> Region {
         self.region
     }
 }
 
 impl Layout {
-    /// The cells of a level in a scope: those at which the centre of the largest filter is in the
+    /// Returns the cells of a level in a scope: those at which the centre of the largest filter is in the
     /// region, and the next ones outside it. If the region ends at the border of the image, all remaining
     /// cells are included. There is at least one cell.
     pub fn window(&self, scope: &Scope, level: usize) -> Window {
@@ -156,13 +156,13 @@ impl Layout {
         }
     }
 
-    /// Number of response values of all levels and filters of a scope.
+    /// Returns the number of response values of all levels and filters of a scope.
     pub fn n_values(&self, scope: &Scope) -> usize {
         let levels = usize::from(scope.levels[0])..usize::from(scope.levels[1]);
         self.values_of(scope, levels)
     }
 
-    /// The position of a level's response maps in the array of a scope's responses, which is
+    /// Returns the position of a level's response maps in the array of a scope's responses, which is
     /// `[level][filter][row][col]` without gaps.
     pub fn maps_in(&self, scope: &Scope, level: usize) -> Range<usize> {
         let before = self.values_of(scope, usize::from(scope.levels[0])..level);

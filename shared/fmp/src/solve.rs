@@ -34,16 +34,16 @@ pub trait ExtraTerms: Sync {
     ///   does not depend on which other cells are requested.
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool;
 
-    /// Score added to every placement of this type of the part.
+    /// Returns the score added to every placement of this type of the part.
     fn of_type(&self, part: usize, mixture: usize) -> f32;
 
-    /// An upper bound of the sum of both terms for any placement of the part. The
+    /// Returns an upper bound of the sum of both terms for any placement of the part. The
     /// [`IncrementalSolver`] uses it to prune levels and poses. Infinite if unknown.
     fn max_gain(&self, _part: usize) -> f32 {
         f32::INFINITY
     }
 
-    /// A key of everything on which the part's terms depend and that can change during the life of an
+    /// Returns a key of everything on which the part's terms depend and that can change during the life of an
     /// [`IncrementalSolver`]: equal keys mean equal terms. `None` if the terms can always change.
     fn key(&self, _part: usize) -> Option<u64> {
         None
@@ -129,12 +129,12 @@ impl Solver {
         }
     }
 
-    /// The model of the solver.
+    /// Returns the model of the solver.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
 
-    /// The best pose over the offered levels, with the extra terms if there are any.
+    /// Returns the best pose over the offered levels, with the extra terms if there are any.
     ///
     /// The result is exact among the poses whose parts are all on cells with values. Ties of the root go to the
     /// lower level, then to the first cell in row-major order, then to the lower type (the
@@ -183,7 +183,7 @@ impl Solver {
         search.finish(&|_, it| self.put_back(it))
     }
 
-    /// The score of the best tree at every cell of the root, `rows x cols` of
+    /// Returns the score of the best tree at every cell of the root, `rows x cols` of
     /// [`Responses::window`].
     ///
     /// # Panics
@@ -201,7 +201,7 @@ impl Solver {
         sweeps.into_iter().next().unwrap_or_default()
     }
 
-    /// The score of a given pose, summed in the order of the messages.
+    /// Returns the score of a given pose, summed in the order of the messages.
     ///
     /// For a pose that this solver returned from the same evidence and terms, it equals the pose's
     /// score bit for bit.
@@ -228,14 +228,14 @@ impl Solver {
         self.tally.sums()
     }
 
-    /// Number of levels on which messages have been computed so far, in solutions of any kind,
+    /// Returns the number of levels on which messages have been computed so far, in solutions of any kind,
     /// including unfinished ones. It shows progress during long computations, and may be read from
     /// another thread.
     pub fn n_sweeps(&self) -> u64 {
         self.n_sweeps.load(Ordering::Relaxed)
     }
 
-    /// The planes of a part.
+    /// Returns the planes of a part.
     fn planes(&self, part: usize) -> Range<usize> {
         self.first_planes[part]..self.first_planes[part + 1]
     }
@@ -244,7 +244,7 @@ impl Solver {
         self.model.spec().root_bias as f32
     }
 
-    /// The workspace that fits `bytes` of planes most closely; the largest one if none is large enough.
+    /// Returns the workspace that fits `bytes` of planes most closely; the largest one if none is large enough.
     fn workspace(&self, bytes: usize) -> Workspace {
         let mut pool = lock(&self.workspaces);
         let fit = |workspace: &Workspace| {
@@ -310,7 +310,7 @@ struct Search<'a> {
 type PutBack<'a> = dyn Fn(u16, Workspace) + Sync + 'a;
 
 impl Search<'_> {
-    /// The score of the best root so far.
+    /// Returns the score of the best root so far.
     fn score(&self) -> f32 {
         let best = lock(&self.best);
         best.as_ref().map_or(f32::NEG_INFINITY, |best| best.0.score)
@@ -373,7 +373,7 @@ impl Search<'_> {
     }
 }
 
-/// The message rule of the child of `edge`.
+/// Returns the message rule of the child of `edge`.
 fn rule(edge: &Edge, n_parent_types: usize, n_types: usize) -> MessageRule {
     let spring = |spring: &Spring| kernels::Spring {
         w: spring.w,

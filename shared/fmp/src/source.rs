@@ -17,7 +17,7 @@ pub(crate) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Size `[rows, cols]` of the features that determine the responses of a level's window.
+    /// Returns the size `[rows, cols]` of the features that determine the responses of a level's window.
     pub(crate) fn map_size(&self, level: usize) -> [usize; 2] {
         let it = &self.layout.levels[level];
         let window = self.layout.window(self.scope, level);
@@ -27,7 +27,7 @@ impl Source<'_> {
         ]
     }
 
-    /// The memory layout of an image's features.
+    /// Returns the memory layout of an image's features.
     pub(crate) fn shape(&self) -> HogShape {
         HogShape {
             cell_px: self.cell_px,

@@ -166,7 +166,7 @@ impl Last {
             && is_recent(settings.full_every_s)
     }
 
-    /// The surroundings of this frame's pose, if any of it is inside the image.
+    /// Returns the surroundings of this frame's pose, if any of it is inside the image.
     fn near(&self, settings: &TrackSettings, layout: &Layout, at: FrameTime) -> Option<Scope> {
         let [x1, y1, x2, y2] = self.around;
         let moved = seconds(self.at, at).map_or(0.0, |second| settings.speed * second);
@@ -190,7 +190,7 @@ impl Last {
     }
 }
 
-/// The time between two frames, if both are known.
+/// Returns the time between two frames, if both are known.
 fn seconds(from: FrameTime, to: FrameTime) -> Option<f64> {
     Some(to.seconds? - from.seconds?)
 }

@@ -34,7 +34,7 @@ pub enum Unknown {
 }
 
 impl Unknown {
-    /// The name used in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Missing => "missing",

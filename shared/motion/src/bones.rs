@@ -94,7 +94,7 @@ fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)])
 /// Positions and their covariances.
 type Projected = (Vec<Vector3<f64>>, Vec<Matrix3<f64>>);
 
-/// The most likely positions for the given bone lengths, and their covariances; `None` if they cannot be computed.
+/// Returns the most likely positions for the given bone lengths, and their covariances; `None` if they cannot be computed.
 fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projected> {
     let n = found.len();
     let unknown = Matrix3::identity() * UNKNOWN_SD_M.powi(2);

@@ -26,7 +26,7 @@ pub struct CutoffError {
     pub rate_hz: f64,
 }
 
-/// The bilinear transform is usable up to 0.45 of the rate.
+/// Returns the bilinear transform is usable up to 0.45 of the rate.
 fn needed_hz(cutoff_hz: f64) -> f64 {
     cutoff_hz / TWICE / 0.45
 }
@@ -84,7 +84,7 @@ pub fn filter(recorded: &Recorded, cutoff_hz: f64, fill_s: f64) -> Result<Motion
     Ok(Motion { joints, report })
 }
 
-/// Maximum difference of the instants from a uniform grid; missing instants do not count as a difference.
+/// Returns the maximum difference of the instants from a uniform grid; missing instants do not count as a difference.
 fn off_grid(times: &[f64], step: f64) -> f64 {
     let first = times.first().copied().unwrap_or(0.0);
     let off = |time: &f64| {
@@ -94,7 +94,7 @@ fn off_grid(times: &[f64], step: f64) -> f64 {
     times.iter().map(off).fold(0.0, f64::max)
 }
 
-/// The runs of measurements without long gaps and breaks.
+/// Returns the runs of measurements without long gaps and breaks.
 fn pieces<'a>(
     known: &'a [(usize, Vector3<f64>)],
     times: &[f64],
@@ -157,7 +157,7 @@ fn fill(
     }
 }
 
-/// The value of the cubic curve through all values at a time, with slopes from the neighbours (Catmull & Rom 1974).
+/// Returns the value of the cubic curve through all values at a time, with slopes from the neighbours (Catmull & Rom 1974).
 fn cubic(times: &[f64], values: &[f64], time: f64) -> f64 {
     let after = times.partition_point(|known| *known <= time);
     if after == 0 || times.len() < 2 {
@@ -218,7 +218,7 @@ fn once(values: &mut [f64], rate_hz: f64, cutoff_hz: f64) {
 mod tests {
     use super::*;
 
-    /// The share of a sine's amplitude that remains in phase with the input.
+    /// Returns the share of a sine's amplitude that remains in phase with the input.
     fn passed(hz: f64) -> f64 {
         let rate = 120.0;
         let wave: Vec<f64> =

@@ -44,7 +44,7 @@ pub(crate) fn settle(
     (changed, counts)
 }
 
-/// Distance of a measurement from the track without this measurement.
+/// Returns the distance of a measurement from the track without this measurement.
 fn away(track: &Track, at: usize, measured: &Usable) -> Option<f64> {
     let known = track.known[at].as_ref()?;
     Some(distance2(known, measured.as_ref()?, 0.0, track.noise.scale))

@@ -25,7 +25,7 @@ impl Sum {
         self.n += other.n;
     }
 
-    /// The mean; `None` if there are no values.
+    /// Returns the mean; `None` if there are no values.
     pub fn mean(self) -> Option<f64> {
         (self.n > 0.0).then(|| self.sum / self.n)
     }
@@ -99,7 +99,7 @@ pub fn add(errors: &mut [Errors], times: &[f64], track: &Path, truth: &Path, cou
     }
 }
 
-/// Velocity and acceleration at the middle point of the parabola through three points.
+/// Returns the velocity and acceleration at the middle point of the parabola through three points.
 fn differences(times: [f64; 3], points: [Vector3<f64>; 3]) -> (Vector3<f64>, Vector3<f64>) {
     let [before, after] = [times[1] - times[0], times[2] - times[1]];
     let slopes = [

@@ -72,7 +72,7 @@ impl Smoother {
         all
     }
 
-    /// The mean delay added to movement at 1 Hz, in seconds; `None` before anything was measured twice.
+    /// Returns the mean delay added to movement at 1 Hz, in seconds; `None` before anything was measured twice.
     pub fn delay_s(&self) -> Option<f64> {
         (self.delay.n > 0.0).then(|| self.delay.sum_s / self.delay.n)
     }

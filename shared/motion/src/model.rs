@@ -50,12 +50,12 @@ impl Belief {
         }
     }
 
-    /// The position.
+    /// Returns the position.
     pub(crate) fn position(&self) -> Vector3<f64> {
         self.mean.fixed_rows::<3>(0).into_owned()
     }
 
-    /// Covariance of the position.
+    /// Returns the covariance of the position.
     pub(crate) fn position_covariance(&self) -> Matrix3<f64> {
         self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
     }
@@ -88,7 +88,7 @@ impl Belief {
         Self { mean, covariance }
     }
 
-    /// Agreement of a measurement with the state before it is used; `None` if it cannot be computed.
+    /// Returns the agreement of a measurement with the state before it is used; `None` if it cannot be computed.
     pub(crate) fn innovation(
         &self,
         position: &Vector3<f64>,

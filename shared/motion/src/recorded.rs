@@ -139,7 +139,7 @@ impl Recorded {
         self.joints.iter().map(other).collect()
     }
 
-    /// The indices at which another person begins, or the same person at another place. There, the whole body is farther away than
+    /// Returns the indices at which another person begins, or the same person at another place. There, the whole body is farther away than
     /// a person can move, and stays there.
     ///
     /// The limit is half a metre plus 12 m/s, faster than anyone runs. The position of the body is the median of its joints along each
@@ -180,7 +180,7 @@ impl Recorded {
     }
 }
 
-/// The median; 0 if there are no values.
+/// Returns the median; 0 if there are no values.
 pub(crate) fn median(values: Vec<f64>) -> f64 {
     statistics::Sorted::new(values).interpolated(0.5).unwrap_or(0.0)
 }

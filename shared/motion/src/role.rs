@@ -13,7 +13,7 @@ impl Side {
     /// Both sides.
     pub const BOTH: [Self; 2] = [Self::Right, Self::Left];
 
-    /// The name used in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -72,7 +72,7 @@ const NAMES: [(&str, Role); 19] = [
 ];
 
 impl Role {
-    /// The role of a joint, by its name; `None` for a keypoint without a role, such as a finger.
+    /// Returns the role of a joint, by its name; `None` for a keypoint without a role, such as a finger.
     pub fn of(name: &str) -> Option<Self> {
         let whole = NAMES.iter().find(|known| known.0 == name);
         if let Some((_, role)) = whole {
@@ -98,7 +98,7 @@ impl Role {
         Some(role)
     }
 
-    /// The same role on the other side; `None` for a role without a side.
+    /// Returns the same role on the other side; `None` for a role without a side.
     pub fn mirrored(self) -> Option<Self> {
         Some(match self {
             Self::Head | Self::Neck | Self::Pelvis => return None,
@@ -115,7 +115,8 @@ impl Role {
     }
 }
 
-/// The name of the joint on the other side. It works for any name that contains the side as a separate word or in the style of `HumanEva`.
+/// Returns the name of the joint on the other side. It works for any name that contains the side as a separate word or in the style of
+/// `HumanEva`.
 pub fn mirrored_name(name: &str) -> Option<String> {
     if let Some(rest) = name.strip_prefix("left ") {
         return Some(format!("right {rest}"));

@@ -34,7 +34,7 @@ pub(crate) struct Stretch {
     pub(crate) weights: Vec<f64>,
 }
 
-/// The weight of a measurement under noise with heavy tails (Lange, Little & Taylor 1989).
+/// Returns the weight of a measurement under noise with heavy tails (Lange, Little & Taylor 1989).
 ///
 /// * `distance2`: squared Mahalanobis distance, scaled.
 pub(crate) fn weight(distance2: f64) -> f64 {
@@ -103,7 +103,7 @@ fn backwards(times: &[f64], forwards: &[Belief], noise: Noise) -> Vec<Known> {
     all
 }
 
-/// Squared Mahalanobis distance of a measurement from the estimate by all *other* measurements, scaled; infinite if it cannot
+/// Returns the squared Mahalanobis distance of a measurement from the estimate by all *other* measurements, scaled; infinite if it cannot
 /// be computed.
 ///
 /// * `weight`: weight of the measurement in the estimate; 0 if it was not used.

@@ -26,7 +26,7 @@ pub enum State {
 }
 
 impl State {
-    /// The name used in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -58,7 +58,7 @@ pub enum Absent {
 }
 
 impl Absent {
-    /// The name used in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gap => "gap",
@@ -97,7 +97,7 @@ pub(crate) fn usable(it: &Measured) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     Some((it.position, covariance))
 }
 
-/// The covariance with standard deviations within [`SD_M`] along its own axes.
+/// Returns the covariance with standard deviations within [`SD_M`] along its own axes.
 fn bounded(covariance: Matrix3<f64>) -> Matrix3<f64> {
     let symmetric = (covariance + covariance.transpose()) * 0.5;
     let [least, most] = SD_M.map(|sd_m| sd_m * sd_m);

@@ -63,7 +63,7 @@ pub(crate) fn tune(stretches: &[(&[f64], &[Usable])], prior: Prior) -> Noise {
     }
 }
 
-/// Position of the maximum of the parabola through the best value and its neighbours, in steps after the best.
+/// Returns the position of the maximum of the parabola through the best value and its neighbours, in steps after the best.
 fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
     if best == 0 || best + 1 >= tried.len() {
         return 0.0;
@@ -77,7 +77,7 @@ fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
     }
 }
 
-/// The whole of a short track, or parts of a long one.
+/// Returns the whole of a short track, or parts of a long one.
 fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [Usable])> {
     let n: usize = stretches.iter().map(|stretch| stretch.0.len()).sum();
     if n <= N_WINDOWS * WINDOW {
@@ -93,7 +93,7 @@ fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [
     chunks.into_iter().step_by(every).collect()
 }
 
-/// The logarithm of the likelihood of the innovations, and the scale that maximises it.
+/// Returns the logarithm of the likelihood of the innovations, and the scale that maximises it.
 ///
 /// * `jerk`: density in m²/s⁵. The filter depends on its ratio to the scale, so it is run again with the estimated scale.
 fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
@@ -132,12 +132,12 @@ fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
 /// Ratio of [`student_scale`] to the variance if the noise is in fact Gaussian, in three dimensions.
 const GAUSSIAN_SHARE: f64 = 0.757;
 
-/// A scale of squared distances that is correct for Gaussian noise and robust against outliers.
+/// Returns a scale of squared distances that is correct for Gaussian noise and robust against outliers.
 fn scale_of(distances: &[f64]) -> f64 {
     student_scale(distances) / GAUSSIAN_SHARE
 }
 
-/// The most likely scale of squared distances in three-dimensional Student noise.
+/// Returns the most likely scale of squared distances in three-dimensional Student noise.
 fn student_scale(distances: &[f64]) -> f64 {
     let sorted = Sorted::new(distances.to_vec());
     // The median of the chi-squared distribution with 3 degrees of freedom is 2.366.

@@ -168,7 +168,7 @@ impl Convergence {
     }
 }
 
-/// The order in which views are solved: highest expected error first, or lowest score first if any
+/// Returns the order in which views are solved: highest expected error first, or lowest score first if any
 /// view has no expected errors. Ties are solved from the last view to the first.
 fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     let expected = input.views.iter();
@@ -182,7 +182,7 @@ fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     order
 }
 
-/// All pairs of views: `[first][second - first - 1]`.
+/// Returns all pairs of views: `[first][second - first - 1]`.
 fn inputs<'a>(input: &AllViewsInput<'a>) -> Vec<Vec<PairInput<'a>>> {
     let n = input.views.len();
     let pair = |first: usize, second: usize| PairInput {
@@ -213,7 +213,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// The terms of two views, and the index of the first given view among the two.
+    /// Returns the terms of two views, and the index of the first given view among the two.
     fn terms_of(&self, view: usize, other: usize) -> (&PairTerms<'a>, usize) {
         let (first, second) = (view.min(other), view.max(other));
         (
@@ -222,7 +222,7 @@ impl<'a> Pairs<'a> {
         )
     }
 
-    /// The consistency sums of a pose of one view and a pose of another.
+    /// Returns the consistency sums of a pose of one view and a pose of another.
     fn between(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
         match self.terms_of(view, other) {
             (terms, 0) => terms.between(pose, others),
@@ -238,7 +238,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// The terms that all other views add to a target.
+    /// Returns the terms that all other views add to a target.
     fn supports<'b>(
         &'b self,
         target: usize,

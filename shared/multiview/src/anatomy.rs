@@ -21,7 +21,7 @@ const L_ELBOW: usize = 10;
 const L_WRIST: usize = 11;
 const HEAD: usize = 13;
 
-/// Evidence that left and right of a labelled skeleton are correct, in trunk lengths.
+/// Returns the evidence that left and right of a labelled skeleton are correct, in trunk lengths.
 ///
 /// The evidence is the sum of these distances: the head in front of the neck, the knees in front of the line from hip to ankle, the elbows
 /// behind the line from shoulder to wrist and, if the up direction is known, the neck in front of the pelvis. Exchanging left and right
@@ -65,7 +65,7 @@ mod tests {
 
     use super::*;
 
-    /// A person facing +x, up +z, left +y; slightly bent knees and elbows, head in front.
+    /// Returns a person facing +x, up +z, left +y; slightly bent knees and elbows, head in front.
     fn standing() -> Vec<Option<Point3<f64>>> {
         [
             [0.0, -0.1, 0.0],

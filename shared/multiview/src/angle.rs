@@ -32,7 +32,7 @@ impl AngleTables {
         Self { bins }
     }
 
-    /// The tables for an angle (see [`angle_between`]), in radians.
+    /// Returns the tables for an angle (see [`angle_between`]), in radians.
     pub fn at(&self, angle: f64) -> Option<&TypeTables> {
         let turn = (angle + PI).rem_euclid(TAU) / TAU;
         let last = self.bins.len().checked_sub(1)?;
@@ -41,7 +41,7 @@ impl AngleTables {
     }
 }
 
-/// The angle between two cameras as seen from the person: the rotation about the person from the
+/// Returns the angle between two cameras as seen from the person: the rotation about the person from the
 /// first to the second camera, in radians from -pi to pi, counter-clockwise as seen from above.
 ///
 /// The person is assumed where the rays through the centres of the views' best poses meet. The angle is
@@ -59,13 +59,13 @@ pub fn angle_between(first: &ViewInput<'_>, second: &ViewInput<'_>) -> Option<f6
     Some(from.cross(&to).dot(&up).atan2(from.dot(&to)))
 }
 
-/// The up direction of the view's picture, in the world.
+/// Returns the up direction of the view's picture, in the world.
 fn up(view: &ViewInput<'_>) -> Vector3<f64> {
     let turn = view.plan.camera().camera_from_world.rotation.inverse();
     turn * -Vector3::y()
 }
 
-/// Direction from the camera to the person, in the world.
+/// Returns the direction from the camera to the person, in the world.
 fn ray(view: &ViewInput<'_>) -> Option<Vector3<f64>> {
     let centres = view.plan.centres(view.best()?);
     let n = centres.len().max(1) as f64;

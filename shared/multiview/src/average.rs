@@ -11,7 +11,7 @@ pub struct FusedPose {
     pub energy: f64,
 }
 
-/// The mean of a view's candidates over its pairs (the paper's section 7: "simply averaged").
+/// Returns the mean of a view's candidates over its pairs (the paper's section 7: "simply averaged").
 ///
 /// * `candidates`: one pose per pair, as its energy and its anatomical part centres.
 /// * Returns `None` if there is no candidate.

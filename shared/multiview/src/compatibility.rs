@@ -153,7 +153,7 @@ impl Compatibility {
         Ok((Self::of(values), disagreement))
     }
 
-    /// The entry of a part for a pair of types; 0 if it is unknown.
+    /// Returns the entry of a part for a pair of types; 0 if it is unknown.
     ///
     /// # Panics
     ///
@@ -162,23 +162,23 @@ impl Compatibility {
         self.values[part][(first, second)]
     }
 
-    /// Number of types of every part.
+    /// Returns the number of types of every part.
     pub fn n_types(&self) -> Vec<usize> {
         self.values.iter().map(DMatrix::nrows).collect()
     }
 
-    /// Number of types of the first view, over all parts, that did not occur in training.
+    /// Returns the number of types of the first view, over all parts, that did not occur in training.
     pub fn n_unseen(&self) -> usize {
         self.n_unseen
     }
 
-    /// The table with its views exchanged.
+    /// Returns the table with its views exchanged.
     #[must_use]
     pub fn transposed(&self) -> Self {
         Self::of(self.values.iter().map(DMatrix::transpose).collect())
     }
 
-    /// The table whose part `i` is part `parts[i]` of this one.
+    /// Returns the table whose part `i` is part `parts[i]` of this one.
     pub(crate) fn permuted(&self, parts: &[usize]) -> Self {
         Self::of(parts.iter().map(|&part| self.values[part].clone()).collect())
     }
@@ -257,7 +257,7 @@ fn shortened(field: &str) -> String {
     field.chars().take(24).collect()
 }
 
-/// The joint `[a, b]`, computed twice: from `second = p(b | a)` and from `first = p(a | b)`.
+/// Returns the joint `[a, b]`, computed twice: from `second = p(b | a)` and from `first = p(a | b)`.
 fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     let (second, first) = without_unseen(second.clone(), first.clone());
     let n = second.nrows();

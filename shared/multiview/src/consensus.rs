@@ -113,7 +113,7 @@ impl ConsensusWorkspace {
     }
 }
 
-/// The point of the world indicated by the choices, unless the means fit together better.
+/// Returns the point of the world indicated by the choices, unless the means fit together better.
 fn meeting(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
@@ -208,7 +208,7 @@ fn mean(points: &[[f64; 2]]) -> Point2<f64> {
     Point2::from(sum.map(|sum| sum / points.len() as f64))
 }
 
-/// The cheapest point in which two rays meet, with its cost first.
+/// Returns the cheapest point in which two rays meet, with its cost first.
 fn best(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
@@ -248,7 +248,7 @@ fn judge(
     })
 }
 
-/// The answer of a view that is nearest to a point of the world, and its cost.
+/// Returns the answer of a view that is nearest to a point of the world, and its cost.
 fn nearest(
     settings: &ConsensusSettings,
     view: &Sightings<'_>,
@@ -266,7 +266,7 @@ fn nearest(
     costs.fold(dearest, |least, it| if it.1 < least.1 { it } else { least })
 }
 
-/// The point closest to both rays; `None` if the rays are parallel or the point lies behind one of them.
+/// Returns the point closest to both rays; `None` if the rays are parallel or the point lies behind one of them.
 fn meeting_point(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
     let between = b.origin - a.origin;
     let cosine = a.direction.dot(&b.direction);

@@ -44,14 +44,14 @@ impl<'a> PairTerms<'a> {
         }
     }
 
-    /// The switches `a_i` of eq. 6 by part of the first view: on if the terms are on for either
+    /// Returns the switches `a_i` of eq. 6 by part of the first view: on if the terms are on for either
     /// view.
     pub(crate) fn active(&self) -> Vec<bool> {
         let [first, second] = &self.active;
         first.iter().zip(second).map(|(a, b)| *a || *b).collect()
     }
 
-    /// The value of the two consistency sums of eq. 3 for two given poses. If the switches of the
+    /// Returns the value of the two consistency sums of eq. 3 for two given poses. If the switches of the
     /// views differ, it is the mean of the values as seen by each view.
     pub(crate) fn between(&self, first: &Pose, second: &Pose) -> f64 {
         let value = self.for_target(0, first, second);
@@ -78,7 +78,7 @@ impl<'a> PairTerms<'a> {
             .sum()
     }
 
-    /// The geometric term of a part of view `view`, with its switch while view `target` is solved.
+    /// Returns the geometric term of a part of view `view`, with its switch while view `target` is solved.
     ///
     /// * `support`: the pose of the other view.
     fn term(&self, [view, target]: [usize; 2], part: usize, support: &Pose) -> Option<Term> {
@@ -93,7 +93,7 @@ impl<'a> PairTerms<'a> {
         Term::new(support_from_target, at, scale, cap)
     }
 
-    /// The appearance term of a type of a part, like [`Self::term`].
+    /// Returns the appearance term of a type of a part, like [`Self::term`].
     fn of_type(
         &self,
         [view, target]: [usize; 2],
@@ -117,7 +117,7 @@ impl<'a> PairTerms<'a> {
         (self.settings.beta * joint) as f32
     }
 
-    /// The part of the other view that corresponds to `part` of view `target`.
+    /// Returns the part of the other view that corresponds to `part` of view `target`.
     fn partner(&self, part: usize) -> usize {
         // The exchange is its own inverse, so one table serves both directions.
         self.counterpart[part]
@@ -206,7 +206,7 @@ impl ExtraTerms for Consistency<'_> {
 /// The key of a part whose support adds nothing.
 pub(crate) const NO_SUPPORT: u64 = u64::MAX;
 
-/// A key of everything in a support on which the terms of one pair depend.
+/// Returns a key of everything in a support on which the terms of one pair depend.
 pub(crate) fn support_key(support: &Pose, part: usize) -> u64 {
     let at = support.parts[part];
     let fields = [at.x, at.y, u16::from(at.mixture)].map(u64::from);

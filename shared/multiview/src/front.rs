@@ -18,7 +18,7 @@ pub(crate) const NECK: usize = 12;
 /// up. Any detector can provide it.
 pub type FrontEvidence = [f32; 2];
 
-/// The direction in which a labelled skeleton faces, as a unit vector in the frame of its joints.
+/// Returns the direction in which a labelled skeleton faces, as a unit vector in the frame of its joints.
 ///
 /// It is `l x u` with `l` from the skeleton's right to its left and `u` from its pelvis to its neck. If left and right are
 /// exchanged, it is the opposite direction.
@@ -33,7 +33,7 @@ pub fn front(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
     left.cross(&trunk(joints)?).try_normalize(1e-9)
 }
 
-/// The vector from the pelvis to the neck.
+/// Returns the vector from the pelvis to the neck.
 pub(crate) fn trunk(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
     let at = |joint: usize| joints.get(joint).copied().flatten();
     Some(at(NECK)? - nalgebra::center(&at(R_HIP)?, &at(L_HIP)?))
@@ -54,14 +54,14 @@ pub fn front_in_view(camera: &Camera, place: &Point3<f64>, front: &Vector3<f64>)
     [right, -ray.dot(&front)]
 }
 
-/// Logarithm of the likelihood ratio of a direction over its opposite, given the evidence of one view, in nats.
+/// Returns the logarithm of the likelihood ratio of a direction over its opposite, given the evidence of one view, in nats.
 pub fn front_log_ratio(in_view: [f64; 2], evidence: FrontEvidence) -> f64 {
     let [right, towards] = evidence.map(f64::from);
     2.0 * (right * in_view[0] + towards * in_view[1])
 }
 
-/// Logarithm of the likelihood ratio of the direction in which a skeleton faces over its opposite, given the evidence of all views, in
-/// nats; 0 without a trunk.
+/// Returns the logarithm of the likelihood ratio of the direction in which a skeleton faces over its opposite, given the evidence of all
+/// views, in nats; 0 without a trunk.
 ///
 /// * `joints`: the same joints as for [`front`], in metres in the world.
 /// * `views`: the camera and the evidence of every view.

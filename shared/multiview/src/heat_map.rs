@@ -12,7 +12,7 @@
 const STRAIGHT: f32 = 0.955;
 const DIAGONAL: f32 = 1.3693;
 
-/// Heat of an epipolar line, as in the released program: 1 on the line, 0 in the farthest cell.
+/// Returns the heat of an epipolar line, as in the released program: 1 on the line, 0 in the farthest cell.
 ///
 /// The heat is `1 - sqrt(d / d_max)`, where `d` is the chamfer distance of a cell from the line and `d_max` the largest one of the map. All
 /// values are zero if the line misses the image. The function is public for comparison with the program; the terms of
@@ -40,7 +40,7 @@ pub fn heat_map(ends: [[f64; 2]; 2], image_size: [usize; 2], rows: usize, cols: 
     map
 }
 
-/// Share of every cell that the line covers.
+/// Returns the share of every cell that the line covers.
 fn coverage(ends: [[f64; 2]; 2], size: [usize; 2], rows: usize, cols: usize) -> Vec<f64> {
     let [width, height] = size;
     let cell = [width as f64 / cols as f64, height as f64 / rows as f64];

@@ -201,12 +201,12 @@ pub(crate) fn is_best(
     !evidence.bounds().is_none_or(is_right) || solver.best(evidence, Some(extra)).as_ref() == found
 }
 
-/// Score of a pose in its own view alone (eq. 1).
+/// Returns the score of a pose in its own view alone (eq. 1).
 fn own_score(solver: &Solver, evidence: &Responses<'_>, pose: &Pose) -> f64 {
     f64::from(solver.score(evidence, pose, None))
 }
 
-/// The first support: the view with the lower expected error, or the higher score if either view
+/// Returns the first support: the view with the lower expected error, or the higher score if either view
 /// has no expected errors; ties go to the first view.
 fn initial_support(pair: &PairInput<'_>, poses: &[Pose; 2]) -> usize {
     let expected = pair
@@ -222,7 +222,7 @@ pub(crate) fn types(pose: &Pose) -> impl Iterator<Item = u8> {
     pose.parts.iter().map(|part| part.mixture)
 }
 
-/// Mean distance between the part centres of two poses, in pixels.
+/// Returns the mean distance between the part centres of two poses, in pixels.
 pub(crate) fn mean_movement(plan: &ViewPlan, from: &Pose, to: &Pose) -> f64 {
     let movement = |part: usize| {
         let [a, b] = [from, to].map(|pose| plan.centre(pose, part));

@@ -135,7 +135,7 @@ impl ExtraTerms for ReleasedTerms<'_> {
     }
 }
 
-/// The whole pixel, counted from 0, at which the program looks up the line of a support.
+/// Returns the whole pixel, counted from 0, at which the program looks up the line of a support.
 ///
 /// * `from_one`: centre of the support, in pixels counted from 1, as computed by the program.
 /// * `size`: size of the support's image and of the program's table. The table contains the pixels
@@ -176,7 +176,7 @@ impl Line {
     }
 }
 
-/// The switches of each view, by its parts: off if the expected error exceeds the threshold.
+/// Returns the switches of each view, by its parts: off if the expected error exceeds the threshold.
 ///
 /// If both views would be off and their expected errors differ by more than the part's median
 /// training error, the better view is switched back on. This is the intended form of the program's rescue,

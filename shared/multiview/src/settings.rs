@@ -48,7 +48,7 @@ pub struct TypeTables {
 }
 
 impl TypeTables {
-    /// The tables of the same views in the opposite order.
+    /// Returns the tables of the same views in the opposite order.
     ///
     /// * `mirror`: for every part, the part on the other side; the parts themselves if the model has no sides.
     #[must_use]
@@ -125,7 +125,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The settings of the authors' runs: their energy, weights and start.
+    /// Returns the settings of the authors' runs: their energy, weights and start.
     pub fn released() -> Self {
         Self {
             energy: EnergyKind::Released,

@@ -105,7 +105,7 @@ impl<'a> FirstSolver<'a> {
         }
     }
 
-    /// The best first solution with no view, or one view, exchanged.
+    /// Returns the best first solution with no view, or one view, exchanged.
     ///
     /// * `best`: the solution with no view exchanged.
     fn with_one_exchanged(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
@@ -129,8 +129,8 @@ impl<'a> FirstSolver<'a> {
         Some(best)
     }
 
-    /// The best first solution with any of the views except the first exchanged. With few views, all combinations are tried; otherwise,
-    /// views are exchanged one after the other as long as that helps.
+    /// Returns the best first solution with any of the views except the first exchanged. With few views, all combinations are tried;
+    /// otherwise, views are exchanged one after the other as long as that helps.
     ///
     /// * `best`: the solution with no view exchanged.
     fn as_seen(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
@@ -175,7 +175,7 @@ impl<'a> FirstSolver<'a> {
         Some(is_better)
     }
 
-    /// The view without which the others agree best, if most of its joints contradict their solution. `None` if there is no
+    /// Returns the view without which the others agree best, if most of its joints contradict their solution. `None` if there is no
     /// such view, or with fewer than four views, which cannot show it.
     ///
     /// A half-covered view still fits with its other half; a view whose camera was moved fits nowhere.

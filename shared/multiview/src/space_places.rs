@@ -52,7 +52,7 @@ impl<'a> Crossings<'a> {
         }
     }
 
-    /// The places of every joint, the best first.
+    /// Returns the places of every joint, the best first.
     ///
     /// * `n`: maximum number of places of a joint.
     /// * A joint that fewer than two of the views show has no places.
@@ -121,7 +121,7 @@ impl<'a> Crossings<'a> {
     }
 }
 
-/// The point nearest to two rays; `None` if it is behind a camera, or the rays are parallel.
+/// Returns the point nearest to two rays; `None` if it is behind a camera, or the rays are parallel.
 fn nearest(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
     let (u, v) = (a.direction.into_inner(), b.direction.into_inner());
     let between = b.origin - a.origin;

@@ -63,7 +63,7 @@ struct Held<'a> {
 }
 
 impl Held<'_> {
-    /// The part of the energy that depends on the place of one joint.
+    /// Returns the part of the energy that depends on the place of one joint.
     ///
     /// * `joints`: places of all joints.
     fn energy(

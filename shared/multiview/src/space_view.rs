@@ -12,7 +12,7 @@ pub(crate) const N: usize = 14;
 /// Places of every joint, in metres in the world.
 pub(crate) type Places = [Vec<Point3<f64>>; N];
 
-/// The same joint on the other side; a joint in the middle of the body maps to itself.
+/// Returns the same joint on the other side; a joint in the middle of the body maps to itself.
 pub(crate) fn other_side(joint: usize) -> usize {
     let pair = LIMBS.iter().flatten().find(|pair| pair.contains(&joint));
     pair.map_or(joint, |[right, left]| right + left - joint)
@@ -52,18 +52,18 @@ pub struct SpaceView<'a> {
     pub front: FrontEvidence,
 }
 
-/// The evidence of all views for a joint at a place.
+/// Returns the evidence of all views for a joint at a place.
 pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
     views.iter().map(|view| view.at(view.named(joint), at)).sum()
 }
 
 impl SpaceView<'_> {
-    /// The evidence for a joint of the body at a place, with the view's exchanges applied.
+    /// Returns the evidence for a joint of the body at a place, with the view's exchanges applied.
     pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
         self.at(self.named(joint), at) as f32
     }
 
-    /// The rays of the possible positions of a joint in the picture; positions for which the lens has no ray are left out.
+    /// Returns the rays of the possible positions of a joint in the picture; positions for which the lens has no ray are left out.
     ///
     /// * `named`: the view's name of the joint.
     pub(crate) fn rays(&self, named: usize) -> Vec<Ray> {
@@ -76,7 +76,7 @@ impl SpaceView<'_> {
         name(joint, self.exchanged)
     }
 
-    /// The evidence for two of the view's joint names at a place.
+    /// Returns the evidence for two of the view's joint names at a place.
     pub(crate) fn evidence_of(&self, named: [usize; 2], at: &Point3<f64>) -> [f64; 2] {
         let pixel = self.camera.project(at);
         named.map(|named| {
@@ -86,7 +86,7 @@ impl SpaceView<'_> {
         })
     }
 
-    /// The evidence for one of the view's joint names at a place.
+    /// Returns the evidence for one of the view's joint names at a place.
     pub(crate) fn at(&self, named: usize, at: &Point3<f64>) -> f64 {
         f64::from(match self.camera.project(at) {
             Some(pixel) => self.evidence.at(named, [pixel.x, pixel.y]),

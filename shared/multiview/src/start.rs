@@ -43,7 +43,7 @@ pub fn choose_start<'a>(
     best_of(settings, views, tables, &all.collect::<Vec<_>>())
 }
 
-/// The best start under every assumption about which views see the person from behind, highest
+/// Returns the best start under every assumption about which views see the person from behind, highest
 /// energy first.
 ///
 /// For `n` views, there are `2^(n - 1)` assumptions if `facing` must be decided, otherwise one. With more than
@@ -89,7 +89,7 @@ pub fn rank_starts<'a>(
     starts
 }
 
-/// The joint state with the highest energy over all pairs.
+/// Returns the joint state with the highest energy over all pairs.
 fn best_of<'a>(
     settings: &Settings,
     views: &[ViewInput<'a>],
@@ -139,7 +139,7 @@ fn states(settings: &Settings, view_input: &ViewInput<'_>, view: usize) -> Vec<S
         .collect()
 }
 
-/// The candidates of a view that may be the start: the best candidates that do not show another person.
+/// Returns the candidates of a view that may be the start: the best candidates that do not show another person.
 fn tried(settings: &Settings, view_input: &ViewInput<'_>) -> impl Iterator<Item = usize> {
     let all = 0..view_input.candidates.len();
     let own = all.filter(|candidate| !view_input.is_other(*candidate));
@@ -200,7 +200,7 @@ impl Problem {
         }
     }
 
-    /// The gain from `state` in the next view, given the views chosen so far.
+    /// Returns the gain from `state` in the next view, given the views chosen so far.
     fn gain(&self, chosen: &[usize], state: usize) -> f64 {
         let view = chosen.len();
         let pairs: f64 = chosen

@@ -76,7 +76,7 @@ impl Term {
         self.inverse_norm2.is_nan()
     }
 
-    /// Sum of the two squared distances for a target at `target_px` (undistorted), in cells^2.
+    /// Returns the sum of the two squared distances for a target at `target_px` (undistorted), in cells^2.
     #[inline]
     pub(crate) fn distance2(&self, target_px: [f64; 2], target_scale2: f64) -> f64 {
         let [x, y] = target_px;

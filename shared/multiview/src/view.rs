@@ -56,34 +56,34 @@ impl ViewPlan {
         }
     }
 
-    /// The camera of the frame.
+    /// Returns the camera of the frame.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The pyramid of the frame.
+    /// Returns the pyramid of the frame.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Size of a cell of a level, in pixels of the frame.
+    /// Returns the size of a cell of a level, in pixels of the frame.
     pub fn scale(&self, level: usize) -> f64 {
         self.layout.levels[level].scale
     }
 
-    /// Undistorted centres of a part at all cells of a level, row major, in pixels.
+    /// Returns the undistorted centres of a part at all cells of a level, row major, in pixels.
     pub fn cells(&self, part: usize, level: usize) -> &[[f64; 2]] {
         let class = self.class_of_part[part];
         let make = || undistorted_cells(&self.camera, &self.layout, level, self.sizes[class]);
         self.cells[class][level].get_or_init(make)
     }
 
-    /// Undistorted centre of a part of a pose, in pixels; NaN if the lens model has no solution.
+    /// Returns the undistorted centre of a part of a pose, in pixels; NaN if the lens model has no solution.
     pub fn ideal_centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
         let level = usize::from(pose.level);
         let at = pose.parts[part];
@@ -91,19 +91,19 @@ impl ViewPlan {
         self.cells(part, level)[cell]
     }
 
-    /// The size of the person in a pose: the longer side of the rectangle around the centres of the
+    /// Returns the size of the person in a pose: the longer side of the rectangle around the centres of the
     /// parts, in pixels of the frame.
     pub fn size(&self, pose: &Pose) -> f64 {
         let centres = (0..pose.parts.len()).map(|part| self.centre(pose, part));
         geometry::longer_side(centres).unwrap_or(0.0)
     }
 
-    /// Centre of a part of a pose, pixels of the frame.
+    /// Returns the centre of a part of a pose, pixels of the frame.
     pub fn centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
         pose.centre(&self.model, &self.layout, part)
     }
 
-    /// Centres of all parts of a pose, pixels of the frame.
+    /// Returns the centres of all parts of a pose, pixels of the frame.
     pub fn centres(&self, pose: &Pose) -> Vec<[f64; 2]> {
         pose.centres(&self.model, &self.layout)
     }
@@ -154,13 +154,13 @@ impl ViewInput<'_> {
         candidate < u64::BITS as usize && self.others >> candidate & 1 == 1
     }
 
-    /// The best candidate that does not show another person.
+    /// Returns the best candidate that does not show another person.
     pub(crate) fn best(&self) -> Option<&Pose> {
         let mut each = self.candidates.iter().enumerate();
         each.find(|candidate| !self.is_other(candidate.0)).map(|candidate| candidate.1)
     }
 
-    /// Expected error and threshold of a part, if both are known.
+    /// Returns the expected error and threshold of a part, if both are known.
     pub(crate) fn expectation(&self, settings: &Settings, part: usize) -> Option<[f32; 2]> {
         let sigma = *self.sigma_px?.get(part)?;
         let tau = if !settings.tau_px.is_empty() {

@@ -73,7 +73,7 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
 /// The same joint on the other side.
 const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
 
-/// Distance within which the rays meet for a third of the joints that two views share; `None` if they share fewer than three.
+/// Returns the distance within which the rays meet for a third of the joints that two views share; `None` if they share fewer than three.
 ///
 /// * `named`: the second view's name of a joint of the first view.
 fn apart([a, b]: [(&Camera, &SeenPerson); 2], named: impl Fn(usize) -> usize) -> Option<f64> {

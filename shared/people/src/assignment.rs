@@ -104,7 +104,7 @@ mod tests {
         each.map(|(row, column)| column.map_or(NEVER, |column| row[column])).sum()
     }
 
-    /// The smallest total cost over all assignments of the rows from `row` on.
+    /// Returns the smallest total cost over all assignments of the rows from `row` on.
     fn least(costs: &[Vec<f64>], row: usize, taken: u32) -> f64 {
         let Some(own) = costs.get(row) else {
             return 0.0;

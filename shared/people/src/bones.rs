@@ -28,7 +28,7 @@ impl Bones {
         }
     }
 
-    /// Mean absolute difference of the logarithms of the lengths; `None` if too few kinds can be compared.
+    /// Returns the mean absolute difference of the logarithms of the lengths; `None` if too few kinds can be compared.
     pub(crate) fn difference(&self, other: &Self) -> Option<f64> {
         let (mut sum, mut n) = (0.0, 0);
         for nth in 0..Kind::ALL.len() {

@@ -24,7 +24,7 @@ impl Coarse {
         covariances: [None; N],
     };
 
-    /// Number of known joints, not counting the head.
+    /// Returns the number of known joints, not counting the head.
     pub(crate) fn n_core(&self) -> usize {
         self.joints[..N - 1].iter().flatten().count()
     }
@@ -98,7 +98,7 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
     }
 }
 
-/// Number of joints, not counting the head, that at least two detections show.
+/// Returns the number of joints, not counting the head, that at least two detections show.
 fn n_common(frame: &Frame, members: &[Member]) -> usize {
     let shows = |joint: usize| {
         let each = members

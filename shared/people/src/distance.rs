@@ -37,7 +37,7 @@ struct Term {
     weight: f64,
 }
 
-/// The trimmed mean of the distances; `None` if there are too few.
+/// Returns the trimmed mean of the distances; `None` if there are too few.
 fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<Mean> {
     let mut kept = [Term {
         distance: 0.0,
@@ -66,7 +66,7 @@ fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<Mean> {
     })
 }
 
-/// The better fit of the two side labellings; the exchanged one is tried only if views label sides as they appear in the picture.
+/// Returns the better fit of the two side labellings; the exchanged one is tried only if views label sides as they appear in the picture.
 fn better(as_seen: bool, mean: impl Fn(bool) -> Option<Mean>) -> Option<Fit> {
     let fit = |is_exchanged: bool| {
         let mean = mean(is_exchanged)?;
@@ -89,7 +89,7 @@ pub(crate) fn named(joint: usize, is_exchanged: bool) -> usize {
     if is_exchanged { MIRROR[joint] } else { joint }
 }
 
-/// Distance of a detection's rays from the joints of a person; `None` if they share too few joints.
+/// Returns the distance of a detection's rays from the joints of a person; `None` if they share too few joints.
 pub(crate) fn to_person(sights: &Sights, joints: &Joints, as_seen: bool) -> Option<Fit> {
     better(as_seen, |is_exchanged| {
         trimmed((0..N).map(|joint| {
@@ -107,7 +107,7 @@ pub(crate) fn to_person(sights: &Sights, joints: &Joints, as_seen: bool) -> Opti
     })
 }
 
-/// Distance between the rays of two detections from different views.
+/// Returns the distance between the rays of two detections from different views.
 ///
 /// * Returns `None` if they share too few joints whose rays meet in front of both cameras.
 pub(crate) fn between(a: &Sights, b: &Sights, as_seen: bool) -> Option<Fit> {
@@ -127,7 +127,7 @@ pub(crate) fn between(a: &Sights, b: &Sights, as_seen: bool) -> Option<Fit> {
     })
 }
 
-/// Mean distance of the joints that two people share, in metres; `None` if they share too few.
+/// Returns the mean distance of the joints that two people share, in metres; `None` if they share too few.
 pub(crate) fn of_people(a: &Joints, b: &Joints) -> Option<f64> {
     let both = a.iter().zip(b).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let (n, sum) = both.fold((0, 0.0), |(n, sum), (a, b)| (n + 1, sum + (a - b).norm()));

@@ -54,7 +54,7 @@ impl Frame {
         self.views.len()
     }
 
-    /// Number of views that have a detection.
+    /// Returns the number of views that have a detection.
     pub(crate) fn n_seeing(&self) -> usize {
         self.views.iter().filter(|view| !view.is_empty()).count()
     }
@@ -67,12 +67,12 @@ impl Frame {
         self.views[at.view][at.index].colour
     }
 
-    /// Index of a detection among the input detections of its view.
+    /// Returns the index of a detection among the input detections of its view.
     pub(crate) fn given(&self, at: Place) -> usize {
         self.views[at.view][at.index].given
     }
 
-    /// The detections of a view.
+    /// Returns the detections of a view.
     pub(crate) fn places(&self, view: usize) -> impl Iterator<Item = Place> + use<> {
         (0..self.views[view].len()).map(move |index| Place { view, index })
     }

@@ -38,7 +38,7 @@ pub(crate) struct Hypothesis {
     pub(crate) support: f64,
 }
 
-/// Support of a place: the sum over the views of the strongest support by a candidate of that view.
+/// Returns the support of a place: the sum over the views of the strongest support by a candidate of that view.
 ///
 /// * `candidates`: sorted so that the candidates of one view are adjacent.
 pub(crate) fn support(candidates: &[Candidate], place: &Point3<f64>) -> f64 {

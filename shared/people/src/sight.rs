@@ -36,7 +36,7 @@ impl Sight {
         })
     }
 
-    /// Distance of a point from the ray, in metres; infinite behind the camera.
+    /// Returns the distance of a point from the ray, in metres; infinite behind the camera.
     pub(crate) fn distance(&self, point: &Point3<f64>) -> f64 {
         let offset = point - self.origin;
         let along = offset.dot(&self.direction);
@@ -46,28 +46,29 @@ impl Sight {
         (offset.norm_squared() - along * along).max(0.0).sqrt()
     }
 
-    /// Standard deviation of the ray at the distance of a point, as stated by the detector, in metres.
+    /// Returns the standard deviation of the ray at the distance of a point, as stated by the detector, in metres.
     pub(crate) fn stated(&self, point: &Point3<f64>) -> f64 {
         self.spread * (point - self.origin).norm()
     }
 
-    /// Standard deviation of the ray at the distance of a point, but at least the floor that applies even where the picture is sharp.
+    /// Returns the standard deviation of the ray at the distance of a point, but at least the floor that applies even where the picture is
+    /// sharp.
     pub(crate) fn sd(&self, point: &Point3<f64>) -> f64 {
         FLOOR_M.hypot(self.stated(point))
     }
 
-    /// Distance of a point from the ray, in standard deviations.
+    /// Returns the distance of a point from the ray, in standard deviations.
     pub(crate) fn deviations(&self, point: &Point3<f64>) -> f64 {
         self.distance(point) / self.sd(point)
     }
 
-    /// Point of the ray that is nearest to a given point.
+    /// Returns the point of the ray that is nearest to a given point.
     pub(crate) fn nearest(&self, point: &Point3<f64>) -> Point3<f64> {
         let along = (point - self.origin).dot(&self.direction);
         self.origin + self.direction * along.max(0.0)
     }
 
-    /// The ray's part of the normal equations for the joint: the inverse covariance across the ray.
+    /// Returns the ray's part of the normal equations for the joint: the inverse covariance across the ray.
     pub(crate) fn information(&self, point: &Point3<f64>) -> Matrix3<f64> {
         let across = Matrix3::identity() - self.direction * self.direction.transpose();
         across / self.sd(point).powi(2)
@@ -162,7 +163,7 @@ pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
     })
 }
 
-/// Support for a place that is this many standard deviations away, 0 to 1.
+/// Returns the support for a place that is this many standard deviations away, 0 to 1.
 pub(crate) fn agreement(deviations: f64) -> f64 {
     (-0.5 * deviations * deviations).exp()
 }

@@ -126,7 +126,7 @@ proptest! {
     }
 }
 
-/// The ids of every frame.
+/// Returns the ids of every frame.
 fn ids(people: &[Vec<Person>]) -> Vec<Vec<u64>> {
     people
         .iter()

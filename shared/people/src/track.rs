@@ -78,7 +78,7 @@ impl Track {
         self.coarse.joints.map(|joint| joint.map(|point| point + moved))
     }
 
-    /// Maximum distance of a matching detection, in metres.
+    /// Returns the maximum distance of a matching detection, in metres.
     ///
     /// * `gap_s`: time since the previous frame, in seconds.
     pub(crate) fn reach(&self, time_s: f64, gap_s: f64) -> f64 {
@@ -87,7 +87,7 @@ impl Track {
         REACH_M + REACH_M_PER_S * unseen_s + FAST_M_PER_S * rare_s
     }
 
-    /// Number of views that see at least half of the joints clearly.
+    /// Returns the number of views that see at least half of the joints clearly.
     ///
     /// * `least_heat`: minimum heat of a joint that is seen clearly, 0 to 1.
     pub(crate) fn n_clear(&self, frame: &Frame, least_heat: f64) -> usize {
@@ -98,7 +98,7 @@ impl Track {
         self.members.iter().filter(is_clear).count()
     }
 
-    /// Number of joints that two views see clearly, and at the same place.
+    /// Returns the number of joints that two views see clearly, and at the same place.
     ///
     /// * `least_heat`: minimum heat of a joint that is seen clearly, 0 to 1.
     pub(crate) fn n_well_seen(&self, frame: &Frame, least_heat: f64) -> usize {
@@ -201,7 +201,7 @@ impl Track {
         }
     }
 
-    /// Centre of the trunk; `None` if no joint of the trunk is known.
+    /// Returns the centre of the trunk; `None` if no joint of the trunk is known.
     pub(crate) fn trunk(&self) -> Option<Point3<f64>> {
         let points = TRUNK.iter().filter_map(|joint| self.coarse.joints[*joint]);
         let (n, sum) = points.fold((0.0, Vector3::zeros()), |(n, sum), point| {
@@ -211,7 +211,7 @@ impl Track {
     }
 }
 
-/// Mean displacement of the trunk, or of all joints if no joint of the trunk is known.
+/// Returns the mean displacement of the trunk, or of all joints if no joint of the trunk is known.
 fn moved(from: &Joints, to: &Joints) -> Option<Vector3<f64>> {
     let of = |joints: &[usize]| {
         let both = joints.iter().filter_map(|joint| Some(to[*joint]? - from[*joint]?));

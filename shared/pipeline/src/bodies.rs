@@ -114,7 +114,7 @@ impl Bodies {
     }
 }
 
-/// The joints of `skeleton::PARSE14` that use the same parts as a joint of a set.
+/// Returns the joints of `skeleton::PARSE14` that use the same parts as a joint of a set.
 fn same_parts(joint: &Joint) -> impl Iterator<Item = usize> {
     let of_body = PARSE14.joints.iter().enumerate();
     let same = of_body.filter(|(_, it)| it.parts.iter().any(|part| joint.parts.contains(part)));

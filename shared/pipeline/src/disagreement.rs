@@ -84,7 +84,7 @@ pub(crate) fn measure(
     }
 }
 
-/// Distances of the joints from the view's nearest candidate, in pixels; NaN for a joint that the view does not see.
+/// Returns the distances of the joints from the view's nearest candidate, in pixels; NaN for a joint that the view does not see.
 fn nearest(
     found_by: &FoundByViews<'_>,
     motion: &mut Motion,
@@ -144,7 +144,7 @@ fn widened(covariance: &Matrix3<f64>, disagreements_m: &mut [f64]) -> Matrix3<f6
     covariance * NOISE_SHARE + Matrix3::from_diagonal_element(added)
 }
 
-/// The median of the finite values.
+/// Returns the median of the finite values.
 fn median(values: &[f64]) -> Option<f64> {
     let known = values.iter().copied().filter(|value| value.is_finite());
     let mut known: Vec<f64> = known.collect();
@@ -152,7 +152,7 @@ fn median(values: &[f64]) -> Option<f64> {
     known.get(known.len() / 2).copied()
 }
 
-/// The joints of all candidates of a view, with sides as labelled and exchanged.
+/// Returns the joints of all candidates of a view, with sides as labelled and exchanged.
 fn readings<'a>(
     found_by: &FoundByViews<'a>,
     view: usize,

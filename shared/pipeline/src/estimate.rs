@@ -105,7 +105,7 @@ impl Estimator {
         })
     }
 
-    /// The prepared views.
+    /// Returns the prepared views.
     pub fn plans(&self) -> &[Arc<ViewPlan>] {
         &self.plans
     }

@@ -77,7 +77,7 @@ impl ExtrasStep {
         }
     }
 
-    /// Number of extra keypoints of a person.
+    /// Returns the number of extra keypoints of a person.
     pub fn n_keypoints(&self) -> usize {
         self.extras.len()
     }
@@ -193,7 +193,7 @@ impl Match {
     }
 }
 
-/// The joint pairs that show the side of a keypoint.
+/// Returns the joint pairs that show the side of a keypoint.
 fn sides_of(name: &str) -> [[usize; 2]; 2] {
     let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
     if has(&["toe", "heel", "foot", "ankle", "knee"]) {
@@ -205,7 +205,7 @@ fn sides_of(name: &str) -> [[usize; 2]; 2] {
     }
 }
 
-/// Median distance of the joints; the sides of each joint may be exchanged.
+/// Returns the median distance of the joints; the sides of each joint may be exchanged.
 fn middle_distance(own: &[[f64; 2]], fused: &[[f64; 2]]) -> f64 {
     let mirror = |joint: usize| {
         let pair = SIDES.iter().find(|side| side.contains(&joint));

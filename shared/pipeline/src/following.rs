@@ -66,7 +66,7 @@ impl Others {
         self.of_views.get(view).copied().unwrap_or(0)
     }
 
-    /// The candidate of a view that shows the followed person; `None` if the view does not show the person, or nobody is followed.
+    /// Returns the candidate of a view that shows the followed person; `None` if the view does not show the person, or nobody is followed.
     pub fn own(&self, view: usize) -> Option<usize> {
         self.own.get(view).copied().flatten()
     }
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use crate::people::tests::{camera, found};
 
-    /// Position of the chosen person, frame by frame.
+    /// Returns the position of the chosen person, frame by frame.
     fn chosen(follow: Follow, frames: &[&[([f64; 2], f64)]]) -> Vec<Option<f64>> {
         let cameras: Vec<_> = (0..4).map(camera).collect();
         let mut following = Following::new(follow);

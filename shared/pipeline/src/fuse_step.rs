@@ -133,7 +133,7 @@ impl FuseStep {
         }
     }
 
-    /// Number of levels solved so far ([`Solver::n_sweeps`]); another thread may read it.
+    /// Returns the number of levels solved so far ([`Solver::n_sweeps`]); another thread may read it.
     pub fn n_sweeps(&self) -> u64 {
         self.solver.n_sweeps()
     }
@@ -319,7 +319,7 @@ impl FuseStep {
         starts
     }
 
-    /// The candidates of a start, with parts named by the side of the body; one entry for each view of the rig.
+    /// Returns the candidates of a start, with parts named by the side of the body; one entry for each view of the rig.
     fn start_views(
         &self,
         start: &Start,
@@ -358,7 +358,7 @@ impl FuseStep {
         }
     }
 
-    /// The tables of a pair: its own tables, or those for the angle between the views at the person.
+    /// Returns the tables of a pair: its own tables, or those for the angle between the views at the person.
     fn tables(&self, pair: [usize; 2], views: [&ViewInput<'_>; 2]) -> Option<&TypeTables> {
         let mut own = self.tables.of_pairs.iter();
         if let Some(own) = own.find(|table| [table.0, table.1] == pair) {
@@ -369,7 +369,7 @@ impl FuseStep {
     }
 }
 
-/// All pairs of `n_views` views, in ascending order.
+/// Returns all pairs of `n_views` views, in ascending order.
 pub fn all_pairs(n_views: usize) -> Vec<[usize; 2]> {
     (0..n_views)
         .flat_map(|first| (first + 1..n_views).map(move |second| [first, second]))

@@ -69,7 +69,7 @@ impl<'a> Fused<'a> {
 }
 
 impl Fused<'_> {
-    /// The candidate of a view from which fusion started, under an assumption about facing; `None` if the
+    /// Returns the candidate of a view from which fusion started, under an assumption about facing; `None` if the
     /// view was not fused.
     pub(crate) fn start(&self, view: usize, exchanged: Exchanges) -> Option<usize> {
         match self {
@@ -85,7 +85,7 @@ impl Fused<'_> {
     }
 }
 
-/// The hypothesis for an assumption about facing or for its complement; otherwise the best hypothesis.
+/// Returns the hypothesis for an assumption about facing or for its complement; otherwise the best hypothesis.
 fn of_facing(result: &AllViewsResult, exchanged: Exchanges) -> Option<&AllViewsHypothesis> {
     let all = result.views.iter().fold(0, |mask, view| mask | (1 << view));
     let fits = |hypothesis: &&AllViewsHypothesis| {
@@ -95,7 +95,7 @@ fn of_facing(result: &AllViewsResult, exchanged: Exchanges) -> Option<&AllViewsH
     chosen.or_else(|| result.hypotheses.first())
 }
 
-/// The views that a hypothesis assumes to be exchanged relative to the first view.
+/// Returns the views that a hypothesis assumes to be exchanged relative to the first view.
 fn exchanges(result: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchanges {
     let each = result.views.iter().zip(&hypothesis.exchanged);
     each.fold(0, |mask, (view, exchanged)| {
@@ -103,7 +103,7 @@ fn exchanges(result: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchan
     })
 }
 
-/// The hypothesis of a pair that agrees with the joint facing decision.
+/// Returns the hypothesis of a pair that agrees with the joint facing decision.
 fn chosen(pair: &PairResult, exchanged: Exchanges) -> Option<&PairEstimate> {
     let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
     let opposite = first != second;
@@ -120,7 +120,7 @@ mod tests {
 
     use super::*;
 
-    /// A pose identified by the column of its only part.
+    /// Returns a pose identified by the column of its only part.
     fn pose(x: u16) -> Pose {
         let at = Placement {
             x,
@@ -134,7 +134,7 @@ mod tests {
         }
     }
 
-    /// A result of views 1, 2 and 4 of a rig, under two assumptions.
+    /// Returns a result of views 1, 2 and 4 of a rig, under two assumptions.
     fn result() -> AllViewsResult {
         let hypothesis = |exchanged: [bool; 3], energy: f64, x: u16| AllViewsHypothesis {
             exchanged: exchanged.to_vec(),

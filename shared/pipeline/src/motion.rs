@@ -78,7 +78,7 @@ impl Motion {
         })
     }
 
-    /// Displacement of the points of a view between the instant of the frame and the time of the picture, in pixels;
+    /// Returns the displacement of the points of a view between the instant of the frame and the time of the picture, in pixels;
     /// `None` if the picture was taken at the instant.
     ///
     /// * `skew_s`: time of the picture after the instant; `taken_s`: time of the points after the instant, both in seconds.
@@ -120,7 +120,7 @@ impl Motion {
     }
 }
 
-/// Height of the person in the picture, in pixels.
+/// Returns the height of the person in the picture, in pixels.
 fn height(points: &Points) -> f64 {
     longer_side(points.iter().flatten().map(|point| [point.x, point.y])).unwrap_or(0.0)
 }

@@ -93,7 +93,7 @@ pub(crate) struct Seen {
 }
 
 impl NetworkMemory {
-    /// The people seen by the network in this frame.
+    /// Returns the people seen by the network in this frame.
     pub(crate) fn people(&self) -> &[Seen] {
         &self.seen[..self.n_seen]
     }
@@ -103,7 +103,7 @@ impl NetworkMemory {
         self.people().iter().map(|person| &person.maps)
     }
 
-    /// The heat of the person who is seen best in this frame, 0 to 1; 0 if there is nobody.
+    /// Returns the heat of the person who is seen best in this frame, 0 to 1; 0 if there is nobody.
     pub(crate) fn best_heat(&self) -> f64 {
         let heats = self.people().iter().map(|known| known.heat);
         heats.fold(0.0, f64::max)
@@ -211,7 +211,7 @@ pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     before.iter().any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)
 }
 
-/// The share of joints that two sights have in common, with sides as labelled or exchanged.
+/// Returns the share of joints that two sights have in common, with sides as labelled or exchanged.
 fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     let [_, top, _, bottom] = first.extent();
     let near = SAME_JOINT * (bottom - top);
@@ -229,7 +229,7 @@ fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     share(&|joint| joint).max(share(&|joint| MIRRORED[joint]))
 }
 
-/// Displacements of the joints from one sight to another.
+/// Returns the displacements of the joints from one sight to another.
 fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]> {
     let both = first.peaks().iter().zip(second.peaks());
     both.filter_map(|(a, b)| {
@@ -242,8 +242,8 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Sorted::new(values.collect::<Vec<f64>>()).upper_median()
 }
 
-/// Displacement of a whole person from one sight to another, as a share of the height of the first window. It is the median over the
-/// joints along each axis, so errors of single joints have little effect.
+/// Returns the displacement of a whole person from one sight to another, as a share of the height of the first window. It is the median
+/// over the joints along each axis, so errors of single joints have little effect.
 pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<[f64; 2]> {
     let [_, top, _, bottom] = first.extent();
     let along = |axis: usize| median(steps(first, second).map(|step| step[axis]));

@@ -64,7 +64,7 @@ impl Default for NetworkSettings {
 
 /// Minimum score of an extra keypoint: below it, the position is a guess (mmpose and `Pose2Sim` use 0.3).
 const LEAST_SCORE: f64 = 0.3;
-/// Maximum number of map values of a frame.
+/// Returns the maximum number of map values of a frame.
 ///
 /// * `n_people`: maximum number of people per view.
 pub const fn most_values(n_people: usize) -> usize {
@@ -102,7 +102,7 @@ impl NetworkStep {
         Self { extras, ..self }
     }
 
-    /// Width and height of the frames.
+    /// Returns the width and height of the frames.
     pub fn size(&self) -> [usize; 2] {
         self.size
     }
@@ -213,7 +213,7 @@ impl NetworkStep {
         }
     }
 
-    /// Maximum amount by which the score of a pose may be below the usual score of its person.
+    /// Returns the maximum amount by which the score of a pose may be below the usual score of its person.
     fn most_lost(&self) -> f32 {
         -MUCH_WORSE * self.settings.maps.floor()
     }
@@ -243,7 +243,7 @@ impl NetworkStep {
         people
     }
 
-    /// The maps of the people returned by [`Self::sightings`], in the same order.
+    /// Returns the maps of the people returned by [`Self::sightings`], in the same order.
     pub fn evidence<'a>(&self, memory: &'a NetworkMemory) -> impl Iterator<Item = PersonMaps<'a>> {
         let people = memory.people().iter();
         people.filter_map(|seen| seen.maps.evidence())
@@ -259,7 +259,7 @@ impl NetworkStep {
         });
     }
 
-    /// The extra keypoints of a person.
+    /// Returns the extra keypoints of a person.
     fn extras_of(&self, maps: &JointMaps) -> impl Iterator<Item = ExtraKeypoint> {
         let each = self.extras.iter();
         each.map(|extra| {
@@ -270,7 +270,8 @@ impl NetworkStep {
     }
 }
 
-/// Evidence of the direction in which a person faces; no evidence for a person seen head down in a picture that was not rotated.
+/// Returns the evidence of the direction in which a person faces; no evidence for a person seen head down in a picture that was not
+/// rotated.
 fn front_of(sighting: &Sighting, seen: &Seen) -> FrontEvidence {
     let is_told = seen.turn != Turn::Up || sighting.trunk_upward().is_none_or(|up| up > 0.0);
     seen.front.filter(|_| is_told).unwrap_or_default()

@@ -53,7 +53,7 @@ pub(crate) struct Person {
 }
 
 impl Person {
-    /// Number of views that see the person.
+    /// Returns the number of views that see the person.
     pub(crate) fn n_views(&self) -> usize {
         self.candidates.iter().flatten().count()
     }
@@ -97,7 +97,7 @@ impl FoundBody {
         bones.any(|[a, b]| distance_to_segment(middle, *a, *b) < SAME * self.size_px)
     }
 
-    /// Mean distance of the points from the projected points of a person, as a share of the size.
+    /// Returns the mean distance of the points from the projected points of a person, as a share of the size.
     fn distance(&self, projected: &Line) -> f64 {
         let each = self.points_px.iter().zip(projected);
         let sum: f64 = each.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
@@ -141,7 +141,7 @@ impl Found {
 }
 
 impl Found {
-    /// The views that see other people but not this person, as bits.
+    /// Returns the views that see other people but not this person, as bits.
     pub(crate) fn without(&self, followed: usize) -> u64 {
         let is_seen = |view: usize| self.people[followed].candidates[view].is_some();
         let sees_others =
@@ -166,7 +166,7 @@ pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {
     Found { views, people }
 }
 
-/// All groups on which enough views agree; the same person occurs many times.
+/// Returns all groups on which enough views agree; the same person occurs many times.
 fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     let n_present = views.iter().filter(|view| !view.is_empty()).count();
     let needed = MIN_VIEWS.min(n_present).max(2);
@@ -191,7 +191,7 @@ fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     found
 }
 
-/// The best group, and those of the other groups that are different people.
+/// Returns the best group, and those of the other groups that are different people.
 fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let mut kept: Vec<Person> = Vec::new();
@@ -292,7 +292,7 @@ fn placed<'a>(
     Some(person)
 }
 
-/// The points nearest to the rays of some candidates; `None` if the rays are parallel or meet behind a camera.
+/// Returns the points nearest to the rays of some candidates; `None` if the rays are parallel or meet behind a camera.
 fn line_in_world<'a>(
     views: &'a [Vec<FoundBody>],
     candidates: &[Option<usize>],
@@ -316,7 +316,7 @@ fn project(camera: &Camera, points: &[Point3<f64>; N_POINTS]) -> Option<Line> {
     Some(projected)
 }
 
-/// The point with the smallest sum of squared distances from the rays.
+/// Returns the point with the smallest sum of squared distances from the rays.
 fn meeting(rays: &[&Ray]) -> Option<Point3<f64>> {
     let mut normal = Matrix3::zeros();
     let mut target = Vector3::zeros();
@@ -341,7 +341,7 @@ fn distance_to_segment(point: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (point - (a + along * share.clamp(0.0, 1.0))).norm()
 }
 
-/// The candidates of a view for the paper's method; empty if the model does not have the parts of the published models.
+/// Returns the candidates of a view for the paper's method; empty if the model does not have the parts of the published models.
 pub(crate) fn bodies_of_poses(plan: &ViewPlan, answer: Option<&ViewResult>) -> Vec<FoundBody> {
     let is_body = plan.model().n_parts() == skeleton::N_PARTS;
     let Some(answer) = answer.filter(|_| is_body) else {

@@ -138,7 +138,7 @@ impl PersonStep {
         }
     }
 
-    /// The views with a candidate that shows the person, at the instant of the frame.
+    /// Returns the views with a candidate that shows the person, at the instant of the frame.
     fn shown<'a>(&mut self, frame: &FrameViews<'_, 'a>, nth: usize) -> Vec<Shown<'a>> {
         let FrameViews {
             answers,
@@ -258,7 +258,7 @@ impl PersonStep {
         (0..N).filter(is_seen).count() >= WELL_SEEN
     }
 
-    /// The heat of a joint of a solution in a view, 0 to 1.
+    /// Returns the heat of a joint of a solution in a view, 0 to 1.
     fn heat_of(&self, joint: usize, found: &SolvedPerson, view: &PartView<'_>) -> f64 {
         let at = found.pose.joints[joint];
         at.map_or(0.0, |at| {
@@ -303,7 +303,7 @@ impl PersonStep {
     }
 }
 
-/// Evidence of a view about the direction in which a person faces.
+/// Returns the evidence of a view about the direction in which a person faces.
 fn front_seen(sighting: &Sighting) -> FrontEvidence {
     if !sighting.front.iter().all(|number| number.is_finite()) {
         return FrontEvidence::default();
@@ -314,7 +314,7 @@ fn front_seen(sighting: &Sighting) -> FrontEvidence {
     sighting.front.map(|told| weight * told)
 }
 
-/// Number of pairs of views.
+/// Returns the number of pairs of views.
 fn pairs_of(n_views: usize) -> usize {
     n_views * n_views.saturating_sub(1) / 2
 }

@@ -26,8 +26,8 @@ pub(crate) struct PartView<'a> {
 }
 
 impl PartView<'_> {
-    /// Expected error of a joint in the view, in pixels along one axis, from the heat at the solution; `None` if the view does not
-    /// show the place.
+    /// Returns the expected error of a joint in the view, in pixels along one axis, from the heat at the solution; `None` if the view does
+    /// not show the place.
     fn sigma_px(&self, maps: &MapSettings, joint: usize, at: &Point3<f64>) -> Option<f64> {
         let pixel = self.shown.camera.project(at)?;
         let [width, height] = self.shown.camera.intrinsics.size.map(f64::from);
@@ -77,7 +77,7 @@ pub(crate) fn joints_at(
     places.iter().enumerate().map(joint).collect()
 }
 
-/// The joints of a set: each is the mean of the joints of `skeleton::PARSE14` that have its parts.
+/// Returns the joints of a set: each is the mean of the joints of `skeleton::PARSE14` that have its parts.
 pub(crate) fn of_set(
     set: &JointSet,
     of_body: &[Result<Triangulated, TriangulateError>],
@@ -154,7 +154,7 @@ pub(crate) struct Between {
     pub(crate) share: f64,
 }
 
-/// The joint of a part, as an index in `skeleton::PARSE14`; `None` for a part between joints.
+/// Returns the joint of a part, as an index in `skeleton::PARSE14`; `None` for a part between joints.
 fn joint_of(part: usize) -> Option<usize> {
     PARSE14.joints.iter().position(|joint| joint.parts == [part])
 }
@@ -176,7 +176,7 @@ pub(crate) fn between(part: usize) -> Between {
     }
 }
 
-/// The first joint among the parts that follow a part, and its distance in steps.
+/// Returns the first joint among the parts that follow a part, and its distance in steps.
 fn next_joint(mut part: usize, next: impl Fn(usize) -> Option<usize>) -> Option<(usize, u32)> {
     let mut n = 0;
     loop {

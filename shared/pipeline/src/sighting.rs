@@ -61,12 +61,12 @@ impl Sighting {
         well.count() >= N / 2
     }
 
-    /// Position of a joint, in pixels of the frame; `None` if it is not seen.
+    /// Returns the position of a joint, in pixels of the frame; `None` if it is not seen.
     pub fn joint(&self, joint: usize) -> Option<[f64; 2]> {
         self.joints[joint].map(|at| at.map(f64::from))
     }
 
-    /// Positions of the joints, in pixels of the frame; NaN for a joint that is not seen.
+    /// Returns the positions of the joints, in pixels of the frame; NaN for a joint that is not seen.
     ///
     /// * `is_exchanged`: true to exchange left and right.
     pub fn places(&self, is_exchanged: bool) -> [[f64; 2]; N] {
@@ -79,18 +79,19 @@ impl Sighting {
         places
     }
 
-    /// The box around the seen joints ([`outline_of`]), in pixels of the frame.
+    /// Returns the box around the seen joints ([`outline_of`]), in pixels of the frame.
     pub fn outline(&self) -> Option<[f64; 4]> {
         let seen = (0..N).filter(|joint| self.heats[*joint] >= FAINT);
         outline_of(seen.filter_map(|joint| self.joint(joint)))
     }
 
-    /// Positions of the joints of a set, like [`Self::places`].
+    /// Returns the positions of the joints of a set, like [`Self::places`].
     pub fn joints_of_set(&self, set: &JointSet, is_exchanged: bool) -> Vec<[f64; 2]> {
         set.from_parts(&parts_of(&self.places(is_exchanged)))
     }
 
-    /// Cosine of the angle between the trunk in the picture and the upward direction: -1 upside down; `None` if the trunk is not seen.
+    /// Returns the cosine of the angle between the trunk in the picture and the upward direction: -1 upside down; `None` if the trunk is
+    /// not seen.
     pub(crate) fn trunk_upward(&self) -> Option<f64> {
         const NECK: usize = 12;
         const HIPS: [usize; 2] = [2, 3];

@@ -173,7 +173,7 @@ impl SkeletonStep {
         }
     }
 
-    /// The poses of the views at the instant of the frame, and the deviations to be added to those of their parts, in pixels.
+    /// Returns the poses of the views at the instant of the frame, and the deviations to be added to those of their parts, in pixels.
     fn at_instant<'a>(
         &mut self,
         answers: &[Option<ViewResult>],
@@ -210,9 +210,8 @@ impl SkeletonStep {
         self.bodies.settle(&settings.body, &of_body, (set, joints))
     }
 
-    /// The weighted expected errors of the joints of every view, in pixels of the frame; empty without
-    /// a prediction. The expected error of a joint is the mean over its parts, each capped
-    /// at the diagonal of the frame.
+    /// Returns the weighted expected errors of the joints of every view, in pixels of the frame; empty without a prediction. The expected
+    /// error of a joint is the mean over its parts, each capped at the diagonal of the frame.
     fn expected_errors(
         &self,
         answers: &[Option<ViewResult>],
@@ -310,7 +309,7 @@ impl SkeletonStep {
         }
     }
 
-    /// The poses from which fusion started; `None` for a view that was not fused.
+    /// Returns the poses from which fusion started; `None` for a view that was not fused.
     fn starts(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<FusedView>> {
         let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {
@@ -387,7 +386,7 @@ impl SkeletonStep {
         views
     }
 
-    /// The camera and uncertainty of a view, still without points.
+    /// Returns the camera and uncertainty of a view, still without points.
     fn sightings<'a>(&self, view: Option<&FusedView>, plan: &'a ViewPlan) -> Sightings<'a> {
         let cell_px = view.map_or(1.0, |view| view.cell_px);
         Sightings {

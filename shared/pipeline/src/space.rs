@@ -49,7 +49,7 @@ impl Space {
         }
     }
 
-    /// The mirror permutation of the parts for a view that sees the person from behind.
+    /// Returns the mirror permutation of the parts for a view that sees the person from behind.
     pub(crate) fn mirror(&self, view: usize, exchanged: Exchanges) -> Option<&[usize]> {
         let mirror = self.plans[view].model().spec().mirror.as_deref();
         mirror.filter(|_| is_exchanged(exchanged, view))
@@ -92,7 +92,7 @@ impl Space {
         Seen { front, log_ratio }
     }
 
-    /// Evidence of a view about the person it was fused to, taken from the nearest candidate.
+    /// Returns the evidence of a view about the person it was fused to, taken from the nearest candidate.
     fn front_evidence(
         &self,
         view: usize,
@@ -115,7 +115,7 @@ impl Space {
         nearest.map(|nearest| *nearest.1)
     }
 
-    /// The geometric term over all views: the squared distance of every part from its reprojection.
+    /// Returns the geometric term over all views: the squared distance of every part from its reprojection.
     pub(crate) fn agreement(
         &self,
         views: &[Option<FusedView>],
@@ -184,14 +184,14 @@ impl Space {
     }
 }
 
-/// Weight of the front evidence of a view: the squared cosine of the angle between the trunk in the picture and the
+/// Returns the weight of the front evidence of a view: the squared cosine of the angle between the trunk in the picture and the
 /// vertical, 0 upside down. The detector was not trained on the heads of people who bend.
 fn upright(centres_px: &[[f64; 2]]) -> f64 {
     let cosine = trunk_upward(centres_px);
     if cosine > 0.0 { cosine * cosine } else { 0.0 }
 }
 
-/// Cosine of the angle between the trunk in the picture and the upward direction: -1 upside down.
+/// Returns the cosine of the angle between the trunk in the picture and the upward direction: -1 upside down.
 pub(crate) fn trunk_upward(centres_px: &[[f64; 2]]) -> f64 {
     const NECK: usize = 1;
     const HIPS: [usize; 2] = [9, 21];

@@ -96,7 +96,7 @@ pub enum ComputedOn {
 }
 
 impl ViewEstimate {
-    /// The result, for a picture taken at the instant of its frame; `None` if nobody was found.
+    /// Returns the result, for a picture taken at the instant of its frame; `None` if nobody was found.
     pub(crate) fn result(&self, sigma_px: Option<Vec<f32>>) -> Option<ViewResult> {
         (!self.candidates.is_empty()).then(|| ViewResult {
             candidates: self.candidates.clone(),
@@ -152,12 +152,12 @@ impl ViewStep {
         }
     }
 
-    /// The pyramid of the frames.
+    /// Returns the pyramid of the frames.
     pub fn layout(&self) -> &Arc<Layout> {
         &self.layout
     }
 
-    /// The bounding box of all part boxes of a pose: left, top, right, bottom, in pixels of the image.
+    /// Returns the bounding box of all part boxes of a pose: left, top, right, bottom, in pixels of the image.
     pub fn bounding_box(&self, pose: &Pose) -> [f64; 4] {
         pose.bounding_box(self.solver.model(), &self.layout)
     }
@@ -236,7 +236,7 @@ impl ViewStep {
         Ok((found, levels))
     }
 
-    /// Evidence of the direction in which the person of every candidate faces; empty without a detector.
+    /// Returns the evidence of the direction in which the person of every candidate faces; empty without a detector.
     fn front(&self, image: Rgb8View<'_>, candidates: &[Pose]) -> Vec<FrontEvidence> {
         let Some(detector) = &self.settings.orientation else {
             return Vec::new();

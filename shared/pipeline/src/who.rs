@@ -172,7 +172,7 @@ impl WhoStep {
     }
 }
 
-/// The longer side of the box around a person, in pixels.
+/// Returns the longer side of the box around a person, in pixels.
 fn longer_px(sighting: &Sighting) -> f64 {
     let [left, top, right, bottom] = sighting.outline().unwrap_or_default();
     (right - left).max(bottom - top)

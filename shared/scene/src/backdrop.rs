@@ -94,7 +94,7 @@ impl View<'_> {
         (0..(width + 1) * (height + 1)).map(at).collect()
     }
 
-    /// The mean of the samples of a pixel.
+    /// Returns the mean of the samples of a pixel.
     ///
     /// * `here`, `right` and `below`: normalised points between which the samples are placed.
     /// * `set_near`: receives 1 / depth of every sample.

@@ -145,7 +145,7 @@ impl Bones {
         }
     }
 
-    /// The frames of all bones, in the frame of the pose.
+    /// Returns the frames of all bones, in the frame of the pose.
     pub(crate) fn frames(&self, pose: &Pose) -> [Isometry3<f64>; N_BONES] {
         let mut frames = [pose.root; N_BONES];
         for bone in 1..N_BONES {
@@ -157,7 +157,7 @@ impl Bones {
         frames
     }
 
-    /// Height of the lowest point of the body.
+    /// Returns the height of the lowest point of the body.
     ///
     /// * `height`: height of the person, in metres.
     pub(crate) fn lowest(&self, frames: &[Isometry3<f64>; N_BONES], height: f64) -> f64 {
@@ -196,7 +196,7 @@ impl Bones {
         ]
     }
 
-    /// The 14 joints of `skeleton::PARSE14`, in its order.
+    /// Returns the 14 joints of `skeleton::PARSE14`, in its order.
     pub(crate) fn joints(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; 14] {
         let joint = |bone: usize| Point3::from(frames[bone].translation.vector);
 
@@ -222,7 +222,7 @@ impl Bones {
 /// Number of extra keypoints: see [`Scene::extras`](crate::Scene::extras).
 pub const N_EXTRAS: usize = 5;
 
-/// The rotation of a joint: twist about the bone first, then abduction, then flexion.
+/// Returns the rotation of a joint: twist about the bone first, then abduction, then flexion.
 fn rotation(bone: usize, degrees: [f64; 3]) -> UnitQuaternion<f64> {
     let [flexion, abduction, twist] = degrees.map(f64::to_radians);
     let side = side_of(bone);

@@ -39,7 +39,7 @@ struct Way {
 }
 
 impl Way {
-    /// The frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of all bones at a time, in the frame of the stage.
     fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         let frames = self.motion.bones.frames(&self.motion.pose(seconds));
         frames.map(|frame| self.on_stage * frame)
@@ -123,12 +123,12 @@ impl Bystander {
         }
     }
 
-    /// The frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of all bones at a time, in the frame of the stage.
     pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         self.way.frames(seconds)
     }
 
-    /// The joints of `skeleton::PARSE14` at a time, in the frame of the stage.
+    /// Returns the joints of `skeleton::PARSE14` at a time, in the frame of the stage.
     pub(crate) fn joints(&self, seconds: f64) -> [Point3<f64>; N_JOINTS] {
         self.way.motion.bones.joints(&self.frames(seconds))
     }

@@ -46,7 +46,7 @@ impl Curve {
     }
 }
 
-/// The sRGB transfer curve (IEC 61966-2-1), from and to 0..1.
+/// Returns the sRGB transfer curve (IEC 61966-2-1), from and to 0..1.
 pub(crate) fn written(share: f32) -> f32 {
     if share <= 0.003_130_8 {
         12.92 * share

@@ -99,7 +99,7 @@ impl Fabric {
         }
     }
 
-    /// The colour at a point.
+    /// Returns the colour at a point.
     ///
     /// * `at`: position around the body and along it, in metres of the cloth.
     /// * `place`: position on the body at rest, in metres.

@@ -100,7 +100,7 @@ impl Flaws {
         frame > 0 && random.fork("drop").nth(camera as u64).nth(frame).chance(self.drop)
     }
 
-    /// The clock offset of a camera, in seconds.
+    /// Returns the clock offset of a camera, in seconds.
     pub(crate) fn late_s(&self, random: Random, camera: usize) -> f64 {
         if camera == 0 {
             return 0.0;

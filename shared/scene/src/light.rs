@@ -47,19 +47,19 @@ impl Light {
         }
     }
 
-    /// Light on a surface with that normal, without the key lamp.
+    /// Returns the light on a surface with that normal, without the key lamp.
     pub(crate) fn around(&self, normal: &Vector3<f32>) -> Linear {
         let up = 0.5 + 0.5 * normal.z;
         let fill = normal.dot(&self.to_fill).max(0.0);
         self.ground + (self.sky - self.ground) * up + self.fill * fill
     }
 
-    /// Light of the key lamp on a surface with that normal, if it is not in shadow.
+    /// Returns the light of the key lamp on a surface with that normal, if it is not in shadow.
     pub(crate) fn direct(&self, normal: &Vector3<f32>) -> Linear {
         self.key * normal.dot(&self.to_key).max(0.0)
     }
 
-    /// The coordinates of a point perpendicular to the rays of the key lamp, and along the rays towards the lamp, in metres.
+    /// Returns the coordinates of a point perpendicular to the rays of the key lamp, and along the rays towards the lamp, in metres.
     pub(crate) fn beam(&self, at: &Vector3<f32>) -> (Vector2<f32>, f32) {
         let [a, b] = self.across;
         (Vector2::new(at.dot(&a), at.dot(&b)), at.dot(&self.to_key))

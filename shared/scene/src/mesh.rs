@@ -83,7 +83,7 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// The bone that a point follows most.
+    /// Returns the bone that a point follows most.
     pub(crate) fn bone(&self, point: usize) -> usize {
         usize::from(self.weights[point][0].0)
     }
@@ -97,7 +97,7 @@ impl Mesh {
     }
 }
 
-/// The bones that a point follows: those whose solids contain it, blended if two are equally near.
+/// Returns the bones that a point follows: those whose solids contain it, blended if two are equally near.
 fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
     let mut distances = shape.by_bone(at);
     // A point of one leg never follows the other leg.
@@ -124,7 +124,7 @@ fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
     shares
 }
 
-/// The surface of a person at rest.
+/// Returns the surface of a person at rest.
 pub(crate) fn of(subject: &crate::subject::Subject, bones: &Bones) -> (BodyShape, Mesh) {
     let shape = BodyShape::new(subject, bones);
     let mesh = Mesh::new(&shape);

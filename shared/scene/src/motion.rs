@@ -52,7 +52,7 @@ impl Action {
         Self::Lying,
     ];
 
-    /// Name of the action on the command line and in files.
+    /// Returns the name of the action on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Walking => "walking",
@@ -68,7 +68,7 @@ impl Action {
         }
     }
 
-    /// The action with that name, if there is one.
+    /// Returns the action with that name, if there is one.
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
@@ -113,7 +113,7 @@ impl Motion {
         }
     }
 
-    /// The pose at a time, in the frame of the stage: in metres, z up, the floor at 0.
+    /// Returns the pose at a time, in the frame of the stage: in metres, z up, the floor at 0.
     pub(crate) fn pose(&self, seconds: f64) -> Pose {
         let action = self.action;
         let mut stance = match action {
@@ -125,7 +125,7 @@ impl Motion {
         self.grounded(&stance)
     }
 
-    /// Standing height of the person, in metres.
+    /// Returns the standing height of the person, in metres.
     pub(crate) fn height(&self) -> f64 {
         self.actor.subject.proportions.height
     }

@@ -146,7 +146,7 @@ impl Painter {
         triangle != NOTHING && (triangle as usize) < end
     }
 
-    /// The number of samples that see each person, the subject first, after [`draw`](Self::draw).
+    /// Returns the number of samples that see each person, the subject first, after [`draw`](Self::draw).
     pub(crate) fn seen(&self) -> Vec<usize> {
         let mut seen = vec![0; self.bodies.len()];
         for triangle in self.samples.triangle.iter().filter(|nearest| **nearest != NOTHING) {
@@ -174,7 +174,7 @@ impl Painter {
         (0..SUB * SUB).map(move |sub| (y * SUB + sub / SUB) * width + x * SUB + sub % SUB)
     }
 
-    /// The mean of the samples of a pixel, if any of them sees a person.
+    /// Returns the mean of the samples of a pixel, if any of them sees a person.
     fn pixel(&self, of: &Input<'_>, x: usize, y: usize) -> Option<Linear> {
         let n = self.of_pixel(x, y).filter(|i| self.samples.triangle[*i] != NOTHING).count();
         if n == 0 {
@@ -195,7 +195,7 @@ impl Painter {
         Some((sum + behind * (all - n as f32)) / all)
     }
 
-    /// The light reflected to the camera by a place of the body.
+    /// Returns the light reflected to the camera by a place of the body.
     fn shade(&self, of: &Input<'_>, triangle: usize, place: Point2<f32>) -> Linear {
         let after = self.bodies.partition_point(|body| body.first_triangle <= triangle);
         let body = &self.bodies[after - 1];

@@ -19,7 +19,7 @@ impl Photo {
         Ok(Self { size, rgb })
     }
 
-    /// The colour at fractions of the width and the height, with bilinear interpolation.
+    /// Returns the colour at fractions of the width and the height, with bilinear interpolation.
     pub(crate) fn at(&self, share: Vector2<f32>) -> Linear {
         let Size { width, height } = self.size;
         if width == 0 || height == 0 {

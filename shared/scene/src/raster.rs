@@ -38,7 +38,7 @@ impl Samples {
         self.touched = [width, height, 0, 0];
     }
 
-    /// Position of a sample in the picture, in pixels.
+    /// Returns the position of a sample in the picture, in pixels.
     pub(crate) fn place(column: usize, row: usize) -> Point2<f32> {
         let at = |value: usize| (value as f32 + 0.5) / SUB as f32 - 0.5;
         Point2::new(at(column), at(row))
@@ -97,7 +97,7 @@ impl Samples {
 /// Samples on an edge belong to both sides, so that rounding leaves no gaps.
 const EDGE: f32 = 1e-5;
 
-/// The weights of the corners at a place in the picture, corrected for depth; they sum to 1.
+/// Returns the weights of the corners at a place in the picture, corrected for depth; they sum to 1.
 pub(crate) fn shares(corners: [&Corner; 3], at: Point2<f32>) -> [f32; 3] {
     let [a, b, c] = corners.map(|corner| Point2::new(corner.x, corner.y));
     let area = (b - a).perp(&(c - a));

@@ -30,12 +30,12 @@ pub struct Posture {
 }
 
 impl Recording {
-    /// Duration from the first posture to the last, in seconds.
+    /// Returns the duration from the first posture to the last, in seconds.
     pub fn seconds(&self) -> f64 {
         self.postures.len().saturating_sub(1) as f64 / self.rate_hz
     }
 
-    /// The posture at a time, interpolated linearly; constant before the first and after the last.
+    /// Returns the posture at a time, interpolated linearly; constant before the first and after the last.
     fn at(&self, seconds: f64) -> Posture {
         let last = self.postures.len() - 1;
         let place = (seconds * self.rate_hz).clamp(0.0, last as f64);
@@ -107,7 +107,7 @@ impl Recorded {
         recorded
     }
 
-    /// The frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of all bones at a time, in the frame of the stage.
     pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         self.posed(&self.recording.at(seconds))
     }
@@ -127,12 +127,12 @@ impl Recorded {
     }
 }
 
-/// Length of a leg, in metres.
+/// Returns the length of a leg, in metres.
 fn leg(bones: &Bones) -> f64 {
     bones.offset[SHIN[LEFT]].norm() + bones.offset[FOOT[LEFT]].norm()
 }
 
-/// Median length of the recorded legs, in metres.
+/// Returns the median length of the recorded legs, in metres.
 fn recorded_leg(recording: &Recording) -> f64 {
     let length = |posture: &Posture, side: usize| {
         let [hip, knee, ankle] =
@@ -146,7 +146,7 @@ fn recorded_leg(recording: &Recording) -> f64 {
         .map_or(1e-3, |upper_median| upper_median.max(1e-3))
 }
 
-/// The rotations of all bones, in the frame of the recording.
+/// Returns the rotations of all bones, in the frame of the recording.
 fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     let joint = |i: usize| Vector3::from(posture.joints[i]);
     let across = |pair: [usize; 2]| joint(pair[LEFT]) - joint(pair[RIGHT]);
@@ -185,7 +185,7 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     turns
 }
 
-/// The rotations of the two bones of a limb, which hang down at rest, from the positions of its three joints.
+/// Returns the rotations of the two bones of a limb, which hang down at rest, from the positions of its three joints.
 ///
 /// The axis of the hinge between them follows from the bend; for a straight limb, it is that of the trunk.
 ///
@@ -210,7 +210,7 @@ fn hinged(
     [upper, turned(down, lower, upper * Vector3::y())]
 }
 
-/// The rotation that takes `from` to the direction of `along`, and the y axis as close to `left` as possible.
+/// Returns the rotation that takes `from` to the direction of `along`, and the y axis as close to `left` as possible.
 fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQuaternion<f64> {
     let basis = |along: Vector3<f64>, left: Vector3<f64>| {
         let along = unit(along, Vector3::z());
@@ -227,7 +227,7 @@ fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQu
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn))
 }
 
-/// The unit vector in the direction of `it`, or `other` for a zero vector.
+/// Returns the unit vector in the direction of `it`, or `other` for a zero vector.
 fn unit(it: Vector3<f64>, other: Vector3<f64>) -> Vector3<f64> {
     it.try_normalize(1e-9).unwrap_or(other)
 }

@@ -126,7 +126,7 @@ impl std::fmt::Display for RigChoice {
     }
 }
 
-/// The cameras of HumanEva-I; the file documents which lenses are published and which are estimated.
+/// Returns the cameras of HumanEva-I; the file documents which lenses are published and which are estimated.
 pub(crate) fn humaneva() -> Result<Rig, RigChoiceError> {
     let text = include_str!("../../../configs/rigs/humaneva-s1.toml");
     Ok(geometry::files::own::parse(text, &ReadOptions::default())?)
@@ -135,7 +135,7 @@ pub(crate) fn humaneva() -> Result<Rig, RigChoiceError> {
 /// Assumed height above the floor of the point at which the cameras of UMPM look, in metres.
 const UMPM_FOCUS: f64 = 0.95;
 
-/// The cameras of UMPM, rotated so that z is up and the floor is at 0.
+/// Returns the cameras of UMPM, rotated so that z is up and the floor is at 0.
 ///
 /// Their calibration has no up direction, so the image rows are assumed to be level.
 fn umpm() -> Result<Rig, RigChoiceError> {
@@ -172,7 +172,7 @@ fn umpm() -> Result<Rig, RigChoiceError> {
     )?)
 }
 
-/// The rotation that takes z to `up`.
+/// Returns the rotation that takes z to `up`.
 fn upright(up: &UnitVector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&Vector3::z(), up).unwrap_or_else(|| {
         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI)
@@ -225,7 +225,7 @@ impl OrX for Vector3<f64> {
     }
 }
 
-/// The pose of the stage: the frame with its origin on the floor, z up.
+/// Returns the pose of the stage: the frame with its origin on the floor, z up.
 ///
 /// The floor is at 0 if the world's z is up and the focus of the cameras is at most 2 m above 0. Otherwise, it is
 /// 0.95 m below the focus.

@@ -150,12 +150,12 @@ impl Scene {
         &self.performance.name
     }
 
-    /// The cameras that take the pictures.
+    /// Returns the cameras that take the pictures.
     pub fn rig(&self) -> &Rig {
         &self.rig
     }
 
-    /// The cameras with the requested calibration error.
+    /// Returns the cameras with the requested calibration error.
     ///
     /// # Errors
     ///
@@ -164,7 +164,7 @@ impl Scene {
         self.settings.flaws.written(&self.rig, self.random)
     }
 
-    /// The first line of the truth.
+    /// Returns the first line of the truth.
     pub fn header(&self) -> Header {
         let up = self.world_from_stage.rotation * Vector3::z();
         Header {
@@ -180,14 +180,14 @@ impl Scene {
         frame as f64 / self.settings.rate_hz
     }
 
-    /// The joints of `skeleton::PARSE14` at a time, in metres in the world.
+    /// Returns the joints of `skeleton::PARSE14` at a time, in metres in the world.
     pub fn joints(&self, seconds: f64) -> [[f64; 3]; N_JOINTS] {
         let frames = self.performance.frames(seconds);
         let joints = self.performance.bones.joints(&frames);
         joints.map(|joint| (self.world_from_stage * joint).coords.into())
     }
 
-    /// The joints of every other person at a time, in metres in the world.
+    /// Returns the joints of every other person at a time, in metres in the world.
     pub fn other_joints(&self, seconds: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
         let in_world = |joints: [Point3<f64>; N_JOINTS]| {
             joints.map(|joint| (self.world_from_stage * joint).coords.into())
@@ -203,7 +203,7 @@ impl Scene {
         extras.map(|extra| (self.world_from_stage * extra).coords.into())
     }
 
-    /// Index of a camera, given its name in the rig or its index.
+    /// Returns the index of a camera, given its name in the rig or its index.
     ///
     /// # Errors
     ///
@@ -212,7 +212,7 @@ impl Scene {
         camera_of(&self.rig, name)
     }
 
-    /// The time at which a camera took the picture of a frame, and whether the picture repeats an earlier one.
+    /// Returns the time at which a camera took the picture of a frame, and whether the picture repeats an earlier one.
     fn taken(&self, camera: usize, frame: u64) -> (f64, bool) {
         let flaws = &self.settings.flaws;
         let mut shown = frame;
@@ -225,7 +225,7 @@ impl Scene {
     }
 }
 
-/// The other people: those who stand, then those who pass.
+/// Returns the other people: those who stand, then those who pass.
 fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
     let standing = 0..settings.others;
     let mut others: Vec<Bystander> =
@@ -243,7 +243,7 @@ fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
     others
 }
 
-/// Index of a camera of a rig, given its name or its index, counted from 0.
+/// Returns the index of a camera of a rig, given its name or its index, counted from 0.
 ///
 /// # Errors
 ///
@@ -258,7 +258,7 @@ pub fn camera_of(rig: &Rig, name: &str) -> Result<usize, SceneError> {
     })
 }
 
-/// Time from the instants of the frames to the pictures of an address's camera, in milliseconds; 0 for a camera that the rig
+/// Returns the time from the instants of the frames to the pictures of an address's camera, in milliseconds; 0 for a camera that the rig
 /// does not have.
 pub fn skew_ms_of(address: &Address) -> f64 {
     let Settings { rig, skews_ms, .. } = &address.settings;
@@ -311,7 +311,7 @@ impl View {
         })
     }
 
-    /// Width and height of the pictures.
+    /// Returns the width and height of the pictures.
     pub fn size(&self) -> Size {
         self.backdrop.size
     }
@@ -337,14 +337,14 @@ impl View {
         self.ground_truth(&frames, seconds, repeated)
     }
 
-    /// The ground truth of the picture of a frame, without the picture.
+    /// Returns the ground truth of the picture of a frame, without the picture.
     pub fn truth(&mut self, frame: u64) -> ViewTruth {
         let (seconds, repeated) = self.scene.taken(self.camera, frame);
         let frames = self.draw(seconds, None);
         self.ground_truth(&frames, seconds, repeated)
     }
 
-    /// The coverage of every pixel of the last picture by the person, 0 to 255, row major.
+    /// Returns the coverage of every pixel of the last picture by the person, 0 to 255, row major.
     pub fn mask(&self) -> Vec<u8> {
         let size = self.size();
         let mut mask = vec![0; size.width * size.height];
@@ -352,7 +352,7 @@ impl View {
         mask
     }
 
-    /// The visible area of each person in the last picture, in pixels: the subject first, then the others in the order of
+    /// Returns the visible area of each person in the last picture, in pixels: the subject first, then the others in the order of
     /// [`Scene::other_joints`].
     pub fn seen_px(&self) -> Vec<f64> {
         let samples = self.painter.seen().into_iter();
@@ -434,7 +434,7 @@ impl View {
         in_front < TISSUE[joint] * self.scene.performance.height / 1.75
     }
 
-    /// The bounding box of the samples that see the person, in pixels.
+    /// Returns the bounding box of the samples that see the person, in pixels.
     fn outline(&self) -> Option<[f64; 4]> {
         let samples = &self.painter.samples;
         let [x1, y1, x2, y2] = samples.touched;

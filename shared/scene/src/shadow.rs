@@ -78,7 +78,7 @@ impl Shadow {
         }
     }
 
-    /// Share of the lamp's light that the bodies block at a point, 0 to 1: the mean over a square of cells.
+    /// Returns the share of the lamp's light that the bodies block at a point, 0 to 1: the mean over a square of cells.
     ///
     /// * `reach`: number of cells to every side; more for a larger lamp.
     /// * `bias`: minimum distance towards the lamp at which a surface casts a shadow, in metres.
@@ -113,7 +113,7 @@ impl Shadow {
     }
 }
 
-/// Weight of a cell along one axis of the square, which covers its first and last cells only in part.
+/// Returns the weight of a cell along one axis of the square, which covers its first and last cells only in part.
 fn weight(nth: i64, taps: i64, part: f32) -> f32 {
     match nth {
         0 => 1.0 - part,

@@ -28,7 +28,7 @@ pub(crate) struct BodyShape {
     pub(crate) height: f32,
 }
 
-/// The pose in which the surface is created: arms and legs are apart, so that they do not touch.
+/// Returns the pose in which the surface is created: arms and legs are apart, so that they do not touch.
 pub(crate) fn rest_pose() -> Pose {
     let mut angles: Angles = [[0.0; 3]; N_BONES];
     for side in 0..2 {
@@ -56,7 +56,7 @@ impl BodyShape {
         }
     }
 
-    /// Minimum and maximum coordinates.
+    /// Returns the minimum and maximum coordinates.
     pub(crate) fn bounds(&self) -> [Vector3<f32>; 2] {
         let all = self.pieces.iter().map(|piece| piece.solid.bounds());
         all.fold(
@@ -87,7 +87,7 @@ impl BodyShape {
         }
     }
 
-    /// The direction away from the body, with length 1 or 0.
+    /// Returns the direction away from the body, with length 1 or 0.
     pub(crate) fn normal(&self, at: &Point3<f32>) -> Vector3<f32> {
         const STEP: f32 = 2e-3;
         let slope = |axis: usize| {
@@ -99,7 +99,7 @@ impl BodyShape {
         gradient.try_normalize(1e-9).unwrap_or_default()
     }
 
-    /// Distance to the nearest solid of every bone, at most [`FAR`].
+    /// Returns the distance to the nearest solid of every bone, at most [`FAR`].
     pub(crate) fn by_bone(&self, at: &Point3<f32>) -> [f32; N_BONES] {
         let mut distances = [FAR; N_BONES];
         for piece in &self.pieces {
@@ -115,7 +115,7 @@ impl BodyShape {
 /// Maximum distance; larger distances are clipped.
 pub(crate) const FAR: f32 = 0.08;
 
-/// The smaller of two values, rounded where they are nearly equal (Quilez, polynomial smooth minimum).
+/// Returns the smaller of two values, rounded where they are nearly equal (Quilez, polynomial smooth minimum).
 fn smooth_min(a: f32, b: f32) -> f32 {
     let overlap = (BLEND - (a - b).abs()).max(0.0) / BLEND;
     a.min(b) - 0.25 * BLEND * overlap * overlap

@@ -183,14 +183,14 @@ impl Frame {
         serde_json::to_string(self)
     }
 
-    /// The joints of another set, in metres in the world.
+    /// Returns the joints of another set, in metres in the world.
     pub fn in_set(&self, set: &JointSet) -> Vec<[f64; 3]> {
         in_set(&self.joints, set)
     }
 }
 
 impl View {
-    /// The joints of another set in the picture; `None` if any joint is behind the camera.
+    /// Returns the joints of another set in the picture; `None` if any joint is behind the camera.
     pub fn in_set(&self, set: &JointSet) -> Option<Vec<[f64; 2]>> {
         let mut joints = [[0.0; 2]; N_JOINTS];
         for (joint, pixel) in joints.iter_mut().zip(self.pixels) {

@@ -46,7 +46,7 @@ impl Wear {
         }
     }
 
-    /// The material at a point of the body at rest.
+    /// Returns the material at a point of the body at rest.
     ///
     /// * `bone`: the bone that the point follows.
     pub(crate) fn finish(&self, at: &Point3<f32>, bone: usize) -> Finish {
@@ -106,7 +106,7 @@ impl Wear {
         self.cloth(above > hem, along, at)
     }
 
-    /// Position along a limb as a share, and positions around and along it in metres.
+    /// Returns the position along a limb as a share, and positions around and along it in metres.
     fn along(limb: &[Point3<f32>; 2], at: &Point3<f32>) -> (f32, Vector2<f32>) {
         let axis = limb[1] - limb[0];
         let from = at - limb[0];

@@ -24,7 +24,7 @@ impl JointSet {
     /// The three joint sets, the default first.
     pub const ALL: [&'static Self; 3] = [&PARSE14, &UMPM15, &HUMANEVA20];
 
-    /// The joint set with that name, if there is one.
+    /// Returns the joint set with that name, if there is one.
     #[must_use]
     pub fn by_name(name: &str) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|set| set.name == name)

@@ -66,28 +66,28 @@ impl<T: Number> Sorted<T> {
         Self { values }
     }
 
-    /// The values, in ascending order.
+    /// Returns the values, in ascending order.
     pub fn values(&self) -> &[T] {
         &self.values
     }
 
-    /// The middle value; for an even number of values, the mean of the two middle values.
+    /// Returns the middle value; for an even number of values, the mean of the two middle values.
     pub fn median(&self) -> Option<T> {
         Some(self.lower_median()?.middle(self.upper_median()?))
     }
 
-    /// The middle value; for an even number of values, the lower of the two middle values.
+    /// Returns the middle value; for an even number of values, the lower of the two middle values.
     pub fn lower_median(&self) -> Option<T> {
         let last = self.values.len().checked_sub(1)?;
         self.values.get(last / 2).copied()
     }
 
-    /// The middle value; for an even number of values, the upper of the two middle values.
+    /// Returns the middle value; for an even number of values, the upper of the two middle values.
     pub fn upper_median(&self) -> Option<T> {
         self.values.get(self.values.len() / 2).copied()
     }
 
-    /// The smallest value for which at least a given share of the sample is no larger (nearest rank). It is always a value of the
+    /// Returns the smallest value for which at least a given share of the sample is no larger (nearest rank). It is always a value of the
     /// sample.
     ///
     /// * `share`: 0.9 is the 90th percentile; 0 the smallest value, 1 the largest.
@@ -99,7 +99,7 @@ impl<T: Number> Sorted<T> {
 }
 
 impl Sorted<f64> {
-    /// The percentile, interpolated linearly between neighbours (definition 7 of Hyndman and Fan 1996).
+    /// Returns the percentile, interpolated linearly between neighbours (definition 7 of Hyndman and Fan 1996).
     ///
     /// * `share`: 0.9 is the 90th percentile; 0 the smallest value, 1 the largest.
     pub fn interpolated(&self, share: f64) -> Option<f64> {

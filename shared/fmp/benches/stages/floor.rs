@@ -46,7 +46,7 @@ impl Floors {
     }
 }
 
-/// Number of single-precision values that one thread computes per millisecond.
+/// Returns the number of single-precision values that one thread computes per millisecond.
 fn per_ms(quick: bool, run: impl Fn() -> u64) -> f64 {
     let clock = Clock::new(1, quick);
     let mut n = 0;
@@ -58,7 +58,7 @@ fn pixels(it: &LevelLayout) -> f64 {
     (it.image_size[0] * it.image_size[1]) as f64
 }
 
-/// Multiplications and additions of resizing and halving; one double-precision operation counts as two.
+/// Returns the multiplications and additions of resizing and halving; one double-precision operation counts as two.
 fn shrinking(workload: &Workload) -> f64 {
     let [width, height] = workload.layout.image_size.map(|image_size| image_size as f64);
     let level = |(at, it): (usize, &LevelLayout)| {
@@ -74,8 +74,8 @@ fn shrinking(workload: &Workload) -> f64 {
     workload.layout.levels.iter().enumerate().map(level).sum()
 }
 
-/// Operations of the features. Per pixel: the gradient in three planes, nine scalar products with comparisons, in double precision, and
-/// four shares. Per cell: 27 values under four norms.
+/// Returns the operations of the features. Per pixel: the gradient in three planes, nine scalar products with comparisons, in double
+/// precision, and four shares. Per cell: 27 values under four norms.
 fn describing(workload: &Workload) -> f64 {
     let per_pixel = 2.0 * (3.0 * 9.0 + 9.0 * 7.0 + 10.0) + 4.0 * 2.0;
     let cell = (workload.model.spec().cell_px as f64).powi(2);
@@ -84,7 +84,7 @@ fn describing(workload: &Workload) -> f64 {
     levels.map(|level| pixels(level) * (per_pixel + per_cell / cell)).sum()
 }
 
-/// Multiply-adds of the filters in the cheapest known form: by definition, or by tiles with a side of some
+/// Returns the multiply-adds of the filters in the cheapest known form: by definition, or by tiles with a side of some
 /// cells that are multiplied point by point (without the transforms).
 ///
 /// * `tiles`: sides of the available tiles, in cells.
@@ -100,7 +100,7 @@ fn products(workload: &Workload, tiles: &[usize]) -> f64 {
     levels.map(|level| (level.rows * level.cols) as f64 * filters).sum()
 }
 
-/// Number of candidates in both passes of every transform, within the window outside of which none can win, and in
+/// Returns the number of candidates in both passes of every transform, within the window outside of which none can win, and in
 /// the choice among the child's types.
 fn candidates(workload: &Workload, ranges: &Ranges) -> f64 {
     let window = |range: f64, quadratic: f64, side: usize| {

@@ -40,7 +40,7 @@ pub(crate) struct StageTimes {
 }
 
 impl StageTimes {
-    /// Total of the elementary stages that make up a stage, if there are any.
+    /// Returns the total of the elementary stages that make up a stage, if there are any.
     pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
         let extract = self.shrink + self.hog + self.filters;
         match stage {

@@ -146,7 +146,7 @@ impl Table {
         )
     }
 
-    /// The peak rates from which the floors were computed.
+    /// Returns the peak rates from which the floors were computed.
     pub(crate) fn foot(&self) -> String {
         let peak = |peaks: &Peaks| {
             let Peaks {

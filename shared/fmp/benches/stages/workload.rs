@@ -21,7 +21,7 @@ pub(crate) struct Workload {
 }
 
 impl Workload {
-    /// The three workloads of the benchmark; for a quick check, a single small one.
+    /// Returns the three workloads of the benchmark; for a quick check, a single small one.
     pub(crate) fn all(quick: bool) -> Vec<Self> {
         if quick {
             return vec![Self::new([48, 52], 3, ["", ""])];
@@ -79,7 +79,7 @@ fn noise(seed: u64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// A model with the published models' tree, and with springs and responses of similar size.
+/// Returns a model with the published models' tree, and with springs and responses of similar size.
 fn made_up_model(side: usize) -> Model {
     let mut noise = noise(side as u64);
     let mut filter = || Filter {

@@ -132,7 +132,7 @@ impl<'v, 'a> At<'v, 'a> {
         }
     }
 
-    /// All numbers of the value; there must be exactly `N`.
+    /// Returns all numbers of the value; there must be exactly `N`.
     fn row<const N: usize>(&self) -> Result<[f64; N], MatError> {
         let numbers = self.numbers_up_to(N)?;
         <[f64; N]>::try_from(numbers.values()).map_err(|_values| self.size(vec![1, N]))
@@ -151,7 +151,7 @@ impl<'v, 'a> At<'v, 'a> {
         values.into_iter().map(|value| self.as_id(value)).collect()
     }
 
-    /// A table of indices, by rows.
+    /// Returns a table of indices, by rows.
     fn table(&self, rows: usize, cols: usize) -> Result<Vec<Vec<usize>>, MatError> {
         if *self.numbers()?.sizes() != [rows, cols] {
             return Err(self.size(vec![rows, cols]));

@@ -35,7 +35,7 @@ impl Solver {
         Bounds::of_some(evidence.layout().levels.len(), found)
     }
 
-    /// The bound of a level whose messages were computed elsewhere without terms; bit-identical to [`Self::bounds`].
+    /// Returns the bound of a level whose messages were computed elsewhere without terms; bit-identical to [`Self::bounds`].
     ///
     /// * `best`: score of the best root, with the root bias.
     /// * `largest`: largest own score of every part.
@@ -54,7 +54,7 @@ impl Solver {
         Bound::of_own(best, own + self.most_of_edges())
     }
 
-    /// The maximum that springs and biases can add to a score.
+    /// Returns the maximum that springs and biases can add to a score.
     pub(super) fn most_of_edges(&self) -> f64 {
         let parts = self.model.spec().parts.iter();
         let of_edge = parts.filter_map(|part| part.edge.as_ref()).map(|edge| {
@@ -72,7 +72,7 @@ impl Solver {
         of_edge.sum::<f64>() + self.model.spec().root_bias.abs()
     }
 
-    /// Upper bound of the terms' contribution to a pose, and the sum of the absolute values of the bounds.
+    /// Returns the upper bound of the terms' contribution to a pose, and the sum of the absolute values of the bounds.
     pub(super) fn max_gain(&self, extra: &dyn ExtraTerms) -> (f64, f64) {
         let gains = (0..self.model.n_parts()).map(|part| f64::from(extra.max_gain(part)));
         gains.fold((0.0, 0.0), |sums, it| (sums.0 + it, sums.1 + it.abs()))

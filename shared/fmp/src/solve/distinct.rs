@@ -8,7 +8,7 @@ use crate::{Bound, Bounds, Pose, Responses};
 const BATCH: usize = 16;
 
 impl Solver {
-    /// The best `n` poses that are distinct; the first one is [`Self::best`].
+    /// Returns the best `n` poses that are distinct; the first one is [`Self::best`].
     ///
     /// The search is greedy, best first, over the local maxima of the root's scores on every level. A pose is kept
     /// if it is far enough from all poses kept before it.
@@ -47,7 +47,7 @@ impl Solver {
         )
     }
 
-    /// The best `n` of these roots whose poses are far enough from each other.
+    /// Returns the best `n` of these roots whose poses are far enough from each other.
     fn greedy(
         &self,
         evidence: &Responses<'_>,

@@ -61,7 +61,7 @@ impl Solver {
 }
 
 impl IncrementalSolver<'_> {
-    /// The best pose over the offered levels; see [`Solver::best`].
+    /// Returns the best pose over the offered levels; see [`Solver::best`].
     ///
     /// Without [`Responses::with_bounds`], the first call computes the bounds.
     ///
@@ -117,7 +117,7 @@ impl IncrementalSolver<'_> {
         search.finish(&put_back)
     }
 
-    /// Number of levels that the bounds could not rule out at the start of the last solution.
+    /// Returns the number of levels that the bounds could not rule out at the start of the last solution.
     pub fn n_levels(&self) -> usize {
         self.order.len()
     }

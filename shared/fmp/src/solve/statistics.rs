@@ -23,7 +23,7 @@ pub struct SolveStatistics {
 }
 
 impl SolveStatistics {
-    /// The difference from earlier counters.
+    /// Returns the difference from earlier counters.
     #[must_use]
     pub fn since(&self, before: &Self) -> Self {
         Self {

@@ -91,7 +91,7 @@ fn boxes(model: &Model, layout: &Layout, pose: &Pose) -> Boxes {
     all
 }
 
-/// Largest share of a picked box that the other box covers.
+/// Returns the largest share of a picked box that the other box covers.
 fn overlap(picked: &Boxes, other: &Boxes) -> f64 {
     let share = |(a, b): (&[f64; 4], &[f64; 4])| {
         let side = |low: f64, high: f64| (high - low + 1.0).max(0.0);

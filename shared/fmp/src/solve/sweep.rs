@@ -103,7 +103,7 @@ impl<'a> Problem<'a> {
         &self.maps[filter * area..][..area]
     }
 
-    /// The part's position term at all cells of the window, if it has one.
+    /// Returns the part's position term at all cells of the window, if it has one.
     fn position_term<'b>(&self, part: usize, buffer: &'b mut [f32]) -> Option<&'b [f32]> {
         let extra = self.extra?;
         buffer.fill(0.0);
@@ -124,7 +124,7 @@ impl<'a> Problem<'a> {
         has_one.then_some(buffer)
     }
 
-    /// The part's position term at one placement, if it has one.
+    /// Returns the part's position term at one placement, if it has one.
     fn term_at(&self, part: usize, at: Placement) -> Option<f32> {
         let level = usize::from(self.level);
         let cols = self.evidence.layout().levels[level].cols;
@@ -134,7 +134,7 @@ impl<'a> Problem<'a> {
         has_one.then_some(term[0])
     }
 
-    /// The minimum position term of a part in a pose that loses less than `slack`, if some terms
+    /// Returns the minimum position term of a part in a pose that loses less than `slack`, if some terms
     /// are lower.
     fn worst_term(&self, part: usize, slack: f64) -> Option<f32> {
         let extra = self.extra?;
@@ -146,7 +146,7 @@ impl<'a> Problem<'a> {
         worst.is_finite().then_some(worst)
     }
 
-    /// Number of message entries of a full sweep.
+    /// Returns the number of message entries of a full sweep.
     pub(super) fn n_entries(&self) -> usize {
         (self.solver.model.n_parts() - 1) * self.n_cells()
     }
@@ -208,30 +208,30 @@ impl<'a> Sweep<'a> {
         self.level
     }
 
-    /// Number of message entries that were computed.
+    /// Returns the number of message entries that were computed.
     pub(super) fn n_computed(&self) -> usize {
         self.workspace.n_computed
     }
 
-    /// The score of the best root of the level.
+    /// Returns the score of the best root of the level.
     pub(super) fn highest(&self) -> f32 {
         let ranges = &self.workspace.ranges[self.solver.planes(0)];
         let most = ranges.iter().map(|range| range.max + self.solver.root_bias());
         most.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Sum of the largest own scores of all parts, if all are new.
+    /// Returns the sum of the largest own scores of all parts, if all are new.
     pub(super) fn own(&self) -> f64 {
         self.workspace.own
     }
 
-    /// The best root of the level; ties go to the first cell in row-major order, then to the first type.
+    /// Returns the best root of the level; ties go to the first cell in row-major order, then to the first type.
     pub(super) fn best_root(&self) -> Option<Root> {
         let better = |a: Root, b: Root| if b.score > a.score { b } else { a };
         self.roots().reduce(better).filter(|root| root.score > f32::NEG_INFINITY)
     }
 
-    /// The best type of the root at every cell of the window, in row-major order.
+    /// Returns the best type of the root at every cell of the window, in row-major order.
     pub(super) fn roots(&self) -> impl Iterator<Item = Root> {
         let bias = self.solver.root_bias();
         let planes = self.planes(0);
@@ -252,7 +252,7 @@ impl<'a> Sweep<'a> {
         })
     }
 
-    /// The best tree with the given root.
+    /// Returns the best tree with the given root.
     pub(super) fn backtrack(&self, root: Root) -> Option<Pose> {
         let model = &*self.solver.model;
         let mut parts = Vec::with_capacity(model.n_parts());
@@ -280,7 +280,7 @@ impl<'a> Sweep<'a> {
         })
     }
 
-    /// The part's planes and the margin after them.
+    /// Returns the part's planes and the margin after them.
     fn planes(&self, part: usize) -> &[f32] {
         let planes = self.solver.planes(part);
         let [first, end] = [planes.start, planes.end].map(|plane| self.grid.len(plane));

@@ -11,7 +11,7 @@ use crate::allocations;
 
 const SIZE: [usize; 2] = [90, 110];
 
-/// A model with thirty filters of two sizes on one part, ten levels per octave.
+/// Returns a model with thirty filters of two sizes on one part, ten levels per octave.
 fn model() -> Arc<Model> {
     let filter = |side: usize| Filter {
         rows: side,
@@ -35,7 +35,7 @@ fn model() -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// Number of allocations and reallocations of the frames after the first.
+/// Returns the number of allocations and reallocations of the frames after the first.
 fn of_frames(n_frames: usize) -> usize {
     let model = model();
     let layout = Layout::new(&model, SIZE[0], SIZE[1]).unwrap();

@@ -26,7 +26,7 @@ impl Noise {
     }
 }
 
-/// A tree of `n_parts` parts with up to three types each, and springs per child type or per pair.
+/// Returns a tree of `n_parts` parts with up to three types each, and springs per child type or per pair.
 pub(crate) fn tree(noise: &mut Noise, n_parts: usize) -> Arc<Model> {
     let mut parts: Vec<PartSpec> = Vec::new();
     let mut filters = Vec::new();

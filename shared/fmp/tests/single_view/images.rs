@@ -34,7 +34,7 @@ const CUTS: [([usize; 2], [usize; 2]); 4] = [
     ([7, 11], [4, 2]),
 ];
 
-/// A model whose filters are cut out of the figure in the given picture.
+/// Returns a model whose filters are cut out of the figure in the given picture.
 fn planted(size: [usize; 2], at: [usize; 2], data: &[u8]) -> Arc<Model> {
     let filter = |[_, [rows, cols]]: [[usize; 2]; 2], weights| Filter {
         rows,

@@ -208,7 +208,7 @@ fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews
     }
 }
 
-/// A pose and the bits of its score.
+/// Returns a pose and the bits of its score.
 fn bits(pose: Option<&Pose>) -> Option<(u32, Pose)> {
     pose.map(|pose| (pose.score.to_bits(), pose.clone()))
 }

@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use crate::common::{Evidence, Noise, tree};
 use crate::other_view::{OtherView, OtherViews};
 
-/// A model with three filters of several sizes on one part.
+/// Returns a model with three filters of several sizes on one part.
 fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
     let mut filter = |rows: usize, cols: usize| Filter {
         rows,
@@ -37,7 +37,7 @@ fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// A range of at least one of `n` items, from two shares.
+/// Returns a range of at least one of `n` items, from two shares.
 fn cut(n: usize, shares: [f64; 2]) -> Range<usize> {
     let at = shares.map(|share| (share * n as f64) as usize);
     at[0].min(at[1])..at[0].max(at[1]) + 1
@@ -51,7 +51,7 @@ fn shares() -> impl Strategy<Value = Shares> {
     [two(), two(), two()]
 }
 
-/// A scope from shares of the levels, the columns and the rows.
+/// Returns a scope from shares of the levels, the columns and the rows.
 fn scope(layout: &Layout, [levels, x, y]: Shares) -> Scope {
     let levels = cut(layout.levels.len(), levels);
     let [x, y] = [(x, 0), (y, 1)].map(|(shares, axis)| {
@@ -66,7 +66,7 @@ fn scope(layout: &Layout, [levels, x, y]: Shares) -> Scope {
     .unwrap()
 }
 
-/// The responses of a scope, and those of the whole image on the same cells.
+/// Returns the responses of a scope, and those of the whole image on the same cells.
 fn both(
     extractor: &Extractor,
     (image, layout): (Rgb8View<'_>, &Layout),
@@ -90,7 +90,7 @@ fn both(
     [got, want]
 }
 
-/// Maximum difference between the response of the scope and that of the whole image, for every response.
+/// Returns the maximum difference between the response of the scope and that of the whole image, for every response.
 ///
 /// It is the bound of [`FilterBank::correlate`] for both, with the largest possible values of features:
 /// four clipped entries, half of their sum; eighteen, weighted as texture; 1.

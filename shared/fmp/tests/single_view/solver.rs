@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::common::{Evidence, Noise, tree};
 use crate::other_view::OtherView;
 
-/// All poses on a level.
+/// Returns all poses on a level.
 fn all_poses(model: &Model, level: u16, [rows, cols]: [usize; 2]) -> Vec<Pose> {
     let mut all = vec![Vec::new()];
     for part in 0..model.n_parts() {

@@ -47,7 +47,7 @@ impl Scene {
         scope == whole
     }
 
-    /// The frames, out of ten at a frame rate, that are searched in full if all scores equal the first.
+    /// Returns the frames, out of ten at a frame rate, that are searched in full if all scores equal the first.
     fn full_at(rate_hz: f64) -> Vec<u64> {
         let mut scene = Self::new(Some(TrackSettings {
             full_every: 1000,
@@ -61,7 +61,7 @@ impl Scene {
     }
 }
 
-/// A pose with parts in columns 10 to 20 and rows 15 to 16 of level 4.
+/// Returns a pose with parts in columns 10 to 20 and rows 15 to 16 of level 4.
 fn pose(score: f32) -> Pose {
     let at = |x: u16, y: u16| Placement { x, y, mixture: 0 };
     Pose {

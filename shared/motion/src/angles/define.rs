@@ -41,7 +41,7 @@ pub enum Angle {
 }
 
 impl Angle {
-    /// All angles, in the order used in files.
+    /// Returns all angles, in the order used in files.
     pub fn all() -> Vec<Self> {
         let trunk = [
             Self::TrunkForwards,
@@ -70,7 +70,7 @@ impl Angle {
         matches!(self, Self::TrunkForwards | Self::TrunkSideways)
     }
 
-    /// The joints that define the angle, in the order expected by `degrees`.
+    /// Returns the joints that define the angle, in the order expected by `degrees`.
     pub fn roles(self) -> Vec<Role> {
         use Role::{Ankle, BigToe, Elbow, Heel, Hip, Knee, Neck, Shoulder, Wrist};
         use Side::{Left, Right};
@@ -94,7 +94,7 @@ impl Angle {
         }
     }
 
-    /// The angle, in degrees; `None` if the points do not define it.
+    /// Returns the angle, in degrees; `None` if the points do not define it.
     ///
     /// * `points`: in the order of [`Self::roles`].
     pub(super) fn degrees(self, points: &[Vector3<f64>], up: &UnitVector3<f64>) -> Option<f64> {
@@ -163,7 +163,7 @@ fn is_told(a: f64, b: f64) -> bool {
     a.hypot(b) > LEAST_TILT
 }
 
-/// The hip line towards the right, and the trunk.
+/// Returns the hip line towards the right, and the trunk.
 ///
 /// * `points`: right hip, left hip, neck, ...
 fn pelvis(points: &[Vector3<f64>]) -> Option<[Vector3<f64>; 2]> {
@@ -172,7 +172,7 @@ fn pelvis(points: &[Vector3<f64>]) -> Option<[Vector3<f64>; 2]> {
     Some([right, trunk])
 }
 
-/// The direction of the thigh in the axes of the pelvis, in which the hip line is kept.
+/// Returns the direction of the thigh in the axes of the pelvis, in which the hip line is kept.
 fn thigh(side: Side, points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let [right, trunk] = pelvis(points)?;
     let hip = if side == Side::Right {
@@ -184,7 +184,7 @@ fn thigh(side: Side, points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     Some(axes_right(&right, &trunk)?.tr_mul(&thigh))
 }
 
-/// The third rotation, about the thigh, in the joint coordinates of Grood & Suntay as in Wu et al. 2002.
+/// Returns the third rotation, about the thigh, in the joint coordinates of Grood & Suntay as in Wu et al. 2002.
 ///
 /// The knee's bending axis points from left to right and is perpendicular to thigh and lower leg; the epicondyles are not known.
 fn hip_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
@@ -209,7 +209,7 @@ fn trunk_rotation(points: &[Vector3<f64>]) -> Option<f64> {
     is_told(line.x, line.z).then(|| line.x.atan2(line.z).to_degrees())
 }
 
-/// The direction of the upper arm in the axes of the thorax with z outwards, and these axes with the sign of z.
+/// Returns the direction of the upper arm in the axes of the thorax with z outwards, and these axes with the sign of z.
 ///
 /// * `points`: right hip, left hip, neck, right shoulder, left shoulder, elbow, ...
 fn arm(side: Side, points: &[Vector3<f64>]) -> Option<(Vector3<f64>, nalgebra::Matrix3<f64>)> {
@@ -226,7 +226,7 @@ fn arm(side: Side, points: &[Vector3<f64>]) -> Option<(Vector3<f64>, nalgebra::M
     Some((arm, axes))
 }
 
-/// The third rotation of Y-X-Y as in Wu et al. 2005, with the elbow's bending axis instead of the epicondyles.
+/// Returns the third rotation of Y-X-Y as in Wu et al. 2005, with the elbow's bending axis instead of the epicondyles.
 fn shoulder_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
     let (arm, axes) = arm(side, points)?;
     if !is_told(arm.x, arm.z) {

@@ -7,7 +7,7 @@ use super::Unknown;
 /// A position and its covariance.
 pub(super) type Place = (Vector3<f64>, Option<Matrix3<f64>>);
 
-/// The standard deviation of `angle` for joints with independent errors; `None` if a covariance is unknown.
+/// Returns the standard deviation of `angle` for joints with independent errors; `None` if a covariance is unknown.
 ///
 /// The method is second-order divided differences (Nørgaard, Poulsen & Ravn 2000): the angle is computed at the square root of three
 /// standard deviations to both sides along every axis of every covariance. Unlike derivatives, these differences respond to the curvature

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use Side::{Left, Right};
 
-/// A body that stands upright and looks along x, with z up in the world, hanging arms and straight limbs.
+/// Returns a body that stands upright and looks along x, with z up in the world, hanging arms and straight limbs.
 fn standing() -> Vec<(Role, Vector3<f64>)> {
     // Axes: x forwards, y left, z up.
     let mut all = vec![
@@ -197,7 +197,7 @@ fn an_angle_that_nothing_is_known_of_is_none() {
     assert_eq!(knee.1.unwrap().sd_degrees, None);
 }
 
-/// A pose in which every angle is defined.
+/// Returns a pose in which every angle is defined.
 fn bent() -> Vec<(Role, Vector3<f64>)> {
     let mut pose = standing();
     for (side, y) in [(Right, -1.0), (Left, 1.0)] {

@@ -229,7 +229,7 @@ fn deployment_of(folder: &Path) -> Option<Value> {
     value.get("deployment").cloned()
 }
 
-/// Direction against gravity in the world of a run: from its deployment, otherwise from its calibration if that still exists.
+/// Returns the direction against gravity in the world of a run: from its deployment, otherwise from its calibration if that still exists.
 pub(crate) fn up(folder: &Path) -> Option<UnitVector3<f64>> {
     let deployment = deployment_of(folder)?;
     if let Ok(up) = serde_json::from_value::<[f64; 3]>(deployment.get("up")?.clone()) {

@@ -49,7 +49,7 @@ pub(super) fn all(
     files::replace(&path, text.as_bytes()).map_err(|error| in_file(&path, &error))
 }
 
-/// The line of an instant with smoothed joints; people who were not measured at this instant come last.
+/// Returns the line of an instant with smoothed joints; people who were not measured at this instant come last.
 fn smoothed_line(mut line: FrameLine, at: usize, run: &Run, motions: &[Motion]) -> FrameLine {
     let smoothed = |person: &Person, motion: &Motion, measured: Option<PersonLine>| {
         let joints = person.recorded.joints.iter().zip(&motion.joints);
@@ -118,7 +118,7 @@ fn write_angles_at(
     Ok(())
 }
 
-/// The name used in files for an angle without a value.
+/// Returns the name used in files for an angle without a value.
 fn unknown(why: Unknown, angle: angles::Angle, up: Option<UnitVector3<f64>>) -> &'static str {
     if up.is_none() && angle.needs_up() {
         return "no vertical";

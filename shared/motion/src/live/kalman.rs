@@ -179,7 +179,7 @@ impl Model {
     }
 }
 
-/// The weight of every filter; the weights sum to 1.
+/// Returns the weight of every filter; the weights sum to 1.
 fn shares(models: &[Model; N_MODELS]) -> [f64; N_MODELS] {
     let best = models.iter().map(|model| model.score).fold(f64::NEG_INFINITY, f64::max);
     let odds = models.each_ref().map(|model| (model.score - best).exp());

@@ -3,12 +3,12 @@
 use super::*;
 use crate::{Joint, Measured, Recorded, Role, Settings, Side, Sides, State};
 
-/// An approximately standard normal number: the sum of 12 uniform ones.
+/// Returns an approximately standard normal number: the sum of 12 uniform ones.
 fn normal(random: &mut fastrand::Rng) -> f64 {
     (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
 }
 
-/// A swinging wrist, 20 cm at 1 Hz, in metres.
+/// Returns a swinging wrist, 20 cm at 1 Hz, in metres.
 fn swing(time: f64) -> Vector3<f64> {
     let turn = core::f64::consts::TAU * time;
     Vector3::new(

@@ -40,7 +40,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// The part of the second view that shows the same limb as `part` of the first view.
+    /// Returns the part of the second view that shows the same limb as `part` of the first view.
     pub(crate) fn partner(&self, part: usize, exchanged: bool) -> usize {
         if exchanged { self.mirror[part] } else { part }
     }
@@ -81,7 +81,7 @@ impl Counts {
         *cell = cell.saturating_add(1);
     }
 
-    /// Number of co-occurrences over all parts.
+    /// Returns the number of co-occurrences over all parts.
     pub fn total(&self) -> u64 {
         let both = self.same.iter().chain(&self.exchanged).flatten();
         both.map(|count| u64::from(*count)).sum()
@@ -137,7 +137,7 @@ impl Counts {
         sizes.map(matrix).collect()
     }
 
-    /// The tables of a pair of views.
+    /// Returns the tables of a pair of views.
     pub fn tables(
         &self,
         shape: &Shape,
@@ -175,7 +175,7 @@ fn lift(joint: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The frequency of every type of every part over all counts, with one extra observation of each type.
+/// Returns the frequency of every type of every part over all counts, with one extra observation of each type.
 pub fn marginals(shape: &Shape, all: &[&Counts]) -> Vec<Vec<f64>> {
     let mut sums: Vec<Vec<f64>> = shape.n_types.iter().map(|&n| vec![1.0; n]).collect();
     for counts in all {

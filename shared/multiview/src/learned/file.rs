@@ -94,7 +94,7 @@ pub struct Weights {
 }
 
 impl Default for Weights {
-    /// The weights of `crate::Settings`.
+    /// Returns the weights of `crate::Settings`.
     fn default() -> Self {
         let settings = crate::Settings::default();
         let cap = settings.max_distance_cells;
@@ -219,7 +219,7 @@ impl Learned {
         })
     }
 
-    /// Tables for any pair of cameras.
+    /// Returns the tables for any pair of cameras.
     pub fn by_angle(&self, appearance: Appearance) -> AngleTables {
         let marginals = self.marginals();
         let tables = |counts: &Counts| {
@@ -229,7 +229,7 @@ impl Learned {
         AngleTables::new(half, &self.model.shape.mirror)
     }
 
-    /// Tables of the cameras of a rig that was learned by name, as pairs of camera indices, the smaller index first.
+    /// Returns the tables of the cameras of a rig that was learned by name, as pairs of camera indices, the smaller index first.
     ///
     /// * Returns `None` if no rig of that name was learned.
     pub fn of_rig(
@@ -253,7 +253,7 @@ impl Learned {
         Some(rig.pairs.iter().filter_map(pair).collect())
     }
 
-    /// The map from parts to the joints of a set, if one was learned.
+    /// Returns the map from parts to the joints of a set, if one was learned.
     pub fn joint_map(&self, set: &JointSet) -> Option<Arc<JointMap>> {
         let found = self.joints.iter().find(|joint| joint.set == set.name)?;
         JointMap::new(found.weights.clone()).map(Arc::new)

@@ -156,7 +156,7 @@ impl JointFile {
         ))
     }
 
-    /// The map from the 26 parts to the joints of a set. All joints of the set must be made of joints of `skeleton::PARSE14`.
+    /// Returns the map from the 26 parts to the joints of a set. All joints of the set must be made of joints of `skeleton::PARSE14`.
     ///
     /// * Returns `None` for a set with a part that is not a joint there.
     pub fn map(&self, set: &JointSet) -> Option<Arc<JointMap>> {

@@ -14,7 +14,7 @@ const SETTINGS: Local = Local {
 /// Distance of an annotated knee beyond its part, as a share of the distance between the thigh part and the knee part.
 const BEYOND: f64 = 0.25;
 
-/// A person in a random pose whose knees are beyond their parts, away from the thigh.
+/// Returns a person in a random pose whose knees are beyond their parts, away from the thigh.
 fn person(random: &mut fastrand::Rng, noise_px: f64) -> Marked {
     let mut noise = |most: f64| most * (2.0 * random.f64() - 1.0);
     let upright = |part: usize| -> [f64; 2] {
@@ -77,7 +77,7 @@ fn learn(people: &[Marked]) -> Vec<Vec<f64>> {
     SETTINGS.learn(&[people.iter().collect()])
 }
 
-/// The weights of the knee's own part and of the thigh.
+/// Returns the weights of the knee's own part and of the thigh.
 fn knee(rows: &[Vec<f64>]) -> [f64; 2] {
     [rows[1][11], rows[1][10]]
 }

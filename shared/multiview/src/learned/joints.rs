@@ -82,7 +82,7 @@ impl JointFit {
         }
     }
 
-    /// The map for a set, with rows for all its joints; joints without samples keep their default.
+    /// Returns the map for a set, with rows for all its joints; joints without samples keep their default.
     pub fn solve(&self, set: &JointSet, ridge: f64) -> JointWeights {
         let rows = set.joints.iter().map(|joint| self.row(joint.parts, ridge));
         JointWeights {
@@ -112,7 +112,7 @@ impl JointFit {
         row.map(|(weight, own)| rounded(weight + left * own)).collect()
     }
 
-    /// Mean squared error of another fit's maps on the samples of this one, in units of the person's size;
+    /// Returns the mean squared error of another fit's maps on the samples of this one, in units of the person's size;
     /// `None` without samples.
     pub fn error_of(&self, other: &Self, ridge: f64) -> Option<f64> {
         let n: f64 = self.joints.iter().map(|joint| joint.n).sum();
@@ -142,7 +142,7 @@ impl Normal {
         Some(factors.solve(&self.targets))
     }
 
-    /// Sum of squared errors.
+    /// Returns the sum of squared errors.
     fn error(&self, weights: &DVector<f64>) -> f64 {
         let quadratic = weights.dot(&(&self.products * weights));
         (self.squares - 2.0 * weights.dot(&self.targets) + quadratic).max(0.0)
@@ -166,7 +166,7 @@ fn rounded(weight: f64) -> f64 {
     (weight * 1e6).round() / 1e6
 }
 
-/// The parts of the joint on the other side.
+/// Returns the parts of the joint on the other side.
 fn mirror_of(parts: &[usize]) -> Option<&'static [usize]> {
     let mut mirrored: Vec<usize> = parts.iter().map(|&part| MIRROR[part]).collect();
     mirrored.sort_unstable();

@@ -163,7 +163,7 @@ impl Learner {
         self.named[at].counts.add(&self.shape, part, types, exchanged);
     }
 
-    /// A type counts if its part and the parent part, to which the type is relative, are right.
+    /// Returns a type counts if its part and the parent part, to which the type is relative, are right.
     fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
         let right = |part: usize| {
@@ -177,12 +177,12 @@ impl Learner {
         self.from.instants += 1;
     }
 
-    /// The regression of the joints.
+    /// Returns the regression of the joints.
     pub fn joints(&self) -> &JointFit {
         &self.joints
     }
 
-    /// Mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
+    /// Returns the mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
     /// b) / (p(a) p(b))`; above 0 if the tables are informative.
     pub fn lift_on(&self, other: &Self) -> Option<f64> {
         let marginals =
@@ -205,7 +205,7 @@ impl Learner {
         (n > 0.0).then(|| sum / n)
     }
 
-    /// The learned parameters.
+    /// Returns the learned parameters.
     ///
     /// * `rig`: the rig of the pairs of cameras that were learned by name.
     ///
@@ -250,7 +250,7 @@ impl Learner {
     }
 }
 
-/// The median; the lower one for an even number of values.
+/// Returns the median; the lower one for an even number of values.
 fn median(values: &[f32]) -> f32 {
     let median = Sorted::new(values).lower_median();
     // More than four digits would exceed the precision of the pictures.

@@ -67,7 +67,7 @@ impl Local {
         rows
     }
 
-    /// The weights of one joint.
+    /// Returns the weights of one joint.
     fn row(self, joint: usize, sets: &[Vec<&Marked>]) -> Vec<f64> {
         let own = own(joint);
         let around = around(own, self.reach);
@@ -109,7 +109,8 @@ impl Local {
     }
 }
 
-/// Mean distance of joints from their annotations, in percent of the person's size, each at most 10; `None` if there are no people.
+/// Returns the mean distance of joints from their annotations, in percent of the person's size, each at most 10; `None` if there are no
+/// people.
 ///
 /// * `rows`: result of [`Local::learn`]; if `None`, the parts themselves are used.
 pub fn mean_error(rows: Option<&[Vec<f64>]>, people: &[&Marked]) -> Option<f64> {
@@ -136,7 +137,7 @@ pub fn try_all(sets: &[Vec<Marked>]) -> Vec<Tried> {
     tried.map(|tried| (tried, left_out(tried, sets))).collect()
 }
 
-/// The settings with the smallest error, with the same weight for every data set; the first ones in a tie.
+/// Returns the settings with the smallest error, with the same weight for every data set; the first ones in a tie.
 pub fn best(tried: &[Tried]) -> Option<&Tried> {
     let mean = |tried: &&Tried| tried.1.iter().sum::<f64>();
     tried.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)))
@@ -170,7 +171,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// Weight of the sample: Tukey's biweight of its distance.
+    /// Returns the weight of the sample: Tukey's biweight of its distance.
     fn trust(&self, weights: &DVector<f64>) -> f64 {
         let [x, y] = [0, 1].map(|axis| self.joint[axis] - self.around[axis].dot(weights));
         let square = (x * x + y * y) / (LIMIT * LIMIT);
@@ -221,19 +222,19 @@ fn read(row: &[f64], person: &Marked) -> [f64; 2] {
     })
 }
 
-/// The part that represents a joint of `skeleton::PARSE14` by default.
+/// Returns the part that represents a joint of `skeleton::PARSE14` by default.
 pub(crate) fn own(joint: usize) -> usize {
     PARSE14.joints[joint].parts[0]
 }
 
-/// The same joint of `skeleton::PARSE14` on the other side.
+/// Returns the same joint of `skeleton::PARSE14` on the other side.
 fn mirror_of(joint: usize) -> usize {
     let other = MIRROR[own(joint)];
     (0..N_JOINTS).find(|i| own(*i) == other).unwrap_or(joint)
 }
 
-/// The parts up to `reach` bones away from a part, without the part itself, in ascending order; for shoulders and hips also the opposite
-/// part.
+/// Returns the parts up to `reach` bones away from a part, without the part itself, in ascending order; for shoulders and hips also the
+/// opposite part.
 fn around(own: usize, reach: usize) -> Vec<usize> {
     let mut near = [false; N_PARTS];
     near[own] = true;
@@ -252,7 +253,7 @@ fn around(own: usize, reach: usize) -> Vec<usize> {
     (0..N_PARTS).filter(|&i| near[i] && i != own).collect()
 }
 
-/// The longer side of the box around the joints plus a pixel, as in PCK.
+/// Returns the longer side of the box around the joints plus a pixel, as in PCK.
 fn size(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
         let values = || joints.iter().map(move |joint| joint[axis]);

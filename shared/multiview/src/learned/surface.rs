@@ -67,7 +67,7 @@ impl Tally {
         self.iterations += iterations.iter().map(|iteration| u64::from(*iteration)).sum::<u64>();
     }
 
-    /// The result over all frames.
+    /// Returns the result over all frames.
     pub fn point(&self, weights: Weights) -> Point {
         let n = self.n.max(1) as f64;
         Point {
@@ -79,13 +79,13 @@ impl Tally {
     }
 }
 
-/// The best of the points; the first one in a tie.
+/// Returns the best of the points; the first one in a tie.
 pub fn best(points: &[Point]) -> Option<&Point> {
     points.iter().reduce(|best, it| if it.area > best.area { it } else { best })
 }
 
 impl Grid {
-    /// The first search: the geometric term alone.
+    /// Returns the first search: the geometric term alone.
     pub fn geometry(&self) -> Vec<Weights> {
         let of_cap = |cap: &Option<f64>| {
             let alphas = self.alphas.iter();
@@ -95,7 +95,7 @@ impl Grid {
         self.caps.iter().flat_map(of_cap).collect()
     }
 
-    /// The second search: the appearance term with the best geometric weights and their neighbours.
+    /// Returns the second search: the appearance term with the best geometric weights and their neighbours.
     pub fn appearance(&self, best: &Weights) -> Vec<Weights> {
         let at = self.alphas.iter().position(|alpha| *alpha == best.alpha);
         let at = at.unwrap_or_default();

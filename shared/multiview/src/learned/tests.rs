@@ -14,7 +14,7 @@ fn shape() -> Shape {
     }
 }
 
-/// A person whose parts have type `types(part)` and an error of `error` tenths.
+/// Returns a person whose parts have type `types(part)` and an error of `error` tenths.
 fn observation(types: impl Fn(usize) -> u8, error: f32, exchanged: bool) -> ViewObservation {
     ViewObservation {
         types: (0..N_PARTS).map(types).collect(),
@@ -50,7 +50,7 @@ fn add_views(learner: &mut Learner, views: [&ViewObservation; 2], degrees: f64, 
     }
 }
 
-/// The paper's table of the pair at an angle: part, types in the first and the second view.
+/// Returns the paper's table of the pair at an angle: part, types in the first and the second view.
 fn at(of: &Learned, degrees: f64, part: usize, types: [usize; 2]) -> f64 {
     let tables = of.by_angle(Appearance::Joint);
     let tables = tables.at(degrees.to_radians()).unwrap();
@@ -209,7 +209,7 @@ fn the_file_survives_a_round_trip_bit_for_bit() {
     assert_eq!(Learned::parse(&text).unwrap(), example);
 }
 
-/// The error for the example with one change.
+/// Returns the error for the example with one change.
 fn error_of(change: impl Fn(&mut serde_json::Value)) -> String {
     let mut value = serde_json::to_value(example()).unwrap();
     change(&mut value);

@@ -119,7 +119,7 @@ fn solved_by<E: JointEvidence>(
     solve_person(&views, settings).unwrap().pose
 }
 
-/// The largest error, in metres.
+/// Returns the largest error, in metres.
 fn worst(found: &SpacePose) -> f64 {
     let errors = found.joints.iter().zip(STANDING);
     errors

@@ -26,7 +26,7 @@ pub(crate) fn own(scene: &Scene, view: usize, pose: &Pose) -> f64 {
     f64::from(scene.solver.score(&evidence, pose, None))
 }
 
-/// The last two sums of eq. 3.
+/// Returns the last two sums of eq. 3.
 pub(crate) fn between(
     scene: &Scene,
     settings: &Settings,
@@ -92,7 +92,7 @@ fn distance2(
     of_side(0) + of_side(1)
 }
 
-/// The released program's score of `poses[target]`, with the other pose fixed.
+/// Returns the released program's score of `poses[target]`, with the other pose fixed.
 pub(crate) fn released(
     scene: &Scene,
     settings: &Settings,
@@ -132,7 +132,7 @@ fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usi
     here || (!there && sigma(0) < sigma(1) - settings.rescue_px[parts[0]])
 }
 
-/// Heat of the line of a support at `pixel` (counted from 1), at a part of the target.
+/// Returns the heat of the line of a support at `pixel` (counted from 1), at a part of the target.
 fn heat(scene: &Scene, target: usize, pose: &Pose, part: usize, pixel: [f64; 2]) -> f64 {
     let [here, there] = [target, 1 - target].map(|view| scene.views[view].plan.camera());
     let fundamental = epipolar::fundamental(there, here);

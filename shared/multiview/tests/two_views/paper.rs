@@ -290,7 +290,7 @@ proptest! {
     }
 }
 
-/// The best value of the terms alone: each part of `view` is optimised independently, the other
+/// Returns the best value of the terms alone: each part of `view` is optimised independently, the other
 /// view is fixed.
 fn all_placements(scene: &Scene, settings: &Settings, view: usize, poses: &[Pose; 2]) -> f64 {
     let level = &scene.views[view].plan.layout().levels[0];

@@ -23,7 +23,7 @@ pub(crate) const MIRROR: [usize; N_PARTS] = [0, 2, 1];
 pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
-    /// A number in 0..1.
+    /// Returns a number in 0..1.
     pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -40,7 +40,7 @@ impl Noise {
     }
 }
 
-/// A model with two equal sides.
+/// Returns a model with two equal sides.
 pub(crate) fn model(noise: &mut Noise) -> Arc<Model> {
     let mut spring = || Spring {
         w: [
@@ -82,7 +82,7 @@ pub(crate) fn model(noise: &mut Noise) -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// A pyramid with levels of `sizes` `[rows, cols]`; the first has cells of `cell_px`, and each next
+/// Returns a pyramid with levels of `sizes` `[rows, cols]`; the first has cells of `cell_px`, and each next
 /// level is twice as coarse.
 pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
     let [rows, cols] = sizes[0];
@@ -108,7 +108,7 @@ pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
     }
 }
 
-/// A camera 4 m from the origin, looking at it, for images of `[width, height]`.
+/// Returns a camera 4 m from the origin, looking at it, for images of `[width, height]`.
 pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensModel) -> Camera {
     let eye = Point3::new(4.0 * bearing.cos(), 4.0 * bearing.sin(), height);
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
@@ -202,7 +202,7 @@ impl View {
     }
 }
 
-/// The pose with the two sides of the model exchanged.
+/// Returns the pose with the two sides of the model exchanged.
 pub(crate) fn mirrored(pose: &Pose) -> Pose {
     Pose {
         parts: MIRROR.map(|part| pose.parts[part]).to_vec(),
@@ -218,7 +218,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// A scene of random evidence on levels of `sizes`.
+    /// Returns a scene of random evidence on levels of `sizes`.
     pub(crate) fn new(seed: u64, n_views: usize, sizes: &[[usize; 2]]) -> Self {
         let noise = &mut Noise(seed);
         let model = model(noise);
@@ -302,7 +302,7 @@ pub(crate) const FROM_BEST: PairStart = PairStart {
     exchanged: false,
 };
 
-/// A random pose on a random level, with its own score.
+/// Returns a random pose on a random level, with its own score.
 fn pose(noise: &mut Noise, solver: &Solver, view: &View) -> Pose {
     let level = noise.pick(&view.levels);
     let level_layout = &view.plan.layout().levels[usize::from(level)];

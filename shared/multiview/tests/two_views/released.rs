@@ -127,7 +127,7 @@ proptest! {
     }
 }
 
-/// The switches of the first view for given expected errors of every part in the two views.
+/// Returns the switches of the first view for given expected errors of every part in the two views.
 fn switch_of_first(sigma_px: [f32; 2]) -> bool {
     let mut scene = Scene::new(7, 2, &SIZES);
     for (view, sigma) in scene.views.iter_mut().zip(sigma_px) {

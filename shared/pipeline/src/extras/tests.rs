@@ -67,7 +67,7 @@ impl Scene {
         scene
     }
 
-    /// The joints of the displaced person in a view.
+    /// Returns the joints of the displaced person in a view.
     fn joints(&self, view: usize, by: [f64; 3]) -> [[f64; 2]; 14] {
         JOINTS.map(|joint| self.project(view, joint, by))
     }

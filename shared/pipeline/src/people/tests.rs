@@ -40,7 +40,7 @@ fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> FoundBody {
     }
 }
 
-/// The sightings of people in all views, in an order that differs from view to view.
+/// Returns the sightings of people in all views, in an order that differs from view to view.
 fn seen(cameras: &[Camera], people: &[([f64; 2], f64)]) -> Vec<Vec<FoundBody>> {
     let of_view = |(view, camera): (usize, &Camera)| {
         let mut all: Vec<FoundBody> = people

@@ -57,7 +57,7 @@ fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<Sightings>> {
     (0..N_VIEWS).map(view).collect()
 }
 
-/// The people of every frame.
+/// Returns the people of every frame.
 fn run(follow: Follow, frames: &[&[([f64; 2], f32)]]) -> Vec<FramePeople> {
     let settings = WhoSettings {
         follow,

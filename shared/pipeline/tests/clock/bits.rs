@@ -4,7 +4,7 @@ use pipeline::{BodySettings, Skeleton, SkeletonSettings, SkeletonStep, ViewResul
 
 use crate::planted::Scene;
 
-/// The skeletons of a few frames in which views find one candidate after the other.
+/// Returns the skeletons of a few frames in which views find one candidate after the other.
 ///
 /// * `instants`: true to pass the instants of the frames to the step.
 fn skeletons(scene: &Scene, instants: bool, skews_s: [f64; 3]) -> Vec<Skeleton> {
@@ -30,7 +30,7 @@ fn skeletons(scene: &Scene, instants: bool, skews_s: [f64; 3]) -> Vec<Skeleton> 
     (0..4).map(frame).collect()
 }
 
-/// All digits of the joints as text, because NaN is not equal to itself.
+/// Returns all digits of the joints as text, because NaN is not equal to itself.
 fn digits(skeletons: &[Skeleton]) -> Vec<String> {
     skeletons.iter().map(|skeleton| format!("{skeleton:?}")).collect()
 }

@@ -20,7 +20,7 @@ enum By {
     Both,
 }
 
-/// Mean distance of the joints from the truth at the instants of the frames, in millimetres.
+/// Returns the mean distance of the joints from the truth at the instants of the frames, in millimetres.
 ///
 /// * `skews_ms`: skews of the cameras from the first on, repeated cyclically.
 fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
@@ -64,7 +64,7 @@ fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
     1e3 * sum / n
 }
 
-/// Position of a point as used, and its deviation.
+/// Returns the position of a point as used, and its deviation.
 fn used(
     (at, sigma_px): (Point2<f64>, f64),
     velocity: Option<Velocity>,
@@ -81,7 +81,7 @@ fn used(
     }
 }
 
-/// The errors for three people: without skews, then with skews and no correction, widening, moving and both.
+/// Returns the errors for three people: without skews, then with skews and no correction, widening, moving and both.
 fn measured(rig: &str, action: Action, skews_ms: &[f64]) -> [f64; 5] {
     let mut sums = [0.0; 5];
     for seed in 1..=3 {

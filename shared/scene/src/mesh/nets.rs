@@ -50,7 +50,7 @@ pub(super) fn surface(grid: &Grid) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// The four cells around an edge of the lattice, anticlockwise as seen against the direction of the edge.
+/// Returns the four cells around an edge of the lattice, anticlockwise as seen against the direction of the edge.
 fn around(at: [usize; 3], axis: usize) -> [[usize; 3]; 4] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     [[1, 1], [0, 1], [0, 0], [1, 0]].map(|[du, dv]| {
@@ -61,7 +61,7 @@ fn around(at: [usize; 3], axis: usize) -> [[usize; 3]; 4] {
     })
 }
 
-/// The mean of the points where the surface intersects the edges of a cell.
+/// Returns the mean of the points where the surface intersects the edges of a cell.
 fn cut(grid: &Grid, cell: [usize; 3]) -> Option<Point3<f32>> {
     let corner = |bits: usize| core::array::from_fn(|axis| cell[axis] + (bits >> axis & 1));
     let values: [f32; 8] = core::array::from_fn(|i| grid.values[grid.index(corner(i))]);

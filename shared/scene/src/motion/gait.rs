@@ -51,14 +51,14 @@ pub(super) fn jogging(actor: &Actor, seconds: f64) -> Stance {
     gait_stance(actor, &gait, seconds)
 }
 
-/// A bump around a phase of the stride, with height 1.
+/// Returns a bump around a phase of the stride, with height 1.
 fn bump(phase: f64, at: f64, width: f64) -> f64 {
     let off = (phase - at + 0.5).rem_euclid(1.0) - 0.5;
     (-0.5 * (off / width).powi(2)).exp()
 }
 
-/// The stance at a time. Joint angles over the stride are bumps and waves fitted by eye to the curves of Winter, *Biomechanics and Motor
-/// Control of Human Movement*.
+/// Returns the stance at a time. Joint angles over the stride are bumps and waves fitted by eye to the curves of Winter, *Biomechanics and
+/// Motor Control of Human Movement*.
 fn gait_stance(actor: &Actor, gait: &Gait, seconds: f64) -> Stance {
     let style = actor.subject.style;
     let mut stage = actor.random.fork("way");

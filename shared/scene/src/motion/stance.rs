@@ -24,7 +24,7 @@ pub(super) struct Stance {
 }
 
 impl Stance {
-    /// A person who stands in the style of the subject.
+    /// Returns a person who stands in the style of the subject.
     pub(super) fn standing(subject: &Subject) -> Self {
         let style = subject.style;
         let mut stance = Self {

@@ -5,7 +5,7 @@ use nalgebra::{Point2, Point3, Vector3};
 
 use super::{Corner, NOTHING, Samples};
 
-/// The nearest triangle that a ray hits from its front, and the depth of the intersection.
+/// Returns the nearest triangle that a ray hits from its front, and the depth of the intersection.
 pub(super) fn nearest_triangle(
     camera: &Camera,
     points: &[Point3<f64>],

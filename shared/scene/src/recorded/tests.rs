@@ -6,7 +6,7 @@ use super::*;
 use crate::motion::{Action, Motion};
 use crate::subject::Subject;
 
-/// An error-free recording of a generated action.
+/// Returns an error-free recording of a generated action.
 fn recorded(number: u64, action: Action, rate_hz: f64, n: usize) -> (Recording, Motion) {
     let motion = Motion::new(&Subject::new(number), action, 7);
     let posture = |nth: usize| {

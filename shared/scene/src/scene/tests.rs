@@ -199,7 +199,7 @@ fn a_camera_is_found_by_name_and_by_number() {
     assert!(error.contains("C1, C2, C3"), "{error}");
 }
 
-/// A scene with the given number of other people.
+/// Returns a scene with the given number of other people.
 fn crowd(others: u64) -> Arc<Scene> {
     let settings = Settings {
         rig: RigChoice::parse("ring:3:6:1.6").unwrap(),

@@ -16,7 +16,7 @@ struct SolidBuilder<'a> {
     pieces: Vec<(usize, Solid)>,
 }
 
-/// All solids, in the frames of their bones.
+/// Returns all solids, in the frames of their bones.
 pub(super) fn pieces(subject: &Subject, bones: &Bones) -> Vec<(usize, Solid)> {
     let mut builder = SolidBuilder {
         subject,

@@ -59,7 +59,7 @@ impl Solid {
         }
     }
 
-    /// A box that contains the solid.
+    /// Returns a box that contains the solid.
     pub(super) fn bounds(&self) -> [Vector3<f32>; 2] {
         match self {
             Self::Cone {

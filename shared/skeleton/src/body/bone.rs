@@ -82,14 +82,14 @@ pub const BONES: [Bone; N_BONES] = [
 pub(crate) const SIDES: [[usize; 2]; 5] = [[0, 4], [1, 3], [5, 8], [6, 7], [9, 10]];
 
 impl Bone {
-    /// The vector from the start of the bone to its end, in metres in the world; `None` if a joint is missing.
+    /// Returns the vector from the start of the bone to its end, in metres in the world; `None` if a joint is missing.
     pub(crate) fn vector(&self, joints: &Joints) -> Option<Vector3<f64>> {
         let [a, b] = self.from;
         let from = nalgebra::center(&joints[a]?, &joints[b]?);
         Some(joints[self.to]? - from)
     }
 
-    /// Length of the bone, in metres; `None` if a joint is missing.
+    /// Returns the length of the bone, in metres; `None` if a joint is missing.
     pub fn length(&self, joints: &Joints) -> Option<f64> {
         self.vector(joints).map(|vector| vector.norm())
     }
@@ -100,7 +100,7 @@ impl Bone {
     }
 }
 
-/// The lengths of all bones, in metres; `None` if a joint is missing.
+/// Returns the lengths of all bones, in metres; `None` if a joint is missing.
 pub(crate) fn lengths(joints: &Joints) -> [Option<f64>; N_BONES] {
     core::array::from_fn(|i| BONES[i].length(joints))
 }
@@ -112,7 +112,7 @@ pub(crate) fn clean(joints: &Joints) -> Joints {
     joints.map(|joint| joint.filter(is_near))
 }
 
-/// The joints of a mask, in ascending order.
+/// Returns the joints of a mask, in ascending order.
 pub(crate) fn joints_of(mut mask: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let joint = mask.trailing_zeros();

@@ -89,7 +89,7 @@ pub(crate) struct Expected {
     pub(crate) spread: f64,
 }
 
-/// Expected length of a kind of bone: the learned length if there is one, otherwise that of people of this stature.
+/// Returns the expected length of a kind of bone: the learned length if there is one, otherwise that of people of this stature.
 pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> Expected {
     let proportion = kind.proportion();
     if let Some(Learned { metres, sd }) = lengths.and_then(|length| length.of_kind(kind)) {
@@ -160,7 +160,7 @@ impl<'a> Judgement<'a> {
         })
     }
 
-    /// The possible statures, in metres: those of people, and near the stature given by the learned lengths of the present
+    /// Returns the possible statures, in metres: those of people, and near the stature given by the learned lengths of the present
     /// bones.
     fn statures(&self) -> [f64; 2] {
         let learned = |bone: usize| self.learned.and_then(|learned| learned.bone(bone));
@@ -173,7 +173,7 @@ impl<'a> Judgement<'a> {
         })
     }
 
-    /// The joint to drop; `None` if all present joints are possible.
+    /// Returns the joint to drop; `None` if all present joints are possible.
     fn worst_joint(&self, joints: &Joints, covariances: &Covariances) -> Option<usize> {
         let mut worst: Option<Conflict> = None;
         let mut spoilt = [0_u32; N_JOINTS];
@@ -198,7 +198,7 @@ impl<'a> Judgement<'a> {
         joints_of(worst?.joints).max_by(order)
     }
 
-    /// Sum of the deviations of a joint's bones.
+    /// Returns the sum of the deviations of a joint's bones.
     fn strain(&self, joint: usize) -> f64 {
         let of_joint = BONES.iter().zip(&self.z).filter(|bone| bone.0.mask() >> joint & 1 == 1);
         of_joint.filter_map(|bone| *bone.1).map(f64::abs).sum()

@@ -82,7 +82,7 @@ impl Lengths {
         self.of_kind(BONES.get(bone)?.kind)
     }
 
-    /// Number of bones, out of 14, whose length is known.
+    /// Returns the number of bones, out of 14, whose length is known.
     pub fn n_learned(&self) -> usize {
         (0..N_BONES).filter(|bone| self.bone(*bone).is_some()).count()
     }
@@ -120,7 +120,7 @@ fn learn(frames: &[f64]) -> Learned {
     Learned { metres, sd }
 }
 
-/// The upper median; reorders the values.
+/// Returns the upper median; reorders the values.
 fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1

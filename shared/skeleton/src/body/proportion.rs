@@ -51,25 +51,25 @@ pub struct Proportion {
 }
 
 impl Proportion {
-    /// Standard deviation of the length from that expected for the stature, as a share of the length; combines people,
+    /// Returns the standard deviation of the length from that expected for the stature, as a share of the length; combines people,
     /// places and postures.
     pub fn spread(&self) -> f64 {
         self.variance().sqrt()
     }
 
-    /// The square of [`spread`](Self::spread).
+    /// Returns the square of [`spread`](Self::spread).
     pub(crate) fn variance(&self) -> f64 {
         self.people * self.people + self.place * self.place + self.posture * self.posture
     }
 
-    /// Length at a stature, in metres.
+    /// Returns the length at a stature, in metres.
     pub fn length(&self, stature: f64) -> f64 {
         let [child, adult] = CHILD_AND_ADULT;
         let share = self.child + self.slope() * (stature.clamp(child, adult) - child);
         share * stature
     }
 
-    /// Derivative of [`length`](Self::length) with respect to the stature.
+    /// Returns the derivative of [`length`](Self::length) with respect to the stature.
     pub(crate) fn length_by_stature(&self, stature: f64) -> f64 {
         let [child, adult] = CHILD_AND_ADULT;
         if stature < child {
@@ -81,7 +81,7 @@ impl Proportion {
         }
     }
 
-    /// The stature at which a bone has this length, metres: the inverse of [`length`](Self::length).
+    /// Returns the stature at which a bone has this length, metres: the inverse of [`length`](Self::length).
     pub fn stature(&self, length: f64) -> f64 {
         let [child, adult] = CHILD_AND_ADULT;
         if length <= self.child * child {
@@ -116,7 +116,7 @@ impl Kind {
         Self::Head,
     ];
 
-    /// Index of the kind in [`ALL`](Self::ALL).
+    /// Returns the index of the kind in [`ALL`](Self::ALL).
     pub(crate) const fn index(self) -> usize {
         self as usize
     }

@@ -27,7 +27,7 @@ const TOWARDS_NECK: [Option<(usize, Kind)>; N_JOINTS] = [
 /// Rank of a joint by its distance from the trunk: 0 for the neck, 3 for the ends.
 pub(crate) const RANK: [u32; N_JOINTS] = [3, 2, 1, 1, 2, 3, 3, 2, 1, 1, 2, 3, 0, 3];
 
-/// Sum of the lengths of the bones from one joint to another, in metres.
+/// Returns the sum of the lengths of the bones from one joint to another, in metres.
 ///
 /// * `length`: returns the length of a kind of bone, in metres.
 pub(crate) fn between(a: usize, b: usize, length: impl Fn(Kind) -> f64) -> f64 {

@@ -92,7 +92,7 @@ impl Votes {
         self.votes_mut().sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     }
 
-    /// The value at half of the total weight, interpolated linearly between the centres of the weights.
+    /// Returns the value at half of the total weight, interpolated linearly between the centres of the weights.
     fn median(&self) -> f64 {
         let half = 0.5 * self.votes().iter().map(|vote| vote[1]).sum::<f64>();
         let [mut last, mut at_last] = [self.votes[0][0], 0.0];
@@ -110,7 +110,7 @@ impl Votes {
     }
 }
 
-/// Weight of a kind of bone in the stature: the inverse of its relative deviation, for a person of 1.7 m.
+/// Returns the weight of a kind of bone in the stature: the inverse of its relative deviation, for a person of 1.7 m.
 fn weight(kind: Kind) -> f64 {
     let it = kind.proportion();
     let measured = MEASUREMENT_SD / (it.adult * 1.7);

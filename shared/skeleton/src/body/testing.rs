@@ -6,12 +6,12 @@ use crate::body::{Covariances, Joints, Kind, Lengths, MIN_FRAMES, N_JOINTS, chec
 
 pub(crate) const NO_COVARIANCES: Covariances = [None; N_JOINTS];
 
-/// The mean body of a stature, standing: facing +x, left at +y, z up.
+/// Returns the mean body of a stature, standing: facing +x, left at +y, z up.
 pub(crate) fn standing(stature: f64) -> Joints {
     posed(stature, [[0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]], 0.0)
 }
 
-/// A person in the middle of a step.
+/// Returns a person in the middle of a step.
 pub(crate) fn walking(stature: f64) -> Joints {
     posed(
         stature,
@@ -20,7 +20,7 @@ pub(crate) fn walking(stature: f64) -> Joints {
     )
 }
 
-/// A person on a chair, hands on the knees.
+/// Returns a person on a chair, hands on the knees.
 pub(crate) fn sitting(stature: f64) -> Joints {
     posed(
         stature,
@@ -29,7 +29,7 @@ pub(crate) fn sitting(stature: f64) -> Joints {
     )
 }
 
-/// A person bent over, with hanging arms.
+/// Returns a person bent over, with hanging arms.
 pub(crate) fn bent(stature: f64) -> Joints {
     posed(
         stature,
@@ -38,7 +38,7 @@ pub(crate) fn bent(stature: f64) -> Joints {
     )
 }
 
-/// A person with raised arms.
+/// Returns a person with raised arms.
 pub(crate) fn reaching(stature: f64) -> Joints {
     posed(
         stature,
@@ -111,12 +111,12 @@ pub(crate) fn learn(lengths: &mut Lengths, joints: &Joints) {
     }
 }
 
-/// The joints of a person with left and right exchanged.
+/// Returns the joints of a person with left and right exchanged.
 pub(crate) fn mirrored<T: Copy>(joints: &[T; N_JOINTS]) -> [T; N_JOINTS] {
     [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13].map(|joint| joints[joint])
 }
 
-/// Mean distance of joints, in metres.
+/// Returns the mean distance of joints, in metres.
 pub(crate) fn error(a: &Joints, b: &Joints) -> f64 {
     let pairs = a.iter().zip(b).filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()));
     let (sum, n) = pairs.fold((0.0, 0.0), |(sum, n), it| (sum + it, n + 1.0));

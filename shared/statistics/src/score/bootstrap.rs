@@ -21,7 +21,7 @@ impl Share {
         values.into_iter().fold(Self::default(), add)
     }
 
-    /// Mean over all frames, each weighted by its number of values; `None` if there are no values.
+    /// Returns the mean over all frames, each weighted by its number of values; `None` if there are no values.
     pub fn mean(frames: &[Self]) -> Option<f64> {
         let sum: f64 = frames.iter().map(|frame| frame.sum).sum();
         let n: f64 = frames.iter().map(|frame| frame.n).sum();
@@ -55,7 +55,7 @@ impl Default for Bootstrap {
 }
 
 impl Bootstrap {
-    /// The percentile interval of the mean over frames (Efron 1979), in circular blocks
+    /// Returns the percentile interval of the mean over frames (Efron 1979), in circular blocks
     /// (Politis & Romano 1992) if `block` is more than 1.
     ///
     /// * Returns the lower and the upper end; `None` if there are no values.
@@ -84,7 +84,7 @@ impl Bootstrap {
         self.percentiles(means)
     }
 
-    /// The percentile interval of any number that is computed from the values of all frames. Frames are always drawn one by one,
+    /// Returns the percentile interval of any number that is computed from the values of all frames. Frames are always drawn one by one,
     /// regardless of `block`.
     ///
     /// * `of`: computes the number; if it returns `None`, the resample is skipped.

@@ -44,7 +44,7 @@ impl Changes {
         self.bins[bin.clamp(0.0, last as f64) as usize] += 1;
     }
 
-    /// The bins from the worst to the best, each as lower edge and count.
+    /// Returns the bins from the worst to the best, each as lower edge and count.
     pub fn bins(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
         let middle = self.bins.len() as f64 / 2.0;
         let edge = move |value: usize| (value as f64 - middle) * self.width;
@@ -52,17 +52,17 @@ impl Changes {
         counts.map(move |(bin, &count)| (edge(bin), count))
     }
 
-    /// Number of improvements.
+    /// Returns the number of improvements.
     pub fn improved(&self) -> usize {
         self.improved
     }
 
-    /// Number of deteriorations.
+    /// Returns the number of deteriorations.
     pub fn deteriorated(&self) -> usize {
         self.deteriorated
     }
 
-    /// Number of all counted differences.
+    /// Returns the number of all counted differences.
     pub fn total(&self) -> usize {
         self.total
     }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::score::Point;
 use crate::score::pcp3d::distance;
 
-/// Distance of every joint from the truth, in the unit of the joints.
+/// Returns the distance of every joint from the truth, in the unit of the joints.
 ///
 /// * Returns `None` if the truth is not known; infinity if the joint was not found.
 pub fn joint_errors(found: &[Option<Point>], truth: &[Option<Point>]) -> Vec<Option<f64>> {
@@ -16,7 +16,7 @@ pub fn joint_errors(found: &[Option<Point>], truth: &[Option<Point>]) -> Vec<Opt
     found.iter().zip(truth).map(error).collect()
 }
 
-/// The found joints after the best alignment by rotation, translation and scale.
+/// Returns the found joints after the best alignment by rotation, translation and scale.
 ///
 /// The alignment minimises the sum of squared distances over all rotations (no mirroring), translations and scales
 /// (Umeyama 1991), using the joints that are both found and known. The remaining distances are the error of the pose regardless of

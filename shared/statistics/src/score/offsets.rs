@@ -58,7 +58,7 @@ pub struct Offset {
     pub interval: [[f64; 2]; 2],
 }
 
-/// The mean offset of every joint.
+/// Returns the mean offset of every joint.
 ///
 /// * `people`: found and true joints of every person, those of `skeleton::PARSE14`.
 /// * Returns one row per joint; joints that were never found have no row.
@@ -92,7 +92,7 @@ pub fn offsets<'a>(
     ROWS.iter().filter_map(row).collect()
 }
 
-/// The offsets of one person, along and across; `None` for joints that were not found.
+/// Returns the offsets of one person, along and across; `None` for joints that were not found.
 fn of_person(
     found: &[[f64; 2]; N_JOINTS],
     truth: &[[f64; 2]; N_JOINTS],
@@ -118,7 +118,8 @@ fn of_person(
     })
 }
 
-/// Standing height of a person, in the unit of the joints: from the top of the head over the neck to the hips, plus the longer leg.
+/// Returns the standing height of a person, in the unit of the joints: from the top of the head over the neck to the hips, plus the longer
+/// leg.
 pub fn height<const D: usize>(joints: &[[f64; D]; N_JOINTS]) -> f64 {
     let distance = |a: [f64; D], b: [f64; D]| {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
@@ -139,7 +140,7 @@ fn middle<const D: usize>(joints: &[[f64; D]; N_JOINTS], of: &[usize]) -> [f64; 
 mod tests {
     use super::*;
 
-    /// A person who stands with hanging arms, 100 px from the neck to the ankles and 20 px above the neck.
+    /// Returns a person who stands with hanging arms, 100 px from the neck to the ankles and 20 px above the neck.
     fn person() -> [[f64; 2]; N_JOINTS] {
         [
             [40.0, 120.0],

@@ -39,7 +39,7 @@ pub struct Pcp {
 }
 
 impl Pcp {
-    /// Percentage of correct sticks; 0 if nothing was judged.
+    /// Returns the percentage of correct sticks; 0 if nothing was judged.
     pub fn percent(&self) -> f64 {
         if self.total == 0 {
             return 0.0;

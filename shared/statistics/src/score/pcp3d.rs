@@ -92,7 +92,7 @@ const HUMANEVA20: Ends = [
     &[13],
 ];
 
-/// The twelve segments between the joints of a set; `None` for an unknown set.
+/// Returns the twelve segments between the joints of a set; `None` for an unknown set.
 ///
 /// If a set contains one point twice (such as the elbow as the end of both arm segments), its two joints are averaged.
 pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
@@ -141,7 +141,7 @@ pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
     Some(std::array::from_fn(segment))
 }
 
-/// The error of every segment: the mean error of its two ends divided by its true length.
+/// Returns the error of every segment: the mean error of its two ends divided by its true length.
 ///
 /// A segment is correct at a threshold `gamma` if the error is at most `gamma` (eq. 13), 0.5 by convention.
 ///
@@ -173,7 +173,7 @@ pub fn segment_errors(
     segments.iter().map(of_segment).collect()
 }
 
-/// Mean of some joints; `None` if one is missing.
+/// Returns the mean of some joints; `None` if one is missing.
 fn mean(joints: &[Option<Point>], of: &[usize]) -> Option<Point> {
     let mut sum = [0.0; 3];
     for &joint in of {

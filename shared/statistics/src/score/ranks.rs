@@ -1,6 +1,6 @@
 //! Rank statistics: area under the ROC, and rank correlation.
 
-/// Area under the receiver operating characteristic: the probability that a sample of the class scores above
+/// Returns the area under the receiver operating characteristic: the probability that a sample of the class scores above
 /// a sample that is not of the class, with ties counting half (Mann and Whitney).
 ///
 /// * `samples`: score, and whether the sample is of the class.

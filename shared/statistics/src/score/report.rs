@@ -49,22 +49,22 @@ impl Report {
         }
     }
 
-    /// Number of judged images.
+    /// Returns the number of judged images.
     pub fn n_images(&self) -> usize {
         self.n_images
     }
 
-    /// Number of images on which nothing was found.
+    /// Returns the number of images on which nothing was found.
     pub fn n_missed(&self) -> usize {
         self.n_missed
     }
 
-    /// Result over all sticks.
+    /// Returns the result over all sticks.
     pub fn pcp(&self, rule: PcpRule) -> Pcp {
         sum(self.sticks(rule).iter().copied())
     }
 
-    /// Result of each of [`PARSE_STICKS`].
+    /// Returns the result of each of [`PARSE_STICKS`].
     pub fn sticks(&self, rule: PcpRule) -> &[Pcp; PARSE_STICKS.len()] {
         match rule {
             PcpRule::MeanOfEnds => &self.sticks[0],
@@ -72,7 +72,7 @@ impl Report {
         }
     }
 
-    /// Results with the sticks of both sides combined in one column each, as in publications, with their names.
+    /// Returns the results with the sticks of both sides combined in one column each, as in publications, with their names.
     pub fn limbs(&self, rule: PcpRule) -> [(&'static str, Pcp); COLUMNS.len()] {
         COLUMNS.map(|(name, sticks)| {
             let sticks = sticks.iter().map(|&stick| self.sticks(rule)[stick]);
@@ -80,7 +80,7 @@ impl Report {
         })
     }
 
-    /// Result over all joints, which is the mean over [`PCK_GROUPS`].
+    /// Returns the result over all joints, which is the mean over [`PCK_GROUPS`].
     ///
     /// * `share`: index into [`PCK_SHARES`].
     ///
@@ -91,7 +91,7 @@ impl Report {
         sum(self.joints[share].iter().copied())
     }
 
-    /// Result of each of [`PCK_GROUPS`].
+    /// Returns the result of each of [`PCK_GROUPS`].
     ///
     /// * `share`: index into [`PCK_SHARES`].
     ///

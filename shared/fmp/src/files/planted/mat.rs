@@ -4,7 +4,7 @@ use testkit::mat::{Mat, number, row};
 
 use crate::{ModelSpec, N_CHANNELS, PartSpec, Springs};
 
-/// The `model` struct of release 1.4 (springs per pair, 0 if a pair never occurs) or 1.3.
+/// Returns the `model` struct of release 1.4 (springs per pair, 0 if a pair never occurs) or 1.3.
 pub(crate) fn model(spec: &ModelSpec) -> Mat {
     let (mut biases, mut springs) = (vec![spec.root_bias], Vec::new());
     let components = spec

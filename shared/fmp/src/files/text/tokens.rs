@@ -21,12 +21,12 @@ impl<'a> Tokens<'a> {
         tokens
     }
 
-    /// The position of the next token.
+    /// Returns the position of the next token.
     pub(super) fn place(&self) -> TextPosition {
         self.place
     }
 
-    /// The next token, without consuming it.
+    /// Returns the next token, without consuming it.
     pub(super) fn peek(&self) -> Option<&'a str> {
         self.rest.split_whitespace().next()
     }
@@ -54,7 +54,7 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// The next token as a number; `kind` describes the expected numbers.
+    /// Returns the next token as a number; `kind` describes the expected numbers.
     pub(super) fn number<T: FromStr>(
         &mut self,
         field: &'static str,
@@ -78,7 +78,7 @@ impl<'a> Tokens<'a> {
         Ok(value)
     }
 
-    /// Upper bound of the number of remaining tokens; limits the memory reserved for a count in the
+    /// Returns the upper bound of the number of remaining tokens; limits the memory reserved for a count in the
     /// file.
     pub(super) fn at_most(&self) -> usize {
         self.rest.len().div_ceil(2)

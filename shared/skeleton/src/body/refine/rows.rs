@@ -33,7 +33,7 @@ impl State {
         }
     }
 
-    /// Largest displacement of a joint between two states, in metres.
+    /// Returns the largest displacement of a joint between two states, in metres.
     pub(super) fn distance(&self, other: &Self) -> f64 {
         let pairs = self.joints.iter().zip(&other.joints);
         pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
@@ -75,7 +75,7 @@ pub(super) struct Linear {
 }
 
 impl Row {
-    /// The rows whose joints are present.
+    /// Returns the rows whose joints are present.
     ///
     /// * `stature`: rough height of the person, in metres, which determines the spread among people.
     pub(super) fn all(
@@ -109,7 +109,7 @@ impl Row {
         })
     }
 
-    /// The residual, in metres; 0 if the expectation is met.
+    /// Returns the residual, in metres; 0 if the expectation is met.
     pub(super) fn residual(&self, state: &State) -> f64 {
         let length = |bone: usize| state.bone(bone).norm();
         match self.of {
@@ -121,7 +121,7 @@ impl Row {
         }
     }
 
-    /// The residual with its derivatives. A bone of length 0 has no direction, so its derivatives are 0.
+    /// Returns the residual with its derivatives. A bone of length 0 has no direction, so its derivatives are 0.
     pub(super) fn linear(&self, state: &State) -> Linear {
         let mut it = Linear {
             residual: self.residual(state),
