@@ -83,9 +83,9 @@ impl Bounds {
 /// Upper bound of a score; see [`Bounds::upper`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Upper {
-    /// The bound.
+    /// The upper bound.
     pub(crate) most: f64,
-    /// Allowance for rounding.
+    /// Allowance for rounding errors.
     rounding: f64,
 }
 

@@ -5,11 +5,11 @@ mod check;
 /// A linear template over feature cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
-    /// Height, cells.
+    /// Height of the filter, in cells.
     pub rows: usize,
-    /// Width, cells.
+    /// Width of the filter, in cells.
     pub cols: usize,
-    /// `rows x cols x N_CHANNELS` weights, channel fastest, then column.
+    /// The weights: `rows x cols x N_CHANNELS`, channel fastest, then column.
     pub weights: Vec<f64>,
 }
 
@@ -42,7 +42,7 @@ pub struct Edge {
     pub parent: usize,
     /// Score of a pair of types, `[parent type][child type]`; `-inf` if the pair never occurs.
     pub bias: Vec<Vec<f64>>,
-    /// The springs.
+    /// Springs between the part and its parent.
     pub springs: Springs,
 }
 
@@ -64,7 +64,7 @@ pub struct ModelSpec {
     pub name: String,
     /// The parts, parents before children.
     pub parts: Vec<PartSpec>,
-    /// All filters.
+    /// All filters of the model.
     pub filters: Vec<Filter>,
     /// Score of every root placement.
     pub root_bias: f64,
@@ -87,7 +87,7 @@ pub enum ModelError {
     /// Part 0 is not the root, or is not the only root.
     #[error("part {part} has {} parent: part 1 and only part 1 is the root", if *.part == 1 { "a" } else { "no" })]
     Root {
-        /// Part, counted from 1.
+        /// The part in question, counted from 1.
         part: usize,
     },
     /// The parents do not form a tree in which every parent comes before its children.
@@ -95,21 +95,21 @@ pub enum ModelError {
         "part {part} names part {parent} as its parent: the tree has a cycle or is out of order"
     )]
     Tree {
-        /// Part, counted from 1.
+        /// The part in question, counted from 1.
         part: usize,
-        /// Parent, counted from 1.
+        /// The parent of the part, counted from 1.
         parent: usize,
     },
     /// An index in a part is out of range.
     #[error("part {part} names {what} {index}, but there are {count}")]
     Missing {
-        /// Part, counted from 1.
+        /// The part in question, counted from 1.
         part: usize,
         /// Kind of item that is indexed.
         what: &'static str,
-        /// Index, counted from 1.
+        /// Index of the item, counted from 1.
         index: usize,
-        /// Number of such items.
+        /// Number of such items in the model.
         count: usize,
     },
     /// The size of an array does not match the header or other arrays.
@@ -141,7 +141,7 @@ pub enum ModelError {
     /// A type of the parent forbids all types of the child, so no pose could contain it.
     #[error("no type of part {part} goes with type {parent_type} of its parent")]
     DeadEnd {
-        /// Part, counted from 1.
+        /// The part in question, counted from 1.
         part: usize,
         /// Type of the parent, counted from 1.
         parent_type: usize,
@@ -151,7 +151,7 @@ pub enum ModelError {
         "part {part} has a bias but no spring for type {parent_type} of its parent and its type {own_type}"
     )]
     NoSpring {
-        /// Part, counted from 1.
+        /// The part in question, counted from 1.
         part: usize,
         /// Type of the parent, counted from 1.
         parent_type: usize,
@@ -163,7 +163,7 @@ pub enum ModelError {
         "part {part} mirrors part {other}, but part {other} does not mirror it, or the tree differs"
     )]
     Mirror {
-        /// Part, counted from 1.
+        /// The part in question, counted from 1.
         part: usize,
         /// Mirror part, counted from 1.
         other: usize,

@@ -25,7 +25,7 @@ impl Pose {
         )
     }
 
-    /// Returns the centre of a part, pixels counted from 1; see [`Layout::centre_from_one`].
+    /// Returns the centre of a part, in pixels counted from 1; see [`Layout::centre_from_one`].
     pub fn centre_from_one(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));

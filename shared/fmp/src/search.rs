@@ -9,7 +9,7 @@ use crate::{Extractor, Layout, Model, Responses, Solver};
 /// A model, ready to search images.
 #[derive(Debug)]
 pub struct Search {
-    /// The model.
+    /// The model to search for.
     pub model: Arc<Model>,
     /// The solver that finds the best poses.
     pub solver: Solver,
@@ -18,7 +18,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Prepares the search.
+    /// Prepares the search for a model.
     pub fn new(model: Arc<Model>) -> Self {
         Self {
             extractor: Extractor::new(Arc::clone(&model)),

@@ -102,7 +102,7 @@ pub struct Root {
 }
 
 impl Solver {
-    /// Prepares `model`.
+    /// Prepares the solver for `model`.
     pub fn new(model: Arc<Model>) -> Self {
         Self::on(Isa::best(), model)
     }

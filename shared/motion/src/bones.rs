@@ -51,7 +51,7 @@ pub(crate) fn constant(
     bones
 }
 
-/// Projects one instant.
+/// Projects the joints at one instant.
 fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)]) {
     let here: Vec<([usize; 2], f64)> = bones
         .iter()

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Position, velocity, acceleration.
+/// A vector of position, velocity and acceleration.
 pub(crate) type Vector9 = SVector<f64, 9>;
 pub(crate) type Matrix9 = SMatrix<f64, 9, 9>;
 type Matrix9x3 = SMatrix<f64, 9, 3>;

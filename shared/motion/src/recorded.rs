@@ -50,7 +50,7 @@ pub struct Recorded {
     pub times: Vec<f64>,
     /// Certainty of the sides at every instant.
     pub sides: Vec<Sides>,
-    /// The joints.
+    /// The joints of the person.
     pub joints: Vec<Joint>,
 }
 

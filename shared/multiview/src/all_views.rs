@@ -308,7 +308,7 @@ impl ExtraTerms for Supports<'_> {
 struct State {
     poses: Vec<Pose>,
     own: Vec<f64>,
-    /// `[first][second]`, symmetric.
+    /// Terms between two views, `[first][second]`; symmetric.
     between: Vec<Vec<f64>>,
 }
 

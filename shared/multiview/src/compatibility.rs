@@ -9,7 +9,7 @@ pub struct Compatibility {
     n_unseen: usize,
 }
 
-/// Why a table was rejected.
+/// Reason why a table was rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CompatibilityError {
     /// The number of rows differs from the number of types of the model.
@@ -183,7 +183,7 @@ impl Compatibility {
         Self::of(parts.iter().map(|&part| self.values[part].clone()).collect())
     }
 
-    /// `p(type in second view | type in first view)` of a joint table.
+    /// Returns `p(type in second view | type in first view)` for a joint table.
     #[must_use]
     pub fn conditional(&self) -> Self {
         let normalised = |matrix: &DMatrix<f64>| normalise_rows(matrix.clone());

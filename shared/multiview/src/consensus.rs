@@ -9,9 +9,9 @@ use nalgebra::{Point2, Point3};
 pub struct Sightings<'a> {
     /// The camera of the frame.
     pub camera: &'a Camera,
-    /// Uncertainty of a position, pixels of the frame.
+    /// Uncertainty of a position, in pixels of the frame.
     pub sigma_px: f64,
-    /// One position per pair, pixels of the frame.
+    /// One position per pair, in pixels of the frame.
     pub points_px: Vec<[f64; 2]>,
 }
 

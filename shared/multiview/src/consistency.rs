@@ -13,7 +13,7 @@ pub(crate) struct PairTerms<'a> {
     /// `counterpart[i]` is the part of the second view that shows the same limb as part `i` of the
     /// first.
     counterpart: Vec<usize>,
-    /// `[target][part of the first view]`.
+    /// Switches of the terms, `[target][part of the first view]`.
     active: [Vec<bool>; 2],
     table: Option<&'a Compatibility>,
 }

@@ -31,7 +31,7 @@ pub struct Iteration {
 /// The result of a pair under one assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairEstimate {
-    /// The start.
+    /// The start of the optimisation.
     pub start: PairStart,
     /// The final joint energy (eq. 3); for `Released`, the sum of the last scores of the two views.
     pub energy: f64,

@@ -24,7 +24,7 @@ pub(crate) struct ReleasedPair<'a> {
     /// first.
     counterpart: Vec<usize>,
     weights: [Vec<bool>; 2],
-    /// `p(type in the other view | type in this view)` for each view.
+    /// The tables `p(type in the other view | type in this view)`, one for each view.
     tables: Option<[&'a Compatibility; 2]>,
 }
 

@@ -36,9 +36,9 @@ pub enum SwitchBy {
 /// The part-type tables of one pair of views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TypeTables {
-    /// `p(type in second | type in first)` and the reverse, for [`EnergyKind::Released`].
+    /// The tables `p(type in second | type in first)` and the reverse, for [`EnergyKind::Released`].
     pub conditional: [Arc<Compatibility>; 2],
-    /// `p(type in first, type in second)`, or another value of two types, for
+    /// The table `p(type in first, type in second)`, or another value for each pair of types, for
     /// [`EnergyKind::Paper`].
     pub joint: Arc<Compatibility>,
     /// Joint table for views of which one sees the other side of the person: rows are types of the

@@ -13,7 +13,7 @@ use crate::space_view::{LIMBS, N, SpaceView};
 /// A person in space, and the decisions about the views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolvedPerson {
-    /// The joints.
+    /// Positions of the joints.
     pub pose: SpacePose,
     /// For every view, whether the names of left and right were exchanged, for the arms and for the legs. `None` for a view that was left
     /// out because it contradicts all others.

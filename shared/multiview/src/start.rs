@@ -146,7 +146,7 @@ fn tried(settings: &Settings, view_input: &ViewInput<'_>) -> impl Iterator<Item 
     own.take(settings.n_candidates.max(1))
 }
 
-/// `[first][second - first - 1][state of first][state of second]`.
+/// Energies between two views: `[first][second - first - 1][state of first][state of second]`.
 type Between = Vec<Vec<Vec<Vec<f64>>>>;
 
 fn between<'a>(

@@ -43,7 +43,7 @@ pub(crate) struct Term {
     support_from_target: Matrix3<f64>,
     /// Line of the support in the target view.
     line: Vector3<f64>,
-    /// `1 / (n^2)` with `n` the norm of the line's first two components.
+    /// `1 / (n^2)`, where `n` is the norm of the line's first two components.
     inverse_norm2: f64,
     support_scale2: f64,
     /// Cap of each squared distance, in cells^2.

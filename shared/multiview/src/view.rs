@@ -98,12 +98,12 @@ impl ViewPlan {
         geometry::longer_side(centres).unwrap_or(0.0)
     }
 
-    /// Returns the centre of a part of a pose, pixels of the frame.
+    /// Returns the centre of a part of a pose, in pixels of the frame.
     pub fn centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
         pose.centre(&self.model, &self.layout, part)
     }
 
-    /// Returns the centres of all parts of a pose, pixels of the frame.
+    /// Returns the centres of all parts of a pose, in pixels of the frame.
     pub fn centres(&self, pose: &Pose) -> Vec<[f64; 2]> {
         pose.centres(&self.model, &self.layout)
     }

@@ -14,7 +14,7 @@ pub(crate) struct Place {
     pub(crate) index: usize,
 }
 
-/// A detection as rays.
+/// A detection converted to rays.
 struct Prepared {
     sights: Sights,
     colour: Option<[f64; 3]>,

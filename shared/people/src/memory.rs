@@ -25,9 +25,9 @@ pub struct Remembered {
     pub velocity: Vector3<f64>,
     /// Time at which the joints were seen, in seconds.
     pub seen_s: f64,
-    /// Lengths of the bones.
+    /// Bone lengths of the person.
     pub bones: Bones,
-    /// Colour of the trunk.
+    /// Colour of the person's trunk.
     pub colour: Option<[f64; 3]>,
 }
 

@@ -172,7 +172,7 @@ pub(crate) fn agreement(deviations: f64) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Prior {
     pub(crate) point: Point3<f64>,
-    /// Standard deviation, in metres.
+    /// Standard deviation of the position, in metres.
     pub(crate) sd: f64,
 }
 

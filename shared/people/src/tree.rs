@@ -34,7 +34,7 @@ const MOST_OF_BONE: f64 = 1.0;
 
 #[derive(Debug, Clone, Copy)]
 enum Limb {
-    /// Index in `BONES`.
+    /// A bone, by its index in `BONES`.
     Bone(usize),
     TrunkToHip,
 }

@@ -7,7 +7,7 @@ use skeleton::{Joint, JointSet, PARSE14};
 
 use crate::skeleton_settings::BodySettings;
 
-/// Why a joint has no position.
+/// Reason why a joint has no position.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NoJoint {
     /// The joint cannot be triangulated.

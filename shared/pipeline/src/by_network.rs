@@ -39,7 +39,7 @@ pub struct ViewFrame<'a> {
 /// What a view contributes to a frame.
 #[derive(Debug, Clone, Copy)]
 pub enum ViewContent<'a> {
-    /// A picture.
+    /// The picture of the view.
     Picture(Rgb8View<'a>),
     /// Keypoints found by another program, per person, in pixels of the frame.
     Keypoints(&'a [Vec<Option<Keypoint>>]),

@@ -15,7 +15,7 @@ use crate::{
     Views, all_pairs,
 };
 
-/// Why an estimator could not be created.
+/// Reason why an estimator could not be created.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EstimatorError {
     /// A view's frames are too small for the model.
@@ -207,7 +207,7 @@ fn search(
     estimate
 }
 
-/// Settings of all steps.
+/// Settings of all steps of the paper's method.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EstimatorSettings {
     /// Settings of the single-view step.
@@ -218,7 +218,7 @@ pub struct EstimatorSettings {
     pub follow: Follow,
     /// Settings of the fusion step.
     pub fuse: Settings,
-    /// Part-type tables.
+    /// Part-type tables of the pairs of views.
     pub tables: PairTables,
     /// Settings of the skeleton step.
     pub skeleton: SkeletonSettings,

@@ -56,7 +56,7 @@ struct Match {
     extras: Vec<ExtraKeypoint>,
     /// Positions of the joints in the candidate and after fusion, in pixels of the frame.
     joints: [Vec<[f64; 2]>; 2],
-    /// Longer side of the fused pose, pixels of the frame.
+    /// Longer side of the fused pose, in pixels of the frame.
     longer_px: f64,
 }
 

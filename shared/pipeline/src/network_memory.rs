@@ -67,7 +67,7 @@ pub(crate) struct Hold {
 /// A box of the detector in which nobody was seen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Empty {
-    /// The box, in pixels.
+    /// The box, in pixels: left, top, right, bottom.
     pub(crate) outline: [f64; 4],
     /// Number of searches since then.
     pub(crate) n_searches: u32,

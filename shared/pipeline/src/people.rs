@@ -42,7 +42,7 @@ pub(crate) struct Person {
     /// Midline of the body (head, neck, hips, knees, ankles) in every picture that shows all of it, in pixels of the
     /// frame.
     pub lines_px: Vec<Option<Line>>,
-    /// Middle of the trunk, metres in the world.
+    /// Middle of the trunk, in metres in the world.
     pub place: Point3<f64>,
     /// Sum over the views of how clearly they see the person. A view counts the score of its candidate above the weakest third, reduced
     /// with the distance from the projected person.

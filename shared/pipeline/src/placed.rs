@@ -8,7 +8,7 @@ use skeleton::{Joint, JointSet, N_PARTS, PARENT, PARSE14};
 
 use crate::fused_view::FusedView;
 
-/// Number of joints.
+/// Number of joints in `skeleton::PARSE14`.
 pub(crate) const N: usize = PARSE14.joints.len();
 
 /// The joints of `skeleton::PARSE14`, in metres in the world; `None` for a joint that fewer than two views show.

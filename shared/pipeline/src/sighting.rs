@@ -22,7 +22,7 @@ pub struct Sighting {
     pub score: f32,
     /// Evidence of the picture about the direction in which the person faces; zeros mean no evidence.
     pub front: FrontEvidence,
-    /// The extra keypoints.
+    /// Extra keypoints of the person.
     pub extras: Vec<ExtraKeypoint>,
 }
 

@@ -16,7 +16,7 @@ use crate::fused_view::FusedView;
 use crate::skeleton_settings::SkeletonSettings;
 use crate::view_result::ViewResult;
 
-/// Points of a view, pixels of the frame.
+/// Points of a view, in pixels of the frame.
 type Points<'a> = Cow<'a, [[f64; 2]]>;
 
 /// The cameras of a rig, and the settings for judging poses.

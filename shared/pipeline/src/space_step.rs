@@ -18,13 +18,13 @@ const MOST_REMEMBERED: usize = 32;
 /// A solved person of a frame.
 #[derive(Debug, Clone)]
 pub struct PersonSkeleton {
-    /// Id within the run.
+    /// Id of the person within the run.
     pub id: u64,
     /// The skeleton; it has no joints if fewer than two views show the person well.
     pub skeleton: Skeleton,
 }
 
-/// Memory of a person.
+/// State that is remembered for a person.
 #[derive(Debug)]
 struct Remembered {
     id: u64,

@@ -25,7 +25,7 @@ const KEPT: f64 = 0.7;
 /// Where to look for a person in the next frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Track {
-    /// The box, in pixels.
+    /// The box, in pixels: left, top, right, bottom.
     pub(crate) outline: [f64; 4],
     /// Rotation of the picture for the network.
     pub(crate) turn: Turn,

@@ -16,7 +16,7 @@ use crate::view_result::ViewResult;
 /// The levels of the pyramid that a view offers as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EvidenceWindow {
-    /// All levels.
+    /// All levels are offered.
     #[default]
     All,
     /// The levels within this distance of the level of any candidate. All candidates count,
@@ -89,7 +89,7 @@ pub enum ComputedOn {
     /// On the processor, as configured.
     #[default]
     Processor,
-    /// On the GPU.
+    /// On the GPU, as configured.
     Gpu,
     /// On the processor, because the GPU was lost.
     ProcessorForGpu,
@@ -124,7 +124,7 @@ pub struct ViewStep {
 type Searched = (gpu::Found, Vec<u16>);
 
 impl ViewStep {
-    /// Prepares the step.
+    /// Prepares the step for frames of one size.
     pub fn new(model: Arc<Model>, layout: Arc<Layout>, settings: ViewSettings) -> Self {
         Self {
             extractor: Extractor::new(Arc::clone(&model)),

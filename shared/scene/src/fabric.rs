@@ -14,7 +14,7 @@ pub(crate) enum Pattern {
     /// Stripes along the body; number per metre.
     Bars(f32),
     Checks(f32),
-    /// Threads of two colours.
+    /// A mixture of threads of two colours.
     Melange,
     Blotches(f32),
     /// One broad stripe at this height above the hips, in metres.

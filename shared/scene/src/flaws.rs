@@ -32,7 +32,7 @@ pub struct Flaws {
 pub struct FlawError {
     /// Name of the flaw.
     pub what: &'static str,
-    /// The value.
+    /// The given value.
     pub got: f64,
     /// Minimum accepted value.
     pub low: f64,

@@ -36,7 +36,7 @@ pub enum RigChoiceError {
         "{text:?} is not a rig: expected humaneva, umpm, ring:N[:RADIUS[:HEIGHT]] or a rig file"
     )]
     Form {
-        /// The text.
+        /// The given text.
         text: String,
     },
     /// The file of a preset cannot be read.

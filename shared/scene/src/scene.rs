@@ -196,7 +196,7 @@ impl Scene {
         others.map(|other| in_world(other.joints(seconds))).collect()
     }
 
-    /// Nose, left and right heel, left and right big toe at a time, metres in the world.
+    /// Returns the nose, the heels (left, right) and the big toes (left, right) at a time, in metres in the world.
     pub fn extras(&self, seconds: f64) -> [[f64; 3]; N_EXTRAS] {
         let frames = self.performance.frames(seconds);
         let extras = self.performance.bones.extras(&frames);

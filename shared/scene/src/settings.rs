@@ -9,7 +9,7 @@ use crate::rigs::{RigChoice, RigChoiceError};
 /// The complete settings of a scene. The same settings give the same pictures, bit for bit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// The cameras.
+    /// The cameras of the scene.
     pub rig: RigChoice,
     /// Number of the subject, which determines shape, clothes and style of movement.
     pub subject: u64,
@@ -75,10 +75,10 @@ pub enum AddressError {
     /// The rig is invalid.
     #[error("the rig of the address is not usable")]
     Rig(#[from] RigChoiceError),
-    /// An unknown key.
+    /// A key is unknown.
     #[error("unknown key {key:?}, expected one of {}", Address::KEYS.join(", "))]
     Key {
-        /// The key.
+        /// The unknown key.
         key: String,
     },
     /// A key has no `=`, or occurs twice.
@@ -87,17 +87,17 @@ pub enum AddressError {
         /// Text of the pair.
         text: String,
     },
-    /// An invalid value.
+    /// A value is invalid.
     #[error("{key}={value}: expected {expected}")]
     Value {
-        /// The key.
+        /// Key of the value.
         key: String,
-        /// The value.
+        /// The invalid value.
         value: String,
         /// Description of the accepted values.
         expected: String,
     },
-    /// An invalid flaw.
+    /// A flaw is invalid.
     #[error("a flaw of the address is not valid")]
     Flaw(#[from] FlawError),
     /// The address does not name a camera.

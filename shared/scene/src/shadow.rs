@@ -25,7 +25,7 @@ pub(crate) struct Shadow {
 }
 
 impl Shadow {
-    /// Draws the bodies.
+    /// Draws the bodies into the shadow map.
     pub(crate) fn cast(&mut self, light: &Light, bodies: &[Surface<'_>]) {
         let points = bodies.iter().flat_map(|body| body.points);
         let beams: Vec<(Vector2<f32>, f32)> =

@@ -44,7 +44,7 @@ pub struct Frame {
     pub frame: u64,
     /// Nominal time in seconds, `frame / frame_rate_hz`.
     pub seconds: f64,
-    /// The joints of `skeleton::PARSE14` at that time, metres in the world.
+    /// The joints of `skeleton::PARSE14` at that time, in metres in the world.
     pub joints: [[f64; 3]; N_JOINTS],
     /// The joints of every other person at that time, in metres in the world.
     pub others: Vec<[[f64; 3]; N_JOINTS]>,
@@ -52,7 +52,7 @@ pub struct Frame {
     pub views: Vec<View>,
 }
 
-/// One picture.
+/// The truth of one picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct View {

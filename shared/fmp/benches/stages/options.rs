@@ -4,7 +4,7 @@ use kernels::Isa;
 
 use crate::stages::Stage;
 
-/// See `scripts/bench --help`.
+/// The parsed options; see `scripts/bench --help`.
 #[derive(Debug, Default)]
 pub(crate) struct Options {
     pub(crate) quick: bool,

@@ -51,7 +51,7 @@ impl Workload {
         }
     }
 
-    /// `width x height`.
+    /// Returns the image size as `width x height`.
     pub(crate) fn image_name(&self) -> String {
         let [width, height] = self.layout.image_size;
         format!("{width}x{height}")

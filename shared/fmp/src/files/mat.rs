@@ -40,7 +40,7 @@ pub enum MatError {
     Number {
         /// Path of the field in the file.
         field: String,
-        /// The number.
+        /// The number that was found.
         value: f64,
         /// The accepted values.
         expected: String,

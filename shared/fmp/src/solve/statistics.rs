@@ -37,7 +37,7 @@ impl SolveStatistics {
     }
 }
 
-/// [`SolveStatistics`] with atomic counters.
+/// Like [`SolveStatistics`], with atomic counters.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     solutions: AtomicU64,
@@ -56,7 +56,7 @@ impl Tally {
         add(&self.entries_offered, entries);
     }
 
-    /// Counts a level.
+    /// Counts a level that was solved.
     pub(super) fn solved(&self, entries: usize, computed: usize) {
         add(&self.levels_solved, 1);
         add(&self.entries_solved, entries);

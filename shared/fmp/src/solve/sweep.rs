@@ -359,7 +359,7 @@ impl Workspace {
     }
 }
 
-/// See [`Solver::score`].
+/// Computes the score of a given pose; see [`Solver::score`].
 pub(super) fn score(problem: &Problem<'_>, pose: &Pose, scores: &mut Vec<f32>) -> f32 {
     let (solver, grid) = (problem.solver, problem.grid);
     let model = &*solver.model;

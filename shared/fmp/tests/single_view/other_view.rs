@@ -33,7 +33,7 @@ pub(crate) struct OtherViews {
     pub(crate) seeds: Vec<u64>,
     /// Value added to every position term; no term exceeds it.
     pub(crate) gain: f32,
-    /// Multiplies all terms.
+    /// Factor by which all terms are multiplied.
     pub(crate) scale: f32,
     /// True if the gain is reported.
     pub(crate) known: bool,

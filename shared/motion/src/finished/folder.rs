@@ -12,7 +12,7 @@ use nalgebra::UnitVector3;
 use runfiles::{FrameLine, JointLine, Line as _, PersonLine};
 use serde_json::Value;
 
-/// A run.
+/// A finished run.
 #[derive(Debug)]
 pub struct Run {
     /// The instants, in seconds, in ascending order.
@@ -50,7 +50,7 @@ struct Gathered {
 }
 
 impl Gathered {
-    /// Adds a line.
+    /// Adds the person of a line.
     fn add(&mut self, at: usize, person: &PersonLine) {
         let before = self.id_at.last().copied();
         self.id_at.resize(at, before.unwrap_or(person.id));

@@ -111,7 +111,7 @@ impl Counts {
         }
     }
 
-    /// `p(type in first view, type in second view)` of every part.
+    /// Returns `p(type in first view, type in second view)` for every part.
     ///
     /// The counts are extended by `weight` observations of independent types, so that rare pairs of types and rare
     /// angles carry little information.

@@ -35,7 +35,7 @@ pub struct JointFile {
     pub version: u32,
     /// Fingerprint of the model file.
     pub model: String,
-    /// The joints.
+    /// Weights of every joint.
     pub joints: Vec<JointRow>,
     /// Settings and results of the learning.
     pub learned: JointsLearned,
@@ -57,9 +57,9 @@ pub struct JointRow {
 pub struct JointsLearned {
     /// Maximum number of bones between a joint's own part and a part that determines its position.
     pub reach: usize,
-    /// Cost of weights.
+    /// Cost of a weight on other parts than the joint's own.
     pub ridge: f64,
-    /// The data sets.
+    /// The data sets from which the joints were learned.
     pub sets: Vec<LearnedSet>,
 }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::learned::Weights;
 
-/// The grid of values.
+/// The grid of weights to try.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Weights of the geometric term.
@@ -31,7 +31,7 @@ impl Default for Grid {
 /// The result of one choice of weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
-    /// The weights.
+    /// The weights that gave this result.
     pub weights: Weights,
     /// The criterion to maximise: area under the curve of PCP3D over its threshold from 0 to 1, in percent.
     pub area: f64,

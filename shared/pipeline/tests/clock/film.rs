@@ -8,7 +8,7 @@ use nalgebra::{Point2, Point3, Vector2};
 use scene::{Action, RigChoice, Scene, Settings};
 use skeleton::PARSE14;
 
-/// Number of joints.
+/// Number of joints in `skeleton::PARSE14`.
 pub(crate) const N: usize = PARSE14.joints.len();
 /// Frames per second.
 pub(crate) const RATE_HZ: f64 = 30.0;

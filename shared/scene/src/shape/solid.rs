@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// A solid.
+/// A smooth solid.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Solid {
     /// The convex hull of two balls.

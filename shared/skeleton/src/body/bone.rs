@@ -45,7 +45,7 @@ const fn bone(name: &'static str, kind: Kind, from: [usize; 2], to: usize) -> Bo
     }
 }
 
-/// The bones.
+/// All bones, in a fixed order.
 pub const BONES: [Bone; N_BONES] = [
     bone("right lower leg", Kind::LowerLeg, [R_KNEE; 2], R_ANKLE),
     bone("right upper leg", Kind::UpperLeg, [R_HIP; 2], R_KNEE),

@@ -85,7 +85,7 @@ pub fn check(joints: &Joints, covariances: &Covariances, lengths: Option<&Length
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Expected {
     pub(crate) metres: f64,
-    /// Standard deviation, in metres.
+    /// Standard deviation of the length, in metres.
     pub(crate) spread: f64,
 }
 

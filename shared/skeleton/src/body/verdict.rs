@@ -13,7 +13,7 @@ pub enum Reason {
     TooFewBones {
         /// Number of bones whose joints are present and possible.
         bones: usize,
-        /// Minimum number of bones.
+        /// Minimum number of such bones.
         needed: usize,
     },
     /// The stature is impossible for any person, or for the person with the learned lengths.

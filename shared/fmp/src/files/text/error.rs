@@ -87,7 +87,7 @@ pub enum TextError {
     OtherLevel {
         /// Start of the array in the text.
         place: TextPosition,
-        /// Spring, counted from 1.
+        /// The spring in question, counted from 1.
         spring: usize,
         /// The anchor's third component.
         got: i32,
