@@ -36,7 +36,7 @@ pub struct ViewFrame<'a> {
     pub skew_s: f64,
 }
 
-/// What a view contributes to a frame.
+/// Contribution of a view to a frame.
 #[derive(Debug, Clone, Copy)]
 pub enum ViewContent<'a> {
     /// The picture of the view.

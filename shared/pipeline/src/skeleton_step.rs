@@ -48,7 +48,7 @@ pub struct Skeleton {
     /// Margin of the decision about which views see the person from the same side: energy of the chosen assumption minus
     /// that of the next best one.
     pub facing_margin: f64,
-    /// Whether left and right are exchanged in all views; `None` if this is not decided.
+    /// Exchange of left and right in all views; `None` if it is not decided.
     pub sides: Option<Sides>,
     /// The poses from which the joints were triangulated.
     pub kept: Kept,
