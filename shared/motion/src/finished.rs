@@ -88,8 +88,7 @@ pub fn smoothed(recorded: &Recorded, settings: &Settings) -> Result<Motion, Fail
         Method::Butterworth => {
             let filtered = butterworth::filter(recorded, settings.cutoff_hz, settings.fill_s);
             filtered.map_err(|error| {
-                let hint =
-                    "a lower --cutoff-hz, or --method rts, which follows the data at any rate";
+                let hint = "use a lower --cutoff-hz, or --method rts, which works at any rate";
                 Failure::new(ExitKind::Usage, error).with_hint(hint)
             })
         }

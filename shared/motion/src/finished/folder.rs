@@ -136,7 +136,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
     let hint = if part.exists() {
         "the run has not ended: its files are still called *.part"
     } else {
-        "give the folder that `output` of the deployment names"
+        "give the folder that is `output` in the deployment"
     };
     in_file(path, error).with_hint(hint)
 }
@@ -157,17 +157,17 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
         let time_s = time_s.ok_or_else(|| {
             let what = format!("{}: line {} has no time", path.display(), nth + 1);
             Failure::new(ExitKind::Input, what)
-                .with_hint("--rate-hz says how many frames there are per second")
+                .with_hint("set the frames per second with --rate-hz")
         })?;
         if let Some(&before_s) = times.last()
             && time_s <= before_s
         {
             let what = format!(
-                "{}: line {} is at {time_s} s, not after {before_s} s of the line before it",
+                "{}: line {} is at {time_s} s, which is not after {before_s} s of the previous line",
                 path.display(),
                 nth + 1
             );
-            let hint = "lines must be in the order of their times; --rate-hz takes the times from the numbers of the frames";
+            let hint = "lines must be in the order of their times; with --rate-hz, the times follow from the frame numbers";
             return Err(Failure::new(ExitKind::Input, what).with_hint(hint));
         }
         for (nth, person) in line.people.iter().enumerate() {
@@ -183,7 +183,7 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
         Ok(())
     })?;
     if frames.is_empty() {
-        let what = format!("{} has no line", path.display());
+        let what = format!("{} has no lines", path.display());
         return Err(Failure::new(ExitKind::Input, what));
     }
     let people: Vec<Gathered> = match is_one {

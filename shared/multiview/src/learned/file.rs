@@ -160,9 +160,7 @@ pub enum FileError {
         expected: &'static str,
     },
     /// The file was learned for another model.
-    #[error(
-        "it was learned for a model whose parts have {got:?} types; this one's have {expected:?}"
-    )]
+    #[error("it was learned for a model with {got:?} types per part; this model has {expected:?}")]
     Model {
         /// Number of types of every part in the file.
         got: Vec<usize>,
