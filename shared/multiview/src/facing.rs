@@ -19,7 +19,7 @@ pub type Exchanges = u32;
 /// Ranks the assignments of exchanges by the sum of the pairs' energies.
 ///
 /// A pair only shows whether its two views agree. The first present view is therefore never
-/// exchanged here; [`FacingFilter`] decides whether all views are exchanged. For a view without a pair,
+/// exchanged here; [`SidesFilter`](crate::SidesFilter) decides whether all views are exchanged. For a view without a pair,
 /// both assignments are returned.
 ///
 /// * `present`: bit `v` is set if view `v` is present; the views of all pairs must be present.
