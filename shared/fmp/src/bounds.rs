@@ -1,9 +1,9 @@
 //! Upper bounds of the scores on every level, for exact pruning.
 
-/// For every level of a layout the score of its best pose without the terms of other views.
+/// For every level of a layout, the score of its best pose without the terms of other views.
 ///
-/// With terms that add at most a known gain, a level whose bound is below the score of some pose
-/// cannot hold the best one and is skipped.
+/// If the terms add at most a known gain, a level whose bound is below the score of some pose
+/// cannot contain the best pose and is skipped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds(Vec<Bound>);
 
@@ -17,7 +17,7 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// For a level without information.
+    /// Bound of a level without information.
     pub const UNKNOWN: Self = Self {
         best: f32::INFINITY,
         size: 0.0,
@@ -25,7 +25,7 @@ impl Bound {
 }
 
 impl Bounds {
-    /// The bounds of some levels; the others are unknown.
+    /// Creates the bounds from those of some levels; the other levels are unknown.
     ///
     /// * `n_levels`: number of levels, offered or not.
     pub(crate) fn of_some(n_levels: usize, found: Vec<(u16, Bound)>) -> Self {
@@ -36,32 +36,32 @@ impl Bounds {
         Self(bounds)
     }
 
-    /// Bounds that were computed elsewhere, one per level of the layout, offered or not.
+    /// Creates the bounds from values computed elsewhere, one per level of the layout, offered or not.
     ///
-    /// Bounds that are too low give wrong results, but are otherwise harmless.
+    /// Bounds that are too low give wrong results, but do no other harm.
     pub fn new(of_levels: Vec<Bound>) -> Self {
         Self(of_levels)
     }
 
-    /// The bound of every level, offered or not.
+    /// Returns the bound of every level, offered or not.
     pub fn levels(&self) -> &[Bound] {
         &self.0
     }
 
-    /// Number of levels, offered or not.
+    /// Returns the number of levels, offered or not.
     pub fn n_levels(&self) -> usize {
         self.0.len()
     }
 
-    /// Upper bound of the score of a pose on a level under terms that add at most `gain` (the sum
-    /// over the parts, and that of its absolute values), for poses that score at least `lowest`.
+    /// Returns the upper bound of the score of a pose on a level under terms that add at most `gain` (the sum
+    /// over the parts, and the sum of its absolute values), for poses that score at least `lowest`.
     /// Not finite if unknown.
     ///
-    /// Rounding is monotone, so a computed score never exceeds the one computed with every term at
-    /// its bound. That one differs from the sum computed here by rounding alone. A score takes
+    /// Rounding is monotone, so a computed score never exceeds the score computed with every term at
+    /// its bound. That score differs from the sum computed here by rounding alone. A score takes
     /// eight sums per part. If the score is not below `lowest`, each partial sum lies between
-    /// `lowest` minus all that can be added to it and all that can be added; both orders of
-    /// summation are off by at most half an ulp of that per sum. The factor below is four times as
+    /// `lowest` minus the maximum that can be added to it, and the maximum total. Both orders of
+    /// summation are off by at most half an ulp of that range per sum. The factor below is four times as
     /// large.
     pub(crate) fn upper(
         &self,
@@ -80,12 +80,12 @@ impl Bounds {
     }
 }
 
-/// See [`Bounds::upper`].
+/// Upper bound of a score; see [`Bounds::upper`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Upper {
-    /// The bound.
+    /// The upper bound.
     pub(crate) most: f64,
-    /// Allowance for rounding.
+    /// Allowance for rounding errors.
     rounding: f64,
 }
 
@@ -95,9 +95,9 @@ impl Upper {
         self.most < f64::from(lowest)
     }
 
-    /// The most that a pose can lose against the bound without scoring less than `lowest`.
+    /// Returns the maximum loss of a pose against the bound without scoring less than `lowest`.
     ///
-    /// The bound of a pose one of whose terms has a given value is [`Self::most`], minus that
+    /// If one term of a pose has a given value, the bound of the pose is [`Self::most`], minus that
     /// term's bound, plus the value. The value itself can be as large as the loss, and adds as much
     /// rounding again.
     pub(crate) fn slack(&self, lowest: f32) -> f64 {

@@ -1,22 +1,22 @@
-//! The parts of a chain's images that the features of a scope are made of.
+//! The parts of a chain's images that are needed for the features of a scope.
 
 use std::ops::Range;
 
 use crate::source::Source;
 
-/// A rectangle of the image of one level, pixels of the level.
+/// A rectangle of the image of one level, in pixels of the level.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Cut {
     pub(crate) x: Range<usize>,
     pub(crate) y: Range<usize>,
 }
 
-/// The cuts of the levels `first`, `first + interval` and so on up to the last one of the scope,
-/// such that every cut is half of the one before it.
+/// Computes the cuts of the levels `first`, `first + interval` and so on up to the last one of the scope,
+/// such that every cut has half the size of the one before it.
 ///
-/// A cut begins and ends at cell borders of its level, or with the image, so that its cells are
+/// A cut begins and ends at cell borders of its level, or at the border of the image, so that its cells are
 /// cells of the whole image. Features depend on the pixels up to two cells away, less at least one
-/// pixel. Halving corrupts up to two pixels along the border of a cut, which takes another cell.
+/// pixel. Halving corrupts up to two pixels along the border of a cut, which needs another cell.
 pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
     let end = usize::from(source.scope.levels().end);
     let levels = (first..end).step_by(source.interval);
@@ -26,7 +26,7 @@ pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
     for (octave, level) in levels.enumerate().rev() {
         let of_axis = |axis: usize| {
             let below = cuts.get(octave + 1).map(|cut| cut.on(axis));
-            // As many cells as become one on the smallest level of the chain.
+            // Number of cells that become one cell on the smallest level of the chain.
             let grid = source.cell_px << (cuts.len() - 1 - octave);
             let own = needed(source, level, axis);
             let twice = below.map(|below| {
@@ -46,7 +46,7 @@ pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
             y: of_axis(1),
         };
     }
-    // The sizes that halving the first cut gives.
+    // The sizes after repeated halving of the first cut.
     for octave in 1..cuts.len() {
         let half = |range: Range<usize>| range.start / 2..range.end.div_ceil(2);
         cuts[octave] = Cut {
@@ -66,7 +66,7 @@ impl Cut {
     }
 }
 
-/// Pixels of a level that the features of its window depend on, if it is in the scope.
+/// Pixels of a level on which the features of its window depend, if the level is in the scope.
 ///
 /// * `axis`: 0 along the rows, 1 down the columns.
 fn needed(source: &Source<'_>, level: usize, axis: usize) -> Option<Range<usize>> {
@@ -78,7 +78,7 @@ fn needed(source: &Source<'_>, level: usize, axis: usize) -> Option<Range<usize>
             [it.padded[1] - it.cols, source.layout.pad[1], it.padded[1]],
             [it.padded[0] - it.rows, source.layout.pad[0], it.padded[0]],
         ][axis];
-        // The cell of the image that entry `at` of the padded features describes is `at - pad`;
+        // Entry `at` of the padded features describes the cell `at - pad` of the image;
         // the first and the last cell of an image have no features.
         let last = padded - 2 * (pad + 1);
         let begin_cell = begin.saturating_sub(pad).clamp(1, last.max(1));

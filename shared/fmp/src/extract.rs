@@ -10,15 +10,16 @@ use crate::pool::{Pool, in_pool, lock};
 use crate::source::Source;
 use crate::{Layout, Model, Scope};
 
-/// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
-/// are used again from frame to frame.
+/// Computes filter responses. Stores everything that can be prepared once per model, and workspaces that
+/// are reused from frame to frame.
 #[derive(Debug)]
 pub struct Extractor {
     model: Arc<Model>,
     isa: Isa,
     bank: FilterBank,
     workspaces: Pool<Features>,
-    /// One for each thread. A stack and no [`Pool`]: the last one put back is the first one taken, and still in the cache.
+    /// One workspace per thread. This is a stack instead of a [`Pool`]: the last workspace put back is taken first, while it is still in
+    /// the cache.
     buffers: Mutex<Vec<CorrelateWorkspace>>,
 }
 
@@ -28,13 +29,13 @@ impl Extractor {
         Self::on(Isa::best(), model)
     }
 
-    /// As [`Self::new`], for a given instruction set; the responses are the same on all.
+    /// Like [`Self::new`], for a given instruction set; the responses are the same on all.
     pub fn on(isa: Isa, model: Arc<Model>) -> Self {
         Self::with(FilterBank::new, isa, model)
     }
 
-    /// As [`Self::new`], but every response is the plain sum of its products: slower, and there to
-    /// compare with. See [`FilterBank::correlate`] for how far apart they can be.
+    /// Like [`Self::new`], but every response is the plain sum of its products. This is slower, and serves as a
+    /// comparison. See [`FilterBank::correlate`] for the maximum difference.
     pub fn direct(model: Arc<Model>) -> Self {
         let isa = Isa::best();
         Self::with(FilterBank::direct, isa, model)
@@ -61,34 +62,34 @@ impl Extractor {
 
     /// Writes the responses of all filters on all levels of `layout` into `out`.
     ///
-    /// Inside a rayon pool the work is spread over its threads, elsewhere it stays on the caller's;
-    /// the values are the same. Filters smaller than the largest have a response at the same cells
-    /// as the largest one: where their own top left cell lies.
+    /// Inside a rayon pool, the work is distributed over its threads; elsewhere, it stays on the caller's thread.
+    /// The values are the same. Filters smaller than the largest filter have a response at the same cells
+    /// as the largest one, at the position of their own top-left cell.
     ///
     /// * `out`: at least [`Layout::n_responses`] values, `[level][filter][row][col]`; all of them
-    ///   are overwritten. May lie in shared memory.
+    ///   are overwritten. It may lie in shared memory.
     ///
     /// # Panics
     ///
-    /// If the image, the layout and `out` disagree in size, or the layout is another model's.
+    /// If the image, the layout and `out` disagree in size, or the layout belongs to another model.
     pub fn responses(&self, image: Rgb8View<'_>, layout: &Layout, out: &mut [f32]) {
         self.responses_in(image, layout, &Scope::whole(layout), out);
     }
 
-    /// Writes the responses of all filters on the cells of a scope into `out`; nothing else is
-    /// computed but what they are made of.
+    /// Writes the responses of all filters on the cells of a scope into `out`; only their inputs are
+    /// computed.
     ///
-    /// Features are bit-identical to those of [`Self::responses`] (except for the rounding of the
-    /// HOG shares where the side of a cell is not a power of two). Responses differ by at most
-    /// twice the bound of [`FilterBank::correlate`], because tiles begin elsewhere. With the whole
-    /// image as its region a scope gives the bits of [`Self::responses`] on its levels.
+    /// Features are bit-identical to those of [`Self::responses`], except for the rounding of the
+    /// HOG shares if the side of a cell is not a power of two. Responses differ by at most
+    /// twice the bound of [`FilterBank::correlate`], because tiles begin elsewhere. A scope with the whole
+    /// image as its region gives results bit-identical to [`Self::responses`] on its levels.
     ///
     /// * `out`: at least [`Layout::n_values`] values, `[level][filter][row][col]` without gaps.
     ///
     /// # Panics
     ///
-    /// If the image, the layout, the scope and `out` disagree in size, or the layout is another
-    /// model's.
+    /// If the image, the layout, the scope and `out` disagree in size, or the layout belongs to another
+    /// model.
     pub fn responses_in(
         &self,
         image: Rgb8View<'_>,
@@ -139,7 +140,7 @@ impl Extractor {
         self.workspaces.put_back(features);
     }
 
-    /// Makes room for every thread.
+    /// Reserves workspaces for every thread.
     fn reserve(&self, layout: &Layout, n_threads: usize) {
         let cols = layout.levels.iter().map(|level| level.cols).max().unwrap_or(0);
         let mut buffers = lock(&self.buffers);
@@ -150,10 +151,10 @@ impl Extractor {
         }
     }
 
-    /// Computes the responses of a part, in smaller ones side by side while it is more than a
-    /// share of the work.
+    /// Computes the responses of a part of the work. If the part is larger than a share, it is split in two halves that run
+    /// in parallel.
     ///
-    /// * `out`: of this part only.
+    /// * `out`: memory for the responses of this part only.
     fn correlate(
         &self,
         (source, features): (&Source<'_>, &Features),
@@ -184,7 +185,7 @@ impl Extractor {
         lock(&self.buffers).push(buffers);
     }
 
-    /// Number of responses.
+    /// Returns the number of responses.
     fn work(&self, source: &Source<'_>, part: &Part) -> usize {
         let windows = part.levels.clone();
         let windows = windows.map(|level| source.layout.window(source.scope, level));
@@ -192,7 +193,7 @@ impl Extractor {
         area * self.bank.filters(part.panels.clone()).len()
     }
 
-    /// Levels that have about half the work, and the others; of one level, the panels.
+    /// Splits the levels in two halves of about the same work; for a single level, splits the panels.
     fn halves(&self, source: &Source<'_>, part: &Part) -> Option<[Part; 2]> {
         let Range { start, end } = part.levels;
         let cut = |levels: Range<usize>, panels: Range<usize>| Part { levels, panels };
@@ -211,13 +212,13 @@ impl Extractor {
     }
 }
 
-/// Parts that a thread's work is cut into at least, so that others can help it.
+/// Minimum number of parts into which a thread's work is split, so that others can help.
 const SHARES: usize = 4;
 
-/// Some levels and filters, whose responses lie without gaps.
+/// Some levels and filters, with their responses stored without gaps.
 #[derive(Debug, Clone)]
 struct Part {
     levels: Range<usize>,
-    /// All of them, unless there is one level only.
+    /// The panels to compute; all panels unless there is only one level.
     panels: Range<usize>,
 }

@@ -14,21 +14,21 @@ use crate::{N_CHANNELS, Scope};
 /// Features of all levels, with their buffers.
 ///
 /// The levels that come from one resized image by repeated halving are a chain; chains are
-/// independent. The first thread that needs a level of a chain computes the chain while others that
-/// need it wait, so responses start as soon as their features exist, without a barrier. Buffers are
+/// independent. The first thread that needs a level of a chain computes the chain, while other threads that
+/// need it wait. So responses start as soon as their features exist, without a barrier. Buffers are
 /// reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Features {
     chains: Vec<Chain>,
-    /// One per thread: the last one put back is the first one taken, and still in the cache.
+    /// One arena per thread: the last one put back is taken first, while it is still in the cache.
     arenas: Mutex<Vec<Arena>>,
 }
 
 #[derive(Debug, Default)]
 struct Chain {
-    /// Padded where the image ends; empty outside of the scope.
+    /// Feature maps with padding at the border of the image; empty outside the scope.
     maps: OnceLock<Maps>,
-    /// Spare maps, in which new ones are made.
+    /// Spare memory for new maps.
     spare: Mutex<Maps>,
 }
 
@@ -43,7 +43,7 @@ struct Arena {
     shrink: ShrinkWorkspace,
     hog: HogWorkspace,
     cuts: Vec<Cut>,
-    /// Features of a cut image with the padding that it would have if it were whole.
+    /// Features of a cut of the image, with the padding that the whole image would have.
     padded: Vec<f32>,
 }
 
@@ -66,7 +66,7 @@ impl Features {
         }
     }
 
-    /// The features of a level of the scope of `source`, the same one for all levels since
+    /// Returns the features of a level in the scope of `source`. The source must be the same for all levels since
     /// [`Self::begin`].
     pub(crate) fn of_level(&self, source: &Source<'_>, level: usize) -> FeatureMap<'_> {
         let [rows, cols] = source.map_size(level);
@@ -108,12 +108,12 @@ impl Arena {
         }
     }
 
-    /// Features of the levels `first`, `first + interval` and so on, as far as the scope goes.
+    /// Computes the features of the levels `first`, `first + interval` and so on, up to the end of the scope.
     fn fill(&mut self, source: &Source<'_>, first: usize, maps: &mut Maps) {
         let levels = (first..source.layout.levels.len()).step_by(source.interval);
         maps.resize_with(levels.len(), Vec::new);
         cuts(source, first, &mut self.cuts);
-        // Images take turns in the two buffers, which keep their places for the next chain.
+        // Images alternate between the two buffers, which are then put back for the next chain.
         let Self {
             shrink,
             hog,
@@ -143,7 +143,7 @@ impl Arena {
     }
 }
 
-/// Writes the features of a level's window, from the part `cut` of its image.
+/// Writes the features of a level's window, from the cut of its image.
 fn describe(
     source: &Source<'_>,
     (level, cut): (usize, &Cut),
@@ -159,7 +159,7 @@ fn describe(
     let [rows, cols] = shape.map_size(image.width(), image.height());
     padded.resize(rows * cols * N_CHANNELS, 0.0);
     hog(source.isa, image, shape, workspace, padded);
-    // Cells of the cut image are those of the whole one, less those before it.
+    // Cell indices of the cut equal those of the whole image minus the cells before the cut.
     let window = source.layout.window(source.scope, level);
     let top = window.top - cut.y.start / source.cell_px;
     let left = window.left - cut.x.start / source.cell_px;

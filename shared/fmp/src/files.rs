@@ -17,77 +17,77 @@ pub use summary::{ModelSummary, PartSummary, SpringRanges, describe};
 
 use crate::{Model, ModelError, ModelSpec};
 
-/// Why a model file could not be read or written.
+/// Reason why a model file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelFileError {
-    /// There is no such file.
+    /// The file does not exist.
     #[error(
         "there is no model file {}: leave the model out to use the one that ships with Parallax; `parallax-lab model \
          import` makes one from Yang & Ramanan's released .mat models or from the paper authors' .txt models",
         path.display()
     )]
     Absent {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The operating system reported an error.
     #[error("cannot {doing} the model file {}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// `read` or `write`.
+        /// The action, `read` or `write`.
         doing: &'static str,
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The file holds nothing.
+    /// The file is empty.
     #[error("the model file {} is empty (0 bytes)", path.display())]
     Empty {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// The beginning matches none of the formats.
+    /// The beginning of the file matches none of the formats.
     #[error(
         "{} is not a model: it begins with \"{beginning}\", expected `PLXMODEL` (Parallax), `MATLAB 5.0` \
          (Yang & Ramanan) or `partsNbr` (the authors' text)",
         path.display()
     )]
     NotAModel {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its first characters.
+        /// First characters of the file.
         beginning: String,
     },
     /// A file in the authors' text format with an error.
     #[error("the model file {} cannot be read", path.display())]
     Text {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The error.
+        /// The error in the text.
         source: text::TextError,
     },
     /// A MATLAB file that is not a valid model.
     #[error("the model file {} cannot be read", path.display())]
     Mat {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The error.
+        /// The error in the MATLAB file.
         source: mat::MatError,
     },
     /// A damaged Parallax file, or a model that could not be encoded.
-    #[error("{} is not a sound model file", path.display())]
+    #[error("{} is not a valid model file", path.display())]
     Own {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The error.
+        /// The error in the Parallax file.
         source: own::OwnError,
     },
     /// The file can be read, but its model is invalid.
     #[error("the model in {} was refused", path.display())]
     Model {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The error.
+        /// The error in the model.
         source: ModelError,
     },
 }
@@ -98,7 +98,7 @@ pub enum ModelFileError {
 ///
 /// # Errors
 ///
-/// [`ModelFileError`]; every one names the file.
+/// [`ModelFileError`]; every variant names the file.
 pub fn read(path: &Path) -> Result<Model, ModelFileError> {
     let bytes = ::files::read(path, ::files::MODEL).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => ModelFileError::Absent {
@@ -119,7 +119,7 @@ pub fn read(path: &Path) -> Result<Model, ModelFileError> {
 
 /// Writes a model as Parallax's own file.
 ///
-/// The write is atomic: a temporary file beside the target is written, flushed to the disk, and
+/// The write is atomic: a temporary file is written beside the target, flushed to the disk, and then
 /// renamed.
 ///
 /// # Errors
@@ -159,7 +159,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
     Ok(spec)
 }
 
-/// The first characters, those that cannot be shown as dots.
+/// Returns the first characters of a file; unprintable characters become dots.
 fn beginning(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(16)]);
     let shown = |letter: char| {
@@ -233,7 +233,7 @@ mod tests {
         let expected = "the model file dir/m cannot be read";
         assert_eq!(outcome("m", b"partsNbr 1 typ"), expected);
         assert_eq!(outcome("m", b"MATLAB 5.0"), expected);
-        assert_eq!(outcome("m", b"PLXMODEL"), "dir/m is not a sound model file");
+        assert_eq!(outcome("m", b"PLXMODEL"), "dir/m is not a valid model file");
     }
 
     #[test]

@@ -1,27 +1,27 @@
-//! Where the cells of the feature pyramid lie in the image, and the maps in memory.
+//! The positions of the feature pyramid's cells in the image, and of the maps in memory.
 
 use std::ops::Range;
 
 use crate::Model;
 
-/// A part on a level of the pyramid: the cell and the type.
+/// The placement of a part on a level of the pyramid: its cell and its type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Placement {
     /// Column of the response map: the filter's leftmost cell.
     pub x: u16,
     /// Row of the response map: the filter's topmost cell.
     pub y: u16,
-    /// Type (mixture component) of the part, from 0.
+    /// Type (mixture component) of the part, counted from 0.
     pub mixture: u8,
 }
 
 /// One level of the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelLayout {
-    /// Side of a cell, pixels of the original image: `cell_px * 2^(level / interval)`, computed as
-    /// the reference programs do, to the last bit; a whole octave is exact.
+    /// Side of a cell, in pixels of the original image: `cell_px * 2^(level / interval)`. It is computed as in
+    /// the reference programs, bit for bit; a whole octave is exact.
     pub scale: f64,
-    /// Size `[width, height]` of the resized image, pixels of the level.
+    /// Size `[width, height]` of the resized image, in pixels of the level.
     pub image_size: [usize; 2],
     /// Size `[rows, cols]` of the padded feature map, cells.
     pub padded: [usize; 2],
@@ -29,32 +29,32 @@ pub struct LevelLayout {
     pub rows: usize,
     /// Width of every response map of the level, cells.
     pub cols: usize,
-    /// Where the level's maps begin in the array of responses.
+    /// Start of the level's maps in the array of responses.
     pub offset: usize,
 }
 
-/// The levels of the pyramid of an image of a given size under a given model.
+/// The levels of the pyramid for an image size and a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
-    /// Size `[width, height]` of the image, pixels.
+    /// Size `[width, height]` of the image, in pixels.
     pub image_size: [usize; 2],
     /// The levels, full resolution first.
     pub levels: Vec<LevelLayout>,
-    /// Padding `[rows, cols]` without the extra ring, cells: largest filter minus 2.
+    /// Padding `[rows, cols]` without the extra ring, in cells: the largest filter minus 2.
     pub pad: [usize; 2],
     /// Number of filters of the model.
     pub n_filters: usize,
 }
 
-/// The image has no level on which the model fits.
+/// The error for an image without a level on which the model fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the image is {width}x{height} pixels, but the smaller side needs at least {minimum}")]
 pub struct ImageTooSmall {
-    /// Width, pixels.
+    /// Width of the image, in pixels.
     pub width: usize,
-    /// Height, pixels.
+    /// Height of the image, in pixels.
     pub height: usize,
-    /// Smallest side accepted, pixels.
+    /// Smallest accepted side, in pixels.
     pub minimum: usize,
 }
 
@@ -62,13 +62,13 @@ impl Layout {
     /// Lays out the pyramid (Yang & Ramanan's `featpyramid`: `interval` levels per octave, no
     /// upsampled octave).
     ///
-    /// `levels = 1 + floor(log2(min(width, height) / (5 cell_px)) * interval)`; response maps of all
+    /// The number of levels is `1 + floor(log2(min(width, height) / (5 cell_px)) * interval)`. The response maps of all
     /// filters of a level have the same size, that of the largest filter.
     ///
     /// # Errors
     ///
-    /// [`ImageTooSmall`] if a side is shorter than 10 cells (40 pixels for 4-pixel cells), below
-    /// which the reference programs write out of bounds.
+    /// [`ImageTooSmall`] if a side is shorter than 10 cells (40 pixels for 4-pixel cells); for smaller
+    /// images, the reference programs write out of bounds.
     pub fn new(model: &Model, width: usize, height: usize) -> Result<Self, ImageTooSmall> {
         let spec = model.spec();
         let minimum = 10 * spec.cell_px;
@@ -88,8 +88,8 @@ impl Layout {
         let mut offset = 0;
         for level in 0..n_levels {
             // The programs take a power for the first octave and halve it from there on. A running
-            // product strays by a few units in the last place, and a centre that lies half-way
-            // between two pixels is then rounded to the other one.
+            // product would drift by a few units in the last place. A centre halfway
+            // between two pixels would then be rounded to the other pixel.
             let shrink = 1.0 / step.powf((level % spec.interval) as f64);
             let relative = shrink * 0.5_f64.powi((level / spec.interval) as i32);
             let image_size = if level < spec.interval {
@@ -121,30 +121,30 @@ impl Layout {
         })
     }
 
-    /// Number of response values of all levels and filters.
+    /// Returns the number of response values of all levels and filters.
     pub fn n_responses(&self) -> usize {
         self.levels.last().map_or(0, |level| {
             level.offset + level.rows * level.cols * self.n_filters
         })
     }
 
-    /// Where the response map of a filter lies in the array of responses.
+    /// Returns the position of a filter's response map in the array of responses.
     pub fn map_range(&self, level: usize, filter: usize) -> Range<usize> {
         let it = &self.levels[level];
         let start = it.offset + filter * it.rows * it.cols;
         start..start + it.rows * it.cols
     }
 
-    /// Centre of a filter placed on a level, pixels of the image, top-left pixel centre = (0, 0).
+    /// Returns the centre of a filter placed on a level, in pixels of the image; the centre of the top-left pixel is (0, 0).
     pub fn centre(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 2] {
         let [x1, y1, x2, y2] = self.part_box(level, filter, at);
         [f64::midpoint(x1, x2), f64::midpoint(y1, y2)]
     }
 
-    /// Box `[x1, y1, x2, y2]` of a filter placed on a level; see [`Self::centre`].
+    /// Returns the box `[x1, y1, x2, y2]` of a filter placed on a level; see [`Self::centre`].
     ///
-    /// `x1 = (x - pad) s`, `x2 = x1 + cols s - 1` with `s` the level's scale: the reference
-    /// programs' boxes less 1, since they count pixels from 1.
+    /// `x1 = (x - pad) s`, `x2 = x1 + cols s - 1`, where `s` is the level's scale. These are the reference
+    /// programs' boxes minus 1, since the programs count pixels from 1.
     pub fn part_box(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 4] {
         let scale = self.levels[level].scale;
         let x1 = (f64::from(at.x) - self.pad[1] as f64) * scale;
@@ -153,8 +153,8 @@ impl Layout {
         [x1, y1, x1 + cols - 1.0, y1 + rows - 1.0]
     }
 
-    /// Centre of a filter placed on a level, pixels counted from 1, in the reference programs' order
-    /// of operations: for whatever rounds a centre as they do.
+    /// Returns the centre of a filter placed on a level, in pixels counted from 1. It uses the reference programs' order
+    /// of operations, for code that must round a centre as they do.
     pub fn centre_from_one(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 2] {
         let scale = self.levels[level].scale;
         let centre = |at: f64, pad: usize, side: usize| {

@@ -4,8 +4,8 @@
 //! feature pyramid in the image; [`Responses`], the score of every filter at every cell;
 //! [`Solver`], which finds the best tree of parts exactly; and [`Pose`], its result. An
 //! [`IncrementalSolver`] solves the same evidence under changing terms with less work. A [`Scope`]
-//! restricts the search to a part of the pyramid, and a [`Tracker`] chooses it. Responses are
-//! single precision and bit-identical on every machine.
+//! restricts the search to a part of the pyramid, and a [`Tracker`] chooses this part. Responses are
+//! in single precision and bit-identical on every machine.
 #![forbid(unsafe_code)]
 
 pub mod files;
@@ -41,6 +41,6 @@ pub use search::Search;
 pub use solve::{CandidateSettings, ExtraTerms, IncrementalSolver, Root, SolveStatistics, Solver};
 pub use track::{FrameTime, TrackSettings, Tracker};
 
-/// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
-/// texture energies, 1 that is set in the padding only.
+/// Number of feature channels: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
+/// texture energies, and 1 that is set only in the padding.
 pub const N_CHANNELS: usize = 32;

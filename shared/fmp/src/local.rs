@@ -2,7 +2,7 @@
 
 use crate::{Model, Pose, Responses};
 
-/// Radius of a part's surroundings, cells.
+/// Radius of a part's neighbourhood, in cells.
 const REACH: usize = 4;
 
 /// How well one part of a pose fits at its position, compared with other positions and types.
@@ -10,19 +10,19 @@ const REACH: usize = 4;
 pub struct LocalScore {
     /// Response of the part's filter at its place.
     pub response: f32,
-    /// The response minus the mean response of the same filter over the surrounding 9 x 9 cells, as
-    /// far as they were searched.
+    /// The response minus the mean response of the same filter over the searched cells among the surrounding
+    /// 9 x 9.
     pub contrast: f32,
-    /// The response less the best response of the part's other types at the same place; 0 if it has one
-    /// type only.
+    /// The response minus the best response of the part's other types at the same place; 0 if the part has only
+    /// one type.
     pub margin: f32,
 }
 
-/// Reads the local scores of a pose, one per part.
+/// Computes the local scores of a pose, one per part.
 ///
 /// # Panics
 ///
-/// If the evidence is another model's, or does not [cover](Responses::covers) the pose.
+/// If the evidence belongs to another model, or does not [cover](Responses::covers) the pose.
 pub fn local_scores(model: &Model, evidence: &Responses<'_>, pose: &Pose) -> Vec<LocalScore> {
     let level = usize::from(pose.level);
     let window = evidence.window(level);
@@ -63,7 +63,7 @@ mod tests {
         Springs,
     };
 
-    /// A root of two types, and a child of one.
+    /// Returns a model with a root of two types, and a child of one type.
     fn model() -> Model {
         let filter = Filter {
             rows: 3,

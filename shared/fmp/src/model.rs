@@ -5,23 +5,23 @@ mod check;
 /// A linear template over feature cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
-    /// Height, cells.
+    /// Height of the filter, in cells.
     pub rows: usize,
-    /// Width, cells.
+    /// Width of the filter, in cells.
     pub cols: usize,
-    /// `rows x cols x N_CHANNELS` weights, channel fastest, then column.
+    /// The weights: `rows x cols x N_CHANNELS`, channel fastest, then column.
     pub weights: Vec<f64>,
 }
 
 /// A quadratic spring between a child and its parent.
 ///
-/// With the parent at cell `p` and the child at `v`, `d = p + anchor - v` and the spring adds
+/// If the parent is at cell `p` and the child at `v`, then `d = p + anchor - v`, and the spring adds
 /// `-(w[0] d_x^2 + w[1] d_x + w[2] d_y^2 + w[3] d_y)` to the score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spring {
-    /// `[d_x^2, d_x, d_y^2, d_y]`, score per cell^2 and per cell; the quadratic ones are positive.
+    /// Weights `[d_x^2, d_x, d_y^2, d_y]`, score per cell^2 and per cell; the quadratic weights are positive.
     pub w: [f64; 4],
-    /// Offset `[x, y]` of the child from its parent at which `d` is zero, cells. The released files
+    /// Offset `[x, y]` of the child from its parent at which `d` is zero, in cells. The released files
     /// count it from 1: `anchor = file - 1`.
     pub anchor: [i32; 2],
 }
@@ -31,7 +31,7 @@ pub struct Spring {
 pub enum Springs {
     /// One spring per type of the child (the paper's models).
     PerChildType(Vec<Spring>),
-    /// One spring per pair of types, `[parent type][child type]`; `None` where the pair never occurs.
+    /// One spring per pair of types, `[parent type][child type]`; `None` if the pair never occurs.
     PerTypePair(Vec<Vec<Option<Spring>>>),
 }
 
@@ -40,9 +40,9 @@ pub enum Springs {
 pub struct Edge {
     /// The parent's index; always smaller than the child's.
     pub parent: usize,
-    /// Score of a pair of types, `[parent type][child type]`; `-inf` where the pair never occurs.
+    /// Score of a pair of types, `[parent type][child type]`; `-inf` if the pair never occurs.
     pub bias: Vec<Vec<f64>>,
-    /// The springs.
+    /// Springs between the part and its parent.
     pub springs: Springs,
 }
 
@@ -51,7 +51,7 @@ pub struct Edge {
 pub struct PartSpec {
     /// Name in tables and pictures.
     pub name: String,
-    /// Index of the filter of every type; its length is the number of types.
+    /// Index of the filter of every type; one entry per type.
     pub filter_of_type: Vec<usize>,
     /// The parent; `None` for the root, which is part 0.
     pub edge: Option<Edge>,
@@ -60,11 +60,11 @@ pub struct PartSpec {
 /// A model as read from a file, not yet validated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
-    /// Where the model comes from, for people.
+    /// Description of the model's origin, for people.
     pub name: String,
     /// The parts, parents before children.
     pub parts: Vec<PartSpec>,
-    /// All filters.
+    /// All filters of the model.
     pub filters: Vec<Filter>,
     /// Score of every root placement.
     pub root_bias: f64,
@@ -72,22 +72,22 @@ pub struct ModelSpec {
     pub interval: usize,
     /// Side of a feature cell, pixels of its level.
     pub cell_px: usize,
-    /// Score above which training found its positives; detection uses `min(threshold, -1)`.
+    /// Minimum score of the positives in training; detection uses `min(threshold, -1)`.
     pub threshold: f64,
-    /// The part on the other side of the body for every part; `None` if the model does not know.
+    /// For every part, the part on the other side of the body; `None` if unknown.
     pub mirror: Option<Vec<usize>>,
 }
 
-/// Why a model was rejected.
+/// Reason why a model was rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// A model finds at least one part.
+    /// The model has no parts.
     #[error("the model has no parts")]
     NoParts,
-    /// Part 0 must be the root, and the only one.
+    /// Part 0 is not the root, or is not the only root.
     #[error("part {part} has {} parent: part 1 and only part 1 is the root", if *.part == 1 { "a" } else { "no" })]
     Root {
-        /// 1-based part.
+        /// The part in question, counted from 1.
         part: usize,
     },
     /// The parents do not form a tree in which every parent comes before its children.
@@ -95,55 +95,55 @@ pub enum ModelError {
         "part {part} names part {parent} as its parent: the tree has a cycle or is out of order"
     )]
     Tree {
-        /// 1-based part.
+        /// The part in question, counted from 1.
         part: usize,
-        /// 1-based parent.
+        /// The parent of the part, counted from 1.
         parent: usize,
     },
-    /// An index of a part is out of range.
+    /// An index in a part is out of range.
     #[error("part {part} names {what} {index}, but there are {count}")]
     Missing {
-        /// 1-based part.
+        /// The part in question, counted from 1.
         part: usize,
-        /// The kind of thing.
+        /// Kind of item that is indexed.
         what: &'static str,
-        /// 1-based index.
+        /// Index of the item, counted from 1.
         index: usize,
-        /// How many there are.
+        /// Number of such items in the model.
         count: usize,
     },
     /// The size of an array does not match the header or other arrays.
     #[error("{what} of {whose} has {got} entries, expected {expected}")]
     Size {
-        /// The array.
+        /// Name of the array.
         what: &'static str,
-        /// Part or filter, 1-based.
+        /// Part or filter, counted from 1.
         whose: String,
-        /// Entries found.
+        /// Number of entries found.
         got: usize,
-        /// Entries expected.
+        /// Number of entries expected.
         expected: usize,
     },
     /// A count is out of range.
     #[error("{what} of {whose} is {got}, expected {min} to {max}")]
     Limit {
-        /// The count.
+        /// Name of the count.
         what: &'static str,
-        /// The model, or a part or filter, 1-based.
+        /// The model, or a part or filter, counted from 1.
         whose: String,
-        /// Its value.
+        /// Value of the count.
         got: usize,
-        /// Least accepted.
+        /// Minimum accepted value.
         min: usize,
-        /// Most accepted.
+        /// Maximum accepted value.
         max: usize,
     },
-    /// A type of the parent forbids all types of the child, so that no pose could contain it.
+    /// A type of the parent forbids all types of the child, so no pose could contain it.
     #[error("no type of part {part} goes with type {parent_type} of its parent")]
     DeadEnd {
-        /// 1-based part.
+        /// The part in question, counted from 1.
         part: usize,
-        /// 1-based type of its parent.
+        /// Type of the parent, counted from 1.
         parent_type: usize,
     },
     /// A pair of types may occur, but has no spring.
@@ -151,47 +151,47 @@ pub enum ModelError {
         "part {part} has a bias but no spring for type {parent_type} of its parent and its type {own_type}"
     )]
     NoSpring {
-        /// 1-based part.
+        /// The part in question, counted from 1.
         part: usize,
-        /// 1-based type of its parent.
+        /// Type of the parent, counted from 1.
         parent_type: usize,
-        /// 1-based type.
+        /// Type of the part, counted from 1.
         own_type: usize,
     },
-    /// The mirror is not an exchange that leaves the tree as it is.
+    /// The mirror does not exchange parts in pairs, or does not preserve the tree.
     #[error(
-        "part {part} mirrors part {other}, but not the other way round or not on the same tree"
+        "part {part} mirrors part {other}, but part {other} does not mirror it, or the tree differs"
     )]
     Mirror {
-        /// 1-based part.
+        /// The part in question, counted from 1.
         part: usize,
-        /// 1-based mirror part.
+        /// Mirror part, counted from 1.
         other: usize,
     },
     /// A number is not finite or too large, or a spring is not stiff enough.
     #[error("{what} of {whose} is {value}, expected {expected}")]
     Value {
-        /// The number.
+        /// Name of the number.
         what: &'static str,
-        /// Part or filter, 1-based.
+        /// Part or filter, counted from 1.
         whose: String,
-        /// Its value.
+        /// Value of the number.
         value: f64,
         /// The accepted values.
         expected: &'static str,
     },
 }
 
-/// A model whose tree, sizes and numbers have been checked.
+/// A validated model: its tree, sizes and numbers have been checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model(ModelSpec);
 
 impl Model {
-    /// Most parts, and most types of a part, that a model may have.
+    /// Maximum number of parts of a model.
     pub const MAX_PARTS: usize = 64;
-    /// See [`Self::MAX_PARTS`].
+    /// Maximum number of types of a part.
     pub const MAX_TYPES: usize = 32;
-    /// Largest side of a filter, cells.
+    /// Maximum side of a filter, in cells.
     pub const MAX_FILTER: usize = 16;
 
     /// Checks `spec`.
@@ -204,32 +204,32 @@ impl Model {
         Ok(Self(spec))
     }
 
-    /// Returns the specification that the model is made of.
+    /// Returns the specification of the model.
     pub fn spec(&self) -> &ModelSpec {
         &self.0
     }
 
-    /// Number of parts.
+    /// Returns the number of parts.
     pub fn n_parts(&self) -> usize {
         self.0.parts.len()
     }
 
-    /// Number of types of a part.
+    /// Returns the number of types of a part.
     pub fn n_types(&self, part: usize) -> usize {
         self.0.parts[part].filter_of_type.len()
     }
 
-    /// Number of filters.
+    /// Returns the number of filters.
     pub fn n_filters(&self) -> usize {
         self.0.filters.len()
     }
 
-    /// The filter of a part's type.
+    /// Returns the filter of a part's type.
     pub fn filter(&self, part: usize, mixture: usize) -> &Filter {
         &self.0.filters[self.0.parts[part].filter_of_type[mixture]]
     }
 
-    /// Largest `[rows, cols]` over all filters, cells.
+    /// Returns the largest `[rows, cols]` over all filters, cells.
     pub fn max_filter(&self) -> [usize; 2] {
         let largest = |side: fn(&Filter) -> usize| self.0.filters.iter().map(side).max();
         [

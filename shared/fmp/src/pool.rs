@@ -1,17 +1,17 @@
-//! Workspaces that are used again from frame to frame, and the threads that share them.
+//! Workspaces that are reused from frame to frame and shared by threads.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crossbeam::queue::ArrayQueue;
 
-/// Most workspaces that are kept: more callers at a time than any machine of ours has threads, and those beyond
-/// only make theirs anew.
+/// Maximum number of workspaces that are kept. This exceeds the number of threads of our machines; any callers beyond
+/// it only create new workspaces.
 const MOST: usize = 256;
 
 /// Workspaces of one kind: a solution takes one when it begins, and returns it at the end.
 ///
-/// A queue without locks, so that threads that begin and end at one time do not wait for each other. First in,
-/// first out: for workspaces of which there is one per caller, not for those that are taken many times a frame and
+/// The pool is a lock-free queue, so threads that begin and end at the same time do not wait for each other. It is first in,
+/// first out. It suits workspaces that are taken once per call, but not those that are taken many times per frame and
 /// should be warm in the cache.
 #[derive(Debug)]
 pub(crate) struct Pool<T> {
@@ -27,24 +27,24 @@ impl<T> Default for Pool<T> {
 }
 
 impl<T: Default> Pool<T> {
-    /// A free workspace, or a new one.
+    /// Returns a free workspace, or a new one.
     pub(crate) fn take(&self) -> T {
         self.free.pop().unwrap_or_default()
     }
 
-    /// Takes a workspace back.
+    /// Puts a workspace back.
     pub(crate) fn put_back(&self, workspace: T) {
-        // Beyond the limit it is dropped.
+        // A workspace beyond the limit is dropped.
         drop(self.free.push(workspace));
     }
 }
 
-/// Returns true if the caller runs inside a rayon pool, and so has asked for its threads to be used.
+/// Returns true if the caller runs inside a rayon pool, and so wants its threads to be used.
 pub(crate) fn in_pool() -> bool {
     rayon::current_thread_index().is_some()
 }
 
-/// Locks a pool of workspaces; they hold nothing that a panic could have left half done.
+/// Locks a list of workspaces; a panic cannot leave them in an invalid state.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! A pose in one image: where every part is, and which of its types.
+//! A pose in one image: the place and the type of every part.
 
 use crate::{Layout, Model, Placement};
 
@@ -7,14 +7,14 @@ use crate::{Layout, Model, Placement};
 pub struct Pose {
     /// Value of the maximised energy (eq. 1 of the paper, or eq. 3 as seen from this view).
     pub score: f32,
-    /// Level of the pyramid, from 0 (full resolution).
+    /// Level of the pyramid, counted from 0 (full resolution).
     pub level: u16,
     /// One placement per part of the model.
     pub parts: Vec<Placement>,
 }
 
 impl Pose {
-    /// Centre of a part's box, pixels of the image; the centre of its top-left pixel is (0, 0).
+    /// Returns the centre of a part's box, in pixels of the image; the centre of the top-left pixel is (0, 0).
     pub fn centre(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -25,7 +25,7 @@ impl Pose {
         )
     }
 
-    /// Centre of a part, pixels counted from 1; see [`Layout::centre_from_one`].
+    /// Returns the centre of a part, in pixels counted from 1; see [`Layout::centre_from_one`].
     pub fn centre_from_one(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -33,12 +33,12 @@ impl Pose {
         layout.centre_from_one(usize::from(self.level), filter, placement)
     }
 
-    /// Centres of all parts; see [`Self::centre`].
+    /// Returns the centres of all parts; see [`Self::centre`].
     pub fn centres(&self, model: &Model, layout: &Layout) -> Vec<[f64; 2]> {
         (0..self.parts.len()).map(|part| self.centre(model, layout, part)).collect()
     }
 
-    /// Box `[x1, y1, x2, y2]` of a part, pixels of the image, both corners inside the box.
+    /// Returns the box `[x1, y1, x2, y2]` of a part, in pixels of the image; both corners belong to the box.
     pub fn part_box(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 4] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
@@ -49,7 +49,7 @@ impl Pose {
         )
     }
 
-    /// The smallest box `[x1, y1, x2, y2]` around the boxes of all parts; see [`Self::part_box`].
+    /// Returns the smallest box `[x1, y1, x2, y2]` around the boxes of all parts; see [`Self::part_box`].
     pub fn bounding_box(&self, model: &Model, layout: &Layout) -> [f64; 4] {
         let boxes = (0..self.parts.len()).map(|part| self.part_box(model, layout, part));
         boxes
@@ -63,9 +63,9 @@ impl Pose {
             })
             .unwrap_or_default()
     }
-    /// Returns whether the pose is far enough from all others.
+    /// Returns true if the pose is far enough from all others.
     ///
-    /// * `min_separation`: least mean distance between the part centres of two poses, in units of the mean side of the boxes of
+    /// * `min_separation`: minimum mean distance between the part centres of two poses, in units of the mean side of the boxes of
     ///   both.
     pub fn is_apart(
         &self,

@@ -1,4 +1,4 @@
-//! The feature pyramid of one image alone, for uses without filter responses.
+//! The feature pyramid of one image, for uses without filter responses.
 
 use kernels::{FeatureMap, Isa, Rgb8View};
 
@@ -22,7 +22,7 @@ impl<'a> FeaturePyramid<'a> {
     ///
     /// # Panics
     ///
-    /// If the layout is that of an image of another size.
+    /// If the layout belongs to another image size.
     pub fn new(model: &Model, image: Rgb8View<'a>, layout: &'a Layout) -> Self {
         assert_eq!(
             layout.image_size,
@@ -43,8 +43,8 @@ impl<'a> FeaturePyramid<'a> {
         pyramid
     }
 
-    /// The features of a level, padded: the response of a filter at `(x, y)` is the sum of its
-    /// products with the cells from row `y` and column `x` on.
+    /// Returns the padded features of a level. The response of a filter at `(x, y)` is the sum of its
+    /// products with the cells starting at row `y` and column `x`.
     ///
     /// # Panics
     ///

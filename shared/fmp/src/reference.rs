@@ -1,8 +1,8 @@
 //! The whole single-view method in double precision, written for readability and comparison.
 //!
 //! It follows the reference programs stage by stage, including the order of sums that decides ties.
-//! About a hundred times slower than [`Extractor`](crate::Extractor) and [`Solver`](crate::Solver),
-//! which give the same results except for rounding; springs are per child type only.
+//! It is about a hundred times slower than [`Extractor`](crate::Extractor) and [`Solver`](crate::Solver),
+//! which give the same results except for rounding. It only supports springs per child type.
 
 use kernels::{
     HogShape, Planes, Rgb8View, Template, correlate_f64, hog_f64, reduce_by_taps, resize_by_taps,
@@ -11,11 +11,11 @@ use kernels::{
 
 use crate::{Edge, Layout, LevelLayout, Model, Placement, Spring, Springs};
 
-/// The image at every level of `layout`.
+/// Returns the image at every level of `layout`.
 ///
 /// # Panics
 ///
-/// If the layout is another image's.
+/// If the layout belongs to another image.
 pub fn pyramid(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Vec<Planes> {
     assert_eq!(layout.image_size, [image.width(), image.height()]);
     let interval = model.spec().interval;
@@ -29,7 +29,7 @@ pub fn pyramid(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Vec<Plane
     images
 }
 
-/// The padded features of one level, `rows x cols x N_CHANNELS` of [`LevelLayout::padded`].
+/// Returns the padded features of one level, `rows x cols x N_CHANNELS` of [`LevelLayout::padded`].
 pub fn features(model: &Model, layout: &Layout, image: &Planes) -> Vec<f64> {
     let shape = HogShape {
         cell_px: model.spec().cell_px,
@@ -38,7 +38,7 @@ pub fn features(model: &Model, layout: &Layout, image: &Planes) -> Vec<f64> {
     hog_f64(image, shape)
 }
 
-/// The response map of every filter on one level, each `rows x cols`.
+/// Returns the response map of every filter on one level, each `rows x cols`.
 pub fn responses(model: &Model, level: &LevelLayout, features: &[f64]) -> Vec<Vec<f64>> {
     let respond = |filter: &crate::Filter| {
         let template = Template {
@@ -57,13 +57,13 @@ pub fn responses(model: &Model, level: &LevelLayout, features: &[f64]) -> Vec<Ve
 pub struct Message {
     /// The best score of the child's subtree.
     pub score: Vec<f64>,
-    /// The placement of the child with this score.
+    /// The placement of the child that gives this score.
     pub child: Vec<Placement>,
 }
 
-/// The max-sum messages of a child for every type of its parent.
+/// Returns the max-sum messages of a child for every type of its parent.
 ///
-/// * `scores`: of the child, one map per type, with the messages of its own children added.
+/// * `scores`: scores of the child, one map per type, with the messages of its own children added.
 ///
 /// # Panics
 ///
@@ -157,14 +157,14 @@ pub fn solve(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Solutio
 pub struct ReferencePose {
     /// Value of the maximised energy.
     pub score: f64,
-    /// Level of the pyramid, from 0.
+    /// Level of the pyramid, counted from 0.
     pub level: usize,
     /// One placement per part.
     pub parts: Vec<Placement>,
 }
 
 impl Solution {
-    /// The best score of the root, its cell and its type; first cell, then first type.
+    /// Returns the best score of the root, its cell and its type. Ties go to the first cell, then to the first type.
     pub fn best(&self) -> (f64, usize, usize) {
         let n_cells = self.root.first().map_or(0, Vec::len);
         let mut best = (f64::NEG_INFINITY, 0, 0);
@@ -178,7 +178,7 @@ impl Solution {
         best
     }
 
-    /// The best tree with a root of the given type at the given cell.
+    /// Returns the best tree with a root of the given type at the given cell.
     pub fn backtrack(
         &self,
         model: &Model,
@@ -202,7 +202,7 @@ impl Solution {
     }
 }
 
-/// The best pose in the image; ties go to the lower level.
+/// Returns the best pose in the image; ties go to the lower level.
 pub fn best(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Option<ReferencePose> {
     let mut best: Option<ReferencePose> = None;
     let images = pyramid(model, layout, image);

@@ -4,7 +4,7 @@ use crate::{Bounds, Layout, Pose, Scope, Window};
 
 /// Responses of all filters on the offered levels.
 ///
-/// The array may lie in shared memory; nothing here copies it.
+/// The array may lie in shared memory; it is not copied.
 #[derive(Debug, Clone, Copy)]
 pub struct Responses<'a> {
     layout: &'a Layout,
@@ -15,27 +15,27 @@ pub struct Responses<'a> {
 }
 
 impl<'a> Responses<'a> {
-    /// Views `values` as the responses of `layout`.
+    /// Interprets `values` as the responses of `layout`.
     ///
     /// * `values`: [`Layout::n_responses`] scores, `[level][filter][row][col]`.
-    /// * `levels`: the levels that hold valid values, ascending.
+    /// * `levels`: the levels with valid values, in ascending order.
     ///
     /// # Panics
     ///
-    /// If `values` is shorter than the layout, or a level is out of range.
+    /// If `values` is shorter than the layout requires, or a level is out of range.
     pub fn new(layout: &'a Layout, values: &'a [f32], levels: &'a [u16]) -> Self {
         Self::within(layout, values, levels, Scope::whole(layout))
     }
 
-    /// The same for the responses of a scope: what lies outside of it has no value, and no pose has
+    /// Interprets `values` as the responses of a scope. Cells outside the scope have no value, and no pose has
     /// a part there.
     ///
     /// * `values`: [`Layout::n_values`] scores, `[level][filter][row][col]` without gaps.
-    /// * `levels`: the levels that hold valid values, ascending.
+    /// * `levels`: the levels with valid values, in ascending order.
     ///
     /// # Panics
     ///
-    /// If there are fewer values than the scope has, or a level is not one of it.
+    /// If there are fewer values than the scope requires, or a level is outside the scope.
     pub fn within(layout: &'a Layout, values: &'a [f32], levels: &'a [u16], scope: Scope) -> Self {
         assert!(
             values.len() >= layout.n_values(&scope),
@@ -54,12 +54,12 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// The same with the bounds of [`Solver::bounds`](crate::Solver::bounds), which are then not
+    /// Adds the bounds of [`Solver::bounds`](crate::Solver::bounds), which are then not
     /// computed again.
     ///
     /// # Panics
     ///
-    /// If the bounds are another layout's.
+    /// If the bounds belong to another layout.
     #[must_use]
     pub fn with_bounds(self, bounds: &'a Bounds) -> Self {
         assert_eq!(
@@ -73,44 +73,44 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// The bounds that came with the responses.
+    /// Returns the bounds that came with the responses.
     pub fn bounds(&self) -> Option<&'a Bounds> {
         self.bounds
     }
 
-    /// Where the cells lie.
+    /// Returns the layout of the cells.
     pub fn layout(&self) -> &'a Layout {
         self.layout
     }
 
-    /// The levels that hold valid values, ascending.
+    /// Returns the levels with valid values, in ascending order.
     pub fn levels(&self) -> &'a [u16] {
         self.levels
     }
 
-    /// The part of the layout that the values cover.
+    /// Returns the part of the layout that the values cover.
     pub fn scope(&self) -> &Scope {
         &self.scope
     }
 
-    /// The cells of a level that have values.
+    /// Returns the cells of a level that have values.
     pub fn window(&self, level: usize) -> Window {
         self.layout.window(&self.scope, level)
     }
 
-    /// Returns true if every part of a pose lies where there are values.
+    /// Returns true if every part of a pose is at a cell with a value.
     pub fn covers(&self, pose: &Pose) -> bool {
         self.levels.binary_search(&pose.level).is_ok()
             && self.window(usize::from(pose.level)).contains_all(pose)
     }
 
-    /// The response maps of all filters of a level, one after the other, each of the window's size,
+    /// Returns the response maps of all filters of a level, one after the other, each with the size of the window,
     /// row major.
     pub fn maps(&self, level: usize) -> &'a [f32] {
         &self.values[self.layout.maps_in(&self.scope, level)]
     }
 
-    /// The response map of a filter: the rows and columns of [`Self::window`], row major.
+    /// Returns the response map of a filter: the rows and columns of [`Self::window`], row major.
     pub fn map(&self, level: usize, filter: usize) -> &'a [f32] {
         let maps = self.maps(level);
         let area = maps.len() / self.layout.n_filters;

@@ -1,4 +1,4 @@
-//! The cells of the pyramid that are searched: some levels, and a rectangle of the image.
+//! The searched cells of the pyramid: some levels, and a rectangle of the image.
 
 use std::ops::Range;
 
@@ -7,19 +7,19 @@ use crate::{Layout, Placement, Pose};
 /// A rectangle of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Region {
-    /// First column, and the one after the last, pixels.
+    /// First column, and one past the last, in pixels.
     pub x: [u32; 2],
-    /// First row, and the one after the last, pixels.
+    /// First row, and one past the last, in pixels.
     pub y: [u32; 2],
 }
 
 /// Some levels of a layout, and their cells in a region of the image.
 ///
-/// Placements are counted in cells of the whole layout, whatever the scope; only the arrays with
+/// Placements are always counted in cells of the whole layout; only arrays with
 /// one value per cell are smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scope {
-    /// First level, and the one after the last.
+    /// First level, and one past the last.
     levels: [u16; 2],
     region: Region,
     is_whole: bool,
@@ -28,9 +28,9 @@ pub struct Scope {
 /// Cells of the response maps of one level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    /// First row of the level's.
+    /// First row, as an index in the level.
     pub top: usize,
-    /// First column of the level's.
+    /// First column, as an index in the level.
     pub left: usize,
     /// Number of rows.
     pub rows: usize,
@@ -38,35 +38,35 @@ pub struct Window {
     pub cols: usize,
 }
 
-/// A scope does not lie on the layout.
+/// The error for a scope that does not fit the layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ScopeError {
-    /// The levels are not there.
+    /// The levels are empty or outside the layout.
     #[error(
         "the range of levels {first} to {end} is empty, or beyond the {n_levels} levels of the layout"
     )]
     Levels {
-        /// First level asked for.
+        /// First requested level.
         first: u16,
-        /// The one after the last.
+        /// One past the last requested level.
         end: u16,
-        /// Levels of the layout.
+        /// Number of levels of the layout.
         n_levels: usize,
     },
     /// The region is empty or not inside the image.
     #[error("the range {begin} to {end} is empty, or beyond the {side} pixels of the image")]
     Region {
-        /// First pixel.
+        /// First pixel of the range.
         begin: u32,
-        /// The one after the last.
+        /// One past the last pixel of the range.
         end: u32,
-        /// Side of the image, pixels.
+        /// Side of the image, in pixels.
         side: usize,
     },
 }
 
 impl Scope {
-    /// Checks that the levels and the region are there.
+    /// Creates a scope, checking that the levels and the region exist.
     ///
     /// # Errors
     ///
@@ -93,7 +93,7 @@ impl Scope {
         })
     }
 
-    /// All levels and the whole image.
+    /// Returns all levels and the whole image.
     pub fn whole(layout: &Layout) -> Self {
         let [width, height] = layout.image_size.map(|image_size| image_size as u32);
         Self {
@@ -106,21 +106,21 @@ impl Scope {
         }
     }
 
-    /// The levels.
+    /// Returns the levels.
     pub fn levels(&self) -> Range<u16> {
         self.levels[0]..self.levels[1]
     }
 
-    /// The region.
+    /// Returns the region.
     pub fn region(&self) -> Region {
         self.region
     }
 }
 
 impl Layout {
-    /// The cells of a level in a scope: those at which the centre of the largest filter lies in the
-    /// region, and the next ones outside of it; where the region ends with the image, all remaining
-    /// cells. At least one cell.
+    /// Returns the cells of a level in a scope: those at which the centre of the largest filter is in the
+    /// region, and the next ones outside it. If the region ends at the border of the image, all remaining
+    /// cells are included. There is at least one cell.
     pub fn window(&self, scope: &Scope, level: usize) -> Window {
         let it = &self.levels[level];
         if scope.is_whole {
@@ -156,13 +156,13 @@ impl Layout {
         }
     }
 
-    /// Number of response values of all levels and filters of a scope.
+    /// Returns the number of response values of all levels and filters of a scope.
     pub fn n_values(&self, scope: &Scope) -> usize {
         let levels = usize::from(scope.levels[0])..usize::from(scope.levels[1]);
         self.values_of(scope, levels)
     }
 
-    /// Where the response maps of a level lie in the array of a scope's responses, which is
+    /// Returns the position of a level's response maps in the array of a scope's responses, which is
     /// `[level][filter][row][col]` without gaps.
     pub fn maps_in(&self, scope: &Scope, level: usize) -> Range<usize> {
         let before = self.values_of(scope, usize::from(scope.levels[0])..level);
@@ -183,7 +183,7 @@ struct Axis {
     n_cells: usize,
     pad: usize,
     filter: usize,
-    /// Side of the image, pixels.
+    /// Side of the image, in pixels.
     side: usize,
 }
 
@@ -208,14 +208,14 @@ impl Axis {
 }
 
 impl Window {
-    /// Returns true if a placement is one of these cells.
+    /// Returns true if a placement is on one of these cells.
     pub fn contains(&self, at: Placement) -> bool {
         let (y, x) = (usize::from(at.y), usize::from(at.x));
         (self.top..self.top + self.rows).contains(&y)
             && (self.left..self.left + self.cols).contains(&x)
     }
 
-    /// Returns true if all parts of a pose of the level lie on these cells.
+    /// Returns true if all parts of a pose on this level are on these cells.
     pub fn contains_all(&self, pose: &Pose) -> bool {
         pose.parts.iter().all(|part| self.contains(*part))
     }

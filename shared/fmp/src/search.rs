@@ -1,4 +1,4 @@
-//! The search of single images by a model: extractor and solver together.
+//! Searches single images with a model: extractor and solver together.
 
 use std::sync::Arc;
 
@@ -9,16 +9,16 @@ use crate::{Extractor, Layout, Model, Responses, Solver};
 /// A model, ready to search images.
 #[derive(Debug)]
 pub struct Search {
-    /// The model.
+    /// The model to search for.
     pub model: Arc<Model>,
-    /// Finds its best poses.
+    /// The solver that finds the best poses.
     pub solver: Solver,
-    /// Computes the responses of its filters.
+    /// The extractor that computes the filter responses.
     pub extractor: Extractor,
 }
 
 impl Search {
-    /// Prepares the search.
+    /// Prepares the search for a model.
     pub fn new(model: Arc<Model>) -> Self {
         Self {
             extractor: Extractor::new(Arc::clone(&model)),
@@ -27,13 +27,13 @@ impl Search {
         }
     }
 
-    /// Runs `look` on the responses of all filters on all levels of an image.
+    /// Calls `look` with the responses of all filters on all levels of an image.
     ///
-    /// * `layout`: of this model and the size of `image`.
+    /// * `layout`: layout of this model for the size of `image`.
     ///
     /// # Panics
     ///
-    /// If `image` has another size than `layout`.
+    /// If the size of `image` differs from that of `layout`.
     pub fn on<T>(
         &self,
         image: Rgb8View<'_>,

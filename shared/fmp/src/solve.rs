@@ -24,61 +24,61 @@ pub use statistics::SolveStatistics;
 
 /// Terms that another view adds to the score of a part (the `xi` and `lambda` of eq. 3).
 ///
-/// Both are optional per part; a part without them is scored by this view alone.
+/// Both terms are optional per part; a part without them is scored by this view alone.
 pub trait ExtraTerms: Sync {
     /// Adds this part's position term to the scores of some cells, the same for every type.
     ///
-    /// Returns `false`, and leaves `score` alone, if the part has none.
+    /// Returns `false` and leaves `score` unchanged if the part has no position term.
     ///
-    /// * `score`: of the cells of the level from `first` on, in row-major order. The term of a cell
-    ///   does not depend on which others are asked for.
+    /// * `score`: scores of the cells of the level starting at `first`, in row-major order. The term of a cell
+    ///   does not depend on which other cells are requested.
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool;
 
-    /// Score added to every placement of this type of the part.
+    /// Returns the score added to every placement of this type of the part.
     fn of_type(&self, part: usize, mixture: usize) -> f32;
 
-    /// An upper bound of the sum of both terms for any placement of the part, with which the
-    /// [`IncrementalSolver`] prunes levels and poses. Infinite if none is known.
+    /// Returns an upper bound of the sum of both terms for any placement of the part. The
+    /// [`IncrementalSolver`] uses it to prune levels and poses. Infinite if unknown.
     fn max_gain(&self, _part: usize) -> f32 {
         f32::INFINITY
     }
 
-    /// Identifies everything the part's terms depend on that can change during the life of an
-    /// [`IncrementalSolver`]: equal keys mean equal terms. `None`: the terms can always change.
+    /// Returns a key of everything on which the part's terms depend and that can change during the life of an
+    /// [`IncrementalSolver`]: equal keys mean equal terms. `None` if the terms can always change.
     fn key(&self, _part: usize) -> Option<u64> {
         None
     }
 }
 
-/// Which placements [`Solver::candidates`] returns.
+/// Settings that select the placements returned by [`Solver::candidates`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CandidateSettings {
-    /// Lowest score of a candidate, in the unit of the model's scores.
+    /// Minimum score of a candidate, in the unit of the model's scores.
     pub threshold: f32,
-    /// Largest share of a picked candidate's box that a later one may cover, 0..1.
+    /// Maximum share of a picked candidate's box that a later candidate may cover, 0..1.
     pub overlap: f64,
-    /// Most poses to return.
+    /// Maximum number of poses to return.
     pub max: usize,
 }
 
-/// Solves one tree on given evidence. Holds the prepared model and the workspaces, which are
-/// reused.
+/// Solves one tree on given evidence. Stores the prepared model and reusable
+/// workspaces.
 ///
 /// The score of a part is `(response + position term) + type term`. The messages of its children
-/// are added in descending order of the children, each `((child + vertical) + horizontal) + bias`,
+/// are added in descending order of the children, each as `((child + vertical) + horizontal) + bias`,
 /// and the root bias comes last, all in single precision.
 ///
-/// Inside a rayon pool the levels are distributed over its threads, elsewhere the work stays on the
-/// caller's thread; the results are the same.
+/// Inside a rayon pool, the levels are distributed over its threads; elsewhere, the work stays on the
+/// caller's thread. The results are the same.
 #[derive(Debug)]
 pub struct Solver {
     model: Arc<Model>,
     isa: Isa,
     /// The message rule of every part; `None` for the root.
     rules: Vec<Option<MessageRule>>,
-    /// Number of score planes before those of every part, and of all.
+    /// Number of score planes before those of each part, followed by the total.
     first_planes: Vec<usize>,
-    /// A list and no [`Pool`]: the one that fits a level best is taken, which a queue cannot look for.
+    /// This is a list instead of a [`Pool`]: the best-fitting workspace for a level is taken, which a queue cannot search for.
     workspaces: Mutex<Vec<Workspace>>,
     /// One list of part scores for every caller of [`Self::score`].
     scores: Pool<Vec<f32>>,
@@ -86,28 +86,28 @@ pub struct Solver {
     n_sweeps: AtomicU64,
 }
 
-/// A placement of the root and the score of the best tree that hangs on it.
+/// A placement of the root and the score of its best tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Root {
     /// The score, with the root bias.
     pub score: f32,
     /// Level of the pyramid.
     pub level: u16,
-    /// Row of the searched cells of the level.
+    /// Row among the searched cells of the level.
     pub y: usize,
-    /// Column of the searched cells of the level.
+    /// Column among the searched cells of the level.
     pub x: usize,
     /// Type of the root.
     pub mixture: usize,
 }
 
 impl Solver {
-    /// Prepares `model`.
+    /// Prepares the solver for `model`.
     pub fn new(model: Arc<Model>) -> Self {
         Self::on(Isa::best(), model)
     }
 
-    /// As [`Self::new`], for a given instruction set; the answers are the same on all.
+    /// Like [`Self::new`], for a given instruction set; the answers are the same on all.
     pub fn on(isa: Isa, model: Arc<Model>) -> Self {
         let rule_of = |part: usize| {
             let edge = model.spec().parts[part].edge.as_ref()?;
@@ -129,31 +129,31 @@ impl Solver {
         }
     }
 
-    /// The model that is solved.
+    /// Returns the model of the solver.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
 
-    /// The best pose over the offered levels, with the extra terms if there are any.
+    /// Returns the best pose over the offered levels, with the extra terms if there are any.
     ///
-    /// Exact among the poses whose parts all lie on cells with values. Ties of the root go to the
+    /// The result is exact among the poses whose parts are all on cells with values. Ties of the root go to the
     /// lower level, then to the first cell in row-major order, then to the lower type (the
-    /// reference programs leave the first two open); ties of a child go to the lower type, then to
+    /// reference programs leave the first two open). Ties of a child go to the lower type, then to
     /// the first column, then to the first row. `None` if no level is offered, or no pose is
     /// possible.
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn best(&self, evidence: &Responses<'_>, extra: Option<&dyn ExtraTerms>) -> Option<Pose> {
         self.best_on(evidence, evidence.levels(), extra)
     }
 
-    /// [`Self::best`] over some levels; those that are not offered are left out.
+    /// Like [`Self::best`], over some levels; levels that are not offered are left out.
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn best_on(
         &self,
         evidence: &Responses<'_>,
@@ -183,12 +183,12 @@ impl Solver {
         search.finish(&|_, it| self.put_back(it))
     }
 
-    /// The score of the best tree at every cell of the root, `rows x cols` of
+    /// Returns the score of the best tree at every cell of the root, `rows x cols` of
     /// [`Responses::window`].
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's, or `level` is not a level of its layout.
+    /// If the evidence belongs to another model, or `level` is not a level of its layout.
     pub fn root_scores(
         &self,
         evidence: &Responses<'_>,
@@ -201,14 +201,14 @@ impl Solver {
         sweeps.into_iter().next().unwrap_or_default()
     }
 
-    /// The score of a given pose, summed in the order of the messages.
+    /// Returns the score of a given pose, summed in the order of the messages.
     ///
-    /// For a pose that this solver returned from the same evidence and terms, it is the pose's
+    /// For a pose that this solver returned from the same evidence and terms, it equals the pose's
     /// score bit for bit.
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's, or it does not [cover](Responses::covers) the pose.
+    /// If the evidence belongs to another model, or does not [cover](Responses::covers) the pose.
     pub fn score(
         &self,
         evidence: &Responses<'_>,
@@ -228,14 +228,14 @@ impl Solver {
         self.tally.sums()
     }
 
-    /// Number of levels on which messages have been computed so far, in solutions of any kind,
-    /// unfinished ones included: a sign of progress during long computations. May be read from
+    /// Returns the number of levels on which messages have been computed so far, in solutions of any kind,
+    /// including unfinished ones. It shows progress during long computations, and may be read from
     /// another thread.
     pub fn n_sweeps(&self) -> u64 {
         self.n_sweeps.load(Ordering::Relaxed)
     }
 
-    /// The planes of a part.
+    /// Returns the planes of a part.
     fn planes(&self, part: usize) -> Range<usize> {
         self.first_planes[part]..self.first_planes[part + 1]
     }
@@ -244,7 +244,7 @@ impl Solver {
         self.model.spec().root_bias as f32
     }
 
-    /// A workspace that fits `bytes` of planes as closely as any that is there, or the largest.
+    /// Returns the workspace that fits `bytes` of planes most closely; the largest one if none is large enough.
     fn workspace(&self, bytes: usize) -> Workspace {
         let mut pool = lock(&self.workspaces);
         let fit = |workspace: &Workspace| {
@@ -302,15 +302,15 @@ struct Search<'a> {
     extra: Option<&'a dyn ExtraTerms>,
     /// Counters of the work, if it is counted.
     tally: Option<&'a Tally>,
-    /// The best root so far, and the workspace in which its tree can be followed.
+    /// The best root so far, with the workspace that contains its tree.
     best: Mutex<Option<(Root, Workspace)>>,
 }
 
-/// Takes the workspace of a level back.
+/// Puts the workspace of a level back.
 type PutBack<'a> = dyn Fn(u16, Workspace) + Sync + 'a;
 
 impl Search<'_> {
-    /// The score of the best root so far.
+    /// Returns the score of the best root so far.
     fn score(&self) -> f32 {
         let best = lock(&self.best);
         best.as_ref().map_or(f32::NEG_INFINITY, |best| best.0.score)
@@ -362,7 +362,7 @@ impl Search<'_> {
         }
     }
 
-    /// The best tree.
+    /// Returns the pose of the best tree.
     fn finish(self, put_back: &PutBack<'_>) -> Option<Pose> {
         let best = self.best.into_inner();
         let (root, workspace) = best.unwrap_or_else(PoisonError::into_inner)?;
@@ -373,7 +373,7 @@ impl Search<'_> {
     }
 }
 
-/// The message rule of the child of `edge`.
+/// Returns the message rule of the child of `edge`.
 fn rule(edge: &Edge, n_parent_types: usize, n_types: usize) -> MessageRule {
     let spring = |spring: &Spring| kernels::Spring {
         w: spring.w,

@@ -17,7 +17,7 @@ pub(crate) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Size `[rows, cols]` of the features that the responses of a level's window are made of.
+    /// Returns the size `[rows, cols]` of the features that determine the responses of a level's window.
     pub(crate) fn map_size(&self, level: usize) -> [usize; 2] {
         let it = &self.layout.levels[level];
         let window = self.layout.window(self.scope, level);
@@ -27,7 +27,7 @@ impl Source<'_> {
         ]
     }
 
-    /// How the features of an image are laid out.
+    /// Returns the memory layout of an image's features.
     pub(crate) fn shape(&self) -> HogShape {
         HogShape {
             cell_px: self.cell_px,

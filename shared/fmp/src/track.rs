@@ -1,13 +1,13 @@
-//! Chooses the part of the next image that is searched, from the last poses.
+//! Chooses the part of the next image to search, based on the last poses.
 
 use crate::{Layout, Model, Pose, Region, Scope};
 
 /// Number and time of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameTime {
-    /// Its number among the frames that are processed.
+    /// Number of the frame among the processed frames.
     pub frame: u64,
-    /// Its time in the footage, seconds; `None` without a frame rate.
+    /// Time of the frame in the footage, in seconds; `None` without a frame rate.
     pub seconds: Option<f64>,
 }
 
@@ -23,23 +23,23 @@ impl From<u64> for FrameTime {
 /// Settings of the tracker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackSettings {
-    /// Levels either side of the last pose's that are searched.
+    /// Number of levels to search on either side of the last pose's level.
     pub levels: u16,
-    /// How far around the last pose's box is searched, as a share of the box's longer side.
+    /// Search distance around the last pose's box, as a share of the box's longer side.
     pub margin: f64,
-    /// A frame this many after the last full search is searched in full; 0 and 1: every frame.
+    /// Number of frames after a full search at which the next full search is made; 0 and 1 mean every frame.
     pub full_every: u64,
-    /// Largest step between frames across which a pose is tracked; 1: no frame may be skipped.
+    /// Maximum step between frames across which a pose is tracked; 1 means that no frame may be skipped.
     pub max_gap: u64,
-    /// How far a score may fall below that of the last full search before the same frame is
-    /// searched in full.
+    /// Maximum drop of the score below that of the last full search; a larger drop causes a full search of the same
+    /// frame.
     pub max_drop: f32,
-    /// Largest movement of a pose per second, as a share of its box's longer side; at low frame
-    /// rates it exceeds `margin`.
+    /// Maximum movement of a pose per second, as a share of its box's longer side; at low frame
+    /// rates, it exceeds `margin`.
     pub speed: f64,
-    /// Longest time between frames across which a pose is tracked, seconds.
+    /// Maximum time between frames across which a pose is tracked, in seconds.
     pub max_gap_s: f64,
-    /// A frame so long after the last full search is searched in full, seconds.
+    /// Time after a full search at which the next full search is made, in seconds.
     pub full_every_s: f64,
 }
 
@@ -51,7 +51,7 @@ impl Default for TrackSettings {
             full_every: 10,
             max_gap: 2,
             max_drop: 0.3,
-            // 3.4 m a second for a person 1.7 m tall: hands and feet in fast walking.
+            // 3.4 m per second for a person 1.7 m tall: hands and feet in fast walking.
             speed: 2.0,
             max_gap_s: 0.25,
             full_every_s: 0.5,
@@ -59,16 +59,14 @@ impl Default for TrackSettings {
     }
 }
 
-/// Tracks the best pose from frame to frame and chooses where the next frame is searched.
+/// Tracks the best pose from frame to frame and chooses where to search the next frame.
 ///
-/// A full search is made of the first frame, and whenever no pose was found, frames were skipped,
-/// the last full search is too long ago (in frames, or in seconds if a frame rate is known), or
-/// frames are too far apart in time; see [`TrackSettings`]. Otherwise only the surroundings of the
-/// last pose are searched; a better pose elsewhere is found at the next full search. A frame
-/// without a pose, or with a score that has fallen, is searched again in full
-/// ([`Self::needs_full_search`]).
+/// The first frame is searched in full. A full search is also made if no pose was found, if frames were skipped, if the last full search is
+/// too long ago (in frames, or in seconds if a frame rate is known), or if frames are too far apart in time; see [`TrackSettings`].
+/// Otherwise, only the surroundings of the last pose are searched; a better pose elsewhere is found at the next full search. A frame
+/// without a pose, or with a score that has dropped, is searched again in full ([`Self::needs_full_search`]).
 ///
-/// Uses no clock and no image: the same frames and poses give the same decisions.
+/// The tracker uses no clock and no image: the same frames and poses give the same decisions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tracker {
     settings: Option<TrackSettings>,
@@ -80,7 +78,7 @@ pub struct Tracker {
 struct Last {
     at: FrameTime,
     level: u16,
-    /// Box `[x1, y1, x2, y2]` around all parts, pixels.
+    /// Box `[x1, y1, x2, y2]` around all parts, in pixels.
     around: [f64; 4],
     full: Full,
 }
@@ -93,7 +91,7 @@ struct Full {
 }
 
 impl Tracker {
-    /// Creates a tracker; without settings every frame is searched in full.
+    /// Creates a tracker; without settings, every frame is searched in full.
     pub fn new(settings: Option<TrackSettings>) -> Self {
         Self {
             settings,
@@ -101,9 +99,9 @@ impl Tracker {
         }
     }
 
-    /// The part of a frame that is to be searched.
+    /// Returns the part of a frame to search.
     ///
-    /// * `at`: when the frame is.
+    /// * `at`: number and time of the frame.
     pub fn scope(&self, layout: &Layout, at: impl Into<FrameTime>) -> Scope {
         let at = at.into();
         let near = || {
@@ -113,11 +111,11 @@ impl Tracker {
         near().unwrap_or_else(|| Scope::whole(layout))
     }
 
-    /// Returns true if the result near the last pose is unreliable, so that the frame is to be searched in full: no pose was
-    /// found, or its score has fallen since the last full search.
+    /// Returns true if the result near the last pose is unreliable, so that the frame must be searched in full: no pose was
+    /// found, or its score has dropped since the last full search.
     ///
     /// * `scope`: as returned by [`Self::scope`].
-    /// * `best`: the best pose found there, if there is one.
+    /// * `best`: the best pose found in the scope, if there is one.
     pub fn needs_full_search(&self, layout: &Layout, scope: &Scope, best: Option<&Pose>) -> bool {
         let (Some(settings), Some(last)) = (&self.settings, &self.last) else {
             return false;
@@ -129,7 +127,7 @@ impl Tracker {
     /// Updates the tracker with the result of a frame.
     ///
     /// * `at`: as passed to [`Self::scope`].
-    /// * `scope`: what was searched last: as returned by [`Self::scope`], or everything.
+    /// * `scope`: the part that was searched last: as returned by [`Self::scope`], or the whole frame.
     /// * `best`: the best pose, if there is one.
     pub fn update(
         &mut self,
@@ -155,7 +153,7 @@ impl Tracker {
 }
 
 impl Last {
-    /// Returns true if a frame may be searched only near this frame's pose.
+    /// Returns true if a later frame may be searched only near this frame's pose.
     fn allows_tracking_to(&self, settings: &TrackSettings, at: FrameTime) -> bool {
         let step = at.frame.checked_sub(self.at.frame).filter(|difference| *difference > 0);
         let age = at.frame.saturating_sub(self.full.at.frame);
@@ -168,7 +166,7 @@ impl Last {
             && is_recent(settings.full_every_s)
     }
 
-    /// The surroundings of this frame's pose, if any of it lies in the image.
+    /// Returns the surroundings of this frame's pose, if any of it is inside the image.
     fn near(&self, settings: &TrackSettings, layout: &Layout, at: FrameTime) -> Option<Scope> {
         let [x1, y1, x2, y2] = self.around;
         let moved = seconds(self.at, at).map_or(0.0, |second| settings.speed * second);
@@ -192,7 +190,7 @@ impl Last {
     }
 }
 
-/// The time between two frames, if both are known.
+/// Returns the time between two frames, if both are known.
 fn seconds(from: FrameTime, to: FrameTime) -> Option<f64> {
     Some(to.seconds? - from.seconds?)
 }

@@ -1,8 +1,8 @@
-//! Angles between the segments of a body, from the places of its joints, with what the covariances of these make of them.
+//! Angles between the segments of a body, computed from the positions of its joints, with deviations from their covariances.
 //!
-//! Definitions follow the recommendations of the International Society of Biomechanics as far as points determine them:
-//! Wu et al. 2002 (hip, ankle; *J. Biomech.* 35:543) and Wu et al. 2005 (shoulder, elbow; *J. Biomech.* 38:981). `docs/guide/smooth.md`
-//! has the table of what is measured, from which joints, and what a skeleton of points cannot give.
+//! Definitions follow the recommendations of the International Society of Biomechanics where points suffice: Wu et al. 2002 (hip, ankle;
+//! *J. Biomech.* 35:543) and Wu et al. 2005 (shoulder, elbow; *J. Biomech.* 38:981). A table in `docs/guide/smooth.md` lists the angles,
+//! the joints they are computed from, and the angles that a skeleton of points cannot provide.
 
 mod body;
 mod define;
@@ -15,26 +15,26 @@ use crate::track::{Estimate, State};
 pub use define::Angle;
 use spread::Place;
 
-/// The sine of the least bend of a knee or elbow that shows about which axis it bends: 20 degrees.
+/// Sine of the smallest bend of a knee or elbow that determines its bending axis: 20 degrees.
 const LEAST_BEND: f64 = 0.342;
-/// The sine of the least angle between a limb and an axis about which its direction is determined: 10 degrees.
+/// Sine of the smallest angle between a limb and an axis at which the limb's direction about the axis is determined: 10 degrees.
 const LEAST_TILT: f64 = 0.1736;
-/// An angle that is less certain is not reported, degrees.
+/// Maximum standard deviation of a reported angle, in degrees.
 pub const MOST_SD_DEGREES: f64 = 45.0;
 
-/// Why an angle has no value.
+/// Reason why an angle has no value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unknown {
-    /// A joint that it is between has no position.
+    /// A joint of the angle has no position.
     Missing,
-    /// The joints lie so that the angle is not defined, as the rotation of a straight arm.
+    /// The angle is not defined for these positions, such as the rotation of a straight arm.
     Undefined,
-    /// Its standard deviation is above [`MOST_SD_DEGREES`].
+    /// The standard deviation of the angle is above [`MOST_SD_DEGREES`].
     Uncertain,
 }
 
 impl Unknown {
-    /// The word in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Missing => "missing",
@@ -47,19 +47,19 @@ impl Unknown {
 /// The value of an angle at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Value {
-    /// Degrees.
+    /// The angle, in degrees.
     pub degrees: f64,
-    /// Standard deviation, degrees; `None` where a covariance is not known.
+    /// Standard deviation, in degrees; `None` if a covariance is unknown.
     pub sd_degrees: Option<f64>,
-    /// State of the least certain of its joints.
+    /// State of the least certain joint of the angle.
     pub state: State,
 }
 
-/// All angles of one instant.
+/// Computes all angles of one instant.
 ///
-/// * `joints`: with a role; of several of one role the first counts.
-/// * `up`: against gravity in the world, where that is known: without it, angles with the vertical are missing.
-/// * Returns every angle of `Angle`, in their order.
+/// * `joints`: the joints with their roles; if a role occurs several times, the first joint counts.
+/// * `up`: direction against gravity in the world, if known; without it, angles with the vertical are missing.
+/// * Returns every angle of `Angle`, in the order of that type.
 pub fn angles(
     joints: &[(Role, Estimate)],
     up: Option<UnitVector3<f64>>,
@@ -107,7 +107,7 @@ fn is_finite(covariance: &Matrix3<f64>) -> bool {
     covariance.iter().all(|value| value.is_finite())
 }
 
-/// The sides in the order of files.
+/// The sides in the order used in files.
 pub(crate) const SIDES: [Side; 2] = Side::BOTH;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Limbs whose bones keep their lengths.
+//! Keeps the bone lengths of the limbs constant.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -6,20 +6,20 @@ use crate::recorded::{Recorded, median};
 use crate::role::{RIGID, Role};
 use crate::track::{Estimate, Smoothed, State};
 
-/// Steps of the projection; it converges quadratically from a few centimetres off.
+/// Number of steps of the projection; it converges quadratically from a few centimetres off.
 const N_STEPS: usize = 6;
-/// A bone that is further off is not what it should be, and stays, as a share of its length.
+/// Maximum deviation of a bone's length, as a share of the length; a bone beyond it is wrong and stays unchanged.
 const MOST_OFF: f64 = 0.5;
-/// Standard deviation of a position whose covariance is not known, metres.
+/// Standard deviation assumed for a position without a covariance, in metres.
 const UNKNOWN_SD_M: f64 = 0.02;
-/// Frames that a length needs.
+/// Minimum number of frames for a length.
 const LEAST_FRAMES: usize = 10;
 
-/// Moves joints so that the limbs' bones have the median of their lengths, as little as their covariances allow.
+/// Moves joints so that each limb bone has its median length, by the smallest displacement in terms of the covariances.
 ///
-/// At every instant the most likely joints on the constraint are found by Gauss-Newton steps: with the covariances `P` and
-/// the derivatives `J` of the lengths, `x -= P J' (J P J')^-1 (lengths - constant)`, and `P` loses what the lengths tell. The lengths
-/// are constant over the run, and the input is smooth, so the result is.
+/// At every instant, the most likely joints on the constraint are found by Gauss-Newton steps. With the covariances `P` and
+/// the derivatives `J` of the lengths, `x -= P J' (J P J')^-1 (lengths - constant)`, and `P` is reduced by the information in the lengths.
+/// The lengths are constant over the run and the input is smooth, so the result is smooth as well.
 ///
 /// * Returns the bones and their lengths.
 pub(crate) fn constant(
@@ -47,11 +47,11 @@ pub(crate) fn constant(
     for at in 0..recorded.times.len() {
         project(tracks, at, &bones);
     }
-    // Twins of a joint (HumanEva names some twice) stay where the first is.
+    // Twins of a joint (HumanEva names some joints twice) stay where the first one is.
     bones
 }
 
-/// Projects one instant.
+/// Projects the joints at one instant.
 fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)]) {
     let here: Vec<([usize; 2], f64)> = bones
         .iter()
@@ -91,10 +91,10 @@ fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)])
     }
 }
 
-/// Positions, and their covariances.
+/// Positions and their covariances.
 type Projected = (Vec<Vector3<f64>>, Vec<Matrix3<f64>>);
 
-/// The most likely positions with bones of the given lengths, and their covariances; `None` if the numbers do not allow it.
+/// Returns the most likely positions for the given bone lengths, and their covariances; `None` if they cannot be computed.
 fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projected> {
     let n = found.len();
     let unknown = Matrix3::identity() * UNKNOWN_SD_M.powi(2);
@@ -103,7 +103,7 @@ fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projecte
     let mut positions: Vec<Vector3<f64>> = found.iter().map(|estimate| estimate.position).collect();
     let mut last = None;
     for _ in 0..N_STEPS {
-        // P J': a column for every bone, which moves two joints.
+        // P J': one column for every bone; a bone moves two joints.
         let mut spread = DMatrix::zeros(3 * n, bones.len());
         let mut derivative = DMatrix::zeros(bones.len(), 3 * n);
         let mut off = DVector::zeros(bones.len());
@@ -114,7 +114,7 @@ fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projecte
                 return None;
             }
             let along = bone / now;
-            // The start of the linearisation is the unprojected position: least squares from there.
+            // The linearisation starts at the unprojected position: least squares from there.
             let moved = (positions[*b] - found[*b].position) - (positions[*a] - found[*a].position);
             off[nth] = now - length - along.dot(&moved);
             for (joint, sign) in [(*a, -1.0), (*b, 1.0)] {

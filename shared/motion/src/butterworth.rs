@@ -7,37 +7,36 @@ use nalgebra::Vector3;
 use crate::recorded::{Counts, Motion, Recorded, Report, median};
 use crate::track::{Absent, Estimate, Smoothed, State};
 
-/// Cutoff in use for gait, Hz.
+/// Usual cutoff for gait, in Hz.
 pub const CUTOFF_HZ: f64 = 6.0;
-/// Twice through a filter of second order lowers its cutoff by this (Winter, *Biomechanics and Motor Control of Human Movement*,
-/// 4th ed., section 3.4.4.2): (sqrt(2) - 1)^(1/4).
+/// Factor by which the cutoff falls when a filter of second order is applied twice (Winter, *Biomechanics and Motor Control of Human
+/// Movement*, 4th ed., section 3.4.4.2): (sqrt(2) - 1)^(1/4).
 const TWICE: f64 = 0.802;
 
-/// The cutoff is not below half of the rate.
+/// The error for a cutoff that is too high for the rate.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "a cutoff of {cutoff_hz} Hz needs instants at a rate above {} Hz, these are at {rate_hz:.3} Hz",
+    "a cutoff of {cutoff_hz} Hz needs a rate above {} Hz, but the rate is {rate_hz:.3} Hz",
     needed_hz(*cutoff_hz)
 )]
 pub struct CutoffError {
-    /// The cutoff.
+    /// The cutoff, in Hz.
     pub cutoff_hz: f64,
-    /// Rate of the instants.
+    /// Rate of the instants, in Hz.
     pub rate_hz: f64,
 }
 
-/// The bilinear transform is of use up to 0.45 of the rate.
+/// Returns the bilinear transform is usable up to 0.45 of the rate.
 fn needed_hz(cutoff_hz: f64) -> f64 {
     cutoff_hz / TWICE / 0.45
 }
 
-/// Filters every joint: a Butterworth filter of second order forwards and backwards, of fourth order together and without delay,
-/// which passes half of the power at the cutoff.
+/// Filters every joint: a Butterworth filter of second order forwards and backwards. Together, it is of fourth order, has no delay,
+/// and passes half of the power at the cutoff.
 ///
-/// Gaps between measurements up to `fill_s` are filled by cubic curves before; longer ones cut a track into pieces, filtered
-/// each separately. Instants that are not uniform are interpolated (cubic) to a uniform grid and back;
-/// [`Report::resampled_s`] says how far off they are. Nothing is rejected but joints with a side where sides are not certain. There are no
-/// covariances.
+/// Gaps between measurements up to `fill_s` are first filled by cubic curves. Longer gaps split a track into pieces that are filtered
+/// separately. Non-uniform instants are interpolated (cubic) to a uniform grid and back; [`Report::resampled_s`] is the largest difference
+/// from the grid. Only joints with a side are rejected, at instants with uncertain sides. The result has no covariances.
 ///
 /// The times must be [checked](Recorded::check).
 ///
@@ -85,7 +84,7 @@ pub fn filter(recorded: &Recorded, cutoff_hz: f64, fill_s: f64) -> Result<Motion
     Ok(Motion { joints, report })
 }
 
-/// How far the instants are from a uniform grid, at most; missing ones leave it uniform.
+/// Returns the maximum difference of the instants from a uniform grid; missing instants do not count as a difference.
 fn off_grid(times: &[f64], step: f64) -> f64 {
     let first = times.first().copied().unwrap_or(0.0);
     let off = |time: &f64| {
@@ -95,7 +94,7 @@ fn off_grid(times: &[f64], step: f64) -> f64 {
     times.iter().map(off).fold(0.0, f64::max)
 }
 
-/// The runs of measurements without long gaps and breaks.
+/// Returns the runs of measurements without long gaps and breaks.
 fn pieces<'a>(
     known: &'a [(usize, Vector3<f64>)],
     times: &[f64],
@@ -110,7 +109,7 @@ fn pieces<'a>(
     known.chunk_by(goes_on).collect()
 }
 
-/// Filters a piece, and fills all instants from its first to its last.
+/// Filters a piece, and fills all instants from the first to the last.
 fn fill(
     track: &mut [Smoothed],
     piece: &[(usize, Vector3<f64>)],
@@ -123,7 +122,7 @@ fn fill(
     };
     let (begin, end) = (times[first.0], times[last.0]);
     let n = ((end - begin) / step).round() as usize + 1;
-    // The step of the grid ends on the last instant.
+    // The step is adjusted so that the grid ends on the last instant.
     let step = if n > 1 {
         (end - begin) / (n - 1) as f64
     } else {
@@ -158,7 +157,7 @@ fn fill(
     }
 }
 
-/// The value at a time of the cubic curve through all values, with slopes from the neighbours (Catmull & Rom 1974).
+/// Returns the value of the cubic curve through all values at a time, with slopes from the neighbours (Catmull & Rom 1974).
 fn cubic(times: &[f64], values: &[f64], time: f64) -> f64 {
     let after = times.partition_point(|known| *known <= time);
     if after == 0 || times.len() < 2 {
@@ -181,7 +180,7 @@ fn cubic(times: &[f64], values: &[f64], time: f64) -> f64 {
         + width * slope(after) * (three - two)
 }
 
-/// Once forwards and once backwards; both ends are continued by their point reflection for a period of the cutoff.
+/// Filters forwards and then backwards; both ends are extended by their point reflection for one period of the cutoff.
 fn twice(values: &[f64], rate_hz: f64, cutoff_hz: f64) -> Vec<f64> {
     let n = values.len();
     if n < 2 {
@@ -198,7 +197,7 @@ fn twice(values: &[f64], rate_hz: f64, cutoff_hz: f64) -> Vec<f64> {
     all[n_around..n_around + n].to_vec()
 }
 
-/// A Butterworth low-pass filter of second order (bilinear transform, prewarped), begun as if the first value had always been.
+/// A Butterworth low-pass filter of second order (bilinear transform, prewarped). It starts in the steady state of the first value.
 fn once(values: &mut [f64], rate_hz: f64, cutoff_hz: f64) {
     let warped = (PI * cutoff_hz / rate_hz).tan();
     let (root, square) = (2.0_f64.sqrt() * warped, warped * warped);
@@ -219,7 +218,7 @@ fn once(values: &mut [f64], rate_hz: f64, cutoff_hz: f64) {
 mod tests {
     use super::*;
 
-    /// The share of a sine's amplitude that is left, and its delay in seconds.
+    /// Returns the share of a sine's amplitude that remains in phase with the input.
     fn passed(hz: f64) -> f64 {
         let rate = 120.0;
         let wave: Vec<f64> =

@@ -1,19 +1,19 @@
-//! Joints of the other side of the body, taken for those of this one.
+//! Corrects joints that were exchanged with those of the other side of the body.
 
 use crate::joint_track::Track;
 use crate::recorded::{Recorded, Sides};
 use crate::rts::{GATE, Usable, distance2};
 use crate::track::usable;
 
-/// Least odds at which one of two sides is chosen, natural logarithm.
+/// Minimum log-odds at which one of two assignments of sides is chosen.
 const LEAST_ODDS: f64 = 3.0;
-/// A measurement contradicts what others say by at most this: it may be wrong for many reasons.
+/// Maximum squared distance that one measurement can contribute: it may be wrong for many reasons.
 const MOST_DISTANCE2: f64 = 40.0;
 
-/// Takes exchanged joints for what they are, and decides instants whose sides are not certain.
+/// Corrects exchanged joints, and decides instants whose sides are uncertain.
 ///
-/// * `others`: of every joint that on the other side.
-/// * Returns the joints whose measurements changed, and how many instants with uncertain sides were kept, exchanged and left out.
+/// * `others`: for every joint, the same joint on the other side.
+/// * Returns the joints whose measurements changed, and the number of instants with uncertain sides that were kept, exchanged and left out.
 pub(crate) fn settle(
     recorded: &Recorded,
     others: &[Option<usize>],
@@ -44,16 +44,16 @@ pub(crate) fn settle(
     (changed, counts)
 }
 
-/// How far a measurement is from what a track says without it.
+/// Returns the distance of a measurement from the track without this measurement.
 fn away(track: &Track, at: usize, measured: &Usable) -> Option<f64> {
     let known = track.known[at].as_ref()?;
     Some(distance2(known, measured.as_ref()?, 0.0, track.noise.scale))
 }
 
-/// Exchanges two joints of which neither fits and each fits the other.
+/// Exchanges two joints if neither fits its own track but each fits the other track.
 fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
     let is_out = |track: &Track| track.used[at].is_some() && track.weights[at] == 0.0;
-    // One of them may fit by chance, where the limbs cross.
+    // One of them may fit by chance where the limbs cross.
     if !is_out(&tracks[a]) || !is_out(&tracks[b]) {
         return false;
     }
@@ -71,7 +71,7 @@ fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
     true
 }
 
-/// Decides an instant whose sides are not certain, from all pairs together.
+/// Decides an instant whose sides are uncertain, from all pairs together.
 ///
 /// * Returns 0 if it was kept as measured, 1 if exchanged, 2 if left out.
 fn unsure(
@@ -88,13 +88,13 @@ fn unsure(
             let (own, other) = if is_exchanged { (b, a) } else { (a, b) };
             let of_a = away(&tracks[a], at, &measured(own));
             let of_b = away(&tracks[b], at, &measured(other));
-            // A pair counts whole or not at all: both sums are then over the same measurements.
+            // A pair counts only if it is complete, so both sums cover the same measurements.
             let both = of_a.zip(of_b);
             both.map_or(0.0, |(a, b)| a.min(MOST_DISTANCE2) + b.min(MOST_DISTANCE2))
         };
         pairs.iter().map(one).sum()
     };
-    // The likelihood of a Gaussian is half the squared distance.
+    // The negative log-likelihood of a Gaussian is half the squared distance.
     let odds = 0.5 * (sum(true) - sum(false));
     if odds.abs() < LEAST_ODDS {
         return 2;

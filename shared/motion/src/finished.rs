@@ -1,7 +1,7 @@
-//! A finished run smoothed: `pose3d-smooth.jsonl`, `smooth.json`, `angles.csv`.
+//! Smoothing of a finished run; writes `pose3d-smooth.jsonl`, `smooth.json` and `angles.csv`.
 //!
-//! Smoothing of a finished run. The measurements are read line by line, and read again as the result is written, so that the
-//! memory that is needed does not grow with the other entries of a line.
+//! The measurements are read line by line, and read again while the result is written. So the
+//! required memory does not grow with the other entries of a line.
 
 mod folder;
 mod settings;
@@ -19,7 +19,7 @@ use runfiles::{SmoothReport, SmoothedJoint, SmoothedPerson, Unsure};
 pub use folder::{Person, Run, read, read_lines};
 pub use settings::{Method, Settings};
 
-/// The doubt where there is nothing to smooth.
+/// The doubt reported if there is nothing to smooth.
 const NOTHING_MEASURED: &str = "no joint was measured in any frame";
 
 /// The files that are written beside the results.
@@ -28,22 +28,22 @@ pub const FILES: [&str; 3] = ["pose3d-smooth.jsonl", "angles.csv", "smooth.json"
 /// Request to smooth a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
-    /// The results of a run.
+    /// Folder with the results of a run.
     pub folder: PathBuf,
-    /// How to smooth.
+    /// Settings of the smoothing.
     pub settings: Settings,
-    /// Frames per second, in place of the times in the file.
+    /// Frames per second; replaces the times in the file.
     pub rate_hz: Option<f64>,
-    /// Against gravity, in place of what the calibration says.
+    /// Direction against gravity; replaces the one from the calibration.
     pub up: Option<UnitVector3<f64>>,
 }
 
-/// Outcome of the request.
+/// Outcome of a request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Content of `smooth.json`.
     pub report: SmoothReport,
-    /// True if a vertical was known for angles with it.
+    /// True if the vertical was known, which some angles need.
     pub has_up: bool,
 }
 
@@ -51,8 +51,8 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// Files that cannot be read or written, lines that are not valid, times that do not ascend, a cutoff above what the
-/// rate allows.
+/// Files that cannot be read or written, invalid lines, times that do not ascend, or a cutoff above the limit for the
+/// rate.
 pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure> {
     console.begin("", "reading");
     let run = read(&request.folder, request.rate_hz)?;
@@ -73,11 +73,11 @@ pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure>
     })
 }
 
-/// The joints, smoothed as the settings say.
+/// Smooths the joints according to the settings.
 ///
 /// # Errors
 ///
-/// A cutoff above what the rate allows.
+/// A cutoff above the limit for the rate.
 pub fn smoothed(recorded: &Recorded, settings: &Settings) -> Result<Motion, Failure> {
     let of_rts = crate::Settings {
         fill_s: settings.fill_s,
@@ -88,8 +88,7 @@ pub fn smoothed(recorded: &Recorded, settings: &Settings) -> Result<Motion, Fail
         Method::Butterworth => {
             let filtered = butterworth::filter(recorded, settings.cutoff_hz, settings.fill_s);
             filtered.map_err(|error| {
-                let hint =
-                    "a lower --cutoff-hz, or --method rts, which follows the data at any rate";
+                let hint = "use a lower --cutoff-hz, or --method rts, which works at any rate";
                 Failure::new(ExitKind::Usage, error).with_hint(hint)
             })
         }
@@ -156,7 +155,7 @@ fn person_report(person: &Person, frames: &[u64], found: &Report) -> SmoothedPer
     }
 }
 
-/// Returns the reasons to doubt the result; of several people with the number of the person.
+/// Returns the reasons to doubt the result; with several people, each reason names the person.
 fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
     let mut doubts = Vec::new();
     doubts.extend(run.cut.clone());
@@ -183,24 +182,24 @@ fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
         doubts.push(NOTHING_MEASURED.to_owned());
     } else if n_rejected * 5 > n_measured {
         doubts.push(format!(
-            "{n_rejected} measurements contradict those before and after, {n_measured} do not: look at what was measured first"
+            "{n_rejected} measurements contradict those before and after, {n_measured} do not: check the measurements first"
         ));
     }
     let n_unsure = person.unsure.kept + person.unsure.exchanged + person.unsure.left_out;
     if n_unsure > 0 && n_unsure == n_frames {
         doubts.push(
-            "left and right are not certain in any frame, and were taken as they are".to_owned(),
+            "left and right are uncertain in every frame, and were kept as measured".to_owned(),
         );
     } else if person.unsure.left_out * 5 > n_frames {
         doubts.push(format!(
-            "left and right are not certain in {} of {n_frames} frames, nor decided by those before and after",
+            "left and right are uncertain in {} of {n_frames} frames, and the frames before and after do not decide them",
             person.unsure.left_out
         ));
     }
     doubts
 }
 
-/// Counts of all joints together, for people.
+/// Counts over all joints, for display.
 pub fn totals(report: &SmoothReport) -> BTreeMap<&'static str, usize> {
     let joints = || report.people.iter().flat_map(|person| person.joints.values());
     let sum = |of: fn(&SmoothedJoint) -> usize| joints().map(of).sum::<usize>();

@@ -1,23 +1,23 @@
-//! One joint on its way from measurements to a smoothed track.
+//! One joint between measurements and smoothed track.
 
 use crate::noise::{Noise, Prior};
 use crate::rts::{self, Known, Usable};
 use crate::track::{Absent, Estimate, Smoothed, State};
 use crate::tune;
 
-/// A joint on its way.
+/// A joint during smoothing.
 #[derive(Debug)]
 pub(crate) struct Track {
     /// Usable measurement at every instant.
     pub(crate) used: Vec<Usable>,
-    /// The measurement is that of the other side.
+    /// True if the measurement comes from the joint on the other side.
     pub(crate) is_exchanged: Vec<bool>,
-    /// There is a measurement.
+    /// True if there is a measurement.
     pub(crate) is_measured: Vec<bool>,
     pub(crate) noise: Noise,
-    /// Knowledge from all measurements at every instant; `None` outside stretches.
+    /// State from all measurements at every instant; `None` outside stretches.
     pub(crate) known: Vec<Option<Known>>,
-    /// The weight of the measurement.
+    /// Weights of the measurements.
     pub(crate) weights: Vec<f64>,
 }
 
@@ -63,7 +63,7 @@ impl Track {
         is_any.then_some(self.noise)
     }
 
-    /// The positions, with gaps filled as far as they are short.
+    /// Returns the positions, with short gaps filled.
     pub(crate) fn filled(&self, times: &[f64], fill_s: f64) -> Vec<Smoothed> {
         let absent = |at: usize| {
             let is_measured = self.is_measured[at];
@@ -100,9 +100,12 @@ impl Track {
         all
     }
 
-    /// Where covariances are larger than what is seen to vary, the rest may vary too slowly to be seen: smoothing does not reduce it.
+    /// Sets the estimate at an instant.
     ///
-    /// * `measured`: the instant of the measurement whose covariance that is.
+    /// If the covariances exceed the observed variation, the remaining error may vary too slowly to be observed. Smoothing does not
+    /// reduce it.
+    ///
+    /// * `measured`: the instant of the measurement with this covariance.
     fn put(&self, place: &mut Smoothed, [at, measured]: [usize; 2], state: State) {
         if let Some((known, (_, own))) = self.known[at].zip(self.used[measured]) {
             let slow = (1.0 - self.noise.scale).max(0.0);

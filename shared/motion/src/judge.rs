@@ -1,16 +1,16 @@
-//! How far a track is from the truth: positions, velocities, accelerations, jitter, lag.
+//! Compares a track with the truth: positions, velocities, accelerations, jitter and delay.
 
 use nalgebra::Vector3;
 
-/// Positions of one joint over time, metres; `None` where there is none.
+/// Positions of one joint over time, in metres; `None` at instants without a position.
 pub type Path = [Option<Vector3<f64>>];
 
-/// A sum and the number of its values.
+/// A sum and its number of values.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sum {
     /// Sum of the values.
     pub sum: f64,
-    /// How many.
+    /// Number of values.
     pub n: f64,
 }
 
@@ -25,7 +25,7 @@ impl Sum {
         self.n += other.n;
     }
 
-    /// The mean; `None` of none.
+    /// Returns the mean; `None` if there are no values.
     pub fn mean(self) -> Option<f64> {
         (self.n > 0.0).then(|| self.sum / self.n)
     }
@@ -34,21 +34,21 @@ impl Sum {
 /// The errors of all joints at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Errors {
-    /// Distance from the true position, metres.
+    /// Distance from the true position, in metres.
     pub position_m: Sum,
-    /// Errors of the velocity by central differences, m/s.
+    /// Error of the velocity by central differences, in m/s.
     pub velocity_m_s: Sum,
-    /// Errors of the acceleration by second differences, m/s².
+    /// Error of the acceleration by second differences, in m/s².
     pub acceleration_m_s2: Sum,
-    /// Amount by which the error changes from one instant to the next, metres.
+    /// Change of the error from one instant to the next, in metres.
     pub jitter_m: Sum,
-    /// Error along the true velocity, times that velocity (m²/s), and the square of the velocity (m²/s²): summed over instants, the first
-    /// over the second is by how much the track is late, in seconds.
+    /// Error along the true velocity times that velocity (m²/s), and the square of the velocity (m²/s²). Summed over instants, the
+    /// ratio of the first to the second is the delay of the track in seconds.
     pub late: [f64; 2],
 }
 
 impl Errors {
-    /// Adds those of another instant.
+    /// Adds the errors of another instant.
     pub fn add(&mut self, other: &Self) {
         self.position_m.take(other.position_m);
         self.velocity_m_s.take(other.velocity_m_s);
@@ -61,11 +61,11 @@ impl Errors {
 
 /// Compares one joint with the truth, and adds to the errors of every instant.
 ///
-/// Differences are taken over three instants in a row, of the track and of the truth alike. They are compared only at
-/// instants that `counted` names, so that several tracks can be compared at the same.
+/// Differences are taken over three successive instants, for the track and the truth in the same way. They are compared only at the
+/// instants selected by `counted`, so that several tracks can be compared at the same instants.
 ///
-/// * `times`: seconds, ascending.
-/// * `counted`: of every instant whether it is compared; the truth must be known there.
+/// * `times`: times in seconds, in ascending order.
+/// * `counted`: for every instant, whether it is compared; the truth must be known there.
 pub fn add(errors: &mut [Errors], times: &[f64], track: &Path, truth: &Path, counted: &[bool]) {
     let both = |at: usize| {
         let is_counted = counted.get(at).copied().unwrap_or(false);
@@ -99,7 +99,7 @@ pub fn add(errors: &mut [Errors], times: &[f64], track: &Path, truth: &Path, cou
     }
 }
 
-/// Velocity and acceleration of the parabola through three points, at the middle one.
+/// Returns the velocity and acceleration at the middle point of the parabola through three points.
 fn differences(times: [f64; 3], points: [Vector3<f64>; 3]) -> (Vector3<f64>, Vector3<f64>) {
     let [before, after] = [times[1] - times[0], times[2] - times[1]];
     let slopes = [

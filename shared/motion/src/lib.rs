@@ -1,15 +1,16 @@
-//! A person's joints over time: smoothed, gaps filled and marked, angles between them.
+//! A person's joints over time: smooths them, fills and marks gaps, and computes angles between them.
 //!
-//! Pure: numbers in, numbers out. The joints are measured with a covariance each, at instants that need not be uniform.
+//! The crate is pure: it takes and returns numbers, except for the files of a finished run. Every measured joint has a covariance. The
+//! instants need not be uniform.
 //!
 //! | question | answer |
 //! |---|---|
-//! | where were the joints, with everything before and after? | [`smooth`] |
-//! | the same with a zero-phase low-pass filter, as laboratories use it | [`butterworth::filter`] |
-//! | where are they now, with what was before? | [`live::Smoother`] |
+//! | where were the joints, given everything before and after? | [`smooth`] |
+//! | the same with a zero-phase low-pass filter, as used by laboratories | [`butterworth::filter`] |
+//! | where are the joints now, given everything before? | [`live::Smoother`] |
 //! | what are the angles of hips, knees, shoulders? | [`angles::angles`] |
-//! | from and to the lines of a run's results | [`lines`] |
-//! | how good is a smoother, against the truth? | [`judge`] |
+//! | how to convert from and to the lines of a run's results? | [`lines`] |
+//! | how good is a smoother, compared with the truth? | [`judge`] |
 #![forbid(unsafe_code)]
 
 pub mod angles;

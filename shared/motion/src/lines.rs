@@ -1,4 +1,4 @@
-//! From the lines of a run's results to measurements, and from smoothed joints back to lines.
+//! Converts the lines of a run's results to measurements, and smoothed joints back to lines.
 
 use nalgebra::Matrix3;
 use runfiles::{FrameLine, JointLine, PersonLine, PlacedJoint};
@@ -16,8 +16,8 @@ pub fn measured(line: &JointLine) -> Option<Measured> {
     })
 }
 
-/// Returns the certainty of the sides of a person: certain unless the line says that they are not. Sides as seen in the pictures
-/// are not decided either, but are the same in all frames of a run.
+/// Returns the certainty of a person's sides. They are certain unless the line says otherwise. If sides are labelled as seen in the
+/// pictures, they are undecided too, but consistent over all frames of a run.
 pub fn sides(person: &PersonLine) -> Sides {
     if person.sides == Some(runfiles::Sides::Unsure) {
         Sides::Unsure
@@ -26,10 +26,10 @@ pub fn sides(person: &PersonLine) -> Sides {
     }
 }
 
-/// A person of a line with the joints smoothed; `None` who was neither there nor is anywhere now.
+/// Returns a person of a line with smoothed joints; `None` if the person was neither measured nor has a smoothed joint.
 ///
-/// * `person`: as measured; `None` for a person who is not in the line.
-/// * `joints`: by name; whether it is an extra keypoint; what it was smoothed to. Others are left out.
+/// * `person`: the person as measured; `None` if the person is not in the line.
+/// * `joints`: for each joint its name, whether it is an extra keypoint, and the smoothed value. Other joints are left out.
 pub fn smoothed<'a>(
     id: u64,
     person: Option<PersonLine>,
@@ -53,7 +53,7 @@ pub fn smoothed<'a>(
                 JointLine::Placed(placed(estimate, old))
             }
             Err(why) => match old {
-                // Why it has none stays, if it had none before.
+                // The joint had no position before; the original reason is kept.
                 Some(missing @ JointLine::Missing { .. }) => missing.clone(),
                 _ => JointLine::Missing {
                     status: why.name().to_owned(),
@@ -73,7 +73,7 @@ pub fn smoothed<'a>(
     (was_there || !person.states.is_empty()).then_some(person)
 }
 
-/// A line with other people.
+/// Returns a line in which the people are replaced.
 pub fn with_people(mut line: FrameLine, people: Vec<PersonLine>) -> FrameLine {
     if people.iter().any(|person| person.status == FrameLine::OK) {
         FrameLine::OK.clone_into(&mut line.status);

@@ -1,4 +1,4 @@
-//! Smoothing while it happens: with what was before alone.
+//! Live smoothing, which only uses earlier measurements.
 
 mod kalman;
 
@@ -8,11 +8,11 @@ use crate::role::Role;
 use crate::track::{Absent, Measured, Smoothed};
 use kalman::Models;
 
-/// The longest time between two measurements of a joint that is filled where nothing else is asked for, seconds.
+/// Default maximum time between two measurements of a joint that is filled, in seconds.
 pub const FILL_S: f64 = 0.25;
 
-/// Smooths the joints of a person as they come: by several Kalman filters of different restlessness for each joint, weighted by
-/// how well they predict.
+/// Smooths the joints of a person as they arrive. Each joint has several Kalman filters with different jerk densities, weighted by
+/// the quality of their predictions.
 #[derive(Debug)]
 pub struct Smoother {
     joints: Vec<Models>,
@@ -30,8 +30,8 @@ struct Delay {
 }
 
 impl Smoother {
-    /// * `names`: of the joints.
-    /// * `fill_s`: how long a joint that is not measured is given a position that is only predicted, seconds.
+    /// * `names`: names of the joints.
+    /// * `fill_s`: how long an unmeasured joint is given a predicted position, in seconds.
     pub fn new(names: &[&str], fill_s: f64) -> Self {
         let models = |name: &&str| Models::new(prior(Role::of(name)));
         Self {
@@ -42,11 +42,11 @@ impl Smoother {
         }
     }
 
-    /// The joints at an instant.
+    /// Returns the joints at an instant.
     ///
-    /// * `time_s`: an instant that is not after the one before begins everything anew.
-    /// * `measured`: in the order of the names; joints that are missing at its end count as not measured.
-    /// * `sides`: joints with a side are left out where these are not certain.
+    /// * `time_s`: time of the instant; if it is not after the one before, everything starts anew.
+    /// * `measured`: measurements in the order of the names; joints missing at the end count as not measured.
+    /// * `sides`: certainty of the sides; if they are uncertain, joints with a side are left out.
     pub fn step(
         &mut self,
         time_s: f64,
@@ -72,7 +72,7 @@ impl Smoother {
         all
     }
 
-    /// The mean delay that was added, seconds, of movement at 1 Hz; none before anything was measured twice.
+    /// Returns the mean delay added to movement at 1 Hz, in seconds; `None` before anything was measured twice.
     pub fn delay_s(&self) -> Option<f64> {
         (self.delay.n > 0.0).then(|| self.delay.sum_s / self.delay.n)
     }

@@ -1,28 +1,28 @@
-//! The model of movement: a point whose jerk is white noise, seen with a covariance of its own at every instant.
+//! The motion model: a point whose jerk is white noise, measured with a separate covariance at every instant.
 //!
-//! The state is position, velocity and acceleration in three axes, which the covariances of measurements couple. Between two
-//! instants `dt` apart the acceleration walks at random: the Wiener-process acceleration model (Bar-Shalom, Li & Kirubarajan,
-//! *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.3). Its spectral density, here
-//! called the jerk density, has the unit m²/s⁵.
+//! The state consists of position, velocity and acceleration in three axes, which the covariances of measurements couple. Between two
+//! instants `dt` apart, the acceleration follows a random walk: the Wiener-process acceleration model (Bar-Shalom, Li & Kirubarajan,
+//! *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.3). Its spectral density, here called the jerk density, has
+//! the unit m²/s⁵.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Position, velocity, acceleration.
+/// A vector of position, velocity and acceleration.
 pub(crate) type Vector9 = SVector<f64, 9>;
 pub(crate) type Matrix9 = SMatrix<f64, 9, 9>;
 type Matrix9x3 = SMatrix<f64, 9, 3>;
 
-/// Standard deviation of the velocity (m/s) and acceleration (m/s²) of a person's joint that nothing is known of.
+/// Initial standard deviations of the velocity (m/s) and acceleration (m/s²) of a person's joint.
 const START_SD: [f64; 2] = [2.0, 15.0];
 
-/// Knowledge of a joint at one instant.
+/// State of a joint at one instant, with its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Belief {
     pub(crate) mean: Vector9,
     pub(crate) covariance: Matrix9,
 }
 
-/// How a measurement fits what was expected.
+/// Agreement of a measurement with the prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Innovation {
     /// Squared Mahalanobis distance; its expectation is 3.
@@ -32,9 +32,9 @@ pub(crate) struct Innovation {
 }
 
 impl Belief {
-    /// From the first measurement.
+    /// Creates the state from the first measurement.
     ///
-    /// * `scale`: what the unit of all covariances is, as a share of square metres: 1 for these themselves.
+    /// * `scale`: unit of all covariances in square metres; 1 for unscaled covariances.
     pub(crate) fn first(position: Vector3<f64>, covariance: Matrix3<f64>, scale: f64) -> Self {
         let mut mean = Vector9::zeros();
         mean.fixed_rows_mut::<3>(0).copy_from(&position);
@@ -50,17 +50,17 @@ impl Belief {
         }
     }
 
-    /// The position.
+    /// Returns the position.
     pub(crate) fn position(&self) -> Vector3<f64> {
         self.mean.fixed_rows::<3>(0).into_owned()
     }
 
-    /// Covariance of the position.
+    /// Returns the covariance of the position.
     pub(crate) fn position_covariance(&self) -> Matrix3<f64> {
         self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
-    /// Returns the knowledge of the instant `dt` seconds later.
+    /// Returns the predicted state `dt` seconds later.
     pub(crate) fn after(&self, dt: f64, jerk: f64) -> Self {
         let mut mean = self.mean;
         for i in 0..3 {
@@ -88,7 +88,7 @@ impl Belief {
         Self { mean, covariance }
     }
 
-    /// How a measurement fits, before it is used; `None` if it cannot be computed from the numbers.
+    /// Returns the agreement of a measurement with the state before it is used; `None` if it cannot be computed.
     pub(crate) fn innovation(
         &self,
         position: &Vector3<f64>,
@@ -106,7 +106,7 @@ impl Belief {
         })
     }
 
-    /// Returns the knowledge after a measurement; unchanged if the numbers do not allow its use.
+    /// Returns the state after a measurement; unchanged if the measurement cannot be used numerically.
     #[must_use]
     pub(crate) fn with(&self, position: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         let total = self.position_covariance() + covariance;
@@ -121,11 +121,11 @@ impl Belief {
         Self { mean, covariance }
     }
 
-    /// Returns the knowledge with everything later (Rauch, Tung & Striebel 1965).
+    /// Returns the state smoothed with all later measurements (Rauch, Tung & Striebel 1965).
     ///
-    /// * `self`: with everything up to its own instant.
-    /// * `predicted`: [`Self::after`] of it at the next instant.
-    /// * `next`: what is known at the next instant with everything.
+    /// * `self`: state from all measurements up to its own instant.
+    /// * `predicted`: [`Self::after`] of this state at the next instant.
+    /// * `next`: smoothed state at the next instant.
     #[must_use]
     pub(crate) fn smoothed(&self, predicted: &Self, next: &Self, dt: f64) -> Self {
         let Some(root) = predicted.covariance.cholesky() else {
@@ -140,7 +140,7 @@ impl Belief {
     }
 }
 
-/// The transition applied from the left.
+/// Applies the transition from the left.
 fn moved(matrix: &Matrix9, dt: f64) -> Matrix9 {
     let mut moved = *matrix;
     let half = 0.5 * dt * dt;

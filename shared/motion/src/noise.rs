@@ -1,15 +1,15 @@
-//! How restless a joint is, and how far the covariances of its measurements can be believed.
+//! Jerk density of a joint, and reliability of the covariances of its measurements.
 
-/// The two numbers of a track.
+/// Noise parameters of a track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Spectral density of the jerk, m²/s⁵: the restlessness of the joint.
+    /// Spectral density of the jerk, in m²/s⁵: a measure of the restlessness of the joint.
     pub jerk: f64,
-    /// Factor of the covariances: 1 where they are right, above where they are too small.
+    /// Factor of the covariances: 1 if they are right, above 1 if they are too small.
     pub scale: f64,
 }
 
-/// Expected jerk density of a joint before anything is measured.
+/// Expected jerk density of a joint before any measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Mean of the common logarithm of the density in m²/s⁵.

@@ -1,12 +1,12 @@
-//! How restless joints of people are.
+//! Expected jerk densities of people's joints.
 
 use crate::noise::Prior;
 use crate::role::Role;
 
-/// Returns the expectation for a joint by its role.
+/// Returns the expectation for a joint, by its role.
 ///
-/// Our own, rounded: what the likelihood alone finds in the ten synthetic actions of seed 1, which nothing is judged by. The spread is
-/// wide: a run of some seconds outweighs it.
+/// The values are our own, rounded: the maximum of the likelihood for the ten synthetic actions of seed 1, which are not used for any
+/// evaluation. The spread is wide, so a run of a few seconds outweighs the expectation.
 pub fn prior(role: Option<Role>) -> Prior {
     let log10_jerk = match role {
         Some(

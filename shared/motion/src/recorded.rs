@@ -1,4 +1,4 @@
-//! A person over time, as measured, and as smoothed.
+//! A person over time: as measured, and as smoothed.
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ use crate::track::{Absent, Measured, Smoothed, State, usable};
 /// Certainty of left and right of a measured skeleton.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sides {
-    /// They are, or nothing says otherwise.
+    /// Left and right are correct, or nothing says otherwise.
     #[default]
     Sure,
     /// Left and right may be exchanged.
@@ -19,7 +19,7 @@ pub enum Sides {
 /// One joint over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
     /// Role of the joint; `None` for a keypoint that has no role here.
     pub role: Option<Role>,
@@ -28,12 +28,12 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// Where it was measured, if at all.
+    /// Measured position, if there is a measurement.
     pub(crate) fn position(&self, at: usize) -> Option<Vector3<f64>> {
         usable(self.measured[at].as_ref()?).map(|measured| measured.0)
     }
 
-    /// Why there is no position where nothing was filled.
+    /// Reason why there is no position at an instant that was not filled.
     pub(crate) fn absent(&self, at: usize) -> Absent {
         if self.measured[at].is_some() {
             Absent::Rejected
@@ -46,39 +46,39 @@ impl Joint {
 /// A person over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recorded {
-    /// The instants, seconds, ascending.
+    /// The instants, in seconds, in ascending order.
     pub times: Vec<f64>,
     /// Certainty of the sides at every instant.
     pub sides: Vec<Sides>,
-    /// The joints.
+    /// The joints of the person.
     pub joints: Vec<Joint>,
 }
 
-/// The instants cannot be worked with.
+/// Reason why the instants cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TimesError {
     /// An instant is not after the one before.
-    #[error("instant {at} is at {time_s} s, not after the one before it at {before_s} s")]
+    #[error("instant {at} at {time_s} s is not after the instant before, which is at {before_s} s")]
     Order {
-        /// Which, from 0.
+        /// Index of the instant, counted from 0.
         at: usize,
-        /// Its time.
+        /// Time of the instant, in seconds.
         time_s: f64,
-        /// The time of the one before it.
+        /// Time of the previous instant, in seconds.
         before_s: f64,
     },
-    /// A time is no number.
+    /// A time is not a number.
     #[error("instant {at} has no time")]
     NotFinite {
-        /// Which, from 0.
+        /// Index of the instant, counted from 0.
         at: usize,
     },
-    /// Some row is longer or shorter than there are instants.
+    /// The length of a row differs from the number of instants.
     #[error("{got} values for {expected} instants")]
     Length {
-        /// Values.
+        /// Number of values in the row.
         got: usize,
-        /// Instants.
+        /// Number of instants.
         expected: usize,
     },
 }
@@ -114,15 +114,15 @@ impl Recorded {
         Ok(())
     }
 
-    /// Returns a predicate of a joint and an instant: true if the measurement is left out because its side is not
-    /// certain. Where no instant's sides are, nothing is left out: it would be everything.
+    /// Returns a predicate of a joint and an instant: true if the measurement is left out because its side is
+    /// uncertain. If the sides are uncertain at all instants, nothing is left out, since otherwise everything would be.
     pub(crate) fn withheld(&self) -> impl Fn(usize, usize) -> bool {
         let others = self.other_sides();
         let is_some_sure = self.sides.contains(&Sides::Sure);
         move |joint, at| is_some_sure && others[joint].is_some() && self.sides[at] == Sides::Unsure
     }
 
-    /// Counts the instants with uncertain sides where nothing decides them: kept, exchanged, left out.
+    /// Counts the instants with uncertain sides if the method does not decide them: kept, exchanged, left out.
     pub(crate) fn unsure(&self) -> [usize; 3] {
         let n = self.sides.iter().filter(|side| **side == Sides::Unsure).count();
         if self.sides.contains(&Sides::Sure) {
@@ -132,17 +132,18 @@ impl Recorded {
         }
     }
 
-    /// Returns for every joint the index of that on the other side.
+    /// Returns, for every joint, the index of the same joint on the other side.
     pub(crate) fn other_sides(&self) -> Vec<Option<usize>> {
         let at = |name: &str| self.joints.iter().position(|joint| joint.name == name);
         let other = |joint: &Joint| mirrored_name(&joint.name).and_then(|name| at(&name));
         self.joints.iter().map(other).collect()
     }
 
-    /// The indices at which another person, or the same person elsewhere, begins: the whole body is somewhere else than
-    /// a person can have gone, and stays there.
+    /// Returns the indices at which another person begins, or the same person at another place. There, the whole body is farther away than
+    /// a person can move, and stays there.
     ///
-    /// The limit is half a metre and 12 m/s, which nobody runs; the body is the median of its joints in each axis.
+    /// The limit is half a metre plus 12 m/s, faster than anyone runs. The position of the body is the median of its joints along each
+    /// axis.
     pub(crate) fn breaks(&self) -> Vec<usize> {
         let centres: Vec<(usize, Vector3<f64>)> =
             (0..self.times.len()).filter_map(|at| Some((at, self.centre(at)?))).collect();
@@ -179,12 +180,12 @@ impl Recorded {
     }
 }
 
-/// The middle value; 0 of none.
+/// Returns the median; 0 if there are no values.
 pub(crate) fn median(values: Vec<f64>) -> f64 {
     statistics::Sorted::new(values).interpolated(0.5).unwrap_or(0.0)
 }
 
-/// A person over time, smoothed.
+/// A smoothed person over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Motion {
     /// Smoothed positions of every joint, in the order of [`Recorded::joints`], at every instant.
@@ -196,34 +197,34 @@ pub struct Motion {
 /// Findings about a person over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
-    /// Noise of every joint; `None` where the method does not ask, or nothing was measured.
+    /// Noise of every joint; `None` if the method does not estimate it, or nothing was measured.
     pub noise: Vec<Option<Noise>>,
-    /// Counts of the states of every joint's instants.
+    /// For every joint, the number of instants in each state.
     pub counts: Vec<Counts>,
     /// Instants at which another person began.
     pub breaks: Vec<usize>,
-    /// Instants whose sides were not certain: how many were kept as measured, exchanged, and left out.
+    /// Number of instants with uncertain sides that were kept as measured, exchanged, and left out.
     pub unsure: [usize; 3],
-    /// Lengths of bones that were kept constant: two joints, metres.
+    /// Bones that were kept at a constant length: two joints, and the length in metres.
     pub bones: Vec<([usize; 2], f64)>,
-    /// Largest difference of an instant from its place on the uniform grid, seconds; `None` where there is none.
+    /// Largest difference of an instant from the uniform grid, in seconds; `None` if there is no grid.
     pub resampled_s: Option<f64>,
-    /// Amount by which a causal method lags, seconds; 0 for those that look ahead.
+    /// Delay of a causal method, in seconds; 0 for methods that look ahead.
     pub delay_s: f64,
 }
 
-/// How many instants of a joint are what.
+/// Number of instants of a joint in each state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Measured and used.
+    /// Instants at which the joint was measured and used.
     pub measured: usize,
-    /// Measured as the other side's joint.
+    /// Instants at which the joint was measured as the other side's joint.
     pub exchanged: usize,
-    /// Not measured, filled.
+    /// Instants at which the joint was not measured, but filled.
     pub filled: usize,
-    /// Measured, left out, filled.
+    /// Instants at which the joint was measured, but left out and filled.
     pub rejected: usize,
-    /// Without a position.
+    /// Instants at which the joint has no position.
     pub absent: usize,
 }
 

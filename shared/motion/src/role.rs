@@ -3,17 +3,17 @@
 /// A side of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Side {
-    /// The person's right.
+    /// The person's right side.
     Right,
-    /// The person's left.
+    /// The person's left side.
     Left,
 }
 
 impl Side {
-    /// Both.
+    /// Both sides.
     pub const BOTH: [Self; 2] = [Self::Right, Self::Left];
 
-    /// The word in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -47,8 +47,8 @@ pub enum Role {
     SmallToe(Side),
 }
 
-/// Names that do not say the side first: those of `skeleton::HUMANEVA20`, and words of networks. The twins of `HumanEva`, one
-/// joint as an end of two limbs, have the role once.
+/// Names that do not begin with the side: those of `skeleton::HUMANEVA20`, and those used by networks. The twins of `HumanEva`, where
+/// one joint is an end of two limbs, have the role once.
 const NAMES: [(&str, Role); 19] = [
     ("head", Role::Head),
     ("neck", Role::Neck),
@@ -72,7 +72,7 @@ const NAMES: [(&str, Role); 19] = [
 ];
 
 impl Role {
-    /// The role of a joint by its name; `None` for what has none here, as a finger.
+    /// Returns the role of a joint, by its name; `None` for a keypoint without a role, such as a finger.
     pub fn of(name: &str) -> Option<Self> {
         let whole = NAMES.iter().find(|known| known.0 == name);
         if let Some((_, role)) = whole {
@@ -98,7 +98,7 @@ impl Role {
         Some(role)
     }
 
-    /// The same on the other side; `None` for what has no side.
+    /// Returns the same role on the other side; `None` for a role without a side.
     pub fn mirrored(self) -> Option<Self> {
         Some(match self {
             Self::Head | Self::Neck | Self::Pelvis => return None,
@@ -115,7 +115,8 @@ impl Role {
     }
 }
 
-/// The name of a joint on the other side, for any name that says its side as a word of its own or in `HumanEva`'s way.
+/// Returns the name of the joint on the other side. It works for any name that contains the side as a separate word or in the style of
+/// `HumanEva`.
 pub fn mirrored_name(name: &str) -> Option<String> {
     if let Some(rest) = name.strip_prefix("left ") {
         return Some(format!("right {rest}"));
@@ -133,9 +134,9 @@ pub fn mirrored_name(name: &str) -> Option<String> {
     rest.strip_prefix('R').map(|rest| format!("{part}L{rest}"))
 }
 
-/// Pairs of joints whose distance a body keeps: the limbs' segments.
+/// Pairs of joints with a constant distance: the segments of the limbs.
 ///
-/// The distances across the trunk change by centimetres as shoulders move and the back bends, and are no part of it.
+/// The distances across the trunk are not included: they change by centimetres as shoulders move and the back bends.
 pub const RIGID: [[Role; 2]; 9] = [
     [Role::Hip(Side::Right), Role::Knee(Side::Right)],
     [Role::Knee(Side::Right), Role::Ankle(Side::Right)],

@@ -1,49 +1,49 @@
-//! The Rauch-Tung-Striebel smoother over one stretch of a track, with weights that outliers lose.
+//! The Rauch-Tung-Striebel smoother over one stretch of a track, with small weights for outliers.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::model::{Belief, Innovation};
 use crate::noise::Noise;
 
-/// A measurement that can be worked with.
+/// A usable measurement.
 pub(crate) type Usable = Option<(Vector3<f64>, Matrix3<f64>)>;
 
-/// Degrees of freedom of the heavy-tailed (Student) noise that measurements are weighted for.
+/// Degrees of freedom of the heavy-tailed (Student) noise for which measurements are weighted.
 pub(crate) const FREEDOM: f64 = 4.0;
-/// A measurement whose squared Mahalanobis distance from what all others say is larger is rejected: 1 of 10 000 good ones.
+/// A measurement is rejected if its squared Mahalanobis distance from the other measurements is larger; this rejects 1 of 10 000 good ones.
 pub(crate) const GATE: f64 = 21.11;
-/// Amount by which movement may be less predictable at times than over the whole track, as a factor of the covariance of what
-/// others say: a punch is no outlier. At high rates it hardly counts, the measurement's own covariance is most of the sum.
+/// Factor on the covariance of the other measurements, because movement is sometimes less predictable than over the whole track: a punch
+/// is not an outlier. At high rates, it has little effect, because the measurement's own covariance dominates the sum.
 const SURPRISE: f64 = 9.0;
-/// Times that weights are found anew; they have settled by then.
+/// Number of rounds of computing weights; they have converged by then.
 const N_ROUNDS: usize = 4;
 
-/// Where a joint is, with its covariance in the unit of those of the measurements, unscaled.
+/// Position of a joint, with its covariance in the unit of those of the measurements, unscaled.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Known {
     pub(crate) position: Vector3<f64>,
     pub(crate) covariance: Matrix3<f64>,
 }
 
-/// Knowledge from all measurements at the instants of a stretch.
+/// State from all measurements at the instants of a stretch.
 #[derive(Debug)]
 pub(crate) struct Stretch {
-    /// At every instant; none if there is no measurement.
+    /// State at every instant; empty if there is no measurement.
     pub(crate) known: Vec<Known>,
-    /// Weight of the measurement at every instant, 0..1; 0 where it is rejected or missing.
+    /// Weight of the measurement at every instant, 0..1; 0 if it is rejected or missing.
     pub(crate) weights: Vec<f64>,
 }
 
-/// The weight of a measurement in noise with heavy tails (Lange, Little & Taylor 1989).
+/// Returns the weight of a measurement under noise with heavy tails (Lange, Little & Taylor 1989).
 ///
 /// * `distance2`: squared Mahalanobis distance, scaled.
 pub(crate) fn weight(distance2: f64) -> f64 {
     ((FREEDOM + 3.0) / (FREEDOM + distance2)).min(1.0)
 }
 
-/// Runs forwards; `each` sees every measurement before it is used and says its weight, 0 to leave it out.
+/// Filters forwards; `each` receives every measurement before it is used and returns its weight, 0 to leave it out.
 ///
-/// * Returns what is known at every instant up to the last; instants before the first measurement that is used repeat it.
+/// * Returns the state at every instant up to the last; instants before the first used measurement repeat that measurement.
 pub(crate) fn forwards(
     times: &[f64],
     measured: &[Usable],
@@ -74,7 +74,7 @@ pub(crate) fn forwards(
         });
         beliefs.push(known);
     }
-    // Before the first measurement nothing is known; the smoother goes back through it.
+    // Before the first measurement, nothing is known; the backward pass covers these instants.
     let Some(first) = beliefs.first().copied() else {
         return beliefs;
     };
@@ -83,7 +83,7 @@ pub(crate) fn forwards(
     all
 }
 
-/// Runs backwards over what [`forwards`] has found.
+/// Smooths the result of [`forwards`] backwards.
 fn backwards(times: &[f64], forwards: &[Belief], noise: Noise) -> Vec<Known> {
     let jerk = noise.jerk / noise.scale;
     let known = |belief: &Belief| Known {
@@ -103,10 +103,10 @@ fn backwards(times: &[f64], forwards: &[Belief], noise: Noise) -> Vec<Known> {
     all
 }
 
-/// Squared Mahalanobis distance of a measurement from what all *other* measurements say, scaled; infinite if it cannot
-/// be computed from the numbers.
+/// Returns the squared Mahalanobis distance of a measurement from the estimate by all *other* measurements, scaled; infinite if it cannot
+/// be computed.
 ///
-/// * `weight`: that the measurement had in what is known; 0 if it had no part in it.
+/// * `weight`: weight of the measurement in the estimate; 0 if it was not used.
 pub(crate) fn distance2(
     known: &Known,
     (position, covariance): &(Vector3<f64>, Matrix3<f64>),
@@ -117,7 +117,7 @@ pub(crate) fn distance2(
         let difference = position - known.position;
         return solved(&(known.covariance * SURPRISE + covariance), &difference) / scale;
     }
-    // What the others say: the information of all less that of the measurement.
+    // The estimate without this measurement: the information of all measurements minus its own.
     let (Some(all), Some(own)) = (known.covariance.try_inverse(), covariance.try_inverse()) else {
         return f64::INFINITY;
     };
@@ -137,7 +137,7 @@ fn solved(total: &Matrix3<f64>, difference: &Vector3<f64>) -> f64 {
     })
 }
 
-/// Smooths a stretch: outliers lose their weight, and those that contradict all others are left out.
+/// Smooths a stretch: outliers get a smaller weight, and measurements that contradict all others are left out.
 pub(crate) fn smooth(times: &[f64], measured: &[Usable], noise: Noise) -> Stretch {
     let mut weights: Vec<f64> = vec![0.0; times.len()];
     let known = forwards(times, measured, noise, |at, innovation| {

@@ -8,13 +8,14 @@ use crate::recorded::{Counts, Joint, Motion, Recorded, Report};
 use crate::rts::Usable;
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
 
-/// A joint that was not measured for longer is smoothed anew, seconds: what was before says nothing of what is after.
+/// Maximum time without a measurement of a joint, in seconds. After a longer time, the joint is smoothed anew, because earlier measurements
+/// carry no information.
 const SPLIT_S: f64 = 1.0;
 
-/// How to smooth.
+/// Settings of the smoother.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The longest time between two measurements that is filled, seconds.
+    /// Maximum time between two measurements that is filled, in seconds.
     pub fill_s: f64,
     /// Keep the lengths of the limbs' bones constant.
     pub constant_bones: bool,
@@ -29,16 +30,16 @@ impl Default for Settings {
     }
 }
 
-/// Smooths a person's joints with everything before and after.
+/// Smooths a person's joints, using all measurements before and after.
 ///
-/// 1. Where the person is suddenly another person, everything begins anew.
-/// 2. Of every joint the jerk density and the scale of the covariances are found from the measurements.
-/// 3. Every joint is smoothed; measurements that contradict all others are rejected. Joints with a side are left out where sides
-///    are not certain.
-/// 4. Where left and right fit better exchanged, they are exchanged; instants whose sides are not certain are taken as what fits,
-///    or left out; the joints that this changes are smoothed again.
-/// 5. Gaps are filled as far as they are short, and marked.
-/// 6. If asked for, the limbs' bones get the median of their lengths.
+/// 1. If the person suddenly changes to another person, everything starts anew.
+/// 2. The jerk density and the scale of the covariances are estimated for every joint from the measurements.
+/// 3. Every joint is smoothed; measurements that contradict all others are rejected. Joints with a side are left out if the sides
+///    are uncertain.
+/// 4. Left and right are exchanged if that fits better. At instants with uncertain sides, the assignment that fits is used; if neither fits
+///    clearly, the instant is left out. The changed joints are smoothed again.
+/// 5. Short gaps are filled and marked.
+/// 6. If requested, each bone of the limbs gets its median length.
 ///
 /// The times must be [checked](Recorded::check).
 pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
@@ -67,7 +68,7 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
         track.smooth(&recorded.times, &stretches(&track.used));
     }
     let noise = tracks.iter().map(Track::known_noise).collect();
-    // Each track goes when its joint is there: a long run would need both at once.
+    // Each track is dropped once its joint is done: a long run would otherwise need the memory of both.
     let filled = |track: Track| track.filled(&recorded.times, settings.fill_s);
     let mut motion = Motion {
         joints: tracks.into_iter().map(filled).collect(),
@@ -85,7 +86,7 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
     motion
 }
 
-/// Where a track can be smoothed as a whole: from the first to after the last measurement, without long gaps and breaks.
+/// Stretches of a track that can be smoothed as a whole: from the first measurement to one past the last, without long gaps and breaks.
 fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> Vec<[usize; 2]> {
     let mut stretches: Vec<[usize; 2]> = Vec::new();
     for at in (0..used.len()).filter(|&at| used[at].is_some()) {
@@ -101,7 +102,7 @@ fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> V
     stretches
 }
 
-/// Returns the measurements unchanged: also joints with a side where sides are not certain.
+/// Returns the measurements unchanged, including joints with a side at instants with uncertain sides.
 pub fn as_measured(recorded: &Recorded) -> Motion {
     let estimate = |measured: &Option<Measured>| -> Smoothed {
         let measured = measured

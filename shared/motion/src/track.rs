@@ -1,31 +1,32 @@
-//! One joint over time: what was measured of it, and what a smoother makes of that.
+//! One joint over time: its measurements, and the result of a smoother.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Where a joint was measured at one instant.
+/// Measured position of a joint at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// In the world, metres.
+    /// Position in the world, in metres.
     pub position: Vector3<f64>,
-    /// Covariance of the position, square metres; `None` where it is not known.
+    /// Covariance of the position, in square metres; `None` if it is unknown.
     pub covariance: Option<Matrix3<f64>>,
 }
 
-/// Basis of a position of a smoothed track.
+/// Basis of a position in a smoothed track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// A measurement, and those around it.
+    /// A measurement of this joint, with the measurements around it.
     Measured,
-    /// The measurement of the joint on the other side of the body, which fits while its own does not: left and right were exchanged.
+    /// The measurement of the joint on the other side of the body, because it fits and the joint's own does not: left and right were
+    /// exchanged.
     Exchanged,
-    /// Only what was measured before and after: there was no measurement.
+    /// Only measurements before and after: there was no measurement.
     Filled,
-    /// Only what was measured before and after: the measurement contradicts them, or its side is not certain.
+    /// Only measurements before and after: the measurement contradicts them, or its side is uncertain.
     Rejected,
 }
 
 impl State {
-    /// The word in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -36,28 +37,28 @@ impl State {
     }
 }
 
-/// Where a joint is at one instant, as a smoother sees it.
+/// Smoothed position of a joint at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// In the world, metres.
+    /// Position in the world, in metres.
     pub position: Vector3<f64>,
-    /// Covariance of the position, square metres; `None` where the method does not give it.
+    /// Covariance of the position, in square metres; `None` if the method does not provide it.
     pub covariance: Option<Matrix3<f64>>,
     /// Basis of the position.
     pub state: State,
 }
 
-/// Why there is no position.
+/// Reason why there is no position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Absent {
-    /// No measurement, and the gap is longer than may be filled, or open at one end.
+    /// There is no measurement, and the gap is too long to be filled, or open at one end.
     Gap,
-    /// The measurement contradicts the others, and the gap without it is longer than may be filled.
+    /// The measurement contradicts the others, and the gap without it is too long to be filled.
     Rejected,
 }
 
 impl Absent {
-    /// The word in files.
+    /// Returns the name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gap => "gap",
@@ -69,15 +70,15 @@ impl Absent {
 /// One instant of a smoothed track.
 pub type Smoothed = Result<Estimate, Absent>;
 
-/// Standard deviation that a measurement without a covariance is given before its scale is estimated, metres.
+/// Standard deviation assumed for a measurement without a covariance before its scale is estimated, in metres.
 const UNKNOWN_SD_M: f64 = 0.02;
-/// Limits to which standard deviations of a measurement are clipped, metres: smaller ones are rounding, larger ones say
-/// nothing.
+/// Limits to which standard deviations of a measurement are clipped, in metres. Smaller ones are rounding errors; larger ones carry no
+/// information.
 const SD_M: [f64; 2] = [1e-5, 10.0];
-/// Farther from the origin there is no measurement, metres.
+/// Maximum distance of a measurement from the origin, in metres.
 const FARTHEST_M: f64 = 1e6;
 
-/// A measurement that can be worked with: a finite position and a positive definite covariance; `None` if the position is not one.
+/// Returns a usable measurement with a finite position and a positive definite covariance; `None` if the position is not usable.
 pub(crate) fn usable(it: &Measured) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let is_near = |x: &f64| x.abs() < FARTHEST_M;
     if !it.position.iter().all(is_near) {
@@ -96,12 +97,12 @@ pub(crate) fn usable(it: &Measured) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     Some((it.position, covariance))
 }
 
-/// The covariance with standard deviations within [`SD_M`] along its own axes.
+/// Returns the covariance with standard deviations within [`SD_M`] along its own axes.
 fn bounded(covariance: Matrix3<f64>) -> Matrix3<f64> {
     let symmetric = (covariance + covariance.transpose()) * 0.5;
     let [least, most] = SD_M.map(|sd_m| sd_m * sd_m);
     let trace = symmetric.trace();
-    // Most are far from both limits: the determinant over the square of the trace bounds the smallest eigenvalue from below.
+    // Most covariances are far from both limits: the determinant over the square of the trace bounds the smallest eigenvalue from below.
     if trace < most && symmetric.determinant() > least * trace * trace {
         return symmetric;
     }

@@ -1,36 +1,36 @@
-//! How restless a joint is and how far the covariances of its measurements can be believed: both from the measurements alone.
+//! Estimates the jerk density of a joint and the scale of its covariances from the measurements alone.
 
 use statistics::Sorted;
 
 use crate::noise::{Noise, Prior};
 use crate::rts::{FREEDOM, Usable, forwards, weight};
 
-/// Jerk densities that are tried, common logarithms: the least, the most and the step.
+/// Minimum, maximum and step of the jerk densities that are tried, as common logarithms.
 const LEAST: f64 = -1.0;
 const MOST: f64 = 5.5;
 const STEP: f64 = 0.5;
-/// Standard deviation of the natural logarithm of the scale before anything is measured: covariances are right within a factor of 3.
+/// Standard deviation of the natural logarithm of the scale before any measurement: covariances are right within a factor of 3.
 const SCALE_SD: f64 = 1.0;
-/// Share of the likelihood that counts: people do not move as the model says, so the innovations say less than they would.
-/// Without it, fast movement at a low rate is taken for noise.
+/// Weight of the likelihood. People do not move exactly as the model assumes, so the innovations carry less information.
+/// Without this weight, fast movement at a low rate is taken for noise.
 const SHARE: f64 = 0.1;
-/// Scales that are believed.
+/// Minimum and maximum plausible scale.
 const SCALES: [f64; 2] = [1e-4, 1e4];
-/// Fewer measurements say nothing of both numbers.
+/// Minimum number of measurements for an estimate.
 const LEAST_MEASURED: usize = 12;
-/// Windows that are looked at of a long track, and their instants.
+/// Number of windows used of a long track, and number of instants of each.
 const N_WINDOWS: usize = 6;
 const WINDOW: usize = 250;
-/// Innovations after the beginning of a window that are not counted: they are about what was assumed.
+/// Number of innovations at the beginning of a window that are not counted: they depend on the initial assumptions.
 const SKIPPED: usize = 3;
 
-/// Finds the numbers of a track by maximum likelihood of the innovations, in noise with heavy tails, on a grid of
-/// jerk densities with the scale found for each.
+/// Estimates the noise parameters of a track by maximum likelihood of the innovations, under noise with heavy tails. The search uses a grid
+/// of jerk densities, with the scale estimated for each.
 ///
-/// A filter depends on the ratio of both numbers alone, so for every ratio one run gives all innovations, and the scale that
-/// explains them best. Of a long track a number of windows is used.
+/// A filter depends only on the ratio of the two parameters. So for every ratio, one run gives all innovations and the scale that
+/// explains them best. For a long track, a number of windows is used.
 ///
-/// * `stretches`: of the track, each with its times, ascending.
+/// * `stretches`: stretches of the track, each with its times in ascending order.
 pub(crate) fn tune(stretches: &[(&[f64], &[Usable])], prior: Prior) -> Noise {
     let windows = windows(stretches);
     let n: usize = windows.iter().map(|window| window.1.iter().flatten().count()).sum();
@@ -63,7 +63,7 @@ pub(crate) fn tune(stretches: &[(&[f64], &[Usable])], prior: Prior) -> Noise {
     }
 }
 
-/// Where the parabola through the best and its neighbours is highest, in steps after the best.
+/// Returns the position of the maximum of the parabola through the best value and its neighbours, in steps after the best.
 fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
     if best == 0 || best + 1 >= tried.len() {
         return 0.0;
@@ -77,7 +77,7 @@ fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
     }
 }
 
-/// All of a short track, parts of a long one.
+/// Returns the whole of a short track, or parts of a long one.
 fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [Usable])> {
     let n: usize = stretches.iter().map(|stretch| stretch.0.len()).sum();
     if n <= N_WINDOWS * WINDOW {
@@ -93,9 +93,9 @@ fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [
     chunks.into_iter().step_by(every).collect()
 }
 
-/// The logarithm of the likelihood of the innovations, and the scale that makes it highest.
+/// Returns the logarithm of the likelihood of the innovations, and the scale that maximises it.
 ///
-/// * `jerk`: density in m²/s⁵; the ratio to the scale decides what the filter does, so it is run again with the scale found.
+/// * `jerk`: density in m²/s⁵. The filter depends on its ratio to the scale, so it is run again with the estimated scale.
 fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
     let mut scale = scale;
     let mut score = f64::NEG_INFINITY;
@@ -129,18 +129,18 @@ fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
     (score, scale)
 }
 
-/// Amount by which [`student_scale`] is smaller than the variance of noise that is Gaussian after all, in three dimensions.
+/// Ratio of [`student_scale`] to the variance if the noise is in fact Gaussian, in three dimensions.
 const GAUSSIAN_SHARE: f64 = 0.757;
 
-/// The scale of squared distances that is right for Gaussian noise and hardly moved by outliers.
+/// Returns a scale of squared distances that is correct for Gaussian noise and robust against outliers.
 fn scale_of(distances: &[f64]) -> f64 {
     student_scale(distances) / GAUSSIAN_SHARE
 }
 
-/// The most likely scale of squared distances in three-dimensional Student noise.
+/// Returns the most likely scale of squared distances in three-dimensional Student noise.
 fn student_scale(distances: &[f64]) -> f64 {
     let sorted = Sorted::new(distances.to_vec());
-    // The median of a chi-squared number with 3 degrees of freedom is 2.366.
+    // The median of the chi-squared distribution with 3 degrees of freedom is 2.366.
     let Some(median) = sorted.interpolated(0.5) else {
         return 1.0;
     };

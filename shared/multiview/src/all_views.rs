@@ -1,4 +1,4 @@
-//! Fuses all views at once: each view is solved in turn, supported by all others, until
+//! Fuses all views at once: each view is solved in turn, supported by all other views, until
 //! convergence.
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ pub struct AllViewsInput<'a> {
     pub views: &'a [ViewInput<'a>],
     /// Part-type tables of a pair `(first, second)` of indices into `views`, `first < second`.
     pub tables: &'a dyn Fn(usize, usize) -> Option<&'a TypeTables>,
-    /// Weight of the terms of a pair. 1 uses those of all pairs unchanged; `1 / (n - 1)` gives all
+    /// Weight of the terms of a pair. 1 uses the terms of all pairs unchanged; `1 / (n - 1)` gives all
     /// supports of a view together the weight of the single support in a pair.
     pub weight: f64,
 }
@@ -26,7 +26,7 @@ pub struct AllViewsInput<'a> {
 pub struct AllViewsStart<'a> {
     /// Candidate of every view.
     pub candidates: &'a [usize],
-    /// For every view true if its left and right are exchanged with respect to the first view.
+    /// For every view, true if its left and right are exchanged relative to the first view.
     pub exchanged: &'a [bool],
 }
 
@@ -47,33 +47,35 @@ pub struct AllViewsEstimate {
 
 /// Maximises one energy over all views, from a given start.
 ///
-/// The paper's eq. 3 with a sum over all views and all pairs of them,
-/// `sum_v S(v) + weight sum_{v<u} (alpha xi + beta lambda)(v, u)`,
-/// which the paper leaves for later work. One view is solved exactly while all others are fixed.
-/// Its terms are the sums of those that each other view alone would add, so the graph remains a
-/// tree. Views take turns, the least trusted first. A solution is accepted only if the energy
-/// rises, so the energy never falls and a cycle is impossible (except with
-/// [`SwitchBy::Support`](crate::SwitchBy::Support)). The loop ends when no view alone can raise the
-/// energy (up to the tolerance of `epsilon_px`), or after `max_iterations / 2` solutions of every
-/// view.
+/// The energy is the paper's eq. 3 with a sum over all views and all pairs of views, `sum_v S(v) +
+/// weight sum_{v<u} (alpha xi + beta lambda)(v, u)`; the paper leaves this for later work. One view
+/// is solved exactly while all others are fixed. Its terms are the sums of the terms that each
+/// other view alone would add, so the graph remains a tree. Views take turns, the least trusted
+/// first. A solution is accepted only if the energy rises, so the energy never falls and a cycle is
+/// impossible (except with [`SwitchBy::Support`](crate::SwitchBy::Support)). The loop ends when no
+/// view alone can raise the energy (up to the tolerance of `epsilon_px`), or after `max_iterations
+/// / 2` solutions of every view.
 ///
-/// Benefit, as PCP3D of `parallax-lab eval` on 134 instants (three views, 14 of them four; see the
-/// documentation of the crate), for the mean of the terms (weight `1 / (n - 1)`) and two starts,
-/// compared with the mean of pairs: 73.3 against 71.0 by geometry, with 15 solutions of a single
-/// view against 20 (four views: 23 against 40); 75.9 against 75.1 with the network's expected
-/// errors. The sum of the terms (weight 1) gives 72.6, with 17 solutions (four views: 32). With an
-/// earlier model three views were better in pairs (73.4 against 71.1). Where one of the four
-/// cameras was moved by two degrees, pairs are still better on these 14 instants (79.8 against 75.0
-/// by geometry), but neither on all 70 frames (78.3 with types against 80.0) nor with the network
-/// (81.3 against 84.3).
+/// The benefit was measured as PCP3D of `parallax-lab eval` on 134 instants (three views, 14 of them four; see the
+/// documentation of the crate). The mean of the terms (weight `1 / (n - 1)`) with two starts is
+/// compared with the mean of pairs:
 ///
-/// A deployment selects this by `views = "all"` in its section `[paper]`, with the mean of the terms
+/// * By geometry, it reaches 73.3 against 71.0. It needs 15 solutions of a single
+///   view against 20 (four views: 23 against 40).
+/// * With the network's expected errors, it reaches 75.9 against 75.1.
+/// * The sum of the terms (weight 1) reaches 72.6, with 17 solutions (four views: 32).
+/// * With an earlier model, pairs were better for three views (73.4 against 71.1).
+/// * If one of the four cameras was moved by two degrees, pairs are still better on these 14 instants (79.8 against 75.0
+///   by geometry). But they are not better on all 70 frames (78.3 with types against 80.0), nor with the network
+///   (81.3 against 84.3).
+///
+/// A deployment selects this method by `views = "all"` in its section `[paper]`, with the mean of the terms
 /// and two starts.
 ///
-/// There is no such form of [`EnergyKind::Released`](crate::EnergyKind::Released); the terms are
+/// [`EnergyKind::Released`](crate::EnergyKind::Released) has no such form; the terms are always
 /// the paper's.
 ///
-/// * `evidence`: the responses of every view; should carry their bounds.
+/// * `evidence`: the responses of every view; should include their bounds.
 ///
 /// # Panics
 ///
@@ -157,17 +159,17 @@ impl Convergence {
         }
     }
 
-    /// Counts a solution; returns whether the optimisation has converged.
+    /// Counts a solution; returns true if the optimisation has converged.
     fn after(&mut self, is_still: bool) -> bool {
         self.n_still = if is_still { self.n_still + 1 } else { 0 };
         self.has_moved |= !is_still;
-        // The last view that moved was solved against all others as they are now.
+        // The last view that moved was solved against the current state of all others.
         self.n_still + usize::from(self.has_moved) >= self.n_views
     }
 }
 
-/// The order in which views are solved: highest expected error first, or lowest score first if any
-/// view has no expected errors; among equals the last view first.
+/// Returns the order in which views are solved: highest expected error first, or lowest score first if any
+/// view has no expected errors. Ties are solved from the last view to the first.
 fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     let expected = input.views.iter();
     let expected = expected.map(|view| view.sigma_px.map(|sigma_px| sigma_px.iter().sum::<f32>()));
@@ -180,7 +182,7 @@ fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     order
 }
 
-/// All pairs of views: `[first][second - first - 1]`.
+/// Returns all pairs of views: `[first][second - first - 1]`.
 fn inputs<'a>(input: &AllViewsInput<'a>) -> Vec<Vec<PairInput<'a>>> {
     let n = input.views.len();
     let pair = |first: usize, second: usize| PairInput {
@@ -211,7 +213,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// The terms of two views, and the index of the first given view among the two.
+    /// Returns the terms of two views, and the index of the first given view among the two.
     fn terms_of(&self, view: usize, other: usize) -> (&PairTerms<'a>, usize) {
         let (first, second) = (view.min(other), view.max(other));
         (
@@ -220,7 +222,7 @@ impl<'a> Pairs<'a> {
         )
     }
 
-    /// The consistency sums of a pose of one view and a pose of another.
+    /// Returns the consistency sums of a pose of one view and a pose of another.
     fn between(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
         match self.terms_of(view, other) {
             (terms, 0) => terms.between(pose, others),
@@ -228,7 +230,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// As [`Self::between`], with the terms that are switched on while `view` is solved.
+    /// Like [`Self::between`], with the terms that are switched on while `view` is solved.
     fn for_target(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
         match self.terms_of(view, other) {
             (terms, 0) => terms.for_target(0, pose, others),
@@ -236,7 +238,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// The terms that all other views add to a target.
+    /// Returns the terms that all other views add to a target.
     fn supports<'b>(
         &'b self,
         target: usize,
@@ -306,7 +308,7 @@ impl ExtraTerms for Supports<'_> {
 struct State {
     poses: Vec<Pose>,
     own: Vec<f64>,
-    /// `[first][second]`, symmetric.
+    /// Terms between two views, `[first][second]`; symmetric.
     between: Vec<Vec<f64>>,
 }
 

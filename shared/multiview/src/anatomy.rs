@@ -1,9 +1,9 @@
 //! Decides which side of a skeleton is the right one, from the direction in which heads, knees,
 //! elbows and backs bend.
 //!
-//! Exchanging left and right in all views at once changes no energy: two views can tell whether
-//! they agree, but not which of them is from behind. The labelled skeleton can tell. With `l` from
-//! its right to its left and `u` from its pelvis to its neck, `l x u` points to the front if the
+//! Exchanging left and right in all views at once changes no energy. Two views show whether
+//! they agree, but not which of them is from behind. The labelled skeleton can show it. Let `l` point from
+//! its right to its left, and `u` from its pelvis to its neck. Then `l x u` points to the front if the
 //! labels are right, and to the back if they are exchanged; and bodies bend forwards.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -21,12 +21,11 @@ const L_ELBOW: usize = 10;
 const L_WRIST: usize = 11;
 const HEAD: usize = 13;
 
-/// Evidence that left and right of a labelled skeleton are correct, in trunk lengths.
+/// Returns the evidence that left and right of a labelled skeleton are correct, in trunk lengths.
 ///
-/// The sum of the distances of the head in front of the neck, the knees in front of the line from
-/// hip to ankle, the elbows behind the line from shoulder to wrist and, if the up direction is
-/// known, the neck in front of the pelvis. Negated exactly when left and right are exchanged. There
-/// is no source: this is our own rule for what the paper leaves open.
+/// The evidence is the sum of these distances: the head in front of the neck, the knees in front of the line from hip to ankle, the elbows
+/// behind the line from shoulder to wrist and, if the up direction is known, the neck in front of the pelvis. Exchanging left and right
+/// negates it exactly. This rule is our own, for a question that the paper leaves open.
 ///
 /// * `joints`: the 14 joints of `skeleton::PARSE14` in the world; a missing joint contributes 0.
 /// * Returns 0 if the trunk or both sides are missing.
@@ -66,7 +65,7 @@ mod tests {
 
     use super::*;
 
-    /// Facing +x, up +z, left +y; slightly bent knees and elbows, head in front.
+    /// Returns a person facing +x, up +z, left +y; slightly bent knees and elbows, head in front.
     fn standing() -> Vec<Option<Point3<f64>>> {
         [
             [0.0, -0.1, 0.0],

@@ -10,11 +10,11 @@ use crate::{TypeTables, ViewInput};
 /// Part-type tables by the angle between two views, as seen from the person.
 ///
 /// The circle is divided into bins of equal width. Tables are given for one half; the other half
-/// has the same tables with the views exchanged. A pair uses the table of the bin that its angle
-/// falls into.
+/// has the same tables with the views exchanged. A pair uses the table of the bin that contains its
+/// angle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleTables {
-    /// By angle from -180 degrees; `None` where there is no table.
+    /// Tables by angle, starting at -180 degrees; `None` if there is no table.
     bins: Vec<Option<TypeTables>>,
 }
 
@@ -32,7 +32,7 @@ impl AngleTables {
         Self { bins }
     }
 
-    /// The tables for an angle (see [`angle_between`]), radians.
+    /// Returns the tables for an angle (see [`angle_between`]), in radians.
     pub fn at(&self, angle: f64) -> Option<&TypeTables> {
         let turn = (angle + PI).rem_euclid(TAU) / TAU;
         let last = self.bins.len().checked_sub(1)?;
@@ -41,12 +41,12 @@ impl AngleTables {
     }
 }
 
-/// The angle between two cameras as seen from the person: the rotation about the person from the
-/// first to the second, radians from -pi to pi, counter-clockwise as seen from above.
+/// Returns the angle between two cameras as seen from the person: the rotation about the person from the
+/// first to the second camera, in radians from -pi to pi, counter-clockwise as seen from above.
 ///
-/// The person is where the rays through the centres of the views' best poses meet. The angle at the
-/// person is therefore that between the rays, and the exact meeting point does not matter. Up is
-/// the mean up direction of the pictures. `None` where the lens model has no solution, or a view
+/// The person is assumed where the rays through the centres of the views' best poses meet. The angle is
+/// therefore the angle between the rays, and the exact meeting point does not matter. Up is
+/// the mean up direction of the pictures. `None` if the lens model has no solution, or a view
 /// looks straight up or down.
 pub fn angle_between(first: &ViewInput<'_>, second: &ViewInput<'_>) -> Option<f64> {
     let ups = [first, second].map(up);
@@ -59,13 +59,13 @@ pub fn angle_between(first: &ViewInput<'_>, second: &ViewInput<'_>) -> Option<f6
     Some(from.cross(&to).dot(&up).atan2(from.dot(&to)))
 }
 
-/// The up direction of the view's picture, in the world.
+/// Returns the up direction of the view's picture, in the world.
 fn up(view: &ViewInput<'_>) -> Vector3<f64> {
     let turn = view.plan.camera().camera_from_world.rotation.inverse();
     turn * -Vector3::y()
 }
 
-/// Direction from the camera to the person, in the world.
+/// Returns the direction from the camera to the person, in the world.
 fn ray(view: &ViewInput<'_>) -> Option<Vector3<f64>> {
     let centres = view.plan.centres(view.best()?);
     let n = centres.len().max(1) as f64;

@@ -3,17 +3,17 @@
 /// The pose of one view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedPose {
-    /// Centre of every anatomical part, pixels of the frame.
+    /// Centre of every anatomical part, in pixels of the frame.
     pub centres_px: Vec<[f64; 2]>,
     /// Number of pairs that were averaged; 0 if this is the view's own pose.
     pub n_pairs: usize,
-    /// Sum of the energies of those pairs.
+    /// Sum of the energies of the averaged pairs.
     pub energy: f64,
 }
 
-/// The mean of a view's candidates over its pairs (the paper's section 7: "simply averaged").
+/// Returns the mean of a view's candidates over its pairs (the paper's section 7: "simply averaged").
 ///
-/// * `candidates`: one pose per pair: its energy and its anatomical part centres.
+/// * `candidates`: one pose per pair, as its energy and its anatomical part centres.
 /// * Returns `None` if there is no candidate.
 ///
 /// # Panics

@@ -9,13 +9,13 @@ pub struct Compatibility {
     n_unseen: usize,
 }
 
-/// Why a table was rejected.
+/// Reason why a table was rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CompatibilityError {
     /// The number of rows differs from the number of types of the model.
     #[error("the table has {got} rows, expected {expected}: one per part and type")]
     Rows {
-        /// Rows found.
+        /// Number of rows found.
         got: usize,
         /// Number of types of all parts.
         expected: usize,
@@ -23,39 +23,39 @@ pub enum CompatibilityError {
     /// The length of a row differs from the number of types of the part.
     #[error("line {line}: {got} columns, expected {expected}: the part, and one per type")]
     Columns {
-        /// Line, from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// Columns found.
+        /// Number of columns found.
         got: usize,
-        /// Columns expected.
+        /// Expected number of columns.
         expected: usize,
     },
     /// The parts are not in order.
     #[error("line {line}, column 1: part `{got}`, expected {expected}")]
     Part {
-        /// Line, from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// The field.
+        /// The field found.
         got: String,
-        /// 1-based part.
+        /// The expected part, counted from 1.
         expected: usize,
     },
     /// A field is not a probability, and not all of its row is NaN.
     #[error("line {line}, column {column}: `{got}` is not a probability from 0 to 1")]
     Probability {
-        /// Line, from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// Column, from 1.
+        /// Column number, counted from 1.
         column: usize,
-        /// The field.
+        /// The field found.
         got: String,
     },
     /// The probabilities of a row do not sum to 1.
     #[error("line {line}: the probabilities sum to {sum}, expected 1")]
     Sum {
-        /// Line, from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// Their sum.
+        /// Sum of the probabilities.
         sum: f64,
     },
     /// Two tables belong to different models.
@@ -63,7 +63,7 @@ pub enum CompatibilityError {
     Shape {
         /// Number of types of every part in the first table.
         first: Vec<usize>,
-        /// In the second table.
+        /// Number of types of every part in the second table.
         second: Vec<usize>,
     },
 }
@@ -71,10 +71,9 @@ pub enum CompatibilityError {
 impl Compatibility {
     /// Reads a table in the authors' format: conditional probabilities, without a header.
     ///
-    /// One line per part and type of the *first*-named view (parts in order, types within them):
-    /// the 1-based part, then `p(type in second view | type in first view)` for every type of the
-    /// second view, separated by commas. A type of the first view that did not occur in training
-    /// has a line of NaN or of zeros. It is read as zeros, which add nothing to any score, and
+    /// The table has one line per part and type of the *first*-named view, ordered by part, then by type. A line contains the 1-based part,
+    /// then `p(type in second view | type in first view)` for every type of the second view, separated by commas. A type of the first view
+    /// that did not occur in training has a line of NaN or of zeros. Such a line is read as zeros, which add nothing to any score, and
     /// counted by [`Self::n_unseen`].
     ///
     /// * `n_types`: number of types of every part.
@@ -115,20 +114,20 @@ impl Compatibility {
 
     /// Computes `p(type in first view, type in second view)` from both conditionals.
     ///
-    /// With `R = p(b | a)` and `Q = p(a | b)` the marginal `p(a)` satisfies `p(a) = p(a) R Q`: it
+    /// With `R = p(b | a)` and `Q = p(a | b)`, the marginal `p(a)` satisfies `p(a) = p(a) R Q`. It
     /// is the stationary distribution of the chain that goes from a type of the first view to one
     /// of the second and back. Then `p(b) = p(a) R`, and both `p(a) R` and `p(b) Q` are the joint
     /// distribution. If the tables contradict each other, these are two joints with the same
     /// marginals, and the result is their mean. Types that did not occur get 0.
     ///
     /// If the types form groups that never occur together, the tables do not determine the
-    /// frequency of the groups; every group is then weighted by its number of types in the first
+    /// frequency of the groups. Every group is then weighted by its number of types in the first
     /// view.
     ///
     /// * `second_given_first`: `p(b | a)`, `[part][a][b]`; `first_given_second`: `p(a | b)`,
     ///   `[part][b][a]`, as [`Self::parse`] reads them from the two files of a pair.
-    /// * Returns the joint, which sums to 1 for every part that occurred, and the largest total
-    ///   variation distance between a part's two joints: 0 where the tables agree, at most 1.
+    /// * Returns the joint, which sums to 1 for every part that occurred. Also returns the largest total
+    ///   variation distance between a part's two joints: 0 if the tables agree, at most 1.
     ///
     /// # Errors
     ///
@@ -154,7 +153,7 @@ impl Compatibility {
         Ok((Self::of(values), disagreement))
     }
 
-    /// The entry of a part for a pair of types; 0 where it is unknown.
+    /// Returns the entry of a part for a pair of types; 0 if it is unknown.
     ///
     /// # Panics
     ///
@@ -163,28 +162,28 @@ impl Compatibility {
         self.values[part][(first, second)]
     }
 
-    /// Number of types of every part.
+    /// Returns the number of types of every part.
     pub fn n_types(&self) -> Vec<usize> {
         self.values.iter().map(DMatrix::nrows).collect()
     }
 
-    /// Number of types of the first view, over all parts, that did not occur in training.
+    /// Returns the number of types of the first view, over all parts, that did not occur in training.
     pub fn n_unseen(&self) -> usize {
         self.n_unseen
     }
 
-    /// The table with its views exchanged.
+    /// Returns the table with its views exchanged.
     #[must_use]
     pub fn transposed(&self) -> Self {
         Self::of(self.values.iter().map(DMatrix::transpose).collect())
     }
 
-    /// The table whose part `i` is part `parts[i]` of this one.
+    /// Returns the table whose part `i` is part `parts[i]` of this one.
     pub(crate) fn permuted(&self, parts: &[usize]) -> Self {
         Self::of(parts.iter().map(|&part| self.values[part].clone()).collect())
     }
 
-    /// `p(type in second view | type in first view)` of a joint table.
+    /// Returns `p(type in second view | type in first view)` for a joint table.
     #[must_use]
     pub fn conditional(&self) -> Self {
         let normalised = |matrix: &DMatrix<f64>| normalise_rows(matrix.clone());
@@ -202,7 +201,7 @@ impl Compatibility {
     }
 }
 
-/// Largest deviation of a row's sum that rounding to five digits may cause.
+/// Maximum deviation of a row's sum from 1 that rounding to five digits may cause.
 const ROUNDING: f64 = 1e-3;
 
 /// Reads one row; `None` if its type did not occur in training.
@@ -258,7 +257,7 @@ fn shortened(field: &str) -> String {
     field.chars().take(24).collect()
 }
 
-/// The joint `[a, b]` twice: from `second = p(b | a)` and from `first = p(a | b)`.
+/// Returns the joint `[a, b]`, computed twice: from `second = p(b | a)` and from `first = p(a | b)`.
 fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     let (second, first) = without_unseen(second.clone(), first.clone());
     let n = second.nrows();
@@ -266,7 +265,7 @@ fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     if seen.sum() == 0.0 {
         return [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
     }
-    // Half of the probability stays in every step, so that the chain cannot oscillate; by squaring,
+    // Half of the probability stays in place in every step, so that the chain cannot oscillate. By squaring,
     // 64 rounds take 2^64 steps.
     let mut steps = normalise_rows((&second * &first + DMatrix::identity(n, n)) / 2.0);
     for _ in 0..64 {

@@ -1,4 +1,4 @@
-//! Selects one position of a part per view from those of the view's pairs, such that all views
+//! Selects one position of a part per view from the positions in the view's pairs, such that all views
 //! agree on one point of the world.
 
 use geometry::{Camera, Ray};
@@ -9,18 +9,18 @@ use nalgebra::{Point2, Point3};
 pub struct Sightings<'a> {
     /// The camera of the frame.
     pub camera: &'a Camera,
-    /// Uncertainty of a position, pixels of the frame.
+    /// Uncertainty of a position, in pixels of the frame.
     pub sigma_px: f64,
-    /// One position per pair, pixels of the frame.
+    /// One position per pair, in pixels of the frame.
     pub points_px: Vec<[f64; 2]>,
 }
 
 /// Settings of the consensus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConsensusSettings {
-    /// Reprojection error above which the pull of a view decreases, sigma.
+    /// Reprojection error above which the pull of a view decreases, in multiples of sigma.
     pub loss_sigmas: f64,
-    /// Distance up to which two pairs of a view count as having the same position, sigma.
+    /// Maximum distance at which two pairs of a view count as having the same position, in multiples of sigma.
     pub same_sigmas: f64,
     /// Weight of the votes of a view's pairs, relative to the agreement between views.
     pub vote_weight: f64,
@@ -36,50 +36,50 @@ impl Default for ConsensusSettings {
     }
 }
 
-/// Replaces the error of a view that cannot see a point, sigma.
+/// Error assumed for a view that cannot see a point, in multiples of sigma.
 const UNSEEN: f64 = 1e6;
 
-/// A position that some of a view's pairs found.
+/// A position found by some of a view's pairs.
 #[derive(Debug, Clone, Copy)]
 struct Choice {
     at: Point2<f64>,
     ray: Option<Ray>,
-    /// Cost of choosing it.
+    /// Cost of choosing this position.
     cost: f64,
 }
 
 /// Chooses a part's position in every view.
 ///
-/// The paper takes the mean over a view's pairs. Where the pairs disagree, as for crossed legs and
+/// The paper takes the mean over a view's pairs. If the pairs disagree, as for crossed legs and
 /// lifted arms, the mean lies between two positions and fits neither. This function looks for the
-/// point of the world that most views support: over all points `X` in which the rays of positions
-/// of two views meet, the minimum of
+/// point of the world that most views support. It considers all points `X` in which rays of positions
+/// of two views meet, and minimises
 ///
 /// `sum over views of min over positions k of c^2 (ln(1 + r_k^2 / c^2) - w ln(n_k / n))`
 ///
 /// where `r_k` is the distance of the projection of `X` from position `k` in sigma, and `n_k` of
 /// the view's `n` pairs found that position. The means are a further alternative, with the cost of
 /// one position that a single pair found; they are chosen if nothing else is consistent. A view
-/// with a single position keeps it. There is no source: this is our own rule.
+/// with a single position keeps it. This rule is our own.
 ///
-/// * Returns one position per view, pixels; `None` for a view without positions.
+/// * Returns one position per view, in pixels; `None` for a view without positions.
 pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<Option<[f64; 2]>> {
     let mut workspace = ConsensusWorkspace::default();
     workspace.agree(settings, views).collect()
 }
 
-/// Workspace of [`consensus()`]: lists that are used again from part to part.
+/// Workspace of [`consensus()`]: lists that are reused from part to part.
 #[derive(Debug, Clone, Default)]
 pub struct ConsensusWorkspace {
-    /// By view.
+    /// Choices of every view.
     choices: Vec<Vec<Choice>>,
-    /// By view: the mean, if there are sightings.
+    /// Mean of every view, if it has sightings.
     means: Vec<Vec<Choice>>,
     kinds: Vec<Kind>,
 }
 
 impl ConsensusWorkspace {
-    /// [`consensus()`], one view after the other.
+    /// Like [`consensus()`], but takes the views one after the other.
     pub fn agree<'a>(
         &'a mut self,
         settings: &'a ConsensusSettings,
@@ -113,7 +113,7 @@ impl ConsensusWorkspace {
     }
 }
 
-/// The point of the world that the choices mean, unless the means fit together better.
+/// Returns the point of the world indicated by the choices, unless the means fit together better.
 fn meeting(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
@@ -140,7 +140,7 @@ fn vote_cost(settings: &ConsensusSettings, n_votes: usize, n_pairs: usize) -> f6
 
 /// The distinct positions of a view, in order of first occurrence.
 ///
-/// Answers close to the first one of their kind are one answer, at their mean.
+/// Answers close to the first one of a group are merged into one answer at their mean.
 fn distinct(
     settings: &ConsensusSettings,
     view: &Sightings<'_>,
@@ -169,7 +169,7 @@ fn distinct(
     choices.extend(kinds.iter().map(choice));
 }
 
-/// Answers that are close to the first of them.
+/// A group of answers that are close to the first of them.
 #[derive(Debug, Clone)]
 struct Kind {
     first: [f64; 2],
@@ -208,7 +208,7 @@ fn mean(points: &[[f64; 2]]) -> Point2<f64> {
     Point2::from(sum.map(|sum| sum / points.len() as f64))
 }
 
-/// The cheapest point in which two rays meet, behind its cost.
+/// Returns the cheapest point in which two rays meet, with its cost first.
 fn best(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
@@ -248,7 +248,7 @@ fn judge(
     })
 }
 
-/// The answer of a view that is nearest to a point of the world, and what it costs.
+/// Returns the answer of a view that is nearest to a point of the world, and its cost.
 fn nearest(
     settings: &ConsensusSettings,
     view: &Sightings<'_>,
@@ -266,7 +266,7 @@ fn nearest(
     costs.fold(dearest, |least, it| if it.1 < least.1 { it } else { least })
 }
 
-/// The point closest to both rays; `None` if they are parallel or it lies behind one of them.
+/// Returns the point closest to both rays; `None` if the rays are parallel or the point lies behind one of them.
 fn meeting_point(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
     let between = b.origin - a.origin;
     let cosine = a.direction.dot(&b.direction);
@@ -385,7 +385,7 @@ mod tests {
         let cameras = cameras(4);
         let views = sightings(&cameras, |view| {
             let [x, y] = projected(&cameras[view], KNEE);
-            // In all directions, so that no two positions of different views meet near a third.
+            // The offsets point in all directions, so that no two positions of different views meet near a third.
             let [dx, dy] = [[60.0, 80.0], [-70.0, 75.0], [65.0, -90.0], [-85.0, -60.0]][view];
             vec![[x + dx, y + dy], [x - dx, y - dy]]
         });

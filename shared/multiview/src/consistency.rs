@@ -13,7 +13,7 @@ pub(crate) struct PairTerms<'a> {
     /// `counterpart[i]` is the part of the second view that shows the same limb as part `i` of the
     /// first.
     counterpart: Vec<usize>,
-    /// `[target][part of the first view]`.
+    /// Switches of the terms, `[target][part of the first view]`.
     active: [Vec<bool>; 2],
     table: Option<&'a Compatibility>,
 }
@@ -21,8 +21,8 @@ pub(crate) struct PairTerms<'a> {
 impl<'a> PairTerms<'a> {
     /// Creates the terms of a pair.
     ///
-    /// * `exchanged`: the second view shows the other side of the body. Such a pair needs a table
-    ///   of its own, or has no appearance term.
+    /// * `exchanged`: true if the second view shows the other side of the body. Such a pair needs a table
+    ///   of its own; without one, it has no appearance term.
     pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
         let model = pair.views[0].plan.model();
         let counterpart = counterparts(model, exchanged);
@@ -44,15 +44,15 @@ impl<'a> PairTerms<'a> {
         }
     }
 
-    /// The switches `a_i` of eq. 6 by part of the first view: on if the terms are on for either
+    /// Returns the switches `a_i` of eq. 6 by part of the first view: on if the terms are on for either
     /// view.
     pub(crate) fn active(&self) -> Vec<bool> {
         let [first, second] = &self.active;
         first.iter().zip(second).map(|(a, b)| *a || *b).collect()
     }
 
-    /// The value of the two consistency sums of eq. 3 for two given poses; if the switches of the
-    /// views differ, the mean of the values as seen by each.
+    /// Returns the value of the two consistency sums of eq. 3 for two given poses. If the switches of the
+    /// views differ, it is the mean of the values as seen by each view.
     pub(crate) fn between(&self, first: &Pose, second: &Pose) -> f64 {
         let value = self.for_target(0, first, second);
         if self.active[0] == self.active[1] {
@@ -62,7 +62,7 @@ impl<'a> PairTerms<'a> {
         }
     }
 
-    /// As [`Self::between`], with the terms that are switched on while `target` is solved.
+    /// Like [`Self::between`], with the terms that are switched on while `target` is solved.
     pub(crate) fn for_target(&self, target: usize, first: &Pose, second: &Pose) -> f64 {
         let plan = self.pair.views[0].plan;
         let scale2 = plan.scale(usize::from(first.level)).powi(2);
@@ -78,7 +78,7 @@ impl<'a> PairTerms<'a> {
             .sum()
     }
 
-    /// The geometric term of a part of view `view`, as it is switched while view `target` is solved.
+    /// Returns the geometric term of a part of view `view`, with its switch while view `target` is solved.
     ///
     /// * `support`: the pose of the other view.
     fn term(&self, [view, target]: [usize; 2], part: usize, support: &Pose) -> Option<Term> {
@@ -93,7 +93,7 @@ impl<'a> PairTerms<'a> {
         Term::new(support_from_target, at, scale, cap)
     }
 
-    /// The appearance term of a type of a part, as [`Self::term`].
+    /// Returns the appearance term of a type of a part, like [`Self::term`].
     fn of_type(
         &self,
         [view, target]: [usize; 2],
@@ -108,7 +108,7 @@ impl<'a> PairTerms<'a> {
         }
         let partner = self.partner(part);
         let other = usize::from(support.parts[partner].mixture);
-        // The table goes by the parts of the first view.
+        // The table is indexed by the parts of the first view.
         let joint = if view == 0 {
             table.value(part, mixture, other)
         } else {
@@ -117,7 +117,7 @@ impl<'a> PairTerms<'a> {
         (self.settings.beta * joint) as f32
     }
 
-    /// The part of the other view that goes with `part` of view `target`.
+    /// Returns the part of the other view that corresponds to `part` of view `target`.
     fn partner(&self, part: usize) -> usize {
         // The exchange is its own inverse, so one table serves both directions.
         self.counterpart[part]
@@ -206,7 +206,7 @@ impl ExtraTerms for Consistency<'_> {
 /// The key of a part whose support adds nothing.
 pub(crate) const NO_SUPPORT: u64 = u64::MAX;
 
-/// Everything about a support that the terms of one pair depend on, as a key.
+/// Returns a key of everything in a support on which the terms of one pair depend.
 pub(crate) fn support_key(support: &Pose, part: usize) -> u64 {
     let at = support.parts[part];
     let fields = [at.x, at.y, u16::from(at.mixture)].map(u64::from);
@@ -222,14 +222,14 @@ pub(crate) fn counterparts(model: &fmp::Model, exchanged: bool) -> Vec<usize> {
     }
 }
 
-/// Eq. 6 for either target view, by part of the first view: a part is off if a relevant expected
+/// Eq. 6 for each target view, by part of the first view: a part is off if a relevant expected
 /// error exceeds its threshold.
 fn active_parts(
     settings: &Settings,
     pair: &PairInput<'_>,
     counterpart: &[usize],
 ) -> [Vec<bool>; 2] {
-    // Without a prediction a part is assumed to be usable.
+    // Without a prediction, a part is assumed to be usable.
     let expected = |view: usize, part: usize| {
         let expectation = pair.views[view].expectation(settings, part);
         expectation.unwrap_or([0.0, 1.0])
@@ -239,7 +239,7 @@ fn active_parts(
         parts.map(|(part, &other)| on(expected(0, part), expected(1, other))).collect()
     };
     let usable = |[sigma, tau]: [f32; 2]| sigma <= tau;
-    // Compared in thresholds, since a person can be larger in one view than in the other.
+    // Errors are compared relative to the thresholds, since a person can be larger in one view than in the other.
     let no_worse =
         |[sigma, tau]: [f32; 2], [other, other_tau]: [f32; 2]| sigma * other_tau <= other * tau;
     match settings.switch {

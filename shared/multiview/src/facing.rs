@@ -1,7 +1,7 @@
 //! Decides which views see the person from behind: ranks assignments by the energies of all pairs
 //! and tracks them over time.
 
-/// The result of one pair under either assumption about its two views.
+/// The result of one pair under each assumption about its two views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairEnergies {
     /// The views.
@@ -10,19 +10,19 @@ pub struct PairEnergies {
     pub same_or_opposite: [f64; 2],
 }
 
-/// Largest number of views for which all assignments are enumerated.
+/// Maximum number of views for which all assignments are enumerated.
 const MAX_VIEWS: usize = 16;
 
-/// Bit `v` is set if left and right of view `v` are exchanged.
+/// A bit set of views: bit `v` is set if left and right of view `v` are exchanged.
 pub type Exchanges = u32;
 
 /// Ranks the assignments of exchanges by the sum of the pairs' energies.
 ///
-/// A pair only tells whether its two views agree. The first present view is therefore never
-/// exchanged here; exchanging all views is decided by [`FacingFilter`]. For a view without a pair
+/// A pair only shows whether its two views agree. The first present view is therefore never
+/// exchanged here; [`SidesFilter`](crate::SidesFilter) decides whether all views are exchanged. For a view without a pair,
 /// both assignments are returned.
 ///
-/// * `present`: bit `v` is set if view `v` is present; the views of the pairs are.
+/// * `present`: bit `v` is set if view `v` is present; the views of all pairs must be present.
 /// * Returns at most `limit` assignments with the sum of the pairs' energies, best first.
 ///
 /// # Panics
@@ -67,19 +67,19 @@ pub fn is_exchanged(exchanges: Exchanges, view: usize) -> bool {
 /// One assignment of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingHypothesis {
-    /// Exchanges with respect to the first view.
+    /// Exchanges relative to the first view.
     pub exchanges: Exchanges,
-    /// Energy of all views under it.
+    /// Energy of all views under this assignment.
     pub energy: f64,
 }
 
-/// How strongly the facing of a frame depends on the frame before.
+/// How strongly the facing of a frame depends on the previous frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingSettings {
     /// Energy cost of exchanging one view from one frame to the next.
     pub change_cost: f64,
-    /// Weight of the earlier frames' scores in the next frame, 0..1. The default halves it in 34
-    /// frames: people face one way for longer than a stoop or a stride takes.
+    /// Weight of the earlier frames' scores in the next frame, 0..1. The default halves the weight in 34
+    /// frames: people keep facing one way for longer than a stoop or a stride takes.
     pub memory: f64,
 }
 
@@ -95,20 +95,20 @@ impl Default for FacingSettings {
 /// The decision of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facing {
-    /// Which views see the person from another side than the first one.
+    /// The views that see the person from another side than the first view.
     pub exchanges: Exchanges,
-    /// The index of the hypothesis that it belongs to.
+    /// Index of the chosen hypothesis.
     pub hypothesis: usize,
-    /// How far it is ahead of the best other assignment; infinite if there is none.
+    /// Lead over the best other assignment; infinite if there is no other.
     pub margin: f64,
 }
 
 /// Tracks over time which views see the person from the same side: a hidden Markov model with a Viterbi
-/// filter. An assignment and its complement are the same here: [`SidesFilter`](crate::SidesFilter)
+/// filter. An assignment and its complement count as the same; [`SidesFilter`](crate::SidesFilter)
 /// decides between them.
 ///
 /// The score of an assignment is its score in this frame plus the best score of a path from the
-/// frame before, where every view that changes has a cost. The first frame is decided by its own
+/// previous frame; every view that changes adds a cost. The first frame is decided by its own
 /// energies alone.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FacingFilter {
@@ -119,7 +119,7 @@ impl FacingFilter {
     /// Decides a frame.
     ///
     /// * `hypotheses`: the frame's assignments, relative to the first view; not empty.
-    /// * `present`: bit `v` is set if view `v` takes part in this frame.
+    /// * `present`: bit `v` is set if view `v` contributes to this frame.
     ///
     /// # Panics
     ///

@@ -1,4 +1,4 @@
-//! The direction in which a person faces: what a skeleton says, and what every view says of it.
+//! The direction in which a person faces, according to a skeleton and according to every view.
 
 use geometry::Camera;
 use nalgebra::{Point3, Vector3};
@@ -12,19 +12,19 @@ pub(crate) const NECK: usize = 12;
 
 /// Evidence of the picture of one view about the direction in which the person faces.
 ///
-/// `[towards the right of the picture, towards the camera]`. For a unit vector `n` with these two
+/// The components are `[towards the right of the picture, towards the camera]`. For a unit vector `n` with these two
 /// components, `2 e n` is the logarithm of the likelihood of facing `n` over that of facing `-n`: the
-/// natural parameter of a von Mises distribution. Zeros say nothing. Evidence of independent views adds
-/// up. Any detector can give it.
+/// natural parameter of a von Mises distribution. Zeros mean no evidence. Evidence of independent views adds
+/// up. Any detector can provide it.
 pub type FrontEvidence = [f32; 2];
 
-/// The direction in which a labelled skeleton faces, of length 1, in the frame of its joints.
+/// Returns the direction in which a labelled skeleton faces, as a unit vector in the frame of its joints.
 ///
-/// `l x u` with `l` from its right to its left and `u` from its pelvis to its neck. If left and right are
-/// exchanged it is the opposite direction.
+/// It is `l x u` with `l` from the skeleton's right to its left and `u` from its pelvis to its neck. If left and right are
+/// exchanged, it is the opposite direction.
 ///
 /// * `joints`: the 14 joints of `skeleton::PARSE14`.
-/// * Returns `None` without a trunk, or without either pair of shoulders and hips.
+/// * Returns `None` without a trunk, or if both the shoulders and the hips are incomplete.
 pub fn front(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
     let at = |joint: usize| joints.get(joint).copied().flatten();
     let across = |right: usize, left: usize| Some(at(left)? - at(right)?);
@@ -33,13 +33,13 @@ pub fn front(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
     left.cross(&trunk(joints)?).try_normalize(1e-9)
 }
 
-/// From the pelvis to the neck.
+/// Returns the vector from the pelvis to the neck.
 pub(crate) fn trunk(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
     let at = |joint: usize| joints.get(joint).copied().flatten();
     Some(at(NECK)? - nalgebra::center(&at(R_HIP)?, &at(L_HIP)?))
 }
 
-/// The components of a direction in the world that [`FrontEvidence`] is about, for a person at a place:
+/// Projects a direction in the world to the two components of [`FrontEvidence`], for a person at a place:
 /// towards the right of the picture, and towards the camera.
 ///
 /// The right is perpendicular to the ray from the camera to the place.
@@ -54,17 +54,17 @@ pub fn front_in_view(camera: &Camera, place: &Point3<f64>, front: &Vector3<f64>)
     [right, -ray.dot(&front)]
 }
 
-/// Logarithm of the likelihood ratio of a direction over its opposite, by the evidence of one view, nats.
+/// Returns the logarithm of the likelihood ratio of a direction over its opposite, given the evidence of one view, in nats.
 pub fn front_log_ratio(in_view: [f64; 2], evidence: FrontEvidence) -> f64 {
     let [right, towards] = evidence.map(f64::from);
     2.0 * (right * in_view[0] + towards * in_view[1])
 }
 
-/// Logarithm of the likelihood ratio of the direction in which a skeleton faces over its opposite, by the evidence of all views, nats;
-/// 0 without a trunk.
+/// Returns the logarithm of the likelihood ratio of the direction in which a skeleton faces over its opposite, given the evidence of all
+/// views, in nats; 0 without a trunk.
 ///
-/// * `joints`: as [`front`] takes them, metres in the world.
-/// * `views`: the camera of every view, and what it says.
+/// * `joints`: the same joints as for [`front`], in metres in the world.
+/// * `views`: the camera and the evidence of every view.
 pub fn front_log_ratio_of(
     joints: &[Option<Point3<f64>>],
     views: &[(&Camera, FrontEvidence)],

@@ -1,10 +1,10 @@
 //! The authors' heat map: the closeness of every cell to a rasterised epipolar line, between 0 and
 //! 1.
 //!
-//! Written from the description of the released program. A line one pixel wide is drawn on an image
-//! of the original size, and the image is reduced by area to the size of the response map. Every
+//! It follows the description of the released program. A line one pixel wide is drawn on an image
+//! of the original size, and the image is reduced by area averaging to the size of the response map. Every
 //! cell whose average differs from the background is on the line. A 3x3 chamfer distance transform
-//! measures the distance of all cells from it, and `1 - sqrt(d / d_max)` is the heat. The map also
+//! measures the distance `d` of all cells from the line, and `1 - sqrt(d / d_max)` is the heat. The map also
 //! covers the padding cells, so the line is off by up to a cell towards the borders, as in the
 //! program.
 
@@ -12,19 +12,19 @@
 const STRAIGHT: f32 = 0.955;
 const DIAGONAL: f32 = 1.3693;
 
-/// Heat of an epipolar line, as in the released program: 1 on the line, 0 in the farthest cell.
+/// Returns the heat of an epipolar line, as in the released program: 1 on the line, 0 in the farthest cell.
 ///
-/// `1 - sqrt(d / d_max)` with `d` the chamfer distance of a cell from the line and `d_max` the
-/// largest of the map; zeros if the line misses the image. Public for comparison with the program;
-/// the terms of [`EnergyKind::Released`](crate::EnergyKind::Released) use it.
+/// The heat is `1 - sqrt(d / d_max)`, where `d` is the chamfer distance of a cell from the line and `d_max` the largest one of the map. All
+/// values are zero if the line misses the image. The function is public for comparison with the program; the terms of
+/// [`EnergyKind::Released`](crate::EnergyKind::Released) use it.
 ///
 /// * `ends`: the line's intersections with the image's border, `[x, y]` as the program counts
 ///   pixels (from 1); rounded half to even, then used as if counted from 0.
-/// * `image_size`: `[width, height]`, pixels.
+/// * `image_size`: `[width, height]`, in pixels.
 /// * `rows`, `cols`: size of the response map; returns one value per cell, row major.
 pub fn heat_map(ends: [[f64; 2]; 2], image_size: [usize; 2], rows: usize, cols: usize) -> Vec<f32> {
     let covered = coverage(ends, image_size, rows, cols);
-    // Averages have eight bits: white (255) becomes 254 from half a grey level on.
+    // Averages have eight bits: white (255) becomes 254 if the line takes more than half a grey level.
     let on_line = |covered: f64| covered > 0.5 / 255.0;
     let distance = |covered: f64| if on_line(covered) { 0.0 } else { f32::INFINITY };
     let mut map: Vec<f32> = covered.into_iter().map(distance).collect();
@@ -40,7 +40,7 @@ pub fn heat_map(ends: [[f64; 2]; 2], image_size: [usize; 2], rows: usize, cols: 
     map
 }
 
-/// Share of every cell that the line covers.
+/// Returns the share of every cell that the line covers.
 fn coverage(ends: [[f64; 2]; 2], size: [usize; 2], rows: usize, cols: usize) -> Vec<f64> {
     let [width, height] = size;
     let cell = [width as f64 / cols as f64, height as f64 / rows as f64];
@@ -73,7 +73,7 @@ fn overlap(index: usize, cell: f64, pixel: f64) -> f64 {
     (hi.min(pixel + 1.0) - lo.max(pixel)).max(0.0)
 }
 
-/// Sides of the image beyond which a point lies, besides left (1) and right (2).
+/// Bits for the sides of the image beyond which a point lies; left is 1 and right is 2.
 const ABOVE: i64 = 0b0100;
 const BELOW: i64 = 0b1000;
 const VERTICAL: i64 = ABOVE | BELOW;

@@ -1,12 +1,12 @@
 //! Learns the consistency parameters between views from people with known joints.
 //!
-//! The paper's section 5, "Consistency parameters". [`Learner`] takes single-view solutions with the truth
-//! ([`ViewObservation`]), and learns from those that are nearly right which part types occur together
+//! This is the paper's section 5, "Consistency parameters". [`Learner`] takes single-view solutions with the truth
+//! ([`ViewObservation`]). From the solutions that are nearly right, it learns which part types occur together
 //! ([`Counts`]), the median errors of parts (tau), and the map from parts to joints. [`Learned`] is the file
 //! beside a model with the result.
 //!
-//! [`Local`] learns from single views of marked people where joints lie among the parts around them; [`JointFile`] is
-//! the file with that. Nothing here reads a file or a clock.
+//! [`Local`] learns from single views of annotated people where joints are relative to the parts around them; [`JointFile`]
+//! stores the result. This module does not read files or the clock.
 
 mod counts;
 mod file;

@@ -9,20 +9,20 @@ use crate::{EnergyKind, PairInput, Settings, ViewPlan};
 /// The start of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PairStart {
-    /// Candidate of either view.
+    /// Candidate of each view.
     pub candidates: [usize; 2],
-    /// True if left and right of the second view are exchanged with respect to the first.
+    /// True if left and right of the second view are exchanged relative to the first.
     pub exchanged: bool,
 }
 
 /// One single-view solution of the optimisation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Iteration {
-    /// The view that was solved, 0 or 1; the other one was the support.
+    /// The view that was solved, 0 or 1; the other view was the support.
     pub target: usize,
     /// Energy of the pair after the solution (`Paper`), or score of the target's pose (`Released`).
     pub score: f64,
-    /// Mean movement of the target's part centres, pixels.
+    /// Mean movement of the target's part centres, in pixels.
     pub moved_px: f64,
     /// The target's pose after the solution.
     pub pose: Pose,
@@ -31,16 +31,16 @@ pub struct Iteration {
 /// The result of a pair under one assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairEstimate {
-    /// The start.
+    /// The start of the optimisation.
     pub start: PairStart,
-    /// The final joint energy (eq. 3); `Released`: the sum of the last scores of the two views.
+    /// The final joint energy (eq. 3); for `Released`, the sum of the last scores of the two views.
     pub energy: f64,
     /// The solutions, in order.
     pub iterations: Vec<Iteration>,
     /// True if the poses had converged at the end.
     pub converged: bool,
-    /// For each part of the first view true if its consistency terms were switched on; `Released`: while the first view was the
-    /// support, which does not describe the second view as a support.
+    /// For each part of the first view, true if its consistency terms were switched on. For `Released`, these are the switches while the
+    /// first view was the support; those of the second view as a support are not included.
     pub active: Vec<bool>,
     /// The pose in the first and in the second view; parts are named by the model, not exchanged.
     pub poses: [Pose; 2],
@@ -48,22 +48,22 @@ pub struct PairEstimate {
 
 /// Maximises the joint energy of a pair from a given start.
 ///
-/// Eq. 3 of the paper is maximised by solving one view exactly while the other one (the support) is
+/// Eq. 3 of the paper is maximised by solving one view exactly while the other view (the support) is
 /// fixed, then exchanging roles (section 6). The first support is the view with the lower expected
 /// error, summed over its parts, or the one with the higher score if either view has no expected
 /// errors.
 ///
-/// Under [`EnergyKind::Paper`] a solution is accepted only if it raises the energy as seen by the
-/// target. With [`SwitchBy::Either`](crate::SwitchBy::Either) both views see the same energy, so it
+/// Under [`EnergyKind::Paper`], a solution is accepted only if it raises the energy as seen by the
+/// target. With [`SwitchBy::Either`](crate::SwitchBy::Either), both views see the same energy, so it
 /// never falls and a cycle is impossible. The loop ends when a view does not move after a solution
 /// of the other: then neither view alone can raise the energy (up to the tolerance of
 /// `epsilon_px`).
 ///
-/// Under [`EnergyKind::Released`] every solution is accepted, whatever its score, as in the
-/// authors' program, until both views have moved by at most `epsilon_px`; a cycle ends at the limit
+/// Under [`EnergyKind::Released`], every solution is accepted, whatever its score, as in the
+/// authors' program, until both views have moved by at most `epsilon_px`. A cycle ends at the limit
 /// of iterations.
 ///
-/// * `evidence`: the responses of either view; they should carry their bounds
+/// * `evidence`: the responses of both views; they should include their bounds
 ///   ([`Responses::with_bounds`]) if they are solved more than once.
 pub fn estimate_pair(
     solver: &Solver,
@@ -186,7 +186,7 @@ fn released_pair(
     }
 }
 
-/// Returns true if the shortcuts gave the exact result; always true with bounds that are not those of the evidence.
+/// Returns true if the shortcuts gave the exact result; always true with bounds that do not belong to the evidence.
 pub(crate) fn is_best(
     solver: &Solver,
     evidence: &Responses<'_>,
@@ -201,12 +201,12 @@ pub(crate) fn is_best(
     !evidence.bounds().is_none_or(is_right) || solver.best(evidence, Some(extra)).as_ref() == found
 }
 
-/// Score of a pose in its own view alone (eq. 1).
+/// Returns the score of a pose in its own view alone (eq. 1).
 fn own_score(solver: &Solver, evidence: &Responses<'_>, pose: &Pose) -> f64 {
     f64::from(solver.score(evidence, pose, None))
 }
 
-/// The first support: the view with the lower expected error, or the higher score if either view
+/// Returns the first support: the view with the lower expected error, or the higher score if either view
 /// has no expected errors; ties go to the first view.
 fn initial_support(pair: &PairInput<'_>, poses: &[Pose; 2]) -> usize {
     let expected = pair
@@ -222,7 +222,7 @@ pub(crate) fn types(pose: &Pose) -> impl Iterator<Item = u8> {
     pose.parts.iter().map(|part| part.mixture)
 }
 
-/// Mean distance between the part centres of two poses, pixels.
+/// Returns the mean distance between the part centres of two poses, in pixels.
 pub(crate) fn mean_movement(plan: &ViewPlan, from: &Pose, to: &Pose) -> f64 {
     let movement = |part: usize| {
         let [a, b] = [from, to].map(|pose| plan.centre(pose, part));

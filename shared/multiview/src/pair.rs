@@ -7,7 +7,7 @@ use crate::{Epipolar, TypeTables, ViewInput};
 pub struct PairInput<'a> {
     /// The two views.
     pub views: [ViewInput<'a>; 2],
-    /// Their geometry, from the first to the second.
+    /// Geometry of the views, from the first to the second.
     pub epipolar: Epipolar,
     /// Part-type tables of the pair, if any were learned.
     pub tables: Option<&'a TypeTables>,

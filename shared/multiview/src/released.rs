@@ -1,9 +1,12 @@
 //! The terms that the authors' program adds to a view's scores, implemented from its description.
 //!
-//! Three points that the description calls bugs are corrected. A support outside its table adds
-//! nothing (the program draws a line around the top-left corner). The rescue of a part that both
-//! views would switch off checks that part (the program checks part 1). A type that did not occur
-//! in training adds nothing (the program's table holds NaN).
+//! Three points that the description calls bugs are corrected:
+//!
+//! * A support outside its table adds nothing (the program draws a line around the top-left
+//!   corner).
+//! * The rescue of a part that both views would switch off checks that part (the program checks
+//!   part 1).
+//! * A type that did not occur in training adds nothing (the program's table holds NaN).
 
 use fmp::{ExtraTerms, Pose};
 use nalgebra::{Matrix3, Vector3};
@@ -18,15 +21,15 @@ pub(crate) struct ReleasedPair<'a> {
     settings: &'a Settings,
     pair: &'a PairInput<'a>,
     /// `counterpart[i]` is the part of the other view that shows the same limb as part `i` of the
-    /// one.
+    /// first.
     counterpart: Vec<usize>,
     weights: [Vec<bool>; 2],
-    /// `p(type in the other view | type in this view)` of either view.
+    /// The tables `p(type in the other view | type in this view)`, one for each view.
     tables: Option<[&'a Compatibility; 2]>,
 }
 
 impl<'a> ReleasedPair<'a> {
-    /// * `exchanged`: the second view shows the other side of the body; such a pair does not use
+    /// * `exchanged`: true if the second view shows the other side of the body. Such a pair does not use
     ///   the type tables, which are learned on views with the model's part names.
     pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
         let counterpart = counterparts(pair.views[0].plan.model(), exchanged);
@@ -42,7 +45,7 @@ impl<'a> ReleasedPair<'a> {
         }
     }
 
-    /// The parts of either view that may support the other one.
+    /// For each view, the parts that may support the other view.
     pub(crate) fn weights(&self) -> &[Vec<bool>; 2] {
         &self.weights
     }
@@ -54,7 +57,7 @@ pub(crate) struct ReleasedTerms<'a> {
     released: &'a ReleasedPair<'a>,
     target: usize,
     support: &'a Pose,
-    /// For every part of the target; `None` where the part adds nothing.
+    /// One entry for every part of the target; `None` if the part adds nothing.
     lines: Vec<Option<Line>>,
 }
 
@@ -132,10 +135,10 @@ impl ExtraTerms for ReleasedTerms<'_> {
     }
 }
 
-/// The whole pixel, counted from 0, at which the program looks up the line of a support.
+/// Returns the whole pixel, counted from 0, at which the program looks up the line of a support.
 ///
-/// * `from_one`: centre of the support, pixels counted from 1, as the program computes it.
-/// * `size`: of its image, which is the size of the program's table. The table contains the pixels
+/// * `from_one`: centre of the support, in pixels counted from 1, as computed by the program.
+/// * `size`: size of the support's image and of the program's table. The table contains the pixels
 ///   of the last row and column, but the program treats them as outside.
 fn looked_up(from_one: [f64; 2], size: [usize; 2]) -> Option<[f64; 2]> {
     // Rounds half away from zero.
@@ -150,7 +153,7 @@ fn looked_up(from_one: [f64; 2], size: [usize; 2]) -> Option<[f64; 2]> {
 enum Line {
     /// The line misses the image and adds no heat.
     Outside,
-    /// Intersects the border at these points, `[x, y]` in pixels counted from 1.
+    /// The line intersects the border at these points, `[x, y]` in pixels counted from 1.
     Across([[f64; 2]; 2]),
 }
 
@@ -173,11 +176,11 @@ impl Line {
     }
 }
 
-/// The switches of either view, by its parts: off where the expected error exceeds the threshold.
+/// Returns the switches of each view, by its parts: off if the expected error exceeds the threshold.
 ///
-/// Where both views would be off and their expected errors differ by more than the part's median
-/// training error, the better one is switched back on (the intended form of the program's rescue,
-/// which checks the wrong part).
+/// If both views would be off and their expected errors differ by more than the part's median
+/// training error, the better view is switched back on. This is the intended form of the program's rescue,
+/// which checks the wrong part.
 fn weights(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> [Vec<bool>; 2] {
     let n_parts = counterpart.len();
     let sigma = |view: usize, part: usize| {
@@ -242,7 +245,7 @@ mod tests {
         assert_eq!(looked_up([7.4, 20.5], [64, 48]), Some([6.0, 20.0]));
     }
 
-    /// The head top of `HumanEva`'s C3: cell 35 of the eleventh level, whose cells are exactly 8
+    /// Test case: the top of the head in `HumanEva`'s C3, at cell 35 of the eleventh level, whose cells are exactly 8
     /// pixels. 263.49999999999983 + 1 was rounded to the pixel on its left.
     #[test]
     fn a_support_between_two_pixels_is_rounded_as_in_the_program() {

@@ -7,28 +7,28 @@ use crate::Compatibility;
 /// The energy of the terms between two views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EnergyKind {
-    /// The paper's: squared point-to-line distances in both directions, joint type table, a part
+    /// The paper's energy: squared point-to-line distances in both directions, joint type table, and a part
     /// switched off if either view is expected to be off (see [`SwitchBy`]).
     #[default]
     Paper,
-    /// That of the authors' program: normalised heat maps, conditional type tables, a part switched
+    /// The energy of the authors' program: normalised heat maps, conditional type tables, and a part switched
     /// off by the supporting view alone.
     Released,
 }
 
-/// Which expected error switches the terms of a part off, in the paper's energy.
+/// The expected error that switches the terms of a part off, in the paper's energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SwitchBy {
-    /// That of either view: the paper's eq. 6.
+    /// The error of either view: the paper's eq. 6.
     #[default]
     Either,
-    /// That of the support alone, as in the authors' program: a reliable view continues to correct
-    /// an unreliable one, and does not follow it. Each view then has its own energy; the energy of
-    /// a pair is their mean, and may fall during the optimisation.
+    /// The error of the support alone, as in the authors' program: a reliable view continues to correct
+    /// an unreliable one, and does not follow it. Each view then has its own energy. The energy of
+    /// a pair is the mean of both, and may fall during the optimisation.
     Support,
-    /// That of the support, if it is also the worse of the two views (each relative to its
-    /// thresholds): of two unreliable views the better one continues to support the other, so that
-    /// errors that are expected everywhere do not separate all views. Energies as with
+    /// The error of the support, if the support is also the worse of the two views (each relative to its
+    /// thresholds). The better of two unreliable views continues to support the other, so that
+    /// errors that are expected everywhere do not separate all views. Energies are defined as for
     /// [`Self::Support`].
     Worse,
 }
@@ -36,21 +36,21 @@ pub enum SwitchBy {
 /// The part-type tables of one pair of views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TypeTables {
-    /// `p(type in second | type in first)` and the reverse, for [`EnergyKind::Released`].
+    /// The tables `p(type in second | type in first)` and the reverse, for [`EnergyKind::Released`].
     pub conditional: [Arc<Compatibility>; 2],
-    /// `p(type in first, type in second)`, or another value of two types, for
+    /// The table `p(type in first, type in second)`, or another value for each pair of types, for
     /// [`EnergyKind::Paper`].
     pub joint: Arc<Compatibility>,
-    /// The same for views of which one sees the other side of the person: rows are types of the
-    /// first view's part, columns those of the second view's part that shows the same limb. `None`:
+    /// Joint table for views of which one sees the other side of the person: rows are types of the
+    /// first view's part, columns are types of the second view's part that shows the same limb. If `None`,
     /// such views have no appearance term.
     pub exchanged: Option<Arc<Compatibility>>,
 }
 
 impl TypeTables {
-    /// The tables of the same views with the second one named first.
+    /// Returns the tables of the same views in the opposite order.
     ///
-    /// * `mirror`: the part on the other side of every part; the parts themselves if the model has no sides.
+    /// * `mirror`: for every part, the part on the other side; the parts themselves if the model has no sides.
     #[must_use]
     pub fn reversed(&self, mirror: &[usize]) -> Self {
         let [first, second] = &self.conditional;
@@ -68,40 +68,40 @@ impl TypeTables {
 /// Settings of the optimiser.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Which energy.
+    /// The kind of energy.
     pub energy: EnergyKind,
     /// Weight of the geometric term.
     ///
     /// `Paper`: score per squared cell. Distances are divided by the cell size of the pose's own
-    /// level before they are squared, so that the weight has the same effect for near and far
+    /// level before they are squared. The weight then has the same effect for near and far
     /// people and at every resolution, and can be compared with the springs of the model (the
     /// weakest of which is 0.01 per squared cell). `Released`: score of a cell on the line; 0.07 in
     /// the authors' runs.
     pub alpha: f64,
     /// Weight of the appearance term: score of two types that always occur together.
     pub beta: f64,
-    /// Distance at which the geometric term of the paper's energy is capped, cells. Infinite is the
+    /// Distance at which the geometric term of the paper's energy is capped, in cells. Infinity gives the
     /// paper's own form.
     pub max_distance_cells: f64,
-    /// Largest number of single-view solutions of a pair.
+    /// Maximum number of single-view solutions of a pair.
     pub max_iterations: usize,
-    /// Mean movement of the part centres below which a view counts as converged, pixels.
+    /// Mean movement of the part centres below which a view counts as converged, in pixels.
     pub epsilon_px: f64,
-    /// Expected error above which a part is switched off, pixels of the frame, one per part; empty:
-    /// never.
+    /// Expected error above which a part is switched off, in pixels of the frame, one per part; if empty,
+    /// no part is switched off.
     pub tau_px: Vec<f32>,
-    /// Which expected error switches a part off.
+    /// The expected error that switches a part off.
     pub switch: SwitchBy,
-    /// The same in tenths of the person's size in the view, which is the longer side of the
+    /// The same thresholds in tenths of the person's size in the view, which is the longer side of the
     /// rectangle around the part centres of its best pose; used if `tau_px` is empty.
     pub tau_tenths: Vec<f32>,
-    /// `Released` only: difference of the expected errors above which the better of two views that
-    /// are both off is switched on again, pixels, one per part (the median training errors); empty:
-    /// never.
+    /// `Released` only: minimum difference of the expected errors at which the better of two views that
+    /// are both off is switched on again, in pixels, one per part (the median training errors); if empty,
+    /// no view is switched on again.
     pub rescue_px: Vec<f32>,
-    /// Decide for every view whether left and right are exchanged; the paper does not.
+    /// Decide for every view whether left and right are exchanged; the paper does not do this.
     pub facing: bool,
-    /// Largest number of candidates of a view that the start may combine; 1 is the paper's start.
+    /// Maximum number of candidates per view that the start may combine; 1 is the paper's start.
     pub n_candidates: usize,
 }
 
@@ -125,7 +125,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The settings of the authors' runs: their energy, weights and start.
+    /// Returns the settings of the authors' runs: their energy, weights and start.
     pub fn released() -> Self {
         Self {
             energy: EnergyKind::Released,

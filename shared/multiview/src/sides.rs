@@ -1,20 +1,20 @@
 //! Decides which side of the body is the right one, for all views together, over time.
 //!
-//! Exchanging left and right in all views changes no energy: it must be decided by what is seen
-//! ([`front`](crate::front())) and by how bodies bend ([`anatomical_evidence`](crate::anatomical_evidence)).
+//! Exchanging left and right in all views changes no energy. So the decision uses the front evidence of the views
+//! ([`front`](crate::front())) and the way bodies bend ([`anatomical_evidence`](crate::anatomical_evidence)).
 
 use nalgebra::Vector3;
 
-/// How the sides are decided.
+/// Settings for deciding the sides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SidesSettings {
-    /// Log-likelihood ratio per nat of the views' evidence about the front. Below 1: what views take for
-    /// the front of a person is wrong in several at once more often than if they were independent.
+    /// Log-likelihood ratio per nat of the views' evidence about the front. The value is below 1 because views err together
+    /// about the front of a person more often than if they were independent.
     pub front_weight: f64,
     /// Log-likelihood ratio per unit of anatomical evidence (trunk lengths), nats.
     pub anatomy_weight: f64,
-    /// Probability that a person turns around from one frame to the next. It limits how much the earlier
-    /// frames weigh.
+    /// Probability that a person turns around from one frame to the next. It limits the weight of the earlier
+    /// frames.
     pub turn: f64,
     /// Log-odds below which a decision is unsure, nats.
     pub unsure: f64,
@@ -34,18 +34,18 @@ impl Default for SidesSettings {
 /// The decision of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides {
-    /// True if left and right are to be exchanged in all views.
+    /// True if left and right must be exchanged in all views.
     pub exchange: bool,
-    /// Log-odds of the decision, nats; not negative.
+    /// Log-odds of the decision, in nats; not negative.
     pub margin: f64,
     /// True if the margin is too small to rely on.
     pub unsure: bool,
 }
 
-/// Follows over time which side is the right one: a Bayes filter of one bit.
+/// Tracks over time which side is the right one: a Bayes filter of one bit.
 ///
-/// The bit is carried from frame to frame by the direction in which the person faces, so it does not
-/// matter how the frames were labelled.
+/// The bit is carried from frame to frame by the direction in which the person faces, so the labels
+/// of the frames do not matter.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SidesFilter {
     /// The last direction, and the log-odds that it is right.
@@ -55,9 +55,9 @@ pub struct SidesFilter {
 impl SidesFilter {
     /// Decides a frame.
     ///
-    /// * `front`: the direction in which the skeleton faces as it is labelled, of length 1; `None` if it
-    ///   has none.
-    /// * `evidence`: log-likelihood ratio of the labels over the exchanged ones, nats, of this frame alone.
+    /// * `front`: direction in which the skeleton faces according to its labels, as a unit vector; `None` if
+    ///   unknown.
+    /// * `evidence`: log-likelihood ratio of the labels over the exchanged ones, from this frame alone, in nats.
     pub fn decide(
         &mut self,
         settings: &SidesSettings,
@@ -81,10 +81,10 @@ impl SidesFilter {
     }
 }
 
-/// Returns the log-odds of this frame's labels that follow from those of the last frame's.
+/// Returns the log-odds of this frame's labels that follow from those of the last frame's labels.
 ///
-/// * `cosine`: of the angle between the two directions. Someone who seems to have turned by a right
-///   angle may have turned either way.
+/// * `cosine`: cosine of the angle between the two directions. A person who seems to have turned by a right
+///   angle may have turned to either side.
 fn carried(settings: &SidesSettings, cosine: f64, log_odds: f64) -> f64 {
     let cosine = cosine.clamp(-1.0, 1.0);
     let turned = settings.turn + (0.5 - settings.turn) * (1.0 - cosine.abs());

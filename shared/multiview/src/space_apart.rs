@@ -1,18 +1,18 @@
-//! The right and the left of a person are not at one place, even if the evidence of both is.
+//! Keeps the right and the left limbs of a person apart, even if the evidence puts both at one place.
 //!
-//! The tree has no bone between two legs. Where a network sees both ankles in the maps of either, both legs may lie on the one that it
-//! sees better: that evidence then counts twice, and the other foot is explained by nothing. A term on pairs of joints tells,
+//! The tree has no bone between the two legs. If a network shows both ankles in the map of either ankle, both legs may end up at the ankle
+//! that is seen better. That evidence then counts twice, and nothing explains the other foot. A term on pairs of joints prevents this:
 //!
 //! `E_apart(X) = - a sum_(r,l) max(0, 1 - |X_r - X_l| / d)`
 //!
-//! with `d` the least distance of a pair. It closes loops, so that the tree alone is not exact any more: one side is kept away from where
-//! the other one is, the tree solved again, and the better one of both sides chosen.
+//! where `d` is the minimum distance of a pair. The term closes loops, so the tree alone is no longer exact. Instead, one side is kept away
+//! from the place of the other, and the tree is solved again. The better of the two solutions is chosen.
 
 use crate::space_places::Choices;
 use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
 use crate::space_view::{LIMBS, N};
 
-/// Returns the cost of the nearness of the pairs of a limb.
+/// Returns the cost of a limb's right and left joints being close to each other.
 fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -> f64 {
     let of_pair = |[right, left]: &[usize; 2]| match (&joints[*right], &joints[*left]) {
         (Some(right), Some(left)) => cost(right, left, settings),
@@ -21,11 +21,11 @@ fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -
     pairs.iter().map(of_pair).sum()
 }
 
-/// The better of a solution and of those in which the right or the left arm or leg is kept away from the other one, if both lie at one
-/// place.
+/// Returns the better of a solution and the solutions in which the right or the left arm or leg is kept away from the other one, if both
+/// are at one place.
 ///
-/// * `first`: the best on the tree.
-/// * Returns the solution, and what its joints are kept away from.
+/// * `first`: the best solution on the tree.
+/// * Returns the solution, and the places that its joints are kept away from.
 pub(crate) fn kept_apart(
     choices: &Choices,
     lengths: &[BoneLength; TREE.len()],
@@ -49,7 +49,7 @@ pub(crate) fn kept_apart(
             let Some(found) = best_on_tree(choices, (lengths, &kept), settings) else {
                 continue;
             };
-            // The other side may have moved as well: judged by where both are now.
+            // The other side may have moved as well, so the energy is computed from the new places of both.
             let known: f64 = pairs
                 .iter()
                 .filter_map(|pair| {

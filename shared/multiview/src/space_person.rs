@@ -1,4 +1,4 @@
-//! A person about whom nothing is known, solved in space: which views name left and right the other way round, which
+//! Solves for a person in space without prior knowledge: which views exchange left and right, which views
 //! look elsewhere, and how tall the person is.
 
 use geometry::Camera;
@@ -10,26 +10,26 @@ use crate::space_solve::solve_in_space;
 use crate::space_tree::{BoneLength, SpacePose, SpaceSettings, TREE, best_on_tree, lengths_of};
 use crate::space_view::{LIMBS, N, SpaceView};
 
-/// A person in space, and what was decided about the views.
+/// A person in space, and the decisions about the views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolvedPerson {
-    /// The joints.
+    /// Positions of the joints.
     pub pose: SpacePose,
-    /// By view: whether the names of left and right were exchanged, of the arms and of the legs. `None` for a view that was left out
-    /// because it contradicts all others.
+    /// For every view, whether the names of left and right were exchanged, for the arms and for the legs. `None` for a view that was left
+    /// out because it contradicts all others.
     pub views: Vec<Option<[bool; 2]>>,
 }
 
 /// Solves for a person about whom nothing is known.
 ///
-/// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
-/// 2. Unless it fits every view: of three views or more, one whose exchange of left and right gives a better first solution is
-///    exchanged. Where left and right follow the picture ([`SpaceSettings::as_seen`]), those of every view may be exchanged
-///    against those of the first; then what the views say of the direction in which the person faces counts as well.
-/// 3. The arms or the legs of any view that fit better exchanged are exchanged.
-/// 4. Unless the first solution fits every view: of four views or more, those that contradict all others are left out: their camera
+/// 1. The places suggested by pairs of views, and the bones of people of any stature, give a first solution.
+/// 2. Unless the first solution fits every view: with three views or more, exchanging left and right in one view is tried. It is kept if it
+///    gives a better first solution. If left and right follow the picture ([`SpaceSettings::as_seen`]), every view may be exchanged
+///    relative to the first. Then the views' evidence of the direction in which the person faces counts as well.
+/// 3. The arms or the legs of a view are exchanged if they fit better that way.
+/// 4. Unless the first solution fits every view: with four views or more, views that contradict all others are left out. Their camera
 ///    was moved, or they look at another person.
-/// 5. The bones of a person of the first solution's stature, and finer and finer grids, give the second one.
+/// 5. The bones of a person of the first solution's stature, and finer and finer grids, give the second solution.
 ///
 /// * Returns `None` if no joint is seen by two views.
 pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SolvedPerson> {
@@ -77,10 +77,10 @@ pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option
     })
 }
 
-/// Most views of which every combination is tried.
+/// Maximum number of views for which every combination is tried.
 const MOST_COMBINED: usize = 5;
 
-/// Makes first solutions: for a person of any stature, among the places to which pairs of views put the joints.
+/// Computes first solutions: for a person of any stature, among the places suggested by pairs of views.
 struct FirstSolver<'a> {
     views: &'a [SpaceView<'a>],
     crossings: Crossings<'a>,
@@ -105,12 +105,12 @@ impl<'a> FirstSolver<'a> {
         }
     }
 
-    /// The best first solution with no view, or one view, exchanged.
+    /// Returns the best first solution with no view, or one view, exchanged.
     ///
-    /// * `best`: the one with none.
+    /// * `best`: the solution with no view exchanged.
     fn with_one_exchanged(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
         if used.len() < 3 {
-            // Which one of two is exchanged cannot be told.
+            // With two views, it is unknown which one is exchanged.
             return Some(best);
         }
         let mut exchanged = None;
@@ -129,10 +129,10 @@ impl<'a> FirstSolver<'a> {
         Some(best)
     }
 
-    /// The best first solution with any of the views but the first exchanged: of all combinations for a few views, else by exchanging
-    /// one after the other as long as that helps.
+    /// Returns the best first solution with any of the views except the first exchanged. With few views, all combinations are tried;
+    /// otherwise, views are exchanged one after the other as long as that helps.
     ///
-    /// * `best`: the one with none.
+    /// * `best`: the solution with no view exchanged.
     fn as_seen(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
         let mut chosen = 0usize;
         let n = used.len().min(usize::BITS as usize);
@@ -158,7 +158,7 @@ impl<'a> FirstSolver<'a> {
         Some(best)
     }
 
-    /// Exchanges the views whose bits are set; whether the first solution is better than the best one, which it then becomes.
+    /// Exchanges the views whose bits are set. If this gives a better first solution than `best`, replaces `best` and returns true.
     fn improves(
         &mut self,
         used: &mut [Used],
@@ -175,10 +175,10 @@ impl<'a> FirstSolver<'a> {
         Some(is_better)
     }
 
-    /// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is
-    /// none, or for fewer than four views, which cannot show it.
+    /// Returns the view without which the others agree best, if most of its joints contradict their solution. `None` if there is no
+    /// such view, or with fewer than four views, which cannot show it.
     ///
-    /// A view of which half is covered fits with the other half; one whose camera was turned fits with nothing.
+    /// A half-covered view still fits with its other half; a view whose camera was moved fits nowhere.
     fn contradicts(&mut self, used: &[Used]) -> Option<usize> {
         const LEAST: usize = 4;
         if used.len() < LEAST {
@@ -203,7 +203,7 @@ impl<'a> FirstSolver<'a> {
         worst.map(|(nth, _)| nth)
     }
 
-    /// Exchanges left and right in views that then fit better; returns whether there were any.
+    /// Exchanges left and right in views that then fit better; returns true if there were any.
     fn exchange(&self, used: &mut [Used], found: &SpacePose) -> bool {
         let mut any = false;
         for used in used {
@@ -240,24 +240,24 @@ fn set_exchanged(used: &mut [Used], combination: usize) {
     }
 }
 
-/// How well the direction in which a solution faces, or the opposite one, agrees with what the views say of it, nats: whether the names
-/// of all views are exchanged is decided elsewhere.
+/// How well the direction in which a solution faces, or the opposite direction, agrees with the evidence of the views, in nats. Whether the
+/// names of all views are exchanged is decided elsewhere.
 ///
-/// Shoulders that are turned by an angle to the viewing directions of two pairs of opposite cameras, and shoulders that are turned by as
-/// much the other way, look alike but for their names: where left and right follow the picture, this alone tells them apart.
+/// Consider two pairs of opposite cameras, and shoulders rotated by an angle from their viewing directions. Shoulders rotated by the same
+/// angle the other way look alike except for the names. If left and right follow the picture, only this function distinguishes the two.
 fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
     let said = views.iter().map(|view| (view.camera, view.front));
     let said: Vec<(&Camera, FrontEvidence)> = said.collect();
     front_log_ratio_of(&found.joints, &said).abs() / 2.0
 }
 
-/// Share of the joints that fall short by at most the [`shortfall`] of a view: one that holds for a quarter only is exceeded by three
+/// Share of the joints used for the [`shortfall`] of a view. A shortfall that holds for only a quarter of the joints is exceeded by three
 /// quarters.
 const QUARTER: f64 = 0.25;
 const MOST: f64 = 0.75;
 
-/// Amount by which the joints that were found fit a view less than the best places that it knows for them: the smallest
-/// amount that holds for a share of them.
+/// Amount by which the found joints fit a view less than the view's own best places: the smallest
+/// amount that holds for a share of the joints.
 fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
     let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
         let named = view.named(joint);

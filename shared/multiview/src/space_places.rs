@@ -1,5 +1,5 @@
-//! Where pairs of views put the joints, with the evidence of every view there: computed once, whatever names the views exchange and
-//! whichever of them are left out.
+//! The places that pairs of views suggest for the joints, with the evidence of every view there. They are computed once, for all exchanges
+//! of names and all selections of views.
 
 use nalgebra::Point3;
 
@@ -9,16 +9,16 @@ use crate::space_view::{N, Places, SpaceView, name, other_side};
 
 /// Places of every joint, and the evidence of all views for the joint at each of them.
 pub(crate) struct Choices {
-    /// Metres in the world.
+    /// Positions, in metres in the world.
     pub(crate) places: Places,
-    /// As many for every joint as it has places.
+    /// Scores, one for each place of a joint.
     pub(crate) scores: [Vec<f64>; N],
 }
 
-/// A view that is used, and whether left and right are exchanged in its evidence, of the arms and of the legs.
+/// A used view, and whether left and right are exchanged in its evidence, for the arms and for the legs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Used {
-    /// Index of the view among those of [`Crossings::new`].
+    /// Index of the view among the views of [`Crossings::new`].
     pub(crate) view: usize,
     pub(crate) exchanged: [bool; 2],
 }
@@ -27,21 +27,21 @@ pub(crate) struct Used {
 #[derive(Default)]
 struct Points {
     at: Vec<Point3<f64>>,
-    /// Evidence of every view for every point, for the name of the first view's joint and for that of its other side.
+    /// Evidence of every view for every point, for the name of the first view's joint and for the name of its other side.
     evidence: Vec<[f64; 2]>,
 }
 
 /// The points at which the rays of maxima of two views come nearest to each other.
 pub(crate) struct Crossings<'a> {
     views: &'a [SpaceView<'a>],
-    /// By view and name; a lens is inverted step by step, which takes long: once for each maximum.
+    /// Rays by view and name. Inverting a lens is iterative and slow, so it is done once per maximum.
     rays: Vec<[Vec<Ray>; N]>,
-    /// By pair of views, name in the first one, and whether the second one has the other side of that name; made when asked for.
+    /// Points by pair of views, name in the first view, and whether the second view has the other side of that name; computed on demand.
     points: Vec<Option<Points>>,
 }
 
 impl<'a> Crossings<'a> {
-    /// Prepares for views whose [`SpaceView::exchanged`] is not looked at.
+    /// Prepares the views; their [`SpaceView::exchanged`] is ignored.
     pub(crate) fn new(views: &'a [SpaceView<'a>]) -> Self {
         let rays = views.iter().map(|view| core::array::from_fn(|name| view.rays(name)));
         let n_pairs = views.len() * views.len();
@@ -52,10 +52,10 @@ impl<'a> Crossings<'a> {
         }
     }
 
-    /// The places of every joint, the best first.
+    /// Returns the places of every joint, the best first.
     ///
-    /// * `n`: most places of a joint.
-    /// * A joint that no two of the views show has none.
+    /// * `n`: maximum number of places of a joint.
+    /// * A joint that fewer than two of the views show has no places.
     pub(crate) fn choices(&mut self, used: &[Used], n: usize) -> Choices {
         let mut choices = Choices {
             places: core::array::from_fn(|_| Vec::new()),
@@ -76,7 +76,7 @@ impl<'a> Crossings<'a> {
         choices
     }
 
-    /// Adds the places to which two views put a joint, with the evidence of all that are used.
+    /// Adds the places that two views suggest for a joint, with the evidence of all used views.
     fn add(
         &mut self,
         joint: usize,
@@ -121,7 +121,7 @@ impl<'a> Crossings<'a> {
     }
 }
 
-/// The point nearest to two rays; `None` behind a camera, or for rays that are parallel.
+/// Returns the point nearest to two rays; `None` if it is behind a camera, or the rays are parallel.
 fn nearest(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
     let (u, v) = (a.direction.into_inner(), b.direction.into_inner());
     let between = b.origin - a.origin;

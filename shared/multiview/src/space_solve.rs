@@ -1,4 +1,4 @@
-//! The joints of a person in space: the best on the tree, with the limbs apart, then on finer and finer grids about it.
+//! Solves for the joints of a person in space: first the best on the tree, then with the limbs apart, then on finer and finer grids.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,16 +7,16 @@ use crate::space_places::Choices;
 use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
 use crate::space_view::{N, SpaceView, unary};
 
-/// Places along each axis of the coarsest grid, and of the finer ones.
+/// Number of places along each axis of the coarsest grid, and of the finer ones.
 const COARSEST: usize = 5;
 const FINER: usize = 3;
-/// Times that a grid is laid about the solution, at most.
+/// Maximum number of grids per resolution around the solution.
 const N_GRIDS: usize = 2;
 
 /// Solves for all joints at once.
 ///
-/// * `choices`: places of every joint; one without any is left out.
-/// * `lengths`: of the bones of [`TREE`](crate::TREE).
+/// * `choices`: places of every joint; a joint without places is left out.
+/// * `lengths`: lengths of the bones of [`TREE`](crate::TREE).
 /// * Returns `None` if no joint has a place.
 pub(crate) fn solve_in_space(
     views: &[SpaceView<'_>],
@@ -52,10 +52,10 @@ pub(crate) fn solve_in_space(
     ))
 }
 
-/// Number of times that every joint is moved between the places of the finest grid.
+/// Number of passes that move every joint between the places of the finest grid.
 const N_SWEEPS: usize = 2;
 
-/// Constraints that hold a joint besides the views.
+/// Constraints on a joint other than the views.
 struct Held<'a> {
     lengths: &'a [BoneLength; N - 1],
     occupied: &'a Occupied,
@@ -63,9 +63,9 @@ struct Held<'a> {
 }
 
 impl Held<'_> {
-    /// The part of the energy that depends on the place of one joint.
+    /// Returns the part of the energy that depends on the place of one joint.
     ///
-    /// * `joints`: the others.
+    /// * `joints`: places of all joints.
     fn energy(
         &self,
         views: &[SpaceView<'_>],
@@ -89,8 +89,8 @@ impl Held<'_> {
     }
 }
 
-/// Moves every joint to the maximum of a parabola along each axis through the energy at its place of the finest grid and beside it, where
-/// that is better.
+/// Refines every joint between the places of the finest grid: along each axis, moves it to the maximum of a parabola through the energy at
+/// its place and the two neighbours, if that is better.
 fn between_places(mut best: SpacePose, views: &[SpaceView<'_>], held: &Held<'_>) -> SpacePose {
     let step = held.settings.finest_m;
     for joint in (0..N_SWEEPS).flat_map(|_| 0..N) {
@@ -122,16 +122,16 @@ fn between_places(mut best: SpacePose, views: &[SpaceView<'_>], held: &Held<'_>)
     best
 }
 
-/// A grid of places about one.
+/// A grid of places around a centre.
 struct Grid {
-    /// Places along each axis, odd.
+    /// Number of places along each axis; odd.
     n_along: usize,
-    /// Distance between two of them, metres.
+    /// Distance between two neighbouring places, in metres.
     step: f64,
 }
 
 impl Grid {
-    /// From the place in the middle to each place, metres.
+    /// Offsets of the places from the centre, in metres.
     fn steps(&self) -> impl Iterator<Item = Vector3<f64>> {
         let (n, step) = (self.n_along, self.step);
         let along = move |nth: usize| (nth as f64 - (n / 2) as f64) * step;
@@ -140,9 +140,9 @@ impl Grid {
     }
 }
 
-/// Grids about the joints, with the evidence of all views.
+/// Grids around the joints, with the evidence of all views.
 ///
-/// The projection into a view is taken as linear about each joint: 8 cm beside a joint that is 3 m away this is off by 3 % of the way.
+/// The projection into a view is linearised at each joint. At 8 cm from a joint that is 3 m away, the error is 3 % of the displacement.
 fn grids(views: &[SpaceView<'_>], about: &SpacePose, grid: &Grid) -> Choices {
     let mut choices = Choices {
         places: core::array::from_fn(|_| Vec::new()),

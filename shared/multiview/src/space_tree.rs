@@ -1,12 +1,12 @@
-//! A pictorial structure in space: the joints of all views at once, over the maps of a network.
+//! A pictorial structure in space: solves for the joints of all views at once, using the maps of a network.
 //!
-//! The energy is the sum of the views' evidence where the joints project, and of springs on the lengths of bones:
+//! The energy is the sum of the views' evidence at the projected joints, and of springs on the lengths of bones:
 //!
 //! `E(X) = sum_v sum_j u_v(j, P_v X_j) - mu sum_(i,j) rho((|X_i - X_j| - L_ij) / s_ij)`
 //!
-//! with `u = lambda ln(max(h, 0) + eps)`, whose floor lets a view that sees nothing of a joint be outvoted, and
-//! `rho(z) = min(z^2 / 2, cap)`. The bones form a tree, so that the best choice among places of every joint is exact (Felzenszwalb &
-//! Huttenlocher 2005). Places are where pairs of views put a joint, then grids about the solution, from coarse to fine
+//! with `u = lambda ln(max(h, 0) + eps)` and `rho(z) = min(z^2 / 2, cap)`. The floor of `u` allows the other views to outvote a view that
+//! does not see a joint. The bones form a tree, so the best choice among places of every joint is exact (Felzenszwalb &
+//! Huttenlocher 2005). Places are first those suggested by pairs of views, then grids around the solution, from coarse to fine
 //! (Pavlakos et al. 2017; Qiu et al. 2019).
 
 use nalgebra::Point3;
@@ -16,7 +16,7 @@ use kernels::{Isa, LengthSpring, ScoredPoints};
 use crate::space_places::Choices;
 use crate::space_view::N;
 
-/// The bones of the tree, `[parent, child]`, joints of `skeleton::PARSE14`, parents first. A hip hangs on the neck.
+/// The bones of the tree, as `[parent, child]` joints of `skeleton::PARSE14`, parents first. The hips are children of the neck.
 pub const TREE: [[usize; 2]; N - 1] = [
     [12, 13],
     [12, 8],
@@ -37,9 +37,9 @@ const ROOT: usize = 12;
 /// The expected length of a bone of [`TREE`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoneLength {
-    /// Mean, metres.
+    /// Mean length, in metres.
     pub mean: f64,
-    /// Standard deviation, metres.
+    /// Standard deviation of the length, in metres.
     pub sd: f64,
 }
 
@@ -48,27 +48,27 @@ pub struct BoneLength {
 pub struct SpaceSettings {
     /// Weight of the springs (mu).
     pub springs: f64,
-    /// Most that a bone costs: half the square of this many standard deviations.
+    /// Maximum cost of a bone, as a number of standard deviations; the cost is half of their square.
     pub cap: f64,
-    /// Cost of a right and a left joint of a pair that lie at one place.
+    /// Cost of the right and the left joint of a pair at the same place.
     pub apart: f64,
-    /// From so far apart on, a pair costs nothing, metres.
+    /// Distance from which a pair costs nothing, in metres.
     pub least_apart_m: f64,
-    /// True if left and right follow the picture: every view may have them exchanged, whatever the others say.
+    /// True if left and right follow the picture: every view may have them exchanged, independently of the others.
     pub as_seen: bool,
-    /// Amount by which exchanged sides must fit a view better.
+    /// Amount by which exchanged sides must fit a view better to be accepted.
     pub margin: f64,
-    /// The first solution fits a view if three quarters of its joints fit by at most this much less than their own best
-    /// places: no other is then looked for.
+    /// The first solution fits a view if three quarters of its joints score at most this much less than the view's own best
+    /// places. If it fits all views, no other solution is searched for.
     pub good_fit: f64,
-    /// A view contradicts all others if three quarters of its joints fit their solution by this much less than their own
+    /// A view contradicts all others if three quarters of the joints of their solution score this much less than the view's own
     /// best places.
     pub most_misfit: f64,
-    /// Most places of a joint at the start.
+    /// Maximum number of places of a joint at the start.
     pub n_places: usize,
-    /// Distance between the places of the coarsest grid, metres.
+    /// Distance between the places of the coarsest grid, in metres.
     pub coarsest_m: f64,
-    /// Distance between the places of the finest grid, metres.
+    /// Distance between the places of the finest grid, in metres.
     pub finest_m: f64,
 }
 
@@ -93,18 +93,18 @@ impl Default for SpaceSettings {
 /// The joints in space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpacePose {
-    /// Joints of `skeleton::PARSE14`, metres in the world; `None` for one that no two views show.
+    /// The joints of `skeleton::PARSE14`, in metres in the world; `None` for a joint that fewer than two views show.
     pub joints: [Option<Point3<f64>>; N],
-    /// The energy.
+    /// Energy of the solution.
     pub energy: f64,
 }
 
-/// Stature of people about whom nothing is known, and its standard deviation, metres: our choice, wide enough for children.
+/// Stature of unknown people, and its standard deviation, in metres; our choice, wide enough for children.
 const STATURE: [f64; 2] = [1.65, 0.20];
 
-/// The bones of [`TREE`] of a person with these joints; without them, of any person.
+/// Bone lengths of [`TREE`] for a person with these joints, or for any person if `joints` is `None`.
 ///
-/// The stature is what the joints say and what is known of people, each by its certainty.
+/// The stature combines the estimate from the joints with the prior for people, each weighted by its certainty.
 pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N - 1] {
     use skeleton::body::Kind::{
         Head, HipWidth, LowerArm, LowerLeg, ShoulderToNeck, Trunk, UpperArm, UpperLeg,
@@ -143,10 +143,10 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
     })
 }
 
-/// Where each joint must not be: at that of the other side. `None` for joints that are not kept away from anything.
+/// Places to avoid: for each joint, the place of the joint on the other side. `None` for a joint without such a constraint.
 pub(crate) type Occupied = [Option<Point3<f64>>; N];
 
-/// Returns the cost of a joint that lies near the other one of its pair.
+/// Returns the cost of a joint near the other joint of its pair.
 pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettings) -> f64 {
     let share = (at - other).norm() / settings.least_apart_m;
     settings.apart * (1.0 - share).max(0.0)
@@ -154,7 +154,7 @@ pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettin
 
 /// The best of all choices of one place for each joint: messages from the leaves to the root, then back.
 ///
-/// * `choices`: a joint may have no place.
+/// * `choices`: the places of every joint, possibly none.
 /// * `occupied`: places that joints are kept away from.
 /// * Returns `None` if no joint has a place.
 pub(crate) fn best_on_tree(
@@ -165,7 +165,7 @@ pub(crate) fn best_on_tree(
     if places.iter().all(Vec::is_empty) {
         return None;
     }
-    // A joint without a place has one that costs nothing: what hangs on it is solved without it.
+    // A joint without places gets one place that costs nothing; its children are solved without it.
     let nowhere = [Point3::origin()];
     let is_there = |joint: usize| !places[joint].is_empty();
     let of = |joint: usize| -> &[Point3<f64>] {

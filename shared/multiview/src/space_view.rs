@@ -6,13 +6,13 @@ use geometry::{Camera, Ray};
 
 use crate::front::FrontEvidence;
 
-/// Number of joints: those of `skeleton::PARSE14`.
+/// Number of joints in `skeleton::PARSE14`.
 pub(crate) const N: usize = 14;
 
-/// Places of every joint, metres in the world.
+/// Places of every joint, in metres in the world.
 pub(crate) type Places = [Vec<Point3<f64>>; N];
 
-/// The other side's joint of the pair; the joint itself of the middle of the body.
+/// Returns the same joint on the other side; a joint in the middle of the body maps to itself.
 pub(crate) fn other_side(joint: usize) -> usize {
     let pair = LIMBS.iter().flatten().find(|pair| pair.contains(&joint));
     pair.map_or(joint, |[right, left]| right + left - joint)
@@ -31,41 +31,41 @@ pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
 
 /// The evidence of a view.
 pub trait JointEvidence {
-    /// How well a joint fits at a point of the picture, pixels.
+    /// Returns how well a joint fits at a point of the picture, in pixels.
     fn at(&self, joint: usize, point: [f64; 2]) -> f32;
-    /// Where a joint may be, pixels of the picture, the best first, each with its evidence.
+    /// Possible positions of a joint in pixels of the picture, the best first, each with its evidence.
     fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
-    /// Returns the evidence of a joint where the view shows nothing of it: the floor.
+    /// Returns the evidence of a joint that the view does not show: the floor.
     fn floor(&self) -> f32;
 }
 
-/// A view.
+/// A view with its evidence.
 #[derive(Clone, Copy)]
 pub struct SpaceView<'a> {
-    /// Its camera.
+    /// Camera of the view.
     pub camera: &'a Camera,
-    /// Evidence that the view shows.
+    /// Evidence of the view.
     pub evidence: &'a dyn JointEvidence,
-    /// For the arms and for the legs true if left and right are exchanged in its evidence.
+    /// True if left and right are exchanged in the evidence, for the arms and for the legs.
     pub exchanged: [bool; 2],
-    /// Evidence of the picture about the direction in which the person faces; zeros say nothing.
+    /// Evidence of the picture about the direction in which the person faces; zeros mean no evidence.
     pub front: FrontEvidence,
 }
 
-/// The evidence of all views for a joint at a place.
+/// Returns the evidence of all views for a joint at a place.
 pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
     views.iter().map(|view| view.at(view.named(joint), at)).sum()
 }
 
 impl SpaceView<'_> {
-    /// The evidence for a joint of the body at a place, whatever the view calls it.
+    /// Returns the evidence for a joint of the body at a place, with the view's exchanges applied.
     pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
         self.at(self.named(joint), at) as f32
     }
 
-    /// The rays of the places in the picture where a joint may be; not of those for which the lens has none.
+    /// Returns the rays of the possible positions of a joint in the picture; positions for which the lens has no ray are left out.
     ///
-    /// * `named`: what the view calls the joint.
+    /// * `named`: the view's name of the joint.
     pub(crate) fn rays(&self, named: usize) -> Vec<Ray> {
         let maxima = self.evidence.maxima(named).iter();
         maxima.filter_map(|(at, _)| self.camera.ray(&(*at).into())).collect()
@@ -76,7 +76,7 @@ impl SpaceView<'_> {
         name(joint, self.exchanged)
     }
 
-    /// The evidence for two names that the view has for joints, at a place.
+    /// Returns the evidence for two of the view's joint names at a place.
     pub(crate) fn evidence_of(&self, named: [usize; 2], at: &Point3<f64>) -> [f64; 2] {
         let pixel = self.camera.project(at);
         named.map(|named| {
@@ -86,7 +86,7 @@ impl SpaceView<'_> {
         })
     }
 
-    /// The evidence for what the view calls a joint, at a place.
+    /// Returns the evidence for one of the view's joint names at a place.
     pub(crate) fn at(&self, named: usize, at: &Point3<f64>) -> f64 {
         f64::from(match self.camera.project(at) {
             Some(pixel) => self.evidence.at(named, [pixel.x, pixel.y]),

@@ -1,13 +1,13 @@
-//! The start of a frame: which candidate of every view is the person, and from which side each view
-//! sees it.
+//! The start of a frame: which candidate of every view shows the person, and from which side each view
+//! sees the person.
 
 use crate::consistency::PairTerms;
 use crate::{Epipolar, PairInput, Settings, TypeTables, ViewInput};
 
-/// Up to this number of joint states the search is exhaustive.
+/// Maximum number of joint states for an exhaustive search.
 const MAX_STATES: usize = 200_000;
 
-/// Up to this number of views besides the first every assumption about facing is tried.
+/// Maximum number of views, not counting the first, for which every assumption about facing is tried.
 const MAX_FREE: usize = 6;
 
 /// The joint start of all views of a frame.
@@ -15,9 +15,9 @@ const MAX_FREE: usize = 6;
 pub struct Start {
     /// Candidate of every view.
     pub candidates: Vec<usize>,
-    /// For every view true if left and right are exchanged with respect to the first view.
+    /// For every view, true if left and right are exchanged relative to the first view.
     pub exchanged: Vec<bool>,
-    /// Sum over all pairs of their joint energy (eq. 3) at the start.
+    /// Sum of the joint energies (eq. 3) of all pairs at the start.
     pub energy: f64,
 }
 
@@ -25,9 +25,9 @@ pub struct Start {
 ///
 /// The sum of eq. 3 over all pairs of views is maximised over one candidate per view and one
 /// exchange per view except the first (an exchange in all views changes no energy). With one
-/// candidate per view and `facing` off this is the paper's start. Up to 200 000 joint states are
-/// searched exhaustively; beyond that views are added one by one and then revised until nothing
-/// changes. Ties go to the lower candidates. The terms between views are the paper's also under
+/// candidate per view and `facing` off, this is the paper's start. Up to 200 000 joint states are
+/// searched exhaustively. Beyond that, views are added one by one and then revised until nothing
+/// changes. Ties go to the lower candidates. The terms between views are always the paper's, even under
 /// [`EnergyKind::Released`](crate::EnergyKind::Released), whose program has no choice of a start;
 /// its alpha, which is meant for heat maps, gives them a large weight.
 ///
@@ -43,11 +43,11 @@ pub fn choose_start<'a>(
     best_of(settings, views, tables, &all.collect::<Vec<_>>())
 }
 
-/// The best start under every assumption about which views see the person from behind, highest
+/// Returns the best start under every assumption about which views see the person from behind, highest
 /// energy first.
 ///
-/// There are `2^(n - 1)` of them for `n` views if `facing` is to be decided, else one. Of more than
-/// seven views only the assumption of [`choose_start`] is tried, and those that differ from it in one view. Equals are
+/// For `n` views, there are `2^(n - 1)` assumptions if `facing` must be decided, otherwise one. With more than
+/// seven views, only the assumption of [`choose_start`] and those that differ from it in one view are tried. Ties are
 /// ordered by the binary number with bit `v - 1` for view `v`.
 pub fn rank_starts<'a>(
     settings: &Settings,
@@ -77,7 +77,7 @@ pub fn rank_starts<'a>(
         let best = choose_start(settings, views, tables).exchanged;
         let flipped = best.iter().skip(1).enumerate();
         let best = flipped.fold(0, |pattern, (bit, it)| pattern | usize::from(*it) << bit);
-        // The first view alone is never exchanged: all others are, in its place.
+        // If the first view alone is exchanged, all others are exchanged instead.
         let all = (1 << n_free) - 1;
         let one = (0..n_free).map(|bit| best ^ 1 << bit);
         let mut some: Vec<usize> = one.chain([best, best ^ all]).collect();
@@ -89,7 +89,7 @@ pub fn rank_starts<'a>(
     starts
 }
 
-/// The joint state with the highest energy over all pairs.
+/// Returns the joint state with the highest energy over all pairs.
 fn best_of<'a>(
     settings: &Settings,
     views: &[ViewInput<'a>],
@@ -139,14 +139,14 @@ fn states(settings: &Settings, view_input: &ViewInput<'_>, view: usize) -> Vec<S
         .collect()
 }
 
-/// The candidates of a view that may be the start: the best ones that are not another person.
+/// Returns the candidates of a view that may be the start: the best candidates that do not show another person.
 fn tried(settings: &Settings, view_input: &ViewInput<'_>) -> impl Iterator<Item = usize> {
     let all = 0..view_input.candidates.len();
     let own = all.filter(|candidate| !view_input.is_other(*candidate));
     own.take(settings.n_candidates.max(1))
 }
 
-/// `[first][second - first - 1][state of first][state of second]`.
+/// Energies between two views: `[first][second - first - 1][state of first][state of second]`.
 type Between = Vec<Vec<Vec<Vec<f64>>>>;
 
 fn between<'a>(
@@ -200,7 +200,7 @@ impl Problem {
         }
     }
 
-    /// The gain from `state` in the next view, given the views chosen so far.
+    /// Returns the gain from `state` in the next view, given the views chosen so far.
     fn gain(&self, chosen: &[usize], state: usize) -> f64 {
         let view = chosen.len();
         let pairs: f64 = chosen
@@ -230,7 +230,7 @@ impl Problem {
         (0..chosen.len()).map(|view| self.gain(&chosen[..view], chosen[view])).sum()
     }
 
-    /// Greedy from every state of the first view, then coordinate ascent until nothing changes.
+    /// Greedy search from every state of the first view, then coordinate ascent until nothing changes.
     fn climb(&self) -> (Vec<usize>, f64) {
         let mut best = (vec![0; self.unary.len()], f64::NEG_INFINITY);
         for first in 0..self.unary[0].len() {

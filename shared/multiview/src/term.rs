@@ -4,13 +4,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::ViewPlan;
 
-/// The squared distance where the lens model has no solution, cells^2.
+/// Squared distance assumed if the lens model has no solution, in cells^2.
 const UNSEEN: f64 = 1e6;
 
 /// The geometry of an ordered pair of views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Epipolar {
-    /// Maps a point in the first view to its line in the second, both in undistorted pixels.
+    /// Maps a point in the first view to its line in the second view, both in undistorted pixels.
     pub second_from_first: Matrix3<f64>,
 }
 
@@ -34,24 +34,24 @@ impl Epipolar {
 
 /// The term `xi` of eq. 4, negated, as a function of the target's position, for a fixed support.
 ///
-/// With `r = q' F p` the squared distances of `p` from the line of `q`, and of `q` from the line of
+/// With `r = q' F p`, the squared distances of `p` from the line of `q`, and of `q` from the line of
 /// `p`, are `r^2 / |F'q|^2` and `r^2 / |Fp|^2` (norms of the first two components). Each is divided
-/// by the squared cell size of its own view, so that the paper's alpha, which weighs pixels, has
+/// by the squared cell size of its own view. The paper's alpha, which weighs pixels, then has
 /// the same effect at every level of the pyramid and at every resolution of the cameras.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Term {
     support_from_target: Matrix3<f64>,
     /// Line of the support in the target view.
     line: Vector3<f64>,
-    /// `1 / (n^2)` of that line.
+    /// `1 / (n^2)`, where `n` is the norm of the line's first two components.
     inverse_norm2: f64,
     support_scale2: f64,
-    /// Cap of either squared distance, cells^2.
+    /// Cap of each squared distance, in cells^2.
     cap: f64,
 }
 
 impl Term {
-    /// The term of a support at `support_px` (undistorted); `None` if it has no line: it lies on
+    /// Creates the term of a support at `support_px` (undistorted); `None` if the support has no line because it lies on
     /// the epipole, or the camera centres coincide.
     pub(crate) fn new(
         support_from_target: Matrix3<f64>,
@@ -76,7 +76,7 @@ impl Term {
         self.inverse_norm2.is_nan()
     }
 
-    /// Sum of the two squared distances for a target at `target_px` (undistorted), cells^2.
+    /// Returns the sum of the two squared distances for a target at `target_px` (undistorted), in cells^2.
     #[inline]
     pub(crate) fn distance2(&self, target_px: [f64; 2], target_scale2: f64) -> f64 {
         let [x, y] = target_px;
@@ -87,8 +87,7 @@ impl Term {
         let r2 = r * r;
         let in_target = r2 * self.inverse_norm2 / target_scale2;
         let in_support = r2 / ((mx * mx + my * my) * self.support_scale2);
-        // `min` also replaces the NaN of a position without a solution, and of the epipole, by the
-        // cap.
+        // `min` also replaces NaN by the cap; a position without a solution, and the epipole, give NaN.
         in_target.min(self.cap) + in_support.min(self.cap)
     }
 }

@@ -19,8 +19,8 @@ pub struct ViewPlan {
     sizes: Vec<[usize; 2]>,
     /// The index into `sizes` for every part.
     class_of_part: Vec<usize>,
-    /// `[class][level]`: undistorted centre of every cell, row major, pixels; NaN where the lens
-    /// model has no solution. Computed at first use: all levels together take as long as some
+    /// Undistorted centre of every cell, in pixels: `[class][level]`, row major; NaN if the lens
+    /// model has no solution. They are computed at first use, because all levels together take as long as several
     /// frames, and people are found on few levels.
     cells: Vec<Vec<OnceLock<Vec<[f64; 2]>>>>,
 }
@@ -32,8 +32,8 @@ impl ViewPlan {
     /// within one part, the centres of the other types are off by at most half the difference, in
     /// cells.
     ///
-    /// * `camera`: the camera of the frame that the pyramid is built on, after resizing and
-    ///   turning.
+    /// * `camera`: the camera of the frame from which the pyramid is built, after resizing and
+    ///   rotation.
     pub fn new(camera: Camera, model: Arc<Model>, layout: Arc<Layout>) -> Self {
         let mut sizes: Vec<[usize; 2]> = Vec::new();
         let class_of_part = (0..model.n_parts())
@@ -56,34 +56,34 @@ impl ViewPlan {
         }
     }
 
-    /// The camera of the frame.
+    /// Returns the camera of the frame.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The pyramid of the frame.
+    /// Returns the pyramid of the frame.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Size of a cell of a level, pixels of the frame.
+    /// Returns the size of a cell of a level, in pixels of the frame.
     pub fn scale(&self, level: usize) -> f64 {
         self.layout.levels[level].scale
     }
 
-    /// Undistorted centres of a part at all cells of a level, row major, pixels.
+    /// Returns the undistorted centres of a part at all cells of a level, row major, in pixels.
     pub fn cells(&self, part: usize, level: usize) -> &[[f64; 2]] {
         let class = self.class_of_part[part];
         let make = || undistorted_cells(&self.camera, &self.layout, level, self.sizes[class]);
         self.cells[class][level].get_or_init(make)
     }
 
-    /// Undistorted centre of a part of a pose, pixels; NaN where the lens model has no solution.
+    /// Returns the undistorted centre of a part of a pose, in pixels; NaN if the lens model has no solution.
     pub fn ideal_centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
         let level = usize::from(pose.level);
         let at = pose.parts[part];
@@ -91,19 +91,19 @@ impl ViewPlan {
         self.cells(part, level)[cell]
     }
 
-    /// The size of the person of a pose: the longer side of the rectangle around the centres of its
-    /// parts, pixels of the frame.
+    /// Returns the size of the person in a pose: the longer side of the rectangle around the centres of the
+    /// parts, in pixels of the frame.
     pub fn size(&self, pose: &Pose) -> f64 {
         let centres = (0..pose.parts.len()).map(|part| self.centre(pose, part));
         geometry::longer_side(centres).unwrap_or(0.0)
     }
 
-    /// Centre of a part of a pose, pixels of the frame.
+    /// Returns the centre of a part of a pose, in pixels of the frame.
     pub fn centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
         pose.centre(&self.model, &self.layout, part)
     }
 
-    /// Centres of all parts of a pose, pixels of the frame.
+    /// Returns the centres of all parts of a pose, in pixels of the frame.
     pub fn centres(&self, pose: &Pose) -> Vec<[f64; 2]> {
         pose.centres(&self.model, &self.layout)
     }
@@ -131,35 +131,36 @@ fn undistorted_cells(
         .collect()
 }
 
-/// The single-view result of one view for one frame, besides its evidence.
+/// The single-view result of one view for one frame, without its evidence.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewInput<'a> {
     /// The prepared view.
     pub plan: &'a ViewPlan,
-    /// Its distinct candidates, best first; not empty.
+    /// Distinct candidates of the view, best first; not empty.
     pub candidates: &'a [Pose],
-    /// Bit `c` is set if candidate `c` is another person than the person of the other views: it is no start. Never all.
+    /// Candidates that show another person than the other views do: bit `c` is set for candidate `c`. They cannot be a start. At least
+    /// one bit is 0.
     pub others: u64,
-    /// Expected error of every part, pixels; `None` where there is no prediction.
+    /// Expected error of every part, in pixels; `None` without a prediction.
     pub sigma_px: Option<&'a [f32]>,
-    /// Thresholds that came with the prediction, pixels; used if [`Settings::tau_px`] and
+    /// Thresholds that came with the prediction, in pixels; used if [`Settings::tau_px`] and
     /// [`Settings::tau_tenths`] are empty.
     pub tau_px: Option<&'a [f32]>,
 }
 
 impl ViewInput<'_> {
-    /// Returns true if a candidate is another person.
+    /// Returns true if a candidate shows another person.
     pub(crate) fn is_other(&self, candidate: usize) -> bool {
         candidate < u64::BITS as usize && self.others >> candidate & 1 == 1
     }
 
-    /// The best candidate that is not another person.
+    /// Returns the best candidate that does not show another person.
     pub(crate) fn best(&self) -> Option<&Pose> {
         let mut each = self.candidates.iter().enumerate();
         each.find(|candidate| !self.is_other(candidate.0)).map(|candidate| candidate.1)
     }
 
-    /// Expected error and threshold of a part, if it has both.
+    /// Returns the expected error and threshold of a part, if both are known.
     pub(crate) fn expectation(&self, settings: &Settings, part: usize) -> Option<[f32; 2]> {
         let sigma = *self.sigma_px?.get(part)?;
         let tau = if !settings.tau_px.is_empty() {

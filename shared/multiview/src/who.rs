@@ -1,29 +1,30 @@
-//! Which of the people that networks found in every view is the same person in all of them.
+//! Selects, among the people found by networks in every view, the same person in all views.
 
 use geometry::Camera;
 use nalgebra::Point2;
 
-/// A person whom a network found in a view.
+/// A person found by a network in one view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenPerson {
-    /// The 14 joints of `skeleton::PARSE14`, pixels of the picture, and how sure the network is of each, 0 to 1.
+    /// The 14 joints of `skeleton::PARSE14`, each with its position in pixels of the picture and the confidence of the network, 0 to 1.
     pub joints: Vec<Option<([f64; 2], f64)>>,
-    /// Height of the box, as a share of that of the picture.
+    /// Height of the box, as a share of the height of the picture.
     pub height: f64,
 }
 
-/// Rays farther apart, metres, do not mean the same person: the nearest third of the joints, since half of a person may be covered.
+/// Maximum distance of the rays to the same person, in metres. Only the nearest third of the joints is used, since half of a person may be
+/// covered.
 const SAME_M: f64 = 0.20;
-/// Joints of a lower score say nothing about who it is.
+/// Minimum score of a joint that is used to identify a person.
 const LEAST_SCORE: f64 = 0.3;
-/// Most people of a view that are looked at, those of the largest boxes first.
+/// Maximum number of people per view that are considered, largest boxes first.
 const MOST: usize = 4;
 
-/// Chooses one person in every view, so that their rays meet; the largest one where several people could be meant.
+/// Chooses one person in every view so that the rays of the views meet; the largest person, if there are several.
 ///
 /// * `views`: the camera and the people of every view.
-/// * `as_seen`: whether left and right follow the picture, so that two views may have them exchanged.
-/// * Returns the index of the person of each view; `None` where nobody fits the others. A single view keeps its largest
+/// * `as_seen`: true if left and right follow the picture, so that two views may have them exchanged.
+/// * Returns the index of the person in each view; `None` if nobody in the view fits the others. A single view keeps its largest
 ///   person.
 pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Option<usize>> {
     let by_size = |people: &[SeenPerson]| {
@@ -33,7 +34,7 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
         order
     };
     let mut best: (f64, Vec<Option<usize>>) = (f64::NEG_INFINITY, vec![None; views.len()]);
-    // Everybody in turn is the person; every other view gives whoever lies nearest to the rays.
+    // Every detection is tried as the person; each other view contributes its person nearest to the rays.
     for (nth, (camera, people)) in views.iter().enumerate() {
         for person in by_size(people) {
             let mut chosen = vec![None; views.len()];
@@ -58,7 +59,7 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
                     size += theirs[it].height;
                 }
             }
-            // Who is seen by more views is the person, then who is larger.
+            // The number of views decides first, then the size.
             let n = chosen.iter().flatten().count();
             let score = 100.0 * n as f64 + size;
             if score > best.0 {
@@ -69,12 +70,12 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
     best.1
 }
 
-/// The joint on the other side.
+/// The same joint on the other side.
 const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
 
-/// The distance within which the rays of a third of the joints meet that two views show; `None` if they share fewer than three.
+/// Returns the distance within which the rays meet for a third of the joints that two views share; `None` if they share fewer than three.
 ///
-/// * `named`: what the second view calls a joint of the first.
+/// * `named`: the second view's name of a joint of the first view.
 fn apart([a, b]: [(&Camera, &SeenPerson); 2], named: impl Fn(usize) -> usize) -> Option<f64> {
     let ray = |camera: &Camera, joint: &Option<([f64; 2], f64)>| {
         let (at, score) = (*joint)?;

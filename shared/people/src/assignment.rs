@@ -1,20 +1,20 @@
-//! The assignment of least cost: every row to at most one column.
+//! Least-cost assignment of rows to columns, each row to at most one column.
 
-/// A pair that may not be made.
+/// Cost of a forbidden pair.
 pub(crate) const NEVER: f64 = 1e6;
 
-/// Assigns rows to columns so that the sum of the costs is least.
+/// Assigns rows to columns so that the sum of the costs is minimal.
 ///
-/// Shortest augmenting paths (Jonker & Volgenant 1987), cubic in the larger side.
+/// Uses shortest augmenting paths (Jonker & Volgenant 1987); the run time is cubic in the larger side.
 ///
-/// * `cost`: of a row and a column, at least 0; [`NEVER`] or more for a pair that may not be made.
-/// * Returns the column of every row; `None` for a row that has none.
+/// * `cost`: returns the cost of a row and a column, at least 0; [`NEVER`] or more if the pair is forbidden.
+/// * Returns the column of every row; `None` for an unassigned row.
 pub(crate) fn assign(
     n_rows: usize,
     n_columns: usize,
     cost: impl Fn(usize, usize) -> f64,
 ) -> Vec<Option<usize>> {
-    // A square problem: what is beyond a side costs as much as a pair that may not be made.
+    // The matrix is padded to a square; padding costs as much as a forbidden pair.
     let n = n_rows.max(n_columns);
     let cost = |row: usize, column: usize| {
         if row < n_rows && column < n_columns {
@@ -27,7 +27,7 @@ pub(crate) fn assign(
         rows: vec![0.0; n],
         columns: vec![0.0; n + 1],
     };
-    // Column `n` stands for the row that is being added.
+    // Column `n` represents the row that is being added.
     let mut row_of: Vec<Option<usize>> = vec![None; n + 1];
     for row in 0..n {
         row_of[n] = Some(row);
@@ -104,7 +104,7 @@ mod tests {
         each.map(|(row, column)| column.map_or(NEVER, |column| row[column])).sum()
     }
 
-    /// The least total of all assignments of the rows from `row` on.
+    /// Returns the smallest total cost over all assignments of the rows from `row` on.
     fn least(costs: &[Vec<f64>], row: usize, taken: u32) -> f64 {
         let Some(own) = costs.get(row) else {
             return 0.0;

@@ -1,23 +1,23 @@
-//! How long a person's bones are, to know the person again.
+//! Bone lengths of a person, used to recognise the person later.
 
 use skeleton::body::{BONES, Joints, Kind};
 
-/// A length counts as the mean of this many frames at most.
+/// Maximum number of frames that a mean length counts for.
 const MOST_FRAMES: f64 = 100.0;
-/// Bodies with fewer kinds of bones in common cannot be compared.
+/// Minimum number of kinds of bones that two bodies must share to be compared.
 const LEAST_KINDS: usize = 6;
 
-/// Mean lengths of a person's bones, metres; both sides together.
+/// Mean lengths of a person's bones, in metres; left and right are averaged together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bones {
-    /// Mean length of each kind of bone, in the order of `skeleton::body::Kind::ALL`; 0 where none was seen.
+    /// Mean length of each kind of bone, in the order of `skeleton::body::Kind::ALL`; 0 if no bone of that kind was seen.
     pub mean_m: [f64; Kind::ALL.len()],
-    /// Number of frames of each.
+    /// Number of frames that each mean counts for.
     pub n: [f64; Kind::ALL.len()],
 }
 
 impl Bones {
-    /// Adds a frame.
+    /// Adds the bones of one frame.
     pub(crate) fn add(&mut self, joints: &Joints) {
         for (nth, kind) in Kind::ALL.iter().enumerate() {
             let of_kind = BONES.iter().filter(|bone| bone.kind == *kind);
@@ -28,7 +28,7 @@ impl Bones {
         }
     }
 
-    /// Mean difference of the logarithms of the lengths; `None` if too few can be compared.
+    /// Returns the mean absolute difference of the logarithms of the lengths; `None` if too few kinds can be compared.
     pub(crate) fn difference(&self, other: &Self) -> Option<f64> {
         let (mut sum, mut n) = (0.0, 0);
         for nth in 0..Kind::ALL.len() {

@@ -1,17 +1,17 @@
-//! Detections of different views that are one person.
+//! Grouping of detections from different views that show one person.
 
 use crate::Frame;
 use crate::distance::between;
 use crate::frame::Place;
 
-/// Detections whose rays pass each other farther away, on the mean, are not one person: metres beyond the deviation that is stated.
+/// Maximum mean distance between the rays of two detections of one person, in metres, after subtracting the stated deviation.
 const GATE_M: f64 = 0.12;
 
-/// A detection of a person.
+/// A detection that belongs to a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Member {
     pub(crate) at: Place,
-    /// Set if the view calls left what is the person's right.
+    /// Set if the view labels the person's right side as left.
     pub(crate) is_exchanged: bool,
 }
 
@@ -22,11 +22,12 @@ struct Pair {
     is_exchanged: bool,
 }
 
-/// Groups detections into people, each with at most one detection of a view, the largest and closest groups first.
+/// Groups detections into people, largest groups first; each group has at most one detection per view.
 ///
-/// Pairs are joined in the order of their distance, where the mean over all pairs across the two groups stays below the gate.
+/// Pairs are joined in the order of their distance. Two groups are joined only if the mean over all pairs between them stays below the
+/// gate.
 ///
-/// * `free`: the detections that are nobody's yet.
+/// * `free`: the detections that are not yet assigned to a person.
 pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
     let n = free.len();
     let mut distances = vec![None; n * n];
@@ -52,7 +53,7 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
         }
     }
     pairs.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-    // Group, and sides, of every detection.
+    // Group of every detection, and whether its sides are exchanged.
     let mut group: Vec<usize> = (0..n).collect();
     let mut sides = vec![false; n];
     for pair in &pairs {
@@ -81,7 +82,7 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
     groups
 }
 
-/// Returns true if two groups have no view in common, and a mean distance below the gate.
+/// Returns true if two groups share no view and their mean distance is below the gate.
 fn may_join(
     free: &[Place],
     distances: &[Option<f64>],

@@ -1,4 +1,4 @@
-//! A person's joints from the detections that are the person.
+//! Coarse joints of a person from the detections assigned to that person.
 
 use skeleton::body::{Covariances, Joints};
 
@@ -7,10 +7,10 @@ use crate::distance::{LEAST_JOINTS, named, to_person};
 use crate::sight::{Sight, meet};
 use crate::{Frame, N};
 
-/// A detection that is farther from the person whom the others see is another person: trimmed mean of the joints, metres.
+/// A detection farther than this from the person that the other views see contradicts them: trimmed mean over the joints, in metres.
 const CONTRADICTS_M: f64 = 0.15;
 
-/// A person, coarsely.
+/// A coarse estimate of a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Coarse {
     pub(crate) joints: Joints,
@@ -18,24 +18,24 @@ pub(crate) struct Coarse {
 }
 
 impl Coarse {
-    /// Nothing is known.
+    /// An estimate in which no joint is known.
     pub(crate) const UNKNOWN: Self = Self {
         joints: [None; N],
         covariances: [None; N],
     };
 
-    /// Number of joints but for the head.
+    /// Returns the number of known joints, not counting the head.
     pub(crate) fn n_core(&self) -> usize {
         self.joints[..N - 1].iter().flatten().count()
     }
 
-    /// Returns true if the bones are those of a person.
+    /// Returns true if the bone lengths are plausible for a person.
     pub(crate) fn is_body(&self) -> bool {
         skeleton::body::check(&self.joints, &self.covariances, None).nobody.is_none()
     }
 }
 
-/// The joints on which the views agree.
+/// Triangulates the joints on which the views agree.
 pub(crate) fn coarse(frame: &Frame, members: &[Member]) -> Coarse {
     let mut person = Coarse::UNKNOWN;
     let mut rays: Vec<Sight> = Vec::with_capacity(members.len());
@@ -54,16 +54,16 @@ pub(crate) fn coarse(frame: &Frame, members: &[Member]) -> Coarse {
     person
 }
 
-/// The detections of a person that agree, where they put the person, and those that contradict.
+/// The detections that agree on a person, the resulting estimate, and the refused detections.
 pub(crate) struct Agreed {
     pub(crate) members: Vec<Member>,
     pub(crate) person: Coarse,
     pub(crate) refused: Vec<Member>,
 }
 
-/// Takes from a person the detections that contradict the others, the worst first.
+/// Removes from a person the detections that contradict the others, the worst first.
 ///
-/// * `expected`: where the person is expected; decides between two detections that contradict each other.
+/// * `expected`: the person's expected joints; they decide between two detections that contradict each other.
 pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&Joints>) -> Agreed {
     let mut refused = Vec::new();
     loop {
@@ -98,7 +98,7 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
     }
 }
 
-/// Number of joints, but for the head, that at least two detections show.
+/// Returns the number of joints, not counting the head, that at least two detections show.
 fn n_common(frame: &Frame, members: &[Member]) -> usize {
     let shows = |joint: usize| {
         let each = members

@@ -1,4 +1,4 @@
-//! How far apart in space two views' detections are, or a detection and a person.
+//! Distances in space between the detections of two views, or between a detection and a person.
 
 use nalgebra::Point3;
 use skeleton::body::Joints;
@@ -6,23 +6,23 @@ use skeleton::body::Joints;
 use crate::sight::{Sights, passing};
 use crate::{MIRROR, N};
 
-/// Detections with fewer joints in common cannot be compared.
+/// Minimum number of joints that two detections must share to be compared.
 pub(crate) const LEAST_JOINTS: usize = 4;
-/// This share of the joints, the farthest ones, does not count: a limb may be covered, or another person's.
+/// One in this many joints is ignored, farthest first: a limb may be covered, or belong to another person.
 const TRIMMED: usize = 4;
 
-/// How well a detection fits.
+/// How well a detection fits a person or another detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Fit {
-    /// Trimmed mean of the joints' distances, each weighted by its heat over its variance; metres.
+    /// Trimmed mean of the joints' distances, in metres; each is weighted by its heat over its variance.
     pub(crate) distance: f64,
-    /// Standard deviation of these distances by what the detector states, metres.
+    /// Standard deviation of these distances as stated by the detector, in metres.
     pub(crate) unknown: f64,
-    /// Set if it fits with left and right exchanged.
+    /// Set if the detection fits with left and right exchanged.
     pub(crate) is_exchanged: bool,
 }
 
-/// Means over the joints.
+/// Weighted means over the joints.
 #[derive(Debug, Clone, Copy)]
 struct Mean {
     distance: f64,
@@ -37,7 +37,7 @@ struct Term {
     weight: f64,
 }
 
-/// The trimmed mean of the distances; `None` of too few.
+/// Returns the trimmed mean of the distances; `None` if there are too few.
 fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<Mean> {
     let mut kept = [Term {
         distance: 0.0,
@@ -66,7 +66,7 @@ fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<Mean> {
     })
 }
 
-/// The better of the two ways to call the sides; the exchanged one only where views call them as they see them.
+/// Returns the better fit of the two side labellings; the exchanged one is tried only if views label sides as they appear in the picture.
 fn better(as_seen: bool, mean: impl Fn(bool) -> Option<Mean>) -> Option<Fit> {
     let fit = |is_exchanged: bool| {
         let mean = mean(is_exchanged)?;
@@ -84,12 +84,12 @@ fn better(as_seen: bool, mean: impl Fn(bool) -> Option<Mean>) -> Option<Fit> {
     }
 }
 
-/// The joint of a detection that is a joint of the person.
+/// Returns the joint of a detection that corresponds to a joint of the person.
 pub(crate) fn named(joint: usize, is_exchanged: bool) -> usize {
     if is_exchanged { MIRROR[joint] } else { joint }
 }
 
-/// How far a detection's rays are from the joints of a person; `None` if they have too few joints in common.
+/// Returns the distance of a detection's rays from the joints of a person; `None` if they share too few joints.
 pub(crate) fn to_person(sights: &Sights, joints: &Joints, as_seen: bool) -> Option<Fit> {
     better(as_seen, |is_exchanged| {
         trimmed((0..N).map(|joint| {
@@ -107,9 +107,9 @@ pub(crate) fn to_person(sights: &Sights, joints: &Joints, as_seen: bool) -> Opti
     })
 }
 
-/// How far the rays of two detections of different views pass each other.
+/// Returns the distance between the rays of two detections from different views.
 ///
-/// * Returns `None` if they have too few joints in common that pass in front of both cameras.
+/// * Returns `None` if they share too few joints whose rays meet in front of both cameras.
 pub(crate) fn between(a: &Sights, b: &Sights, as_seen: bool) -> Option<Fit> {
     better(as_seen, |is_exchanged| {
         trimmed((0..N).map(|joint| {
@@ -127,7 +127,7 @@ pub(crate) fn between(a: &Sights, b: &Sights, as_seen: bool) -> Option<Fit> {
     })
 }
 
-/// Mean distance of the joints that two people have in common, metres; `None` if these are too few.
+/// Returns the mean distance of the joints that two people share, in metres; `None` if they share too few.
 pub(crate) fn of_people(a: &Joints, b: &Joints) -> Option<f64> {
     let both = a.iter().zip(b).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let (n, sum) = both.fold((0, 0.0), |(n, sum), (a, b)| (n + 1, sum + (a - b).norm()));

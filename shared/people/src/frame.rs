@@ -1,4 +1,4 @@
-//! The detections of a frame as rays, in an order that does not depend on how they were given.
+//! The detections of a frame as rays, in an order that does not depend on the input order.
 
 use core::cmp::Ordering;
 
@@ -14,11 +14,11 @@ pub(crate) struct Place {
     pub(crate) index: usize,
 }
 
-/// A detection as rays.
+/// A detection converted to rays.
 struct Prepared {
     sights: Sights,
     colour: Option<[f64; 3]>,
-    /// Index among the detections as they were given.
+    /// Index of the detection in the input.
     given: usize,
 }
 
@@ -29,9 +29,9 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// Takes what the views saw.
+    /// Prepares the detections of all views.
     ///
-    /// * `order`: the views in the order in which they are taken.
+    /// * `order`: the order in which the views are processed.
     pub(crate) fn new(cameras: &[Camera], order: &[usize], views: &[View], as_seen: bool) -> Self {
         let prepare = |view: &usize| {
             let given = views.get(*view).map_or(&[][..], |view| &view.detections);
@@ -54,7 +54,7 @@ impl Frame {
         self.views.len()
     }
 
-    /// Number of views that show anybody.
+    /// Returns the number of views that have a detection.
     pub(crate) fn n_seeing(&self) -> usize {
         self.views.iter().filter(|view| !view.is_empty()).count()
     }
@@ -67,18 +67,18 @@ impl Frame {
         self.views[at.view][at.index].colour
     }
 
-    /// Index of a detection among those of its view, as they were given.
+    /// Returns the index of a detection among the input detections of its view.
     pub(crate) fn given(&self, at: Place) -> usize {
         self.views[at.view][at.index].given
     }
 
-    /// The detections of a view.
+    /// Returns the detections of a view.
     pub(crate) fn places(&self, view: usize) -> impl Iterator<Item = Place> + use<> {
         (0..self.views[view].len()).map(move |index| Place { view, index })
     }
 }
 
-/// An order of detections that depends on nothing but their joints.
+/// Compares detections by their joints only.
 fn by_pixels(a: &Detection, b: &Detection) -> Ordering {
     let numbers = |detection: &Detection| {
         detection.joints.map(|joint| {

@@ -1,46 +1,46 @@
-//! Where a joint of a person may be: places that rays propose, and how far the views support each.
+//! Candidate places of a person's joint: places proposed by rays, each with its support from the views.
 
 use nalgebra::Point3;
 
 use crate::sight::{Prior, Sight, agreement, passing};
 
-/// Rays that pass each other at more standard deviations propose nothing.
+/// Two rays propose no place if the distance between them exceeds this many standard deviations.
 const APART: f64 = 3.0;
-/// The most places of a joint.
+/// Maximum number of places for a joint.
 const MOST: usize = 12;
-/// Places that are nearer are the same, metres.
+/// Places closer together than this count as one, in metres.
 const SAME_M: f64 = 0.02;
-/// A joint is at most this far from where it was expected, metres.
+/// Maximum distance of a joint from its expected place, in metres.
 const RADIUS_M: f64 = 0.6;
-/// A single view proposes a place if it passes by as near as this, in standard deviations of what is expected.
+/// A single view proposes a place if its ray passes this close to the expected place, in standard deviations of the expectation.
 const BESIDE: f64 = 3.0;
 
-/// A place in a view that may be a joint of a person.
+/// A joint seen by one view that may belong to a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Candidate {
     pub(crate) view: usize,
     pub(crate) sight: Sight,
-    /// How likely it is this person's, 0 to 1.
+    /// Probability that the joint belongs to this person, 0 to 1.
     pub(crate) trust: f64,
 }
 
 impl Candidate {
-    /// How far it supports a place.
+    /// Returns how strongly the candidate supports a place.
     pub(crate) fn support(&self, place: &Point3<f64>) -> f64 {
         self.trust * self.sight.heat * agreement(self.sight.deviations(place))
     }
 }
 
-/// A place, and how far the views support it.
+/// A place and its support from the views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hypothesis {
     pub(crate) place: Point3<f64>,
     pub(crate) support: f64,
 }
 
-/// Support of a place: in every view that of the candidate that supports it most.
+/// Returns the support of a place: the sum over the views of the strongest support by a candidate of that view.
 ///
-/// * `candidates`: those of a view lie together.
+/// * `candidates`: sorted so that the candidates of one view are adjacent.
 pub(crate) fn support(candidates: &[Candidate], place: &Point3<f64>) -> f64 {
     let views = candidates.chunk_by(|a, b| a.view == b.view);
     views
@@ -51,10 +51,10 @@ pub(crate) fn support(candidates: &[Candidate], place: &Point3<f64>) -> f64 {
         .sum()
 }
 
-/// The places of a joint, the most supported first.
+/// Returns the candidate places of a joint, the best supported first.
 ///
-/// * `near`: where the joint is looked for.
-/// * `prior`: where it is expected.
+/// * `near`: centre of the search.
+/// * `prior`: the expected place.
 pub(crate) fn hypotheses(
     candidates: &[Candidate],
     near: Option<Point3<f64>>,

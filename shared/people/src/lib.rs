@@ -1,12 +1,12 @@
-//! Who is who among the people that several cameras see, and where their joints are.
+//! Identifies the people that several cameras see, and finds where their joints are.
 //!
-//! [`Tracker`] is given what a detector found in every view of a frame, joints in pixels with their deviations, and says which
-//! detections are one person, by an id that lasts ([`Person`]). [`Solver`] is given the people, and says where their joints are, by all
-//! that the views saw and not only by what a detector made one detection of. Distances are in metres, weighted by the stated
-//! deviations, so that one gate holds for every rig.
+//! [`Tracker`] takes the output of a detector for every view of a frame: joints in pixels with their deviations. It groups the detections
+//! into people with lasting ids ([`Person`]). [`Solver`] takes these people and computes their joints. It uses everything that the views
+//! saw, not only what the detector combined into one detection. Distances are in metres and weighted by the stated deviations, so the same
+//! limits apply to every rig.
 //!
-//! The same input gives the same bits. The order of views and of detections changes nothing: views are taken in the order of the
-//! cameras' names, detections in that of their pixels. Nothing here reads a clock or a file.
+//! The same input gives bit-identical results. The order of views and of detections has no effect: views are processed in the order of
+//! their cameras' names, and detections in the order of their pixel positions. The crate does not read the clock or any file.
 #![forbid(unsafe_code)]
 
 mod assignment;
@@ -44,7 +44,7 @@ pub use settings::Settings;
 pub use solver::{Solved, Solver};
 pub use tracker::Tracker;
 
-/// Number of joints, those of `skeleton::PARSE14`.
+/// Number of joints in `skeleton::PARSE14`.
 pub(crate) const N: usize = skeleton::body::N_JOINTS;
 
 pub(crate) use skeleton::MIRRORED as MIRROR;
@@ -52,61 +52,61 @@ pub(crate) use skeleton::MIRRORED as MIRROR;
 /// A joint in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keypoint {
-    /// The place, pixels of the recorded picture.
+    /// Position of the joint, in pixels of the recorded picture.
     pub at_px: [f64; 2],
-    /// Standard deviation of the place along each axis, pixels.
+    /// Standard deviation of the position along each axis, in pixels.
     pub sd_px: f64,
-    /// How sure the detector is that this is the joint, 0 to 1.
+    /// Confidence of the detector in this joint, 0 to 1.
     pub heat: f64,
 }
 
-/// A person whom a detector found in a view.
+/// A person found by a detector in one view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
     /// The joints of `skeleton::PARSE14`, in its order; `None` where the joint was not found.
     pub joints: [Option<Keypoint>; N],
-    /// The colour of the trunk, each channel from 0 to 1; tells people apart who leave and come back.
+    /// Colour of the trunk, each channel from 0 to 1; helps to recognise people who leave and come back.
     pub colour: Option<[f64; 3]>,
 }
 
-/// Everything that a detector found in a view.
+/// Everything that a detector found in one view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct View {
-    /// The people.
+    /// The detected people.
     pub detections: Vec<Detection>,
-    /// Places of each joint that the detector assigned to no person, in the order of `skeleton::PARSE14`; empty if the
-    /// detector does not give them.
+    /// Keypoints of each joint that the detector assigned to no person, in the order of `skeleton::PARSE14`; empty if the detector does not
+    /// report them.
     pub loose: Vec<Vec<Keypoint>>,
 }
 
-/// How well a person is known.
+/// How reliably a person is tracked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// First given in this frame.
+    /// Reported for the first time in this frame.
     New,
     /// Seen by enough views.
     Tracked,
-    /// Seen by one view only, or too near to another person to tell the two apart.
+    /// Seen by one view only, or too close to another person to tell the two apart.
     Unsure,
-    /// Not seen in this frame; the joints are where they are expected.
+    /// Not seen in this frame; the joints are at their expected places.
     Lost,
 }
 
-/// A person of a frame.
+/// A tracked person in a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Lasting identity, from 1; never used for another person.
+    /// Lasting id, counted from 1; never reused for another person.
     pub id: u64,
-    /// How well the person is known.
+    /// How reliably the person is tracked.
     pub state: State,
-    /// Index of the person among the detections of every view; `None` where the view does not show the person.
+    /// Index of the person's detection in every view; `None` if the view does not show the person.
     pub detections: Vec<Option<usize>>,
-    /// Set if a view calls left what is the person's right; only where views call the sides as they see them.
+    /// For every view, true if it labels the person's right side as left; only if views label sides as they appear in the picture.
     pub is_exchanged: Vec<bool>,
-    /// The joints, coarsely, metres in the world.
+    /// Coarse positions of the joints, in metres in the world.
     pub joints: Joints,
-    /// Their covariances, square metres.
+    /// Covariances of the joints, in square metres.
     pub covariances: Covariances,
-    /// Velocity of the trunk, metres a second.
+    /// Velocity of the trunk, in metres per second.
     pub velocity: Vector3<f64>,
 }

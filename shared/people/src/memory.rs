@@ -1,4 +1,4 @@
-//! Everything that a tracker has to know to take up the work of another, also as plain numbers.
+//! The state with which a tracker continues the work of another, also as plain numbers.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use skeleton::body::{Covariances, Joints, Kind};
@@ -7,36 +7,36 @@ use crate::bones::Bones;
 use crate::track::Track;
 use crate::{N, State};
 
-/// Bones of a body by kind, numbers.
+/// Number of kinds of bones.
 const KINDS: usize = Kind::ALL.len();
 /// Id, joints, covariances, velocity, time, lengths and counts of the bones, colour.
 const NUMBERS_OF_PERSON: usize = 1 + 3 * N + 9 * N + 3 + 1 + 2 * KINDS + 3;
 
-/// A person as a [`Memory`] holds it.
+/// A person stored in a [`Memory`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remembered {
-    /// Identity.
+    /// The person's id.
     pub id: u64,
-    /// The joints, metres in the world.
+    /// Positions of the joints, in metres in the world.
     pub joints: Joints,
-    /// Their covariances, square metres.
+    /// Covariances of the joints, in square metres.
     pub covariances: Covariances,
-    /// Velocity of the trunk, metres a second.
+    /// Velocity of the trunk, in metres per second.
     pub velocity: Vector3<f64>,
-    /// When the joints were seen, seconds.
+    /// Time at which the joints were seen, in seconds.
     pub seen_s: f64,
-    /// Lengths of the bones.
+    /// Bone lengths of the person.
     pub bones: Bones,
-    /// Colour of the trunk.
+    /// Colour of the person's trunk.
     pub colour: Option<[f64; 3]>,
 }
 
-/// Everything that a tracker has to know to take up the work of another.
+/// The state with which a tracker continues the work of another.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Memory {
-    /// The id of the next new person is one more, or more.
+    /// Highest id given so far; the next new person gets a higher id.
     pub last_id: u64,
-    /// The people, also those who are gone.
+    /// The people, including those who have left.
     pub people: Vec<Remembered>,
 }
 
@@ -50,7 +50,7 @@ impl Memory {
         numbers
     }
 
-    /// Reads what [`to_numbers`](Self::to_numbers) gave; `None` if these are other numbers.
+    /// Reads the numbers written by [`to_numbers`](Self::to_numbers); `None` if they are not a valid memory.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         let (last_id, people) = numbers.split_first()?;
         let (people, []) = people.as_chunks::<NUMBERS_OF_PERSON>() else {
@@ -65,7 +65,7 @@ impl Memory {
 }
 
 impl Remembered {
-    /// Appends the person; a place, covariance or colour that is not known is stored as NaN.
+    /// Appends the person's numbers; an unknown position, covariance or colour is stored as NaN.
     fn push_to(&self, numbers: &mut Vec<f64>) {
         numbers.push(self.id as f64);
         for joint in self.joints {
@@ -105,7 +105,7 @@ impl Remembered {
     }
 }
 
-/// An identity; `None` if the number is not an identity.
+/// Converts a number to an id; `None` if it is not a valid id.
 fn id(number: f64) -> Option<u64> {
     let is_id = number.fract() == 0.0 && (0.0..=2.0_f64.powi(53)).contains(&number);
     is_id.then_some(number as u64)

@@ -1,20 +1,20 @@
-//! Whom to track.
+//! Settings of the tracker.
 
-/// Whom to track.
+/// Settings of the tracker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The most people at once.
+    /// Maximum number of people tracked at the same time.
     pub max: usize,
-    /// The least number of views that see a person, 2 or more.
+    /// Minimum number of views that must see a person, 2 or more.
     pub min_views: usize,
-    /// Set if left and right follow the picture, so that two views may have them exchanged.
+    /// Set if the detector labels left and right as they appear in the picture, so that two views may disagree.
     pub as_seen: bool,
-    /// Half of the joints of a new person have this heat in two views that agree on them, 0 to 1.
+    /// Minimum heat for a new person, 0 to 1: half of the joints must reach it in two views that agree on them.
     pub least_heat: f64,
 }
 
 impl Settings {
-    /// Returns true if detections may be of nobody: a network sees a person in every box.
+    /// Returns true if detections may be false: some networks report a person in every box.
     pub(crate) fn is_doubtful(&self) -> bool {
         self.least_heat > 0.0
     }

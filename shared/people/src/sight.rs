@@ -1,29 +1,29 @@
-//! One joint as a view sees it: a ray, and how far the joint may be from it.
+//! One joint as seen by a view: a ray, and how far the joint may be from it.
 
 use geometry::Camera;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::{Detection, Keypoint, N};
 
-/// The joints of a view are off by this much in space even where the picture is sharp: standard deviation, metres.
+/// Minimum standard deviation of a view's joints in space, even where the picture is sharp, in metres.
 const FLOOR_M: f64 = 0.03;
-/// Rays with a smaller sine of the angle between them say nothing about how far away the joint is: 3 degrees.
+/// Smallest sine of the angle between two rays (3 degrees) at which they determine the distance of the joint.
 const LEAST_SINE: f64 = 0.05;
 
-/// A joint as a view sees it.
+/// A joint as seen by a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sight {
     pub(crate) origin: Point3<f64>,
-    /// The direction, of length 1.
+    /// Direction of the ray, a unit vector.
     pub(crate) direction: Vector3<f64>,
-    /// Standard deviation across the ray, metres for every metre of distance.
+    /// Standard deviation across the ray, in metres per metre of distance.
     pub(crate) spread: f64,
-    /// How sure the detector is, 0 to 1.
+    /// Confidence of the detector, 0 to 1.
     pub(crate) heat: f64,
 }
 
 impl Sight {
-    /// Takes a keypoint; `None` where the lens has no ray.
+    /// Creates the ray of a keypoint; `None` if the lens model has no ray there.
     pub(crate) fn new(camera: &Camera, keypoint: &Keypoint) -> Option<Self> {
         let usable = keypoint.sd_px.is_finite() && keypoint.sd_px > 0.0 && keypoint.heat > 0.0;
         let ray = camera.ray(&Point2::from(keypoint.at_px)).filter(|_| usable)?;
@@ -36,7 +36,7 @@ impl Sight {
         })
     }
 
-    /// Distance of a point from the ray, metres; infinite behind the camera.
+    /// Returns the distance of a point from the ray, in metres; infinite behind the camera.
     pub(crate) fn distance(&self, point: &Point3<f64>) -> f64 {
         let offset = point - self.origin;
         let along = offset.dot(&self.direction);
@@ -46,52 +46,53 @@ impl Sight {
         (offset.norm_squared() - along * along).max(0.0).sqrt()
     }
 
-    /// Standard deviation of the ray at the distance of a point, by what the detector states; metres.
+    /// Returns the standard deviation of the ray at the distance of a point, as stated by the detector, in metres.
     pub(crate) fn stated(&self, point: &Point3<f64>) -> f64 {
         self.spread * (point - self.origin).norm()
     }
 
-    /// The same, but never less than joints are off where the picture is sharp.
+    /// Returns the standard deviation of the ray at the distance of a point, but at least the floor that applies even where the picture is
+    /// sharp.
     pub(crate) fn sd(&self, point: &Point3<f64>) -> f64 {
         FLOOR_M.hypot(self.stated(point))
     }
 
-    /// How far a point is from the ray, in standard deviations.
+    /// Returns the distance of a point from the ray, in standard deviations.
     pub(crate) fn deviations(&self, point: &Point3<f64>) -> f64 {
         self.distance(point) / self.sd(point)
     }
 
-    /// The point of the ray that is nearest to a point.
+    /// Returns the point of the ray that is nearest to a given point.
     pub(crate) fn nearest(&self, point: &Point3<f64>) -> Point3<f64> {
         let along = (point - self.origin).dot(&self.direction);
         self.origin + self.direction * along.max(0.0)
     }
 
-    /// The rows of the normal equations for the joint: inverse covariance across the ray.
+    /// Returns the ray's part of the normal equations for the joint: the inverse covariance across the ray.
     pub(crate) fn information(&self, point: &Point3<f64>) -> Matrix3<f64> {
         let across = Matrix3::identity() - self.direction * self.direction.transpose();
         across / self.sd(point).powi(2)
     }
 }
 
-/// The joints of a detection as a view sees them.
+/// The joints of a detection as seen by a view.
 pub(crate) type Sights = [Option<Sight>; N];
 
-/// The joints of a detection as rays.
+/// Converts the joints of a detection to rays.
 pub(crate) fn sights(camera: &Camera, detection: &Detection) -> Sights {
     core::array::from_fn(|joint| Sight::new(camera, detection.joints[joint].as_ref()?))
 }
 
-/// Where two rays pass each other.
+/// The closest approach of two rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Passing {
-    /// The middle between the two.
+    /// Midpoint between the two rays.
     pub(crate) point: Point3<f64>,
-    /// Distance of the rays, metres.
+    /// Distance between the rays, in metres.
     pub(crate) gap: f64,
 }
 
-/// Where two rays pass each other; `None` if they are parallel, or pass behind a camera.
+/// Returns the closest approach of two rays; `None` if they are parallel or meet behind a camera.
 pub(crate) fn passing(a: &Sight, b: &Sight) -> Option<Passing> {
     let between = b.origin - a.origin;
     let cosine = a.direction.dot(&b.direction);
@@ -115,7 +116,7 @@ pub(crate) fn passing(a: &Sight, b: &Sight) -> Option<Passing> {
     })
 }
 
-/// A joint in space.
+/// A joint triangulated from rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Met {
     pub(crate) point: Point3<f64>,
@@ -124,13 +125,13 @@ pub(crate) struct Met {
     pub(crate) n: usize,
 }
 
-/// Rays farther from the joint than this many standard deviations do not count.
+/// Rays farther from the joint than this many standard deviations are ignored.
 const OUTLYING: f64 = 3.0;
 
-/// The joint on which most of the rays agree, each weighted by its deviation and heat.
+/// Triangulates the joint on which most of the rays agree, each weighted by its deviation and heat.
 ///
-/// Every two rays propose a place; the place that the others support most is moved to where the rays that agree with it have the least
-/// squared distances.
+/// Each pair of rays proposes a place. The place with the most support from the other rays is chosen, then moved to minimise the squared
+/// distances to the rays that agree with it.
 ///
 /// * `sights`: one for each view.
 /// * Returns `None` if no two rays agree.
@@ -162,20 +163,20 @@ pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
     })
 }
 
-/// Support for a place at this many standard deviations, 0 to 1.
+/// Returns the support for a place that is this many standard deviations away, 0 to 1.
 pub(crate) fn agreement(deviations: f64) -> f64 {
     (-0.5 * deviations * deviations).exp()
 }
 
-/// Knowledge of a joint before it is looked at.
+/// The expected position of a joint before the current frame is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Prior {
     pub(crate) point: Point3<f64>,
-    /// Standard deviation, metres.
+    /// Standard deviation of the position, in metres.
     pub(crate) sd: f64,
 }
 
-/// The place of the least squared distances from rays, weighted by their heats; and from a prior.
+/// Returns the place with the smallest squared distances to the rays, weighted by their heats, and to the prior.
 pub(crate) fn settle(sights: &[Sight], start: &Point3<f64>, prior: Option<Prior>) -> Option<Met> {
     let (mut normal, mut target) = (Matrix3::zeros(), Vector3::zeros());
     for sight in sights {

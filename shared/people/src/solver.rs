@@ -1,4 +1,4 @@
-//! Where the joints of known people are, by all that the views saw.
+//! Computes the joints of known people from everything that the views saw.
 
 use std::collections::BTreeMap;
 
@@ -12,49 +12,49 @@ use crate::sight::{Prior, Sight, Sights, settle, sights};
 use crate::tree::{Choice, Expectations, choose};
 use crate::{N, Person, View};
 
-/// How likely a place in a picture is a person's joint that the detector gave to another person, or to nobody.
+/// Probability that a keypoint belongs to a person although the detector gave it to another person, or to nobody.
 const TRUST_OTHERS: f64 = 0.3;
 const TRUST_LOOSE: f64 = 0.6;
-/// A joint is expected where it goes; how well that is known, metres, and how much less for every second, metres a second.
+/// Standard deviation of a joint's expected place, in metres, and its growth with time, in metres per second.
 const EXPECTED_SD_M: f64 = 0.04;
 const EXPECTED_SD_M_PER_S: f64 = 1.5;
-/// Share of a new velocity in the kept one, and of the kept one in what is expected.
+/// Weight of a new velocity in the stored velocity, and of the stored velocity in the expected place.
 const NEW_VELOCITY: f64 = 0.5;
 const DAMPING: f64 = 0.5;
-/// How long a joint that no view sees is reported at the place where it is expected, seconds.
+/// How long a joint that no view sees is still reported at its expected place, in seconds.
 const CARRIED_S: f64 = 1.0;
-/// A place costs this much for every half squared standard deviation from where the joint is expected, and at most this much.
+/// Cost of a place per half squared standard deviation from the expected place of the joint, and the maximum of this cost.
 const MOVED: f64 = 0.25;
 const MOST_OF_MOVED: f64 = 0.5;
-/// Rays farther from the joint than this many standard deviations do not count.
+/// Rays farther from the joint than this many standard deviations are ignored.
 const OUTLYING: f64 = 3.0;
-/// The stature of a person who does not show it, metres.
+/// Stature assumed for a person whose stature is unknown, in metres.
 const ANY_STATURE_M: f64 = 1.7;
 
-/// The joints of a person.
+/// The computed joints of a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved {
-    /// The person's identity.
+    /// The person's id.
     pub id: u64,
-    /// The joints, metres in the world.
+    /// Positions of the joints, in metres in the world.
     pub joints: Joints,
-    /// Their covariances, square metres.
+    /// Covariances of the joints, in square metres.
     pub covariances: Covariances,
-    /// Number of views that agree on each joint; 0 of one that is only expected there.
+    /// Number of views that agree on each joint; 0 if the position is only an expectation.
     pub n_views: [usize; N],
 }
 
-/// Knowledge of a joint from the frames before.
+/// State of a joint after the earlier frames.
 #[derive(Debug, Clone, Copy)]
 struct Past {
     point: Point3<f64>,
     velocity: Vector3<f64>,
     sd: f64,
-    /// When a view last saw it, seconds.
+    /// Time at which a view last saw the joint, in seconds.
     seen_s: f64,
 }
 
-/// Knowledge of a person from the frames before.
+/// State of a person after the earlier frames.
 #[derive(Debug, Clone, Default)]
 struct Knowledge {
     joints: [Option<Past>; N],
@@ -72,12 +72,13 @@ impl Knowledge {
     }
 }
 
-/// Finds the joints of known people, frame by frame.
+/// Computes the joints of known people, frame by frame.
 ///
-/// A joint may be wherever rays meet that could be its own: those of the person's detections, and, with less trust, those that the detector
-/// gave to nobody or to others. Of all these places the ones are taken which most views support, which lie where the joint was going, and
-/// between which the bones have lengths of a person of this stature: exactly, over the tree of the body. Then every joint moves to the least
-/// squared distances from its rays, and the bones pull as far as the joints are uncertain.
+/// The candidate places of a joint are where suitable rays meet. These are the rays of the person's detections and, with less trust, rays
+/// that the detector gave to other people or to nobody. The solver chooses one place for each joint. It weighs three criteria: the support
+/// by the views, the distance from the expected place, and the bone lengths of a person of this stature. The choice is exact over the tree
+/// of the body. Then every joint moves to minimise the squared distances to its rays. Finally, the bone lengths correct the joints in
+/// proportion to their uncertainty.
 #[derive(Debug, Clone)]
 pub struct Solver {
     cameras: Vec<Camera>,
@@ -85,16 +86,16 @@ pub struct Solver {
     known: BTreeMap<u64, Knowledge>,
 }
 
-/// The joints of everything that a view shows, as rays.
+/// Everything that a view shows, as rays.
 struct Rays {
     detections: Vec<Sights>,
     loose: Vec<Vec<Sight>>,
 }
 
 impl Solver {
-    /// Begins without anybody.
+    /// Creates a solver that knows no people yet.
     ///
-    /// * `cameras`: of the views, in the order in which views will be given.
+    /// * `cameras`: the cameras of the views, in the order of the views passed to [`step`](Self::step).
     pub fn new(cameras: Vec<Camera>) -> Self {
         let mut order: Vec<usize> = (0..cameras.len()).collect();
         order.sort_by(|a, b| cameras[*a].name.cmp(&cameras[*b].name));
@@ -105,10 +106,10 @@ impl Solver {
         }
     }
 
-    /// Finds the joints of the people of the next frame.
+    /// Finds the joints of the people in the next frame.
     ///
-    /// * `people`: as [`Tracker::step`](crate::Tracker::step) gives them.
-    /// * `views`: what it was given.
+    /// * `people`: the people returned by [`Tracker::step`](crate::Tracker::step).
+    /// * `views`: the views that were passed to the tracker.
     pub fn step(&mut self, time_s: f64, people: &[Person], views: &[View]) -> Vec<Solved> {
         let rays: Vec<Rays> = self
             .cameras
@@ -163,7 +164,7 @@ impl Solver {
     }
 }
 
-/// Weighs a place as a candidate for a joint.
+/// Converts a place to a weighted choice for a joint.
 fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
     let moved = prior.map_or(0.0, |prior| {
         let z = (place.place - prior.point).norm() / prior.sd;
@@ -175,7 +176,7 @@ fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
     }
 }
 
-/// Keeps what the next frame has to know.
+/// Stores the state that the next frame needs.
 fn remember(known: &mut Knowledge, time_s: f64, solved: &Solved) {
     let step_s = time_s - known.time_s;
     for joint in 0..N {
@@ -204,7 +205,7 @@ fn remember(known: &mut Knowledge, time_s: f64, solved: &Solved) {
     known.time_s = time_s;
 }
 
-/// A joint moved to the least squared distances from the rays that support its place; with its covariance and the number of views.
+/// Moves a joint to minimise the squared distances to the rays that support its place; also returns its covariance and the number of views.
 fn refined(
     candidates: &[Candidate],
     start: Point3<f64>,
@@ -230,7 +231,7 @@ fn refined(
     result
 }
 
-/// The places in the pictures that may be a joint of a person, view by view.
+/// Returns the keypoints that may be a given joint of a person, view by view.
 fn candidates(
     joint: usize,
     person: &Person,

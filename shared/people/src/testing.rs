@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 
 use crate::{Detection, Keypoint, N, View};
 
-/// A standing person, as shares of the stature: to the right, forward, up.
+/// A standing person, in fractions of the stature: right, forward, up.
 const STANDING: [[f64; 3]; N] = [
     [0.06, 0.0, 0.04],
     [0.055, 0.01, 0.285],
@@ -24,7 +24,7 @@ const STANDING: [[f64; 3]; N] = [
     [0.0, 0.03, 1.0],
 ];
 
-/// A person at a place, turned about the vertical.
+/// A person at a position, rotated about the vertical.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Actor {
     pub(crate) at: [f64; 2],
@@ -40,7 +40,7 @@ impl Actor {
     }
 }
 
-/// Cameras in a ring of 4 m, 2 m high, that look at the middle.
+/// Cameras on a ring of radius 4 m at a height of 2 m that look at the centre.
 pub(crate) fn ring(n: usize) -> Vec<Camera> {
     let camera = |nth: usize| {
         let angle = 0.3 + std::f64::consts::TAU * nth as f64 / n as f64;
@@ -65,9 +65,9 @@ pub(crate) fn ring(n: usize) -> Vec<Camera> {
     (0..n).map(camera).collect()
 }
 
-/// Shows people to the cameras: some joints are missed, all are off.
+/// Renders people into the cameras' views: some joints are missing, and all have noise.
 ///
-/// * `noise_px`: standard deviation, pixels.
+/// * `noise_px`: standard deviation of the noise, in pixels.
 pub(crate) fn seen(
     cameras: &[Camera],
     people: &[Actor],

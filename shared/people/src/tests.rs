@@ -1,4 +1,4 @@
-//! Laws of who is who.
+//! Properties of the tracker.
 
 use std::collections::BTreeSet;
 
@@ -18,7 +18,7 @@ fn settings() -> Settings {
     }
 }
 
-/// People who walk about, who come and go; the same seed gives the same.
+/// People who walk about, arrive and leave; the same seed gives the same scene.
 fn walk(seed: u64, n_people: usize, n_frames: usize, n_views: usize) -> Vec<Vec<View>> {
     let mut random = Rng::with_seed(seed);
     let cameras = ring(n_views);
@@ -95,7 +95,7 @@ proptest! {
                 for (view, detection) in person.detections.iter().enumerate() {
                     prop_assert!(detection.is_none_or(|detection| taken.insert((view, detection))));
                 }
-                // Somebody who is new has the next number, or is one of those who were there.
+                // A newly reported person has either the next id or a known id.
                 prop_assert!(known.contains(&person.id) || person.id == last + 1);
                 last = last.max(person.id);
                 known.insert(person.id);
@@ -107,7 +107,7 @@ proptest! {
 
     #[test]
     fn a_tracker_that_takes_up_the_work_of_another_goes_on_with_the_same_people(seed in any::<u64>(), n_people in 1_usize..5) {
-        // Everybody is there, so that nobody is about to be born.
+        // All people are there from the start, so no track is about to be confirmed.
         let actors: Vec<Actor> = (0..n_people).map(|nth| Actor { at: [nth as f64 - 1.5, 0.3], turn: nth as f64, stature: 1.7 }).collect();
         let mut random = Rng::with_seed(seed);
         let frames: Vec<_> = (0..12).map(|_| seen(&ring(4), &actors, 3.0, &mut random)).collect();
@@ -126,7 +126,7 @@ proptest! {
     }
 }
 
-/// The ids of every frame.
+/// Returns the ids of every frame.
 fn ids(people: &[Vec<Person>]) -> Vec<Vec<u64>> {
     people
         .iter()

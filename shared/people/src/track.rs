@@ -1,4 +1,4 @@
-//! A person from frame to frame.
+//! The track of a person from frame to frame.
 
 use nalgebra::{Point3, Vector3};
 use skeleton::body::Joints;
@@ -9,41 +9,41 @@ use crate::coarse::Coarse;
 use crate::distance::named;
 use crate::{Frame, N, State};
 
-/// Neck, shoulders, hips.
+/// The joints of the trunk: shoulders, hips and neck.
 const TRUNK: [usize; 5] = [2, 3, 8, 9, 12];
-/// A velocity is forgotten in this time, seconds.
+/// Time constant of the decay of a velocity, in seconds.
 const DAMPED_S: f64 = 0.3;
-/// Share of a new velocity in the kept one.
+/// Weight of a new velocity in the stored velocity.
 const NEW_VELOCITY: f64 = 0.5;
-/// How far from where a person is expected the detections may be, metres; and how much farther for every second without being seen.
+/// Maximum distance of detections from a person's expected place, in metres, and its growth for every second without a sighting.
 const REACH_M: f64 = 0.25;
 const REACH_M_PER_S: f64 = 0.5;
 const LONGEST_S: f64 = 1.0;
-/// Rays that pass a joint nearer show it at the same place, metres.
+/// Rays that pass this close to a joint show it at the same place, in metres.
 const SAME_PLACE_M: f64 = 0.15;
-/// Frames that are farther apart show who runs elsewhere, and how far for every second.
+/// If frames are farther apart than this, in seconds, the reach grows by a running person's speed.
 const SOON_S: f64 = 0.1;
 const FAST_M_PER_S: f64 = 4.0;
-/// A glimpse keeps this share of the velocity, and makes the time since the joints were seen shorter by it.
+/// A glimpse keeps this share of the velocity, and shortens the time since the joints were last placed by the same share.
 const GLIMPSED: f64 = 0.5;
-/// And moves the person by no more, metres: one ray does not show how far away a person is.
+/// Maximum distance by which a glimpse moves the person, in metres: one ray does not show how far away a person is.
 const GLIMPSED_M: f64 = 0.1;
-/// A track is a person if it was seen in this many of the last five frames.
+/// A track becomes a person after sightings in this many of the last five frames.
 const FRAMES_OF_BIRTH: u32 = 3;
 const RECENT: u32 = 0b1_1111;
-/// A track that was seen in this many of the last eight frames is not a chance meeting of the rays of two people, who move.
+/// A track with sightings in this many of the last eight frames is not a chance meeting of the rays of two moving people.
 const FRAMES_OF_TWO_VIEWS: u32 = 6;
 const LONG: u32 = 0b1111_1111;
 
-/// A person from frame to frame.
+/// The track of a person from frame to frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Track {
-    /// `None` until it is clear that this is a person.
+    /// The person's id; `None` until the track is confirmed to be a person.
     pub(crate) id: Option<u64>,
     pub(crate) coarse: Coarse,
-    /// Velocity of the trunk, metres a second.
+    /// Velocity of the trunk, in metres per second.
     pub(crate) velocity: Vector3<f64>,
-    /// When the joints were last seen, and when any view last saw the person.
+    /// Time at which the joints were last placed, and time at which any view last saw the person, in seconds.
     pub(crate) placed_s: f64,
     pub(crate) seen_s: f64,
     /// Bit `n` is set if the person was seen `n` frames ago.
@@ -55,7 +55,7 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Somebody who was not there before.
+    /// Creates a track without any sightings.
     pub(crate) fn new(time_s: f64) -> Self {
         Self {
             id: None,
@@ -71,25 +71,25 @@ impl Track {
         }
     }
 
-    /// Where the joints are expected.
+    /// Returns the expected positions of the joints.
     pub(crate) fn expected(&self, time_s: f64) -> Joints {
         let unseen_s = (time_s - self.placed_s).max(0.0);
         let moved = self.velocity * DAMPED_S * (1.0 - (-unseen_s / DAMPED_S).exp());
         self.coarse.joints.map(|joint| joint.map(|point| point + moved))
     }
 
-    /// How far away a detection may be, metres.
+    /// Returns the maximum distance of a matching detection, in metres.
     ///
-    /// * `gap_s`: since the frame before.
+    /// * `gap_s`: time since the previous frame, in seconds.
     pub(crate) fn reach(&self, time_s: f64, gap_s: f64) -> f64 {
         let unseen_s = (time_s - self.placed_s).clamp(0.0, LONGEST_S);
         let rare_s = (gap_s - SOON_S).clamp(0.0, LONGEST_S);
         REACH_M + REACH_M_PER_S * unseen_s + FAST_M_PER_S * rare_s
     }
 
-    /// Number of views that see half of the joints well.
+    /// Returns the number of views that see at least half of the joints clearly.
     ///
-    /// * `least_heat`: of a joint that is seen well, 0 to 1.
+    /// * `least_heat`: minimum heat of a joint that is seen clearly, 0 to 1.
     pub(crate) fn n_clear(&self, frame: &Frame, least_heat: f64) -> usize {
         let is_clear = |member: &&Member| {
             let sights = frame.sights(member.at).iter().flatten();
@@ -98,9 +98,9 @@ impl Track {
         self.members.iter().filter(is_clear).count()
     }
 
-    /// Number of joints that two views see well, and at the same place.
+    /// Returns the number of joints that two views see clearly, and at the same place.
     ///
-    /// * `least_heat`: of a joint that is seen well, 0 to 1.
+    /// * `least_heat`: minimum heat of a joint that is seen clearly, 0 to 1.
     pub(crate) fn n_well_seen(&self, frame: &Frame, least_heat: f64) -> usize {
         let is_well_seen = |joint: &usize| {
             let Some(place) = self.coarse.joints[*joint] else {
@@ -117,29 +117,29 @@ impl Track {
         (0..N).filter(is_well_seen).count()
     }
 
-    /// Begins a frame without having been seen in it.
+    /// Starts a frame as not yet seen.
     pub(crate) fn wait(&mut self) {
         self.history <<= 1;
         self.members.clear();
         self.state = State::Lost;
     }
 
-    /// Returns true if this may still become a person.
+    /// Returns true if the track may still become a person.
     pub(crate) fn is_possible(&self) -> bool {
         self.history & 0b111 != 0
     }
 
-    /// Returns true if it was seen in enough of the last frames.
+    /// Returns true if the track was seen in enough of the last frames to be a person.
     pub(crate) fn is_somebody(&self) -> bool {
         (self.history & RECENT).count_ones() >= FRAMES_OF_BIRTH
     }
 
-    /// Returns true if it was seen for so long that two views are enough.
+    /// Returns true if the track was seen for long enough that two views suffice.
     pub(crate) fn is_lasting(&self) -> bool {
         (self.history & LONG).count_ones() >= FRAMES_OF_TWO_VIEWS
     }
 
-    /// Takes the joints of this frame.
+    /// Updates the track with the joints of this frame.
     pub(crate) fn place(
         &mut self,
         time_s: f64,
@@ -152,7 +152,7 @@ impl Track {
         if let Some(moved) = moved(&self.coarse.joints, &seen.joints).filter(|_| step_s > 0.0) {
             self.velocity += NEW_VELOCITY * (moved / step_s - self.velocity);
         }
-        // A joint that was not seen goes with the others.
+        // An unseen joint moves with the others.
         let shift = moved(&expected, &seen.joints).unwrap_or_else(Vector3::zeros);
         for (joint, expected) in expected.iter().enumerate() {
             let unseen = expected.map(|point| point + shift);
@@ -169,7 +169,7 @@ impl Track {
         self.state = State::Tracked;
     }
 
-    /// Takes detections that place too few joints, as that of the only view that sees the person: the joints move to their rays.
+    /// Updates the track from detections that place too few joints, such as those of a single view: the joints move towards the rays.
     pub(crate) fn glimpse(&mut self, time_s: f64, frame: &Frame, members: Vec<Member>) {
         let expected = self.expected(time_s);
         let (mut sum, mut n) = (Vector3::zeros(), 0.0);
@@ -201,7 +201,7 @@ impl Track {
         }
     }
 
-    /// The middle of the trunk; `None` if nothing of it is known.
+    /// Returns the centre of the trunk; `None` if no joint of the trunk is known.
     pub(crate) fn trunk(&self) -> Option<Point3<f64>> {
         let points = TRUNK.iter().filter_map(|joint| self.coarse.joints[*joint]);
         let (n, sum) = points.fold((0.0, Vector3::zeros()), |(n, sum), point| {
@@ -211,7 +211,7 @@ impl Track {
     }
 }
 
-/// Amount by which the trunk moved; by how much everything did, where nothing of the trunk is known.
+/// Returns the mean displacement of the trunk, or of all joints if no joint of the trunk is known.
 fn moved(from: &Joints, to: &Joints) -> Option<Vector3<f64>> {
     let of = |joints: &[usize]| {
         let both = joints.iter().filter_map(|joint| Some(to[*joint]? - from[*joint]?));

@@ -1,4 +1,4 @@
-//! People from frame to frame, by ids that last.
+//! Tracks people from frame to frame under lasting ids.
 
 use geometry::Camera;
 use nalgebra::Vector3;
@@ -14,70 +14,69 @@ use crate::settings::Settings;
 use crate::track::Track;
 use crate::{Frame, N, Person, State, View};
 
-/// People of fewer joints, the head not counted, are not taken for new ones.
+/// Minimum number of joints of a new person, not counting the head.
 const LEAST_CORE: usize = 6;
-/// And of fewer are not where they were expected.
+/// Minimum number of joints that place a known person, not counting the head.
 const LEAST_SEEN: usize = 5;
-/// People whose trunks are nearer cannot be distinguished, metres.
+/// Two people whose trunks are closer than this cannot be distinguished, in metres.
 const ONE_M: f64 = 0.3;
-/// Somebody who was not seen is looked for as far away, metres, beyond the reach of single detections.
+/// Extra distance at which a person who was not seen is searched for, in metres, added to the reach of single detections.
 const TAKEN_UP_M: f64 = 0.25;
-/// A new person who is as near as this to a missed person, metres, is the missed person, if the bones do not differ by
-/// more than this, mean of the logarithms.
+/// A new person is taken for a missed person within this distance, in metres, if the bones differ by less than this mean of the logarithms.
 const MISSED_M: f64 = 1.5;
 const OTHER_BONES: f64 = 0.15;
-/// Nobody is kept for longer without being seen, seconds.
+/// A person is dropped after this time without being seen, in seconds.
 const DEATH_S: f64 = 1.0;
-/// Nobody is known again after longer, seconds.
+/// A person can be recognised for this time after being dropped, in seconds.
 const REMEMBERED_S: f64 = 60.0;
-/// Somebody is known again by bones that differ by less, mean of the logarithms, after this many frames at least; and by a colour of the
-/// trunk that differs by less.
+/// Limits for recognising a person: the mean difference of the logarithms of the bone lengths, the minimum number of frames, and the
+/// difference in the colour of the trunk.
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
-/// A new person is seen by this many views, or by all views if there are fewer.
+/// Number of views that must see a new person, or all views if there are fewer.
 const VIEWS_AT_ONCE: usize = 3;
 
-/// Finds out who is who, frame by frame.
+/// Identifies people frame by frame.
 ///
-/// 1. Everybody is expected where they go.
-/// 2. In every view, detections are assigned to the people whose rays pass nearest.
-/// 3. Of what is left, detections of different views whose rays pass near each other are one person.
-/// 4. A detection that contradicts its person goes back to 3, once; what does not have the bones of a person is not one.
-/// 5. A new person is one whom three views see, or all views if there are fewer: after three of five frames, and at once
-///    if no known person is seen. A person who was not seen for a second is gone, and is recognised by the bones and the
-///    colour of the trunk within a minute.
+/// 1. The tracker predicts where every known person is.
+/// 2. In every view, it assigns detections to the people whose joints are nearest to the detections' rays.
+/// 3. It groups the remaining detections: detections of different views whose rays pass close to each other are one person.
+/// 4. A detection that contradicts its person goes back to step 3, once. A group without the bone lengths of a person is rejected.
+/// 5. A new person must be seen by three views, or by all views if there are fewer. The person is confirmed after three of five frames, or
+///    at once if no known person is seen. A person who was not seen for a second is dropped. Within a minute, the tracker can recognise
+///    this person by the bones and the colour of the trunk.
 #[derive(Debug, Clone)]
 pub struct Tracker {
     cameras: Vec<Camera>,
-    /// The views by the names of their cameras.
+    /// The views, sorted by the names of their cameras.
     order: Vec<usize>,
     settings: Settings,
     tracks: Vec<Track>,
     gone: Vec<Remembered>,
     last_id: u64,
-    /// When the last frame was taken, seconds.
+    /// Time at which the last frame was taken, in seconds.
     last_s: Option<f64>,
 }
 
-/// The frame that is looked at, and where the people of the frames before are expected in it.
+/// The current frame, with the expected places of known people.
 struct Now<'a> {
     frame: &'a Frame,
     time_s: f64,
-    /// Since the frame before, seconds.
+    /// Time since the previous frame, in seconds.
     gap_s: f64,
     expected: &'a [Joints],
 }
 
 impl Tracker {
-    /// Begins without anybody.
+    /// Creates a tracker that knows no people yet.
     ///
-    /// * `cameras`: of the views, in the order in which views will be given.
+    /// * `cameras`: the cameras of the views, in the order of the views passed to [`step`](Self::step).
     pub fn new(cameras: Vec<Camera>, settings: Settings) -> Self {
         Self::resume(cameras, settings, &Memory::default())
     }
 
-    /// Takes up the work of a tracker that has ended.
+    /// Creates a tracker that continues the work of another tracker.
     pub fn resume(cameras: Vec<Camera>, settings: Settings, memory: &Memory) -> Self {
         let mut order: Vec<usize> = (0..cameras.len()).collect();
         order.sort_by(|a, b| cameras[*a].name.cmp(&cameras[*b].name));
@@ -93,7 +92,7 @@ impl Tracker {
         }
     }
 
-    /// Returns what another tracker has to know to go on from here.
+    /// Returns the state that another tracker needs to continue from here.
     pub fn memory(&self) -> Memory {
         let known = self.tracks.iter().filter_map(remembered);
         Memory {
@@ -104,8 +103,8 @@ impl Tracker {
 
     /// Returns the people of the next frame, in the order of their ids.
     ///
-    /// * `time_s`: when the frame was taken; not before the last one.
-    /// * `views`: in the order of the cameras; a view that is missing sees nobody.
+    /// * `time_s`: time at which the frame was taken, in seconds; not before that of the last frame.
+    /// * `views`: one view per camera, in the order of the cameras; a missing view has no detections.
     pub fn step(&mut self, time_s: f64, views: &[View]) -> Vec<Person> {
         let frame = Frame::new(&self.cameras, &self.order, views, self.settings.as_seen);
         let expected: Vec<Joints> =
@@ -124,7 +123,7 @@ impl Tracker {
             self.follow(&now, &mut free, &mut members, is_known);
         }
         self.place(&now, members, &mut free);
-        // What contradicts a group goes back once.
+        // Detections that contradict a group get a second chance to form one.
         for _ in 0..2 {
             self.group(&now, &mut free);
         }
@@ -135,9 +134,9 @@ impl Tracker {
         self.people(&frame, &births)
     }
 
-    /// Returns true if detections are given to a track as to those of known people. Doubtful detections also go to
-    /// tracks that have been seen for some frames: a known person who is hidden would otherwise take the detections of a
-    /// person beside.
+    /// Returns true if a track has the same claim to detections as a known person. If detections are doubtful, this includes
+    /// tracks that have been seen for some frames. Otherwise a known person who is hidden would take the detections of a
+    /// person nearby.
     fn is_established(&self, track: &Track) -> bool {
         track.id.is_some() || self.settings.is_doubtful() && track.is_somebody()
     }
@@ -187,7 +186,7 @@ impl Tracker {
         }
     }
 
-    /// Places the people who were expected.
+    /// Updates the people for whom detections were assigned.
     fn place(&mut self, now: &Now<'_>, members: Vec<Vec<Member>>, free: &mut [Vec<Place>]) {
         let &Now { frame, time_s, .. } = now;
         let each = self.tracks.iter_mut().zip(members).zip(now.expected);
@@ -197,7 +196,7 @@ impl Tracker {
             let n = agreed.members.len();
             let is_placed =
                 n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN;
-            // Rays of two people meet as well.
+            // Rays of two different people can also meet.
             let is_nobody =
                 is_placed && n == 2 && self.settings.is_doubtful() && !agreed.person.is_body();
             if is_placed && !is_nobody {
@@ -210,7 +209,7 @@ impl Tracker {
         }
     }
 
-    /// Makes people of the detections that are nobody's.
+    /// Groups the unassigned detections into people.
     fn group(&mut self, now: &Now<'_>, free: &mut [Vec<Place>]) {
         let frame = now.frame;
         let all: Vec<Place> = free.iter().flatten().copied().collect();
@@ -230,7 +229,7 @@ impl Tracker {
         }
     }
 
-    /// Gives a group to the person whom it shows: one who was placed, one who was missed, or a new one.
+    /// Assigns a group to the person it shows: a person already placed, a missed person, or a new one.
     fn take(&mut self, now: &Now<'_>, members: Vec<Member>, person: &Coarse) {
         let &Now {
             frame,
@@ -278,7 +277,7 @@ impl Tracker {
         }
     }
 
-    /// Takes away who has not been seen for too long.
+    /// Drops people who have not been seen for too long.
     fn bury(&mut self, time_s: f64) {
         let (alive, dead) = self.tracks.drain(..).partition(|track: &Track| match track.id {
             Some(_) => time_s - track.seen_s <= DEATH_S,
@@ -289,19 +288,19 @@ impl Tracker {
         self.gone.retain(|person| time_s - person.seen_s <= REMEMBERED_S);
     }
 
-    /// Gives ids to the tracks that are people by now.
+    /// Gives ids to the tracks that are now confirmed to be people.
     fn births(&mut self, frame: &Frame, time_s: f64) -> Vec<u64> {
         let is_known = |track: &Track| track.id.is_some() && track.state != State::Lost;
         let is_empty = !self.tracks.iter().any(is_known);
         let needed = VIEWS_AT_ONCE.min(frame.n_seeing()).max(2);
-        // What sees somebody everywhere has to be sure of somebody new.
+        // A detector that reports people everywhere must be confident about a new person.
         let is_doubtful = self.settings.is_doubtful();
         let is_rich = frame.n_seeing() > VIEWS_AT_ONCE;
         let clear = if is_rich { VIEWS_AT_ONCE } else { 2 };
         let mut births = Vec::new();
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
-            // What two views of many see is often nobody: rays of two people meet as well.
+            // Two views of many often see nobody: rays of two different people can also meet.
             let (needed, clear) = if track.is_lasting() {
                 (2, 2)
             } else {
@@ -329,8 +328,8 @@ impl Tracker {
         births
     }
 
-    /// The id of a new person: that of the person who was missed there or is recognised, or the next one. Bones that are
-    /// known are taken over.
+    /// Returns the id of a new person: that of a missed or recognised person, or the next free one. Known bone lengths are
+    /// taken over.
     fn identity(&mut self, nth: usize, time_s: f64) -> u64 {
         if let Some(missed) = self.missed(&self.tracks[nth]) {
             let bones = self.tracks[missed].bones;
@@ -346,7 +345,7 @@ impl Tracker {
         })
     }
 
-    /// The nearest of the people who have been missed for some time and in whose reach a new person has turned up.
+    /// Returns the nearest missed person whose reach includes a new person.
     fn missed(&self, new: &Track) -> Option<usize> {
         let trunk = new.trunk()?;
         let each = self.tracks.iter().enumerate().filter_map(|(nth, track)| {
@@ -358,7 +357,7 @@ impl Tracker {
         each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|nearest| nearest.0)
     }
 
-    /// The person among those who are gone who has the same bones and the same colour.
+    /// Returns the dropped person with the same bones and the same colour.
     fn known_again(&self, track: &Track, time_s: f64) -> Option<usize> {
         let each = self.gone.iter().enumerate().filter_map(|(nth, person)| {
             let n = person.bones.n.iter().copied().fold(f64::INFINITY, f64::min);
@@ -374,7 +373,7 @@ impl Tracker {
         each.min_by(|a, b| a.1.total_cmp(&b.1)).map(|nearest| nearest.0)
     }
 
-    /// Marks people who are too near to each other to be distinguished.
+    /// Marks people who are too close to each other to be distinguished.
     fn mark_near(&mut self) {
         let trunks: Vec<_> = self
             .tracks
@@ -391,7 +390,7 @@ impl Tracker {
         }
     }
 
-    /// The people in the order of their ids.
+    /// Returns the people in the order of their ids.
     fn people(&self, frame: &Frame, births: &[u64]) -> Vec<Person> {
         let person = |track: &Track| {
             let id = track.id?;
@@ -419,7 +418,7 @@ impl Tracker {
     }
 }
 
-/// Makes detections nobody's.
+/// Makes detections available again.
 fn give_back(free: &mut [Vec<Place>], members: &[Member]) {
     for member in members {
         let free = &mut free[member.at.view];

@@ -1,11 +1,11 @@
-//! One place for every joint, so that the views support all of them and the bones keep their lengths.
+//! Chooses one place for every joint by the support of the views and the lengths of the bones.
 
 use nalgebra::Point3;
 use skeleton::body::BONES;
 
 use crate::N;
 
-/// A joint and the joint towards the neck, with the bone between them; the neck first, every joint behind its parent.
+/// Each joint with its parent towards the neck and the bone between them; parents come before their children, starting from the neck.
 const BRANCHES: [(usize, usize, Limb); N - 1] = [
     (13, 12, Limb::Bone(13)),
     (8, 12, Limb::Bone(9)),
@@ -22,31 +22,31 @@ const BRANCHES: [(usize, usize, Limb); N - 1] = [
     (5, 4, Limb::Bone(4)),
 ];
 const ROOT: usize = 12;
-/// Bones of the trunk and of the hips' width in `BONES`.
+/// Indices in `BONES` of the trunk and of the width of the hips.
 const TRUNK: usize = 12;
 const HIP_WIDTH: usize = 2;
 
-/// Standard deviation of a bone's length between places of joints, metres, beside that of the length itself.
+/// Standard deviation of a bone's length that comes from the places of the joints, in metres, in addition to that of the length itself.
 const PLACE_SD_M: f64 = 0.04;
-/// A bone costs this much for every half squared standard deviation, and at most this much.
+/// Cost of a bone per half squared standard deviation, and the maximum of this cost.
 const BONE: f64 = 0.25;
 const MOST_OF_BONE: f64 = 1.0;
 
 #[derive(Debug, Clone, Copy)]
 enum Limb {
-    /// Index in `BONES`.
+    /// A bone, by its index in `BONES`.
     Bone(usize),
     TrunkToHip,
 }
 
-/// A length that is expected, metres.
+/// An expected length, in metres.
 #[derive(Debug, Clone, Copy)]
 struct Expected {
     metres: f64,
     sd: f64,
 }
 
-/// The lengths of the bones of people of a stature.
+/// The expected bone lengths of a person of a given stature.
 #[derive(Debug, Clone)]
 pub(crate) struct Expectations {
     limbs: [Expected; N - 1],
@@ -83,21 +83,21 @@ impl Expectations {
     }
 }
 
-/// A place that a joint may have, and what it is worth.
+/// A possible place of a joint and its worth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Choice {
     pub(crate) place: Point3<f64>,
     pub(crate) worth: f64,
 }
 
-/// Chooses one place for every joint so that the worth of all, less the costs of the bones between them, is the most.
+/// Chooses one place for every joint so that the total worth, minus the costs of the bones between the places, is maximal.
 ///
-/// * Returns the index of the choice; `None` for a joint whose best place costs more than it is worth.
+/// * Returns the index of each joint's choice; `None` if the best place of the joint costs more than it is worth.
 pub(crate) fn choose(
     choices: &[Vec<Choice>; N],
     expectations: &Expectations,
 ) -> [Option<usize>; N] {
-    // Worth of every choice with what hangs on it, and of no place for the joint; the children of every joint are done first.
+    // Worth of every choice including its subtree, and of leaving the joint out; the children of a joint are computed first.
     let mut worths: [Vec<f64>; N] = core::array::from_fn(|joint| {
         let each = choices[joint].iter().map(|choice| choice.worth);
         each.chain([0.0]).collect()

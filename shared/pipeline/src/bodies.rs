@@ -1,4 +1,4 @@
-//! The found joints as a body: what is impossible is left out, bones keep their lengths.
+//! Checks the joints found as a body: impossible joints are left out, and bones keep their lengths.
 
 use geometry::{TriangulateError, Triangulated};
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -7,51 +7,51 @@ use skeleton::{Joint, JointSet, PARSE14};
 
 use crate::skeleton_settings::BodySettings;
 
-/// Why a joint has no position.
+/// Reason why a joint has no position.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NoJoint {
-    /// It cannot be triangulated.
+    /// The joint cannot be triangulated.
     #[error(transparent)]
     Triangulation(#[from] TriangulateError),
-    /// Where it was found no body can have it.
-    #[error("no body has the joint there")]
+    /// No body can have the joint at the place where it was found.
+    #[error("no body can have the joint at this position")]
     Implausible,
 }
 
-/// Skeleton, judged as a body.
+/// Assessment of a skeleton as a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {
-    /// Standing height by the lengths of the bones, metres; `None` with too few bones.
+    /// Standing height estimated from the bone lengths, in metres; `None` if too few bones are known.
     pub stature_m: Option<f64>,
-    /// Root mean square deviation of the bones' lengths from those of people, standard deviations.
+    /// Root mean square deviation of the bone lengths from those of people, in standard deviations.
     pub deviation: f64,
-    /// Why the skeleton is not that of a person; then no joint has a position.
+    /// Reason why the skeleton is not that of a person; if set, no joint has a position.
     pub nobody: Option<Reason>,
 }
 
-/// The bodies of a run: learns how long the bones of the person are.
+/// The bodies of a run; learns the bone lengths of the person.
 #[derive(Debug, Default)]
 pub(crate) struct Bodies {
     lengths: Lengths,
-    /// Frames since the last one with a body.
+    /// Number of frames since the last one with a body.
     n_without: u32,
 }
 
-/// After this many frames without a body, the next one is another person's.
+/// After this many frames without a body, the next body is taken for another person.
 const FORGET_AFTER: u32 = 30;
 
-/// Changes of each of the 14 joints.
+/// Change of one of the 14 joints.
 struct Change {
     is_dropped: bool,
-    /// How far it moves, and its covariance then.
+    /// Displacement of the joint, and its new covariance.
     moved: Option<(Vector3<f64>, Matrix3<f64>)>,
 }
 
 impl Bodies {
-    /// Leaves out what no body has, and moves the others to where bones keep their lengths.
+    /// Removes joints that no body can have, and moves the others so that bones keep their lengths.
     ///
     /// * `of_body`: the joints of `skeleton::PARSE14`.
-    /// * `joints`: those of the set.
+    /// * `joints`: the joints of the set.
     pub(crate) fn settle(
         &mut self,
         settings: &BodySettings,
@@ -114,7 +114,7 @@ impl Bodies {
     }
 }
 
-/// The joints of `skeleton::PARSE14` that are made of the same parts as a joint of a set.
+/// Returns the joints of `skeleton::PARSE14` that use the same parts as a joint of a set.
 fn same_parts(joint: &Joint) -> impl Iterator<Item = usize> {
     let of_body = PARSE14.joints.iter().enumerate();
     let same = of_body.filter(|(_, it)| it.parts.iter().any(|part| joint.parts.contains(part)));

@@ -1,4 +1,4 @@
-//! The method of networks in one process: pictures or keypoints of all views in, skeletons out.
+//! The network method in one process: pictures or keypoints of all views in, skeletons out.
 
 use std::sync::Arc;
 
@@ -14,56 +14,56 @@ use crate::{
     SpaceStepSettings, WhoSettings, WhoStep,
 };
 
-/// Settings of all steps but those of the views.
+/// Settings of all steps except those of the views.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NetworkEstimatorSettings {
-    /// Who is who.
+    /// Settings of the step that identifies people.
     pub who: WhoSettings,
-    /// The step in space.
+    /// Settings of the step in space.
     pub space: SpaceStepSettings,
-    /// Frames per second, if that is known: without it nothing is moved from the time of its picture to the instant of its frame.
+    /// Frames per second, if known. If not, points are not moved from the time of their picture to the instant of the frame.
     pub frame_rate_hz: Option<f64>,
-    /// Most frames between one in which people are seen and the next in which they are still in their boxes.
+    /// Maximum number of frames after which people can still be expected in their boxes.
     pub most_apart: Option<f64>,
 }
 
-/// A view of a frame.
+/// One view of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewFrame<'a> {
-    /// Content of the view.
+    /// The picture or the keypoints of the view.
     pub content: ViewContent<'a>,
-    /// How long after the instant of the frame the picture was taken, seconds.
+    /// Time of the picture after the instant of the frame, in seconds.
     pub skew_s: f64,
 }
 
-/// Content of a view of a frame.
+/// Contribution of a view to a frame.
 #[derive(Debug, Clone, Copy)]
 pub enum ViewContent<'a> {
-    /// A picture.
+    /// The picture of the view.
     Picture(Rgb8View<'a>),
-    /// Keypoints that another program found, by person, pixels of the frame.
+    /// Keypoints found by another program, per person, in pixels of the frame.
     Keypoints(&'a [Vec<Option<Keypoint>>]),
 }
 
-/// A view, and what it keeps from frame to frame.
+/// A view and its state from frame to frame.
 #[derive(Debug)]
 struct View {
     step: NetworkStep,
     memory: NetworkMemory,
 }
 
-/// A frame, estimated.
+/// The result of one frame.
 #[derive(Debug, Clone)]
 pub struct NetworkEstimate {
-    /// The people that each view sees; `None` of one that is missing or sees nobody.
+    /// The people seen by each view; `None` if the view is missing or sees nobody.
     pub sightings: Vec<Option<Sightings>>,
-    /// Who they are.
+    /// The identified people.
     pub people: FramePeople,
-    /// Their skeletons, the person who is followed first.
+    /// The skeletons of the people, the followed person first.
     pub skeletons: Vec<PersonSkeleton>,
 }
 
-/// The method of networks in one process.
+/// The network method in one process.
 #[derive(Debug)]
 pub struct NetworkEstimator {
     views: Vec<View>,
@@ -76,7 +76,7 @@ impl NetworkEstimator {
     /// Prepares the pipeline for a rig.
     ///
     /// * `plans`: the views of the rig, in the rig's order.
-    /// * `steps`: one per view.
+    /// * `steps`: the single-view steps, one per view.
     pub fn new(
         plans: &[Arc<ViewPlan>],
         steps: Vec<NetworkStep>,
@@ -96,11 +96,11 @@ impl NetworkEstimator {
         }
     }
 
-    /// Estimates a frame. The result depends on the frames before. Views run in parallel on the current rayon pool; the result
+    /// Estimates a frame. The result depends on the earlier frames. Views run in parallel on the current rayon pool; the result
     /// does not depend on the number of threads.
     ///
-    /// * `frame`: its number; larger than that of the frame before.
-    /// * `frames`: one per view; `None` for a view that is missing.
+    /// * `frame`: number of the frame; larger than that of the previous frame.
+    /// * `frames`: one per view; `None` for a missing view.
     ///
     /// # Errors
     ///
@@ -158,7 +158,7 @@ impl View {
     }
 }
 
-/// When a frame was taken, seconds; without a rate, frames are taken to be of a common one.
+/// Returns the time of a frame, in seconds; if the rate is unknown, a common rate is assumed.
 pub fn time_s(frame: u64, frame_rate_hz: Option<f64>) -> f64 {
     const COMMON_HZ: f64 = 30.0;
     frame as f64 / frame_rate_hz.unwrap_or(COMMON_HZ)

@@ -1,4 +1,4 @@
-//! How far what every view found by itself lies from the result.
+//! Measures how far the findings of the single views are from the result.
 
 use std::sync::Arc;
 
@@ -11,36 +11,36 @@ use crate::bodies::NoJoint;
 use crate::motion::Motion;
 use crate::sighting::Sightings;
 
-/// Farthest that the median joint of a view lies from the result where the view shows the same person, metres.
+/// Maximum median distance of a view's joints from the result at which the view shows the same person, in metres.
 const SAME_PERSON_M: f64 = 0.25;
-/// Largest disagreement that adds to the covariance of a joint, metres: that of views of which one or none sees it.
+/// Maximum disagreement that is added to the covariance of a joint, in metres; also used if fewer than two views see the joint.
 const MOST_M: f64 = 0.3;
-/// Error of joints on which all views agree, metres: where a joint lies in the body is not defined better.
+/// Error of joints on which all views agree, in metres: the position of a joint within the body is not defined more precisely.
 const DEFINITION_M: f64 = 0.02;
-/// Share of the covariance from the noise of the pictures that is left where views disagree.
+/// Share of the covariance from picture noise that is kept when the disagreement is added.
 const NOISE_SHARE: f64 = 0.5;
 
-/// The views of a frame, and what they found by themselves.
+/// The views of a frame and their single-view findings.
 #[derive(Clone, Copy)]
 pub(crate) struct FoundByViews<'a> {
     pub(crate) plans: &'a [Arc<ViewPlan>],
     pub(crate) answers: &'a [Option<Sightings>],
-    /// For every view true if it has a part in the result.
+    /// For every view, true if the view contributed to the result.
     pub(crate) takes_part: &'a [bool],
-    /// Heat of half of the joints of a candidate of a view without a part in the result, for which the view counts as one that sees the
-    /// person elsewhere.
+    /// Minimum heat of half of the joints of a candidate, if its view did not contribute to the result. Only then does the view count as
+    /// one that sees the person elsewhere.
     pub(crate) least_heat: f64,
     pub(crate) joints: &'static JointSet,
 }
 
-/// Measures the joints of a result that was solved in space against the poses that the views found by themselves.
+/// Compares the joints of a result solved in space with the poses found by the single views.
 ///
-/// A view found the candidate that lies nearest, with its sides as they are or exchanged; so did a view that was left out, if it sees
-/// a person there. A view that shows another person does not count, where two others agree. The residuals of every joint
-/// are set, and their root mean square; and the disagreement of the two views that agree best on it is added to its
+/// Each view is represented by its nearest candidate, with sides as labelled or exchanged. A view that did not contribute also counts if it
+/// sees a person clearly. Views that show another person are ignored if at least two other views agree. The function sets the residuals of
+/// every joint and their root mean square. It also adds the disagreement of the two views that agree best on a joint to the joint's
 /// covariance (docs/method/three-d.md).
 ///
-/// * `motion`: of the solution, as the views would show it.
+/// * `motion`: motion of the solution in the views.
 pub(crate) fn measure(
     found_by: &FoundByViews<'_>,
     motion: &mut Motion,
@@ -62,7 +62,7 @@ pub(crate) fn measure(
         let is_same = median(&metres).is_some_and(|value| value < SAME_PERSON_M);
         found.push((view, is_same, distances_px));
     }
-    // A result on which no two views agree is judged by all of them.
+    // If no two views agree on the result, all views are used.
     let has_agreed = found.iter().filter(|view| view.1).count() >= 2;
     for (view, _, distances_px) in found.iter().filter(|view| view.1 || !has_agreed) {
         for (joint, px) in joints.iter_mut().zip(distances_px) {
@@ -84,7 +84,7 @@ pub(crate) fn measure(
     }
 }
 
-/// Distances of the joints from where a view found them, pixels, by the candidate that lies nearest; NaN where it does not see them.
+/// Returns the distances of the joints from the view's nearest candidate, in pixels; NaN for a joint that the view does not see.
 fn nearest(
     found_by: &FoundByViews<'_>,
     motion: &mut Motion,
@@ -99,7 +99,7 @@ fn nearest(
         .iter()
         .map(|joint| camera.project(&joint.as_ref().ok()?.in_world).filter(inside))
         .collect();
-    // A picture that was taken at another time shows them elsewhere.
+    // A picture taken at another time shows the joints elsewhere.
     if let Some(by) = motion.since_instant(view, [answer.skew_s, 0.0], projected.clone()) {
         for (at, by) in projected.iter_mut().zip(by) {
             *at = at.map(|at| at + by);
@@ -116,7 +116,7 @@ fn nearest(
         .min_by(|a, b| sum(a).total_cmp(&sum(b)))
 }
 
-/// Distances in a picture as metres at the depth of the joints.
+/// Converts distances in a picture to metres at the depth of the joints.
 fn in_metres(
     plan: &ViewPlan,
     joints: &[Result<Triangulated, NoJoint>],
@@ -132,9 +132,9 @@ fn in_metres(
     each.map(|joint| metres(joint).unwrap_or(f64::NAN)).collect()
 }
 
-/// The covariance of a joint on which views disagree.
+/// Returns the covariance of a joint, widened by the disagreement of the views.
 ///
-/// * `disagreements_m`: distance of what each view shows from the joint, metres.
+/// * `disagreements_m`: distance of each view's finding from the joint, in metres.
 fn widened(covariance: &Matrix3<f64>, disagreements_m: &mut [f64]) -> Matrix3<f64> {
     disagreements_m.sort_by(f64::total_cmp);
     let second = disagreements_m
@@ -144,7 +144,7 @@ fn widened(covariance: &Matrix3<f64>, disagreements_m: &mut [f64]) -> Matrix3<f6
     covariance * NOISE_SHARE + Matrix3::from_diagonal_element(added)
 }
 
-/// The median of those that are known.
+/// Returns the median of the finite values.
 fn median(values: &[f64]) -> Option<f64> {
     let known = values.iter().copied().filter(|value| value.is_finite());
     let mut known: Vec<f64> = known.collect();
@@ -152,7 +152,7 @@ fn median(values: &[f64]) -> Option<f64> {
     known.get(known.len() / 2).copied()
 }
 
-/// The joints of all candidates of a view, with their sides as they are and exchanged.
+/// Returns the joints of all candidates of a view, with sides as labelled and exchanged.
 fn readings<'a>(
     found_by: &FoundByViews<'a>,
     view: usize,

@@ -15,7 +15,7 @@ use crate::{
     Views, all_pairs,
 };
 
-/// Why an estimator could not be created.
+/// Reason why an estimator could not be created.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EstimatorError {
     /// A view's frames are too small for the model.
@@ -23,7 +23,7 @@ pub enum EstimatorError {
     TooSmall {
         /// Name of the camera.
         view: String,
-        /// How small.
+        /// The sizes of the image and of the model.
         source: ImageTooSmall,
     },
 }
@@ -31,17 +31,17 @@ pub enum EstimatorError {
 /// The result of one set of images.
 #[derive(Debug, Clone)]
 pub struct Estimate {
-    /// The result of every single view.
+    /// The single-view results.
     pub answers: Vec<Option<ViewResult>>,
-    /// The joint start: candidate and exchange of every view.
+    /// The joint start: the candidate of every view, and whether its sides are exchanged.
     pub start: Vec<Option<(usize, bool)>>,
     /// The part of every view's image that was searched.
     pub scopes: Vec<Option<Scope>>,
-    /// The result of every pair; empty if all views are solved at once.
+    /// The results of the pairs; empty if all views are solved at once.
     pub pairs: Vec<PairResult>,
-    /// The result of all views at once, if they are solved so.
+    /// The result of all views at once, if they are solved that way.
     pub all_views: Option<AllViewsResult>,
-    /// The result.
+    /// The resulting skeleton.
     pub skeleton: Skeleton,
 }
 
@@ -55,7 +55,7 @@ pub struct Estimator {
     skeleton: SkeletonStep,
     plans: Vec<Arc<ViewPlan>>,
     responses: Vec<Vec<f32>>,
-    /// One per view.
+    /// The trackers, one per view.
     trackers: Vec<Tracker>,
     /// Number of frames estimated so far.
     n_frames: u64,
@@ -64,8 +64,8 @@ pub struct Estimator {
 impl Estimator {
     /// Prepares the pipeline for a rig.
     ///
-    /// * `cameras`: the cameras of the frames, after resizing and turning, in the rig's order; the
-    ///   size of the frames is that of the camera.
+    /// * `cameras`: the cameras of the frames after resizing and rotation, in the rig's order; each camera
+    ///   must have the size of its frames.
     ///
     /// # Errors
     ///
@@ -105,21 +105,21 @@ impl Estimator {
         })
     }
 
-    /// The prepared views.
+    /// Returns the prepared views.
     pub fn plans(&self) -> &[Arc<ViewPlan>] {
         &self.plans
     }
 
-    /// Estimates the next frame. Where poses are tracked, the result depends on the frames before.
+    /// Estimates the next frame. If poses are tracked, the result depends on the earlier frames.
     /// Views and pairs run in parallel on the current rayon pool; the result does not depend on the
     /// number of threads.
     ///
-    /// * `images`: one per view; `None` for a view that is missing.
-    /// * `sigma_px`: expected error of every part of every view, where there is a prediction.
+    /// * `images`: one per view; `None` for a missing view.
+    /// * `sigma_px`: expected error of every part of every view, if predicted.
     ///
     /// # Panics
     ///
-    /// If the number of images, or the size of one, is not that of the rig.
+    /// If the number of images, or the size of an image, does not match the rig.
     pub fn estimate(
         &mut self,
         images: &[Option<Rgb8View<'_>>],
@@ -175,7 +175,7 @@ impl Estimator {
         }
     }
 
-    /// The results of all pairs of views that have one.
+    /// Returns the results of all pairs that have one.
     fn pairs(
         &self,
         answers: &[Option<ViewResult>],
@@ -191,7 +191,7 @@ impl Estimator {
     }
 }
 
-/// Searches a view near the last pose, or in full where that is not enough.
+/// Searches a view near the last pose, or in full if that does not suffice.
 fn search(
     step: &ViewStep,
     tracker: &mut Tracker,
@@ -207,18 +207,18 @@ fn search(
     estimate
 }
 
-/// Settings of all steps.
+/// Settings of all steps of the paper's method.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EstimatorSettings {
     /// Settings of the single-view step.
     pub view: ViewSettings,
-    /// Unit in which views are solved: pairs, or all at once.
+    /// How views are solved: in pairs, or all at once.
     pub views: Views,
-    /// Which of several people is followed.
+    /// The person to follow if there are several.
     pub follow: Follow,
     /// Settings of the fusion step.
     pub fuse: Settings,
-    /// Part-type tables.
+    /// Part-type tables of the pairs of views.
     pub tables: PairTables,
     /// Settings of the skeleton step.
     pub skeleton: SkeletonSettings,

@@ -1,7 +1,7 @@
-//! Extra keypoints: what networks name beside the joints of the skeleton (face, feet, hands), triangulated beside it.
+//! Triangulates extra keypoints: points that networks name in addition to the joints of the skeleton (face, feet, hands).
 //!
-//! The tree does not know them, so nothing holds them together: each is triangulated by itself, from the views in which it was found
-//! on the person whom fusion chose.
+//! The tree model does not contain them, so each is triangulated separately. Only the views that found the keypoint on the person chosen
+//! by fusion are used.
 
 use geometry::{Camera, Observation, Settings, Triangulated};
 use keypoints::mirrored;
@@ -16,17 +16,17 @@ use crate::skeleton_step::Skeleton;
 use crate::space::by_view;
 use crate::view_result::ExtraKeypoint;
 
-/// A candidate that lies further from the fused pose than this is another person: the median distance of the joints,
-/// share of the longer side of the fused pose.
+/// Maximum median distance between the joints of a candidate and of the fused pose, as a share of the longer side of the fused pose.
+/// A candidate farther away is another person.
 const SAME: f64 = 0.1;
-/// A view that is further off than this many standard deviations is left out.
+/// A view farther off than this many standard deviations is left out.
 const MOST_SIGMAS: f64 = 3.0;
-/// Least distance at which a view is left out, share of the longer side of the fused pose.
+/// Minimum distance at which a view is left out, as a share of the longer side of the fused pose.
 const LEAST_REACH: f64 = 0.02;
-/// No keypoint of a person is further from every joint, metres.
+/// Maximum distance of a keypoint from the nearest joint of its person, in metres.
 const MOST_FROM_JOINTS_M: f64 = 0.5;
 
-/// Pairs of joints of `skeleton::PARSE14`, right and left, that show how a view names the sides: knees and ankles, elbows and
+/// Pairs of joints of `skeleton::PARSE14`, right and left, that show how a view labels the sides: knees and ankles, elbows and
 /// wrists, hips and shoulders.
 const LEGS: [[usize; 2]; 2] = [SIDES[0], SIDES[1]];
 const ARMS: [[usize; 2]; 2] = [SIDES[3], SIDES[4]];
@@ -35,9 +35,9 @@ const TRUNK: [[usize; 2]; 2] = [SIDES[2], SIDES[5]];
 /// An extra keypoint.
 #[derive(Debug)]
 struct Extra {
-    /// The number of the one on the other side; its own without a side.
+    /// Index of the keypoint on the other side; the keypoint's own index if it has no side.
     mirror: usize,
-    /// The joints whose sides are its own.
+    /// The joint pairs that determine the side of this keypoint.
     sides: [[usize; 2]; 2],
 }
 
@@ -52,18 +52,18 @@ pub struct ExtrasStep {
 /// The person's candidate in a view.
 struct Match {
     view: usize,
-    /// At the instant of the frame.
+    /// The extra keypoints, moved to the instant of the frame.
     extras: Vec<ExtraKeypoint>,
-    /// Where the joints are in the candidate and after fusion, pixels of the frame.
+    /// Positions of the joints in the candidate and after fusion, in pixels of the frame.
     joints: [Vec<[f64; 2]>; 2],
-    /// Longer side of the fused pose, pixels of the frame.
+    /// Longer side of the fused pose, in pixels of the frame.
     longer_px: f64,
 }
 
 impl ExtrasStep {
     /// Prepares the step.
     ///
-    /// * `names`: of the keypoints, as every view numbers them.
+    /// * `names`: names of the keypoints, in the order used by every view.
     pub fn new(names: &[String], cameras: Vec<Camera>, triangulation: Settings) -> Self {
         let number = |name: &String| names.iter().position(|known| known == name);
         let extra = |(own, name): (usize, &String)| Extra {
@@ -77,7 +77,7 @@ impl ExtrasStep {
         }
     }
 
-    /// Number of extra keypoints of a person.
+    /// Returns the number of extra keypoints of a person.
     pub fn n_keypoints(&self) -> usize {
         self.extras.len()
     }
@@ -85,7 +85,7 @@ impl ExtrasStep {
     /// Triangulates the extra keypoints of a frame.
     ///
     /// * `views`: in the rig's order; `None` for a view without a result.
-    /// * `motion`: of the extra keypoints, after [`Motion::begin`]; brings them to the instant of the frame.
+    /// * `motion`: motion of the extra keypoints, after [`Motion::begin`]; used to move them to the instant of the frame.
     /// * Returns one entry for every name.
     pub fn run(
         &self,
@@ -112,14 +112,14 @@ impl ExtrasStep {
         (0..self.extras.len()).map(of_extra).collect()
     }
 
-    /// The candidate of a view that is the person.
+    /// Returns the candidate of a view that shows the person.
     fn person(&self, view: usize, found: &Sightings, fused: &FusedView) -> Option<Match> {
         if fused.pose.centres_px.len() != skeleton::N_PARTS {
             return None;
         }
         let joints = PARSE14.from_parts(&fused.pose.centres_px);
         let longer_px = geometry::longer_side(joints.iter().copied())?;
-        // Those of the last people may be missing.
+        // The extra keypoints of the last people may be missing.
         let told = found.people.iter();
         let told = told.filter(|sighting| sighting.extras.len() == self.extras.len());
         let of_candidate = told.map(|sighting| {
@@ -169,7 +169,7 @@ impl ExtrasStep {
 }
 
 impl Match {
-    /// Moves the keypoints of a picture that was taken at another time.
+    /// Moves the keypoints of a picture taken at another time to the instant of the frame.
     fn move_to_instant(&mut self, skew_s: f64, motion: &mut Motion) {
         let points = self.extras.iter();
         let points = points.map(|point| point.map(|found| Point2::from(found.0))).collect();
@@ -181,7 +181,7 @@ impl Match {
         }
     }
 
-    /// Returns true if the view's left is the right side of the person, by two pairs of joints.
+    /// Returns true if the view labels the person's right side as left, judged by two pairs of joints.
     fn is_exchanged(&self, sides: &[[usize; 2]; 2]) -> bool {
         let [own, fused] = &self.joints;
         let distance = |a: usize, b: usize| distance(own[a], fused[b]);
@@ -193,7 +193,7 @@ impl Match {
     }
 }
 
-/// The joints that show the side of a keypoint.
+/// Returns the joint pairs that show the side of a keypoint.
 fn sides_of(name: &str) -> [[usize; 2]; 2] {
     let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
     if has(&["toe", "heel", "foot", "ankle", "knee"]) {
@@ -205,7 +205,7 @@ fn sides_of(name: &str) -> [[usize; 2]; 2] {
     }
 }
 
-/// Median distance of the joints, whose sides may be exchanged.
+/// Returns the median distance of the joints; the sides of each joint may be exchanged.
 fn middle_distance(own: &[[f64; 2]], fused: &[[f64; 2]]) -> f64 {
     let mirror = |joint: usize| {
         let pair = SIDES.iter().find(|side| side.contains(&joint));

@@ -1,4 +1,4 @@
-//! Which of several people is followed.
+//! Chooses which of several people to follow.
 
 use std::sync::Arc;
 
@@ -9,23 +9,23 @@ use nalgebra::Point3;
 use crate::people::{Found, Person, bodies_of_poses, find};
 use crate::view_result::ViewResult;
 
-/// Which of several people is followed.
+/// Rule for choosing which of several people to follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Follow {
-    /// The one nearest to where the person was in the frame before; at first the clearest.
+    /// The person nearest to the followed person of the previous frame; in the first frame, the clearest person.
     #[default]
     Last,
-    /// The one that is largest in the pictures.
+    /// The person who is largest in the pictures.
     Largest,
-    /// The one that most views see most clearly.
+    /// The person whom most views see, and most clearly.
     Clearest,
 }
 
-/// Farther away than this from where the person was in the frame before it is another person, metres; and how much more for
-/// every frame without the person.
+/// Maximum distance of the followed person from the place in the previous frame, in metres, and its growth for every frame
+/// without the person.
 const REACH_M: f64 = 1.0;
 const REACH_PER_FRAME_M: f64 = 0.1;
-/// Another one is followed after as many frames without the person as there were with it, at most this many.
+/// The number of frames to wait for a missing person equals the number of frames with the person, up to this maximum.
 const MOST_PATIENCE: u32 = 30;
 
 /// Follows one person from frame to frame.
@@ -33,10 +33,10 @@ const MOST_PATIENCE: u32 = 30;
 pub struct Following {
     follow: Follow,
     last: Option<Point3<f64>>,
-    /// Frames without the person that are left.
+    /// Number of frames left to wait for the person.
     patience: u32,
     n_without: u32,
-    /// Identity of the person, from 1; 0 before the first.
+    /// Id of the person, counted from 1; 0 before the first person.
     id: u64,
 }
 
@@ -46,7 +46,7 @@ pub struct Others {
     of_views: Vec<u64>,
     /// Bit `v` is set if view `v` sees others, but not the followed person.
     without: u64,
-    /// The candidate of each view that shows the followed person.
+    /// For each view, the candidate that shows the followed person.
     own: Vec<Option<usize>>,
 }
 
@@ -61,24 +61,24 @@ impl Others {
         }
     }
 
-    /// Bit `c` is set if candidate `c` of a view is another person.
+    /// Candidates of a view that show other people: bit `c` is set for candidate `c`.
     pub fn of_view(&self, view: usize) -> u64 {
         self.of_views.get(view).copied().unwrap_or(0)
     }
 
-    /// The candidate of a view that shows the followed person; `None` if the view does not see it, or nobody is followed.
+    /// Returns the candidate of a view that shows the followed person; `None` if the view does not show the person, or nobody is followed.
     pub fn own(&self, view: usize) -> Option<usize> {
         self.own.get(view).copied().flatten()
     }
 
-    /// Returns true if a view sees others, but not the followed person: it has no part in the frame.
+    /// Returns true if a view sees other people but not the followed person. Such a view is left out of the frame.
     pub fn only(&self, view: usize) -> bool {
         self.without >> view & 1 == 1
     }
 }
 
 impl Following {
-    /// Nobody has been followed so far.
+    /// Creates the state before the first frame.
     pub fn new(follow: Follow) -> Self {
         Self {
             follow,
@@ -86,7 +86,7 @@ impl Following {
         }
     }
 
-    /// Chooses the person of the next frame, and says which candidates are others.
+    /// Chooses the person of the next frame, and returns the candidates that show other people.
     pub fn others(&mut self, plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Others {
         let views = plans.iter().zip(answers);
         let views = views.map(|(plan, answer)| bodies_of_poses(plan, answer.as_ref()));
@@ -96,7 +96,7 @@ impl Following {
         Others::new(&found, followed)
     }
 
-    /// The followed person; `None` if that person was not found.
+    /// Returns the followed person; `None` if the person was not found.
     fn choose(&mut self, found: &Found) -> Option<usize> {
         let people = || found.people.iter().enumerate();
         let first = people().next().map(|person| person.0);
@@ -116,7 +116,7 @@ impl Following {
         chosen
     }
 
-    /// The one nearest to the last; the first once the last has been away for too long.
+    /// Returns the person nearest to the last place, or the first person if the last one has been away for too long.
     fn nearest(&mut self, people: &[Person]) -> Option<usize> {
         let near = self.last.and_then(|last| {
             let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
@@ -134,7 +134,7 @@ impl Following {
         if self.patience > 0 {
             return None;
         }
-        // Somebody new.
+        // Start following a new person.
         let first = people.first()?;
         (self.last, self.patience, self.n_without) = (Some(first.place), 1, 0);
         self.id += 1;
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use crate::people::tests::{camera, found};
 
-    /// Where the one who is chosen stands, frame by frame.
+    /// Returns the position of the chosen person, frame by frame.
     fn chosen(follow: Follow, frames: &[&[([f64; 2], f64)]]) -> Vec<Option<f64>> {
         let cameras: Vec<_> = (0..4).map(camera).collect();
         let mut following = Following::new(follow);
@@ -164,7 +164,7 @@ mod tests {
         let frames: [&[([f64; 2], f64)]; 4] = [
             &[([-0.5, 0.0], 1.0), ([1.0, 0.5], 0.8)],
             &[([-0.3, 0.0], 0.6), ([1.0, 0.5], 1.0)],
-            // For one frame the person is not found.
+            // The person is not found for one frame.
             &[([1.0, 0.5], 1.0)],
             &[([-0.1, 0.0], 0.6), ([1.0, 0.5], 1.0)],
         ];
@@ -196,7 +196,7 @@ mod tests {
         let frames = [vec![both; n + 10], vec![one; n], vec![both; 2]].concat();
         let got = chosen(Follow::Last, &frames);
         assert!(got[..n + 10].iter().all(|place| *place == Some(-1.0)));
-        // The other one, two metres away, is out of reach for ten frames.
+        // The other person, two metres away, is out of reach for ten frames.
         assert!(got[n + 10..n + 20].iter().all(Option::is_none));
         assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");
     }
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn the_largest_is_the_one_that_is_large_in_the_pictures() {
-        // The first camera stands at x = 5 m, the others all around.
+        // The first camera is at x = 5 m, the others all around.
         let near_and_far: &[([f64; 2], f64)] = &[([0.0, 0.0], 1.0), ([1.2, 1.2], 0.7)];
         let cameras: Vec<_> = (0..3).map(camera).collect();
         let found = found(&cameras, near_and_far);

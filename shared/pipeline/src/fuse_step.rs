@@ -1,4 +1,4 @@
-//! The fusion step: maximises the joint energy of pairs of views, or of all views, on their
+//! The fusion step: maximises the joint energy of pairs of views, or of all views. It reads the
 //! evidence in place.
 
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::view_result::ViewResult;
 pub struct PairTables {
     /// Tables of pairs `(first, second)` of views with `first < second`.
     pub of_pairs: Vec<(usize, usize, TypeTables)>,
-    /// Tables of all other pairs, by the angle between the views at the person.
+    /// Tables for all other pairs, by the angle between the views at the person.
     pub by_angle: Option<Arc<AngleTables>>,
 }
 
@@ -38,33 +38,33 @@ pub struct FuseStep {
 /// The result of a pair: one estimate per assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairResult {
-    /// The two views, ascending.
+    /// The two views, in ascending order.
     pub views: [usize; 2],
-    /// Same facing, then opposite facing; the latter only where facing is to be decided.
+    /// The estimates for same facing, then for opposite facing; the latter only if facing must be decided.
     pub hypotheses: Vec<PairEstimate>,
 }
 
-/// Number of assumptions about facing, those of the highest energies, that are judged in space.
+/// Number of assumptions about facing that are judged in space; the ones with the highest energies are taken.
 const N_RANKED: usize = 32;
 
 /// Number of assumptions about facing that are tried with all views at once; the message of a pair
-/// has room for as many.
+/// has room for the same number.
 const N_STARTS: usize = 2;
 
 /// Unit in which the views of a frame are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Views {
-    /// In pairs, whose poses are then combined: the paper's method.
+    /// Views are solved in pairs whose poses are then combined: the paper's method.
     Pairs,
-    /// All at once; each view is supported by the mean of the terms of all others.
+    /// All views are solved at once; each view is supported by the mean of the terms of all others.
     #[default]
     All,
 }
 
-/// Weight of the terms of a pair where all views are solved at once.
+/// Weight of the terms of a pair if all views are solved at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
-    /// Weight 1: the terms of the other views add up.
+    /// Each pair has weight 1: the terms of the other views add up.
     Sum,
     /// The other views together weigh as much as the one other view of a pair.
     Mean,
@@ -73,7 +73,7 @@ pub enum Support {
 /// The result of all views at once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsResult {
-    /// The views with a result, ascending.
+    /// The views with a result, in ascending order.
     pub views: Vec<usize>,
     /// One estimate per assumption about facing; never empty.
     pub hypotheses: Vec<AllViewsHypothesis>,
@@ -82,9 +82,9 @@ pub struct AllViewsResult {
 /// The result of all views at once under one assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsHypothesis {
-    /// For each view true if its left and right were assumed to be exchanged with respect to the first view.
+    /// For each view, true if its left and right are assumed to be exchanged relative to the first view.
     pub exchanged: Vec<bool>,
-    /// The candidate of each view from which it started.
+    /// The candidate of each view from which the solution started.
     pub candidates: Vec<usize>,
     /// The result, by index into the views.
     pub estimate: AllViewsEstimate,
@@ -133,15 +133,15 @@ impl FuseStep {
         }
     }
 
-    /// Number of levels solved so far ([`Solver::n_sweeps`]); may be read by another thread.
+    /// Returns the number of levels solved so far ([`Solver::n_sweeps`]); another thread may read it.
     pub fn n_sweeps(&self) -> u64 {
         self.solver.n_sweeps()
     }
 
-    /// The joint start of a frame; `None` for views without a result.
+    /// Returns the joint start of a frame; `None` for views without a result.
     ///
-    /// Every fusion worker computes it for all views, from their (small) single-view results alone,
-    /// so that all pairs start from the same person.
+    /// Every fusion worker computes the start for all views. It needs only their (small) single-view results,
+    /// and all pairs start from the same person.
     ///
     /// * `others`: candidates that show other people ([`Following::others`](crate::Following::others)).
     pub fn start(
@@ -177,8 +177,8 @@ impl FuseStep {
 
     /// Solves one pair from the joint start.
     ///
-    /// * Returns `None` if either view has no result, or one whose poses its evidence does not
-    ///   [cover](Responses::covers).
+    /// * Returns `None` if either view has no result, or if the evidence of either view does not
+    ///   [cover](Responses::covers) its poses.
     pub fn pair(
         &self,
         views: [usize; 2],
@@ -192,7 +192,7 @@ impl FuseStep {
                 return None;
             }
         }
-        // The start has been chosen.
+        // The start is already chosen.
         let others = Others::default();
         let each = [
             self.view_answer(first, answers[first].as_ref()?, &others),
@@ -235,13 +235,13 @@ impl FuseStep {
         Some(PairResult { views, hypotheses })
     }
 
-    /// Solves all views at once, from the best starts under different assumptions about which views
+    /// Solves all views at once. Starts from the best starts under different assumptions about which views
     /// see the person from behind.
     ///
-    /// * `evidence`: of the views with a result; should carry its bounds.
+    /// * `evidence`: evidence of the views with a result; should include its bounds.
     /// * `others`: candidates that show other people ([`Following::others`](crate::Following::others)).
-    /// * Returns `None` if fewer than two views have a result whose poses their evidence
-    ///   [covers](Responses::covers).
+    /// * Returns `None` if fewer than two views have a result whose poses are [covered](Responses::covers)
+    ///   by their evidence.
     pub fn all_views(
         &self,
         answers: &[Option<ViewResult>],
@@ -293,7 +293,7 @@ impl FuseStep {
         })
     }
 
-    /// The best starts by their energies, the agreement of the views in space, and what the views see of the front.
+    /// Returns the best starts, judged by their energies, the agreement of the views in space, and the front evidence of the views.
     ///
     /// * `starts`: highest energy first.
     fn most_likely(
@@ -306,7 +306,7 @@ impl FuseStep {
         if starts.len() > N_STARTS && self.space.can_exchange() {
             let score = |start: &Start| {
                 let views = self.start_views(start, present, answers);
-                // A start's energy counts every view once for each other view.
+                // The energy of a start counts every view once for each other view.
                 let of_one = start.energy / (present.len() - 1).max(1) as f64;
                 of_one + self.space.judge(answers, &views).score
             };
@@ -319,7 +319,7 @@ impl FuseStep {
         starts
     }
 
-    /// The candidates of a start, parts named by the side of the body; one entry for each view of the rig.
+    /// Returns the candidates of a start, with parts named by the side of the body; one entry for each view of the rig.
     fn start_views(
         &self,
         start: &Start,
@@ -358,7 +358,7 @@ impl FuseStep {
         }
     }
 
-    /// The tables of a pair: its own, or those for the angle between the views at the person.
+    /// Returns the tables of a pair: its own tables, or those for the angle between the views at the person.
     fn tables(&self, pair: [usize; 2], views: [&ViewInput<'_>; 2]) -> Option<&TypeTables> {
         let mut own = self.tables.of_pairs.iter();
         if let Some(own) = own.find(|table| [table.0, table.1] == pair) {
@@ -369,7 +369,7 @@ impl FuseStep {
     }
 }
 
-/// All pairs of `n_views` views, ascending.
+/// Returns all pairs of `n_views` views, in ascending order.
 pub fn all_pairs(n_views: usize) -> Vec<[usize; 2]> {
     (0..n_views)
         .flat_map(|first| (first + 1..n_views).map(move |second| [first, second]))

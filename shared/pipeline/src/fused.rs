@@ -1,4 +1,4 @@
-//! The result of fusion, by pairs or by all views at once, under every assumption about facing.
+//! The result of fusion, by pairs or by all views at once, under each assumption about facing.
 
 use fmp::Pose;
 use multiview::{Exchanges, PairEnergies, PairEstimate, is_exchanged, rank_facing};
@@ -10,7 +10,7 @@ const N_HYPOTHESES: usize = 16;
 
 /// The result of fusion, in pairs or all views at once.
 pub(crate) enum Fused<'a> {
-    /// In ascending order of their views.
+    /// The results of the pairs, in ascending order of their views.
     Pairs(Vec<&'a PairResult>),
     AllViews(&'a AllViewsResult),
 }
@@ -23,7 +23,7 @@ impl<'a> Fused<'a> {
         }
     }
 
-    /// The best assumptions about facing, with the energy of all views.
+    /// Returns the best assumptions about facing, each with its energy over all views.
     pub(crate) fn facing(&self, present: Exchanges) -> Vec<(Exchanges, f64)> {
         match self {
             Self::Pairs(pairs) => {
@@ -44,8 +44,8 @@ impl<'a> Fused<'a> {
         }
     }
 
-    /// The poses of a view under an assumption about facing, with their energies: one per pair of
-    /// the view, or the single one of all views.
+    /// Returns the poses of a view under an assumption about facing, with their energies: one per pair of
+    /// the view, or a single one if all views were solved at once.
     pub(crate) fn poses(&self, view: usize, exchanged: Exchanges) -> Vec<(f64, &'a Pose)> {
         match self {
             Self::Pairs(pairs) => {
@@ -69,8 +69,8 @@ impl<'a> Fused<'a> {
 }
 
 impl Fused<'_> {
-    /// The candidate of a view from which fusion started, under an assumption about facing; `None` for a
-    /// view that was not fused.
+    /// Returns the candidate of a view from which fusion started, under an assumption about facing; `None` if the
+    /// view was not fused.
     pub(crate) fn start(&self, view: usize, exchanged: Exchanges) -> Option<usize> {
         match self {
             Self::Pairs(pairs) => pairs.iter().find_map(|pair| {
@@ -85,7 +85,7 @@ impl Fused<'_> {
     }
 }
 
-/// The hypothesis of an assumption about facing or of its complement, else the best one.
+/// Returns the hypothesis for an assumption about facing or for its complement; otherwise the best hypothesis.
 fn of_facing(result: &AllViewsResult, exchanged: Exchanges) -> Option<&AllViewsHypothesis> {
     let all = result.views.iter().fold(0, |mask, view| mask | (1 << view));
     let fits = |hypothesis: &&AllViewsHypothesis| {
@@ -95,7 +95,7 @@ fn of_facing(result: &AllViewsResult, exchanged: Exchanges) -> Option<&AllViewsH
     chosen.or_else(|| result.hypotheses.first())
 }
 
-/// The views that a hypothesis assumes to be exchanged with respect to the first.
+/// Returns the views that a hypothesis assumes to be exchanged relative to the first view.
 fn exchanges(result: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchanges {
     let each = result.views.iter().zip(&hypothesis.exchanged);
     each.fold(0, |mask, (view, exchanged)| {
@@ -103,7 +103,7 @@ fn exchanges(result: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchan
     })
 }
 
-/// The hypothesis of a pair that agrees with the joint facing decision.
+/// Returns the hypothesis of a pair that agrees with the joint facing decision.
 fn chosen(pair: &PairResult, exchanged: Exchanges) -> Option<&PairEstimate> {
     let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
     let opposite = first != second;
@@ -120,7 +120,7 @@ mod tests {
 
     use super::*;
 
-    /// A pose identified by the column of its only part.
+    /// Returns a pose identified by the column of its only part.
     fn pose(x: u16) -> Pose {
         let at = Placement {
             x,
@@ -134,7 +134,7 @@ mod tests {
         }
     }
 
-    /// A result of views 1, 2 and 4 of a rig, under two assumptions.
+    /// Returns a result of views 1, 2 and 4 of a rig, under two assumptions.
     fn result() -> AllViewsResult {
         let hypothesis = |exchanged: [bool; 3], energy: f64, x: u16| AllViewsHypothesis {
             exchanged: exchanged.to_vec(),

@@ -6,11 +6,11 @@ use multiview::{Exchanges, FusedPose, ViewPlan, average, is_exchanged};
 /// One view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedView {
-    /// The pose combined from its pairs; parts are named by the side of the body.
+    /// The pose combined from the poses of the view's pairs; parts are named by the side of the body.
     pub pose: FusedPose,
     /// True if the view sees the person from behind.
     pub exchanged: bool,
-    /// Mean cell size of the levels on which it was fused, pixels of the frame.
+    /// Mean cell size of the levels on which the view was fused, in pixels of the frame.
     pub cell_px: f64,
     /// Score of the view's own best candidate.
     pub single_score: f64,
@@ -25,9 +25,9 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// A pose of a view.
+    /// Creates the candidate of a pose.
     ///
-    /// * `mirror`: the permutation of its parts where the view sees the person from behind.
+    /// * `mirror`: permutation of the parts if the view sees the person from behind.
     pub(crate) fn of_pose(
         pose: &Pose,
         energy: f64,
@@ -43,7 +43,7 @@ impl Candidate {
         }
     }
 
-    /// The view with this pose, which no pair changed.
+    /// Returns the view with this pose alone, unchanged by any pair.
     pub(crate) fn alone(self, exchanged: bool) -> FusedView {
         FusedView {
             pose: FusedPose {
@@ -61,15 +61,15 @@ impl Candidate {
 /// The poses of one view.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidates {
-    /// Those of its pairs, or the view's own if it is in no pair; not empty.
+    /// The poses from the view's pairs, or the view's own pose if it is in no pair; never empty.
     pub(crate) poses: Vec<Candidate>,
-    /// How many of them are of pairs.
+    /// Number of these poses that come from pairs.
     pub(crate) n_pairs: usize,
     /// Score of the view's own best candidate.
     pub(crate) single_score: f64,
 }
 
-/// The mean pose of every view.
+/// Computes the mean pose of every view.
 pub(crate) fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedView>> {
     let fuse_view = |(view, candidates): (usize, &Option<Candidates>)| {
         let candidates = candidates.as_ref()?;

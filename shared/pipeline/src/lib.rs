@@ -1,7 +1,7 @@
-//! The pure processing steps, and all of them in one process.
+//! The pure processing steps, and complete pipelines that run them in one process.
 //!
-//! The services call the steps one by one. [`NetworkEstimator`] and [`Estimator`] run those of either method in sequence; the system
-//! tests compare the processes with them: the same input gives the same bits.
+//! The services run the steps in separate processes. [`NetworkEstimator`] and [`Estimator`] run all steps of one method in sequence. The
+//! system tests compare the services with these estimators: the same input gives bit-identical results.
 #![forbid(unsafe_code)]
 
 mod bodies;

@@ -1,4 +1,4 @@
-//! Looks for the people of a frame with a network, and keeps whom it sees well.
+//! Runs a network on the people of a frame, and keeps the people who are seen well.
 
 use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap};
@@ -6,43 +6,43 @@ use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap}
 use crate::network_memory::{Empty, NetworkMemory, Seen, is_known, shift};
 use crate::tracks::{Pace, Track, moved, wider};
 
-/// Boxes that overlap by more are of one person.
+/// Two boxes that overlap by more than this show the same person.
 const SAME: f64 = 0.5;
-/// Boxes of a detector that overlap by more are of one person.
+/// Two boxes of a detector that overlap by more than this show the same person.
 const SAME_BOX: f64 = 0.85;
-/// A person whose box overlaps with that of a larger person by more may be hidden soon.
+/// A person whose box overlaps that of a larger person by more than this may soon be hidden.
 const BEHIND: f64 = 0.2;
-/// Least number of joints of a person behind others that these do not cover.
+/// Minimum number of joints of a person behind others that the others do not cover.
 const LEAST_BEHIND: usize = 7;
-/// A new person who is seen so much worse than the best one of the frame, as a share of the heat, is a chair or a poster.
+/// Minimum heat of a new person, as a share of the heat of the best person in the frame; anything fainter is a chair or a poster.
 const FAINT: f64 = 0.7;
-/// Least heat of a joint that says where its person is, 0 to 1.
+/// Minimum heat of a joint that counts for the position of its person, 0 to 1.
 const SURE: f64 = 0.2;
 
-/// The people of a frame, one after another.
+/// Looks at the people of a frame, one after another.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Looks<'a> {
     pub(crate) looker: Looker<'a>,
     pub(crate) image: Rgb8View<'a>,
     /// Width and height of the picture.
     pub(crate) size: [usize; 2],
-    /// Most people that are looked at.
+    /// Maximum number of people to look at.
     pub(crate) n_most: usize,
-    /// Least mean heat of the joints of a person who is seen well, 0 to 1.
+    /// Minimum mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) least_heat: f64,
-    /// Amount by which the score of a pose may be lower than usual for its person.
+    /// Maximum amount by which the score of a pose may be below the usual score of its person.
     pub(crate) most_lost: f32,
 }
 
-/// Returns true if the joints that are seen in a box lie in quite another one: the person moved fast, or the last frame is long
-/// ago. The box then shows only some of the person, and that near its edge.
+/// Returns true if the joints seen in a box span a clearly different box. Either the person moved fast, or the last frame is long
+/// ago. The box then shows only part of the person, near the edge of the box.
 fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     let sure = maps.peaks().iter().flatten();
     let sure = sure.filter(|sure| sure.score >= SURE).map(|sure| sure.at);
     outline_of(sure).is_some_and(|other| overlap(other, outline) < SAME)
 }
 
-/// The boxes of a detector that are not of people who are held.
+/// Returns the boxes of a detector that do not belong to held people.
 pub(crate) fn of_others(outlines: Vec<[f64; 4]>, held: &[Seen]) -> Vec<[f64; 4]> {
     let of_held: Vec<usize> =
         held.iter().filter_map(|held| best_box(&outlines, held.outline)).collect();
@@ -53,26 +53,26 @@ pub(crate) fn of_others(outlines: Vec<[f64; 4]>, held: &[Seen]) -> Vec<[f64; 4]>
         .collect()
 }
 
-/// The box of a detector that is of the person in a box; `None` if none is.
+/// Returns the detector box that best matches a given box; `None` if none overlaps enough.
 fn best_box(outlines: &[[f64; 4]], outline: [f64; 4]) -> Option<usize> {
     let overlaps = outlines.iter().map(|other| overlap(*other, outline));
     let best = overlaps.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
     best.filter(|best| best.1 > SAME).map(|best| best.0)
 }
 
-/// How a person of the frame before moves, by another look.
+/// Returns the pace of a person of the previous frame, updated by another look.
 ///
-/// * `n_frames`: from the last look to this one.
+/// * `n_frames`: number of frames from the last look to this one.
 fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>) -> Option<Pace> {
     let moved = shift(&before?.maps, &seen.maps)?;
     Some(Pace::next(track.pace, moved, n_frames?))
 }
 
 impl Looks<'_> {
-    /// Takes the people of the frame before who stand still as they were. The first is looked at in every frame, and so is a person behind a larger
-    /// one.
+    /// Holds the people of the previous frame who stand still: their last sight is reused. The first person is looked at in every frame,
+    /// and so is a person behind a larger one.
     ///
-    /// * `before`: the people of the frame before; of those who are held, other memory afterwards.
+    /// * `before`: the people of the previous frame; the entries of held people are overwritten.
     pub(crate) fn hold_still(
         &self,
         tracks: &mut [Track],
@@ -87,7 +87,7 @@ impl Looks<'_> {
             let track = &mut others[0];
             let is_behind = |larger: &Track| overlap(larger.outline, track.outline) > BEHIND;
             let n_frames = track.n_held + hold.gap;
-            // One frame further, the person would have moved too far by the next.
+            // Look one frame early: by the next frame, the person would have moved too far.
             if n_frames < hold.most
                 && track.is_still(n_frames + 1)
                 && !larger.iter().any(is_behind)
@@ -98,10 +98,10 @@ impl Looks<'_> {
         }
     }
 
-    /// Looks at a person of the frame before who is not seen yet: around the box of then if that is long ago, in a wider box if the last pose
-    /// was doubtful, else in the same. Where boxes were looked for, the person is looked at in the same box only.
+    /// Looks at a person of the previous frame who has not been seen yet in this frame. If a search ran in this frame, only the last box is
+    /// used. Otherwise, the box is enlarged if the last frame is long ago, or if the last pose was doubtful.
     ///
-    /// * `before`: the people of the frame before.
+    /// * `before`: the people of the previous frame.
     pub(crate) fn see_once_more(
         &self,
         track: &Track,
@@ -120,10 +120,10 @@ impl Looks<'_> {
         self.see_again(track, before.get(track.index), memory)
     }
 
-    /// Looks into the boxes of a detector, each of which is of one person. Closer into the only one, which may fit badly: among others a
-    /// closer look would end at the one in front.
+    /// Looks into the boxes of a detector, each of which shows one person. A single box may fit badly, so the step looks closer into it.
+    /// With several boxes, a closer look would end at the person in front.
     ///
-    /// * `outlines`: the nearest person first.
+    /// * `outlines`: the boxes, nearest person first.
     pub(crate) fn see_boxes(
         &self,
         outlines: &[[f64; 4]],
@@ -144,7 +144,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at the person in a box; where that is a person who is known, at the one behind.
+    /// Looks at the person in a box. If this person is already known, looks at the person behind.
     fn see_box(
         &self,
         outline: [f64; 4],
@@ -174,9 +174,9 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at the person in a box behind those who are known: these are painted over.
+    /// Looks at the person in a box behind known people, who are painted over.
     ///
-    /// * `usual_score`: of a person of the frame before.
+    /// * `usual_score`: usual score of the person, if known from the previous frame.
     fn see_behind(
         &self,
         boxed: ([f64; 4], Turn),
@@ -203,7 +203,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks into a box, with the picture turned where the person is not upright; the maps are those of the next person.
+    /// Looks into a box, with the picture rotated if the person is not upright; the maps are stored in the next person.
     fn see_in(
         &self,
         (outline, turn): ([f64; 4], Turn),
@@ -223,10 +223,10 @@ impl Looks<'_> {
         Ok(Some(best))
     }
 
-    /// Takes a person of the frame before who has hardly moved as the last look saw them; returns whether nobody is known there yet.
+    /// Reuses the last sight of a person of the previous frame who has hardly moved; returns true if the person was added.
     ///
-    /// * `n_held`: frames since that look.
-    /// * `before`: the sight of the person in the frame before; other memory afterwards.
+    /// * `n_held`: number of frames since the last look.
+    /// * `before`: the sight of the person in the previous frame; overwritten.
     fn hold(
         &self,
         track: &Track,
@@ -250,7 +250,7 @@ impl Looks<'_> {
         is_new
     }
 
-    /// Looks at a person of the frame before, where nobody is known yet, in a wider box as well and around what is seen there, and keeps
+    /// Looks at a person of the previous frame in the same box and in a wider box, unless somebody is already known there. Keeps
     /// the best sight if it is good.
     fn see_wider(&self, track: &Track, memory: &mut NetworkMemory) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
@@ -265,8 +265,8 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks for a person of a frame long before, where nobody is known yet, around the box of then; keeps who is seen well, and not much
-    /// worse than the person usually is.
+    /// Looks around the old box of a person last seen many frames ago, unless somebody is already known there. Keeps a person who is seen
+    /// well and whose score is not much below the usual one.
     ///
     /// * `around`: the box, enlarged for the time that has passed.
     fn see_later(
@@ -288,10 +288,10 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at a person of the frame before, where nobody is known yet, and closer if the person has moved far since, which takes
-    /// some time, or with the picture turned if the person lies or gets up; keeps what is seen well.
+    /// Looks at a person of the previous frame, unless somebody is already known there. If the person has moved far, looks closer, which
+    /// takes some time. If the person lies down or gets up, looks with the picture rotated. Keeps a person who is seen well.
     ///
-    /// * `before`: the sight of the person in the frame before.
+    /// * `before`: the sight of the person in the previous frame.
     fn see_again(
         &self,
         track: &Track,
@@ -340,13 +340,13 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Returns true if there is room for the person in a box, and nobody is known there.
+    /// Returns true if another person can be kept and nobody is known in the box.
     fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
         let is_known = |seen: &Seen| overlap(seen.outline, outline) > SAME;
         memory.n_seen < self.n_most && !memory.people().iter().any(is_known)
     }
 
-    /// Keeps the next person, whose maps are read, as [`Self::keep`] does; returns the same.
+    /// Like [`Self::keep`], for the next person, whose maps have been read.
     fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
         seen.outline = look.outline;
@@ -357,7 +357,7 @@ impl Looks<'_> {
         self.keep(memory)
     }
 
-    /// Keeps the next person if it is seen well and not known yet; returns whether somebody is seen well.
+    /// Keeps the next person if the person is seen well and not known yet. Returns true if the person is seen well.
     fn keep(&self, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
         if !seen.judge(self.size, self.least_heat) {

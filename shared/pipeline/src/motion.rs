@@ -1,4 +1,4 @@
-//! Pictures that were not taken at the instant of their frame: what views found is moved to the instant.
+//! Moves the findings of pictures that were not taken at the instant of their frame to that instant.
 
 use geometry::longer_side;
 use geometry::skew::{Tracks, Velocity, moved};
@@ -7,42 +7,42 @@ use nalgebra::{Point2, Vector2};
 use crate::fused_view::FusedView;
 use crate::view_result::ViewResult;
 
-/// Points of a view; `None` for one that it does not show.
+/// Points of a view; `None` for a point that the view does not show.
 type Points = Vec<Option<Point2<f64>>>;
 
 /// The poses of the views at the instant of a frame.
 #[derive(Debug, Clone)]
 pub(crate) struct AtInstant {
     pub(crate) views: Vec<Option<FusedView>>,
-    /// Additions to the deviations of their parts, pixels.
+    /// Deviations to be added to those of the parts, in pixels.
     pub(crate) more_px: Vec<Vec<f64>>,
 }
 
-/// How the points of every view move, from frame to frame.
+/// Motion of the points of every view from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
     views: Vec<Tracks>,
-    /// Instant of the frame, seconds.
+    /// Instant of the frame, in seconds.
     instant_s: Option<f64>,
 }
 
 impl Motion {
     /// Begins a frame.
     ///
-    /// * `instant_s`: its instant, seconds; `None` where the rate of the frames is not known: then nothing is moved.
+    /// * `instant_s`: instant of the frame, in seconds. If it is `None` (frame rate unknown), nothing is moved.
     pub fn begin(&mut self, instant_s: Option<f64>) {
         self.instant_s = instant_s;
     }
 
-    /// The instant of the frame, if what was found is to be moved there: some picture was taken at another time.
+    /// Returns the instant of the frame if points must be moved, that is, if some picture was taken at another time.
     fn instant(&self, answers: &[Option<ViewResult>]) -> Option<f64> {
         let is_off = answers.iter().flatten().any(|answer| answer.skew_s != 0.0);
         self.instant_s.filter(|_| is_off)
     }
 
-    /// The poses of the views at the instant of the frame; `None` if all pictures were taken then.
+    /// Returns the poses of the views at the instant of the frame; `None` if all pictures were taken at that instant.
     ///
-    /// * `sigma_cells`: standard deviation of a part, cells.
+    /// * `sigma_cells`: standard deviation of a part, in cells.
     pub(crate) fn at_instant(
         &mut self,
         answers: &[Option<ViewResult>],
@@ -78,10 +78,10 @@ impl Motion {
         })
     }
 
-    /// Amount by which the points of a view had moved from the instant of the frame when its picture was taken, pixels;
-    /// `None` if that was then.
+    /// Returns the displacement of the points of a view between the instant of the frame and the time of the picture, in pixels;
+    /// `None` if the picture was taken at the instant.
     ///
-    /// * `skew_s`: of the picture; `taken_s`: when the points were there, seconds after the instant.
+    /// * `skew_s`: time of the picture after the instant; `taken_s`: time of the points after the instant, both in seconds.
     pub(crate) fn since_instant(
         &mut self,
         view: usize,
@@ -99,7 +99,7 @@ impl Motion {
         Some(velocities.into_iter().map(by).collect())
     }
 
-    /// The velocities of the points of a view, which are then remembered.
+    /// Computes and stores the velocities of the points of a view.
     fn velocities(
         &mut self,
         view: usize,
@@ -120,7 +120,7 @@ impl Motion {
     }
 }
 
-/// How tall the person is in the picture, pixels.
+/// Returns the height of the person in the picture, in pixels.
 fn height(points: &Points) -> f64 {
     longer_side(points.iter().flatten().map(|point| [point.x, point.y])).unwrap_or(0.0)
 }

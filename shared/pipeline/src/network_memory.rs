@@ -1,4 +1,4 @@
-//! Memory of the step with a network from frame to frame.
+//! State of the network step from frame to frame.
 
 use multiview::FrontEvidence;
 use posenetwork::{Bar, JointMaps, LookMemory, Turn, overlap};
@@ -7,94 +7,93 @@ use statistics::Sorted;
 
 use crate::tracks::{Pace, Track, wider};
 
-/// Joints that are nearer to each other, as a share of the height of the network's window, are the same; and sights that have this share
-/// of the joints in common, with sides as they are or exchanged, are of one person.
+/// Maximum distance of two joints that count as the same, as a share of the height of the network's window. The second constant is the
+/// share of common joints at which two sights show the same person, with sides as labelled or exchanged.
 const SAME_JOINT: f64 = 0.05;
 const TWIN: f64 = 0.3;
-/// Nobody leaves the box of the last frame within this share of the time for which people can be followed without a frame: a person
-/// who runs moves 0.2 m in 0.07 s.
+/// Within this share of the maximum gap between frames, nobody leaves the box of the last frame: a running person moves 0.2 m in 0.07 s.
 const SOON: f64 = 1.0 / 6.0;
-/// How long a person who stands still need not be looked at, as a share of that time: a person who begins to walk moves
-/// 0.1 m in 0.13 s.
+/// Time for which a person who stands still is held without a look, as a share of the maximum gap between frames: a person who starts
+/// to walk moves 0.1 m in 0.13 s.
 const HELD: f64 = 1.0 / 3.0;
-/// A box in which nobody is seen is looked into again in the fourth search after: chairs and posters stay where they are.
+/// An empty box is looked into again at the fourth search after: chairs and posters stay in place.
 const LOOKED_AGAIN: u32 = 4;
-/// After this many times that time (2 s) a person may be anywhere.
+/// After this multiple of the maximum gap between frames (2 s), a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
-/// State of the step from frame to frame: memory that is used again, and the boxes of the people it sees.
+/// State of the step from frame to frame: reusable memory, and the boxes of the people seen.
 #[derive(Debug, Default)]
 pub struct NetworkMemory {
     pub(crate) look: LookMemory,
     pub(crate) values: Vec<f32>,
-    /// Parts of people whom others are behind.
+    /// Body parts of people in front of others.
     pub(crate) bars: Vec<Bar>,
-    /// Where the people of this frame are looked for in the next one.
+    /// Where to look for the people of this frame in the next frame.
     pub(crate) tracks: Vec<Track>,
-    /// The people of this frame; those beyond `n_seen` are memory for more.
+    /// The people of this frame; entries beyond `n_seen` are spare memory.
     pub(crate) seen: Vec<Seen>,
     pub(crate) n_seen: usize,
-    /// The people of the frame before.
+    /// The people of the previous frame.
     pub(crate) before: Vec<Seen>,
     /// Boxes of the detector in which nobody was seen.
     pub(crate) empty: Vec<Empty>,
-    /// Frames until boxes are looked for; none before the first frame.
+    /// Number of frames until the next search for boxes; `None` before the first frame.
     pub(crate) until: Option<u64>,
-    /// Frames for which boxes are looked for often: people were near each other, or one of several was lost or found.
+    /// Number of remaining frames with frequent searches: people were near each other, or one of several was lost or found.
     n_unsettled: u64,
-    /// The number of the last frame, if it is known ([`Self::begin`]).
+    /// Number of the last frame, if known ([`Self::begin`]).
     last: Option<u64>,
-    /// True if the last frame is so recent that nobody has left their box.
+    /// True if the last frame is so recent that nobody has left the box.
     pub(crate) is_soon: bool,
-    /// Frames from the last one to this one, and most frames for which a person who stands still is not looked at; `None` where the
-    /// frames' rate is not known.
+    /// Number of frames since the last one, and the maximum number of frames without a look at a person who stands still; `None` if the
+    /// frame rate is unknown.
     pub(crate) hold: Option<Hold>,
-    /// How many times the longest time for which people are followed without a frame has passed since the last frame, where it is more
-    /// than once: people are looked for around their boxes first.
+    /// Time since the last frame as a multiple of the maximum gap between frames, if it is more than 1. People are then first
+    /// looked for around their boxes.
     pub(crate) apart: Option<f64>,
-    /// True if people were looked for in this frame.
+    /// True if this frame was searched for people.
     pub(crate) has_searched: bool,
 }
 
-/// For how long a person who stands still need not be looked at.
+/// How long a person who stands still can be held without a look.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hold {
-    /// Frames from the last one to this one.
+    /// Number of frames from the last one to this one.
     pub(crate) gap: u64,
-    /// Most frames from one look to the next.
+    /// Maximum number of frames from one look to the next.
     pub(crate) most: u64,
 }
 
 /// A box of the detector in which nobody was seen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Empty {
-    /// The box, pixels.
+    /// The box, in pixels: left, top, right, bottom.
     pub(crate) outline: [f64; 4],
-    /// Searches since then.
+    /// Number of searches since then.
     pub(crate) n_searches: u32,
 }
 
 /// A person in a frame.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// Where the person is looked for next; `None` of one who was just looked at.
+    /// Where to look for the person next; `None` if the person was just looked at.
     pub(crate) next: Option<Track>,
-    /// As in [`Track`].
+    /// Pace of the person, as in [`Track`].
     pub(crate) pace: Option<Pace>,
     pub(crate) maps: JointMaps,
     pub(crate) outline: [f64; 4],
-    /// How the picture was turned for the network.
+    /// Rotation of the picture for the network.
     pub(crate) turn: Turn,
-    /// The score that the person's poses had in the frames before; `None` for a new person.
+    /// Usual score of the person's poses in the earlier frames; `None` for a new person.
     pub(crate) usual_score: Option<f32>,
     /// Mean heat of the joints at their peaks, 0 to 1.
     pub(crate) heat: f64,
-    /// Direction in which the trunk faces, if the network gives it.
+    /// Evidence of the direction in which the trunk faces, if the network provides it.
     pub(crate) front: Option<FrontEvidence>,
 }
 
 impl NetworkMemory {
-    /// The people that the network sees in this frame.
+    /// Returns the people seen by the network in this frame.
     pub(crate) fn people(&self) -> &[Seen] {
         &self.seen[..self.n_seen]
     }
@@ -104,13 +103,13 @@ impl NetworkMemory {
         self.people().iter().map(|person| &person.maps)
     }
 
-    /// The heat of the person of this frame who is seen best, 0 to 1; 0 without anybody.
+    /// Returns the heat of the person who is seen best in this frame, 0 to 1; 0 if there is nobody.
     pub(crate) fn best_heat(&self) -> f64 {
         let heats = self.people().iter().map(|known| known.heat);
         heats.fold(0.0, f64::max)
     }
 
-    /// Memory for looking, and for one more person of this frame.
+    /// Returns memory for a look and for one more person of this frame.
     pub(crate) fn next(&mut self) -> (&mut LookMemory, &mut Seen) {
         if self.seen.len() == self.n_seen {
             self.seen.push(Seen::default());
@@ -118,7 +117,7 @@ impl NetworkMemory {
         (&mut self.look, &mut self.seen[self.n_seen])
     }
 
-    /// Counts a search for the boxes in which nobody was seen; forgets those that are due again.
+    /// Counts a search for every empty box, and forgets the boxes that are due for another look.
     pub(crate) fn age_empty_boxes(&mut self) {
         self.empty.retain_mut(|empty| {
             empty.n_searches += 1;
@@ -126,7 +125,7 @@ impl NetworkMemory {
         });
     }
 
-    /// Keeps the people of this frame who are seen largest and best.
+    /// Keeps only the people of this frame who are seen largest and best.
     pub(crate) fn keep_largest(&mut self, n_most: usize) {
         let size = |seen: &Seen| seen.heat * (seen.outline[3] - seen.outline[1]);
         self.seen[..self.n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
@@ -135,8 +134,8 @@ impl NetworkMemory {
 
     /// Notes whether people are near each other in this frame, or their number changed.
     ///
-    /// * `n_before`: people of the frame before.
-    /// * `n_frames`: frames for which boxes are looked for often after that.
+    /// * `n_before`: number of people in the previous frame.
+    /// * `n_frames`: number of frames with frequent searches after such an event.
     pub(crate) fn note_company(&mut self, n_before: usize, n_frames: u64) {
         let people = self.people();
         let are_near = |(nth, person): (usize, &Seen)| {
@@ -156,17 +155,17 @@ impl NetworkMemory {
         self.hold.is_some() && self.apart.is_none()
     }
 
-    /// Returns true if boxes are to be looked for often.
+    /// Returns true if boxes should be searched for frequently.
     pub(crate) fn is_unsettled(&self) -> bool {
         self.n_unsettled > 0
     }
 
-    /// Begins with a frame. If it is long after the last one, frames between were dropped or lost: people are then looked for around
-    /// the boxes in which they were, and after very long everywhere, unless the last frame was searched as well. Where a search takes that long
-    /// itself, no frame would be looked at in any other way.
+    /// Begins a frame. If the last frame is long ago, because frames were dropped or lost, people are first looked for around their old
+    /// boxes. If it is very long ago, the whole picture is searched, unless the last frame was searched as well. Otherwise, a slow search
+    /// could cause a search in every frame.
     ///
-    /// * `frame`: its number.
-    /// * `most_apart`: most frames from one in which people are seen to the next one in which they are in their boxes.
+    /// * `frame`: number of the frame.
+    /// * `most_apart`: maximum number of frames after which people can still be expected in their boxes.
     pub fn begin(&mut self, frame: u64, most_apart: Option<f64>) {
         let apart = self.last.map(|last| frame.saturating_sub(last));
         let share = apart.zip(most_apart);
@@ -178,27 +177,27 @@ impl NetworkMemory {
         });
         self.apart = share.filter(|share| *share > 1.0);
         if share.is_some_and(|share| share > LOST) && !self.has_searched {
-            // The first frame is searched anyway, and sets its own phase.
+            // The first frame is searched in any case, and sets its own phase.
             self.until = self.until.map(|_| 0);
         }
         self.last = Some(frame);
     }
 
-    /// Returns true if boxes are to be looked for in this frame, no matter who is seen.
+    /// Returns true if this frame must be searched for boxes, even if people are seen.
     pub(crate) fn is_due(&self) -> bool {
         self.until.is_none_or(|until| until == 0)
     }
 
-    /// Returns true if boxes were looked for in this frame.
+    /// Returns true if this frame was searched for boxes.
     pub fn has_searched(&self) -> bool {
         self.has_searched
     }
 }
 
 impl Seen {
-    /// Judges what is seen of a person who was looked at; returns whether the person is seen well, and in the frame.
+    /// Checks a person who was looked at; returns true if the person is seen well and lies in the frame.
     ///
-    /// * `size`: width and height of the frame; `least_heat`: mean heat of the joints of a person who is seen well, 0 to 1.
+    /// * `size`: width and height of the frame; `least_heat`: minimum mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) fn judge(&mut self, size: [usize; 2], least_heat: f64) -> bool {
         self.next = None;
         self.heat = self.maps.heat();
@@ -206,13 +205,13 @@ impl Seen {
     }
 }
 
-/// Returns true if the person after the first `n` is one of these: two boxes can be of one person.
+/// Returns true if the person at index `n` is one of the `n` people before: two boxes can show the same person.
 pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     let (before, last) = seen[..=n].split_at(n);
     before.iter().any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)
 }
 
-/// The share of the joints that two sights have in common, with sides as they are or exchanged.
+/// Returns the share of joints that two sights have in common, with sides as labelled or exchanged.
 fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     let [_, top, _, bottom] = first.extent();
     let near = SAME_JOINT * (bottom - top);
@@ -230,7 +229,7 @@ fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     share(&|joint| joint).max(share(&|joint| MIRRORED[joint]))
 }
 
-/// Steps from the joints of one sight to those of another.
+/// Returns the displacements of the joints from one sight to another.
 fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]> {
     let both = first.peaks().iter().zip(second.peaks());
     both.filter_map(|(a, b)| {
@@ -243,8 +242,8 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Sorted::new(values.collect::<Vec<f64>>()).upper_median()
 }
 
-/// How far a whole person has moved from one sight to another: the median over the joints along each axis, which the errors of single
-/// joints hardly change; share of the height of the first one's window.
+/// Returns the displacement of a whole person from one sight to another, as a share of the height of the first window. It is the median
+/// over the joints along each axis, so errors of single joints have little effect.
 pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<[f64; 2]> {
     let [_, top, _, bottom] = first.extent();
     let along = |axis: usize| median(steps(first, second).map(|step| step[axis]));

@@ -1,8 +1,8 @@
 //! The single-view step with a network: pixels in, people and the maps of their joints out.
 //!
-//! A network that looks at one person needs a box. While a person is seen well, the box of the next frame is that of the pose,
-//! widened; now and then, and where nobody is seen well, a detector finds boxes. Keypoints that another program found take the same way,
-//! without a picture.
+//! A network that looks at one person needs a box. While a person is seen well, the box for the next frame is that of the pose,
+//! widened. From time to time, and if nobody is seen well, a detector searches for boxes. Keypoints found by another program go through
+//! the same step, without a picture.
 
 use kernels::Rgb8View;
 use keypoints::{Keypoint, Way};
@@ -18,32 +18,33 @@ use crate::sighting::Sighting;
 use crate::tracks::{MUCH_WORSE, Track};
 use crate::view_result::ExtraKeypoint;
 
-/// Source of the places of people's joints.
+/// Source of the positions of people's joints.
 #[derive(Debug)]
 pub enum Eyes {
-    /// A network that looks into boxes, and the detector of people that finds these.
+    /// A network that looks into boxes, and the person detector that finds the boxes.
     Network(Box<PoseNetwork>, Box<Detector>),
-    /// Keypoints that another program found: how the joints follow from them (`keypoints::joint_ways` of their names).
+    /// Keypoints found by another program, with the rules that derive the joints from them (`keypoints::joint_ways` of their names).
     Keypoints(Vec<Vec<Way>>),
 }
 
 /// Settings of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NetworkSettings {
-    /// Most people of a view: each costs a run of the network.
+    /// Maximum number of people per view; each person costs a run of the network.
     pub n_people: usize,
-    /// Boxes are looked for in every n-th frame, and in every one in which nobody is seen well.
+    /// Boxes are searched for in every n-th frame, and in every frame in which nobody is seen well.
     pub find_every: u64,
-    /// The same while people are near each other, and for [`Self::find_every`] frames after: one who is hidden for a moment is found
-    /// again soon; also after one of several was lost or found.
+    /// Search interval while people are near each other, and for [`Self::find_every`] frames after. A briefly hidden person is then found
+    /// again soon. It also applies after one of several people was lost or found.
     pub find_every_of_several: u64,
-    /// By how many frames the second of these comes sooner: views that look for boxes in turn do not keep one frame waiting.
+    /// Number of frames by which the second regular search comes earlier. With different phases, the views do not all search in the same
+    /// frame.
     pub find_phase: u64,
-    /// Least mean heat of the joints of a person who is seen well, 0 to 1.
+    /// Minimum mean heat of the joints of a person who is seen well, 0 to 1.
     pub least_heat: f64,
-    /// How maps become evidence.
+    /// Settings for turning maps into evidence.
     pub maps: MapSettings,
-    /// Standard deviation of keypoints that another program found, share of the height of the person's box enlarged by a quarter.
+    /// Standard deviation of keypoints found by another program, as a share of the height of the person's box enlarged by a quarter.
     pub keypoint_sigma: f64,
 }
 
@@ -61,11 +62,11 @@ impl Default for NetworkSettings {
     }
 }
 
-/// Least score of an extra keypoint: below it, its place is a guess (0.3 is what mmpose and `Pose2Sim` use).
+/// Minimum score of an extra keypoint: below it, the position is a guess (mmpose and `Pose2Sim` use 0.3).
 const LEAST_SCORE: f64 = 0.3;
-/// Most values of the maps of a frame.
+/// Returns the maximum number of map values of a frame.
 ///
-/// * `n_people`: most people of a view.
+/// * `n_people`: maximum number of people per view.
 pub const fn most_values(n_people: usize) -> usize {
     n_people * N * MOST_CELLS
 }
@@ -92,28 +93,30 @@ impl NetworkStep {
         }
     }
 
-    /// The step with keypoints that no joint follows from: every candidate has them.
+    /// Adds the keypoints that are not joints; every candidate then has them.
     ///
-    /// * `extras`: of every wanted keypoint its number in the order of the card or of the file; `None` where these do not know it.
+    /// * `extras`: for every wanted keypoint, its index in the order of the card or of the file; `None` if the card or file does not have
+    ///   it.
     #[must_use]
     pub fn with_extras(self, extras: Vec<Option<usize>>) -> Self {
         Self { extras, ..self }
     }
 
-    /// Width and height of the frames.
+    /// Returns the width and height of the frames.
     pub fn size(&self) -> [usize; 2] {
         self.size
     }
 
-    /// Looks at a frame; what is seen stays in the memory ([`Self::sightings`], [`Self::evidence`]).
+    /// Looks at a frame, and stores the result in the memory ([`Self::sightings`], [`Self::evidence`]).
     ///
-    /// Who stands still is held. Where boxes are looked for, they come before those of the frame before, so that no box shrinks or wanders off
-    /// unnoticed. A person whose pose was much worse than usual is looked at in a wider box as well, and the better sight kept. Up to twice as many
-    /// people as are kept are looked at, and the largest kept. While somebody is seen, a box in which nobody was seen is left out of some searches.
+    /// People who stand still are held. In a frame with a search, the detector's boxes come before the boxes of the previous frame, so that
+    /// no box shrinks or drifts unnoticed. A person whose pose was much worse than usual is also looked at in a wider box, and the better
+    /// sight is kept. The step looks at up to twice as many people as it keeps, and keeps the largest. While somebody is seen, empty boxes
+    /// are skipped in some searches.
     ///
     /// # Errors
     ///
-    /// [`LookError`] if the network or the detector fails, or gives numbers that are not finite.
+    /// [`LookError`] if the network or the detector fails or returns numbers that are not finite.
     pub fn look(&self, image: Rgb8View<'_>, memory: &mut NetworkMemory) -> Result<(), LookError> {
         memory.n_seen = 0;
         let Eyes::Network(network, detector) = &self.eyes else {
@@ -155,13 +158,13 @@ impl NetworkStep {
         }
         memory.note_company(tracks.len(), self.settings.find_every);
         self.plan_search(memory);
-        // The memory of the list is kept.
+        // Reuse the memory of the list.
         memory.tracks = tracks;
         memory.tracks.clear();
         Ok(())
     }
 
-    /// Plans in how many frames boxes are searched for next.
+    /// Plans the frame of the next search for boxes.
     fn plan_search(&self, memory: &mut NetworkMemory) {
         let settings = &self.settings;
         let first = settings.find_every - settings.find_phase % settings.find_every;
@@ -179,9 +182,9 @@ impl NetworkStep {
         memory.until = until.map(|left| left.saturating_sub(1));
     }
 
-    /// Takes the people of a frame whose keypoints another program found; they stay in the memory as after [`Self::look`].
+    /// Takes the people of a frame from keypoints found by another program; they are stored in the memory as after [`Self::look`].
     ///
-    /// * `people`: keypoints of every person, pixels of the frame.
+    /// * `people`: keypoints of every person, in pixels of the frame.
     pub fn take<P: AsRef<[Option<Keypoint>]>>(
         &self,
         people: impl Iterator<Item = P>,
@@ -210,18 +213,18 @@ impl NetworkStep {
         }
     }
 
-    /// Amount by which the score of a pose may be lower than usual for its person.
+    /// Returns the maximum amount by which the score of a pose may be below the usual score of its person.
     fn most_lost(&self) -> f32 {
         -MUCH_WORSE * self.settings.maps.floor()
     }
 
-    /// The people of the frame that was looked at, the largest and best seen first; keeps where they are looked for in the next one.
+    /// Returns the people of the frame, the largest and best seen first. Stores where to look for them in the next frame.
     pub fn sightings(&self, memory: &mut NetworkMemory) -> Vec<Sighting> {
         let n_seen = memory.n_seen;
         let mut people = Vec::with_capacity(n_seen);
         for (nth, seen) in memory.seen[..n_seen].iter_mut().enumerate() {
             let score = seen.maps.score(&self.settings.maps);
-            // Who was not looked at has a track already.
+            // A held person already has a track.
             if seen.next.is_none() {
                 self.track(seen, score);
             }
@@ -240,13 +243,13 @@ impl NetworkStep {
         people
     }
 
-    /// The maps of the people of [`Self::sightings`], in their order.
+    /// Returns the maps of the people returned by [`Self::sightings`], in the same order.
     pub fn evidence<'a>(&self, memory: &'a NetworkMemory) -> impl Iterator<Item = PersonMaps<'a>> {
         let people = memory.people().iter();
         people.filter_map(|seen| seen.maps.evidence())
     }
 
-    /// Plans where to search next for a person who was looked at.
+    /// Plans where to look next for a person who was looked at.
     fn track(&self, seen: &mut Seen, score: f32) {
         let before = ((seen.outline, seen.turn), seen.usual_score);
         let around = seen.maps.around();
@@ -256,7 +259,7 @@ impl NetworkStep {
         });
     }
 
-    /// The extra keypoints of a person.
+    /// Returns the extra keypoints of a person.
     fn extras_of(&self, maps: &JointMaps) -> impl Iterator<Item = ExtraKeypoint> {
         let each = self.extras.iter();
         each.map(|extra| {
@@ -267,13 +270,14 @@ impl NetworkStep {
     }
 }
 
-/// In which direction a person faces; nothing of one who is seen head down in a picture that was not turned.
+/// Returns the evidence of the direction in which a person faces; no evidence for a person seen head down in a picture that was not
+/// rotated.
 fn front_of(sighting: &Sighting, seen: &Seen) -> FrontEvidence {
     let is_told = seen.turn != Turn::Up || sighting.trunk_upward().is_none_or(|up| up > 0.0);
     seen.front.filter(|_| is_told).unwrap_or_default()
 }
 
-/// Boxes around people, pixels, who is sure and large first: the frame has room for a few.
+/// Finds boxes around people, in pixels. Certain and large ones come first, because the frame has room for only a few.
 fn find(
     detector: &Detector,
     image: Rgb8View<'_>,

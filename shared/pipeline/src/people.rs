@@ -1,4 +1,4 @@
-//! The people that the views of a frame could mean: candidates of different views that are one person in space.
+//! Finds the people that the views of a frame could mean: candidates of different views that are one person in space.
 
 use geometry::{Camera, Ray};
 use multiview::ViewPlan;
@@ -6,61 +6,60 @@ use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::view_result::ViewResult;
 
-/// The parts whose mean is a point of the middle line of the body: head, neck, hips, knees, ankles. Where these lie does
-/// not depend on which side is called left.
+/// Pairs of parts whose means are points of the midline of the body: head, neck, hips, knees, ankles. These points do
+/// not depend on which side is labelled left.
 const LINE: [[usize; 2]; N_POINTS] = [[0, 0], [1, 1], [9, 21], [11, 23], [13, 25]];
 const N_POINTS: usize = 5;
 /// Indices of the neck and of the hips in `LINE`.
 const NECK: usize = 1;
 const HIPS: usize = 2;
-/// Shortest and longest distance of successive points, metres: wide enough for a child of three years and a tall man. The
-/// middle between two knees may be anywhere between the legs.
+/// Minimum and maximum distance of successive points, in metres: wide enough for a three-year-old child and a tall man. The
+/// midpoint between two knees may be anywhere between the legs.
 const LENGTHS: [[f64; 2]; N_POINTS - 1] = [[0.05, 0.5], [0.2, 0.8], [0.0, 0.7], [0.0, 0.7]];
 
-/// Largest mean distance of a candidate's points from where the person is projected, as a share of its size in the picture.
+/// Maximum mean distance of a candidate's points from the projected person, as a share of the candidate's size in the picture.
 const TOLERANCE: f64 = 0.15;
-/// A candidate whose trunk is nearer than this share of its size to the middle line of a person is that person in the
-/// picture.
+/// A candidate shows a person if its trunk is nearer to the person's midline than this share of the candidate's size.
 const SAME: f64 = 0.15;
-/// People whose trunks are nearer are the same person, metres.
+/// People whose trunks are nearer than this are the same person, in metres.
 const APART_M: f64 = 0.5;
-/// Rays that pass each other farther away are not to the same point, metres: twice what a body's size tolerates.
+/// Maximum distance between two rays to the same point, in metres: twice the tolerance for the size of a body.
 const MAX_GAP_M: f64 = 0.5;
-/// Rounds of looking for more views.
+/// Maximum number of rounds of searching for more views.
 const MAX_ROUNDS: usize = 3;
-/// Least determinant of the normal matrix of rays: two that are 3 degrees apart have 0.005.
+/// Minimum determinant of the normal matrix of the rays: two rays 3 degrees apart have 0.005.
 const MIN_SPREAD: f64 = 0.002;
-/// Views that must agree; all of a smaller rig.
+/// Minimum number of views that must agree; in a smaller rig, all views must agree.
 const MIN_VIEWS: usize = 3;
-/// Weakest person, as a share of the strength of the strongest one.
+/// Minimum strength of a person, as a share of the strength of the strongest person.
 const MIN_STRENGTH: f64 = 0.28;
 
 /// A person that several views could mean.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Person {
-    /// The candidate of every view; `None` for a view without one.
+    /// The candidate of every view; `None` for a view without a candidate.
     pub candidates: Vec<Option<usize>>,
-    /// The middle line of the body in every picture that shows all of it, head, neck, hips, knees and ankles, pixels of the
+    /// Midline of the body (head, neck, hips, knees, ankles) in every picture that shows all of it, in pixels of the
     /// frame.
     pub lines_px: Vec<Option<Line>>,
-    /// Middle of the trunk, metres in the world.
+    /// Middle of the trunk, in metres in the world.
     pub place: Point3<f64>,
-    /// How clearly the views see the person: by how much its candidates score above the weakest third of their views, less the
-    /// farther they are from where the person is projected. Sum over the views.
+    /// Sum over the views of how clearly they see the person. A view counts the score of its candidate above the weakest third, reduced
+    /// with the distance from the projected person.
     pub strength: f64,
-    /// Size in the pictures: the longer side of the rectangle around the parts, mean over the views that see it, pixels of
-    /// the frame.
+    /// Size in the pictures, in pixels of the frame: longer side of the rectangle around the parts, averaged over the views
+    /// that see the person.
     pub size_px: f64,
 }
 
 impl Person {
-    /// Number of views that see the person.
+    /// Returns the number of views that see the person.
     pub(crate) fn n_views(&self) -> usize {
         self.candidates.iter().flatten().count()
     }
 }
 
-/// The middle line of a body in a picture, pixels of the frame.
+/// Midline of a body in a picture, in pixels of the frame.
 type Line = [[f64; 2]; N_POINTS];
 
 /// A candidate of a view.
@@ -72,7 +71,7 @@ pub(crate) struct FoundBody {
 }
 
 impl FoundBody {
-    /// * `strength`: how clearly the view sees it; at least 0 counts.
+    /// * `strength`: how clearly the view sees the body; negative values count as 0.
     fn new(camera: &Camera, points_px: Line, size_px: f64, strength: f64) -> Self {
         let ray = |[x, y]: [f64; 2]| {
             let is_seen = x.is_finite() && y.is_finite();
@@ -91,14 +90,14 @@ impl FoundBody {
         [0, 1].map(|axis| f64::midpoint(neck[axis], hips[axis]))
     }
 
-    /// Returns true if the body lies on the middle line of a person in the picture.
+    /// Returns true if the body lies on the midline of a person in the picture.
     fn is_on(&self, line: &Line) -> bool {
         let middle = self.middle();
         let mut bones = line.array_windows();
         bones.any(|[a, b]| distance_to_segment(middle, *a, *b) < SAME * self.size_px)
     }
 
-    /// Mean distance of the points from where those of a person are projected, as a share of the size.
+    /// Returns the mean distance of the points from the projected points of a person, as a share of the size.
     fn distance(&self, projected: &Line) -> f64 {
         let each = self.points_px.iter().zip(projected);
         let sum: f64 = each.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
@@ -113,11 +112,11 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    /// The candidates of every view that are another person than one of the people, as bits.
+    /// Returns the candidates of every view that show a person other than the followed one, as bits.
     ///
-    /// In a view that sees nobody but others nothing is left out: there the person may be hidden, or badly found.
+    /// A view that sees only other people leaves nothing out: the followed person may be hidden there, or badly found.
     ///
-    /// * `followed`: who is followed; `None` if it is none of them.
+    /// * `followed`: index of the followed person; `None` if the person was not found.
     pub(crate) fn others(&self, followed: Option<usize>) -> Vec<u64> {
         let people = || self.people.iter().enumerate();
         let of_view = |(view, sightings): (usize, &Vec<FoundBody>)| {
@@ -142,7 +141,7 @@ impl Found {
 }
 
 impl Found {
-    /// The views that see others, but not this person, as bits.
+    /// Returns the views that see other people but not this person, as bits.
     pub(crate) fn without(&self, followed: usize) -> u64 {
         let is_seen = |view: usize| self.people[followed].candidates[view].is_some();
         let sees_others =
@@ -154,20 +153,20 @@ impl Found {
     }
 }
 
-/// Finds the people of a frame, the one that most views see most clearly first.
+/// Finds the people of a frame; the person whom most views see most clearly comes first.
 ///
-/// Every two candidates of two views are put in space by their middle lines; what could be a person there is looked for in
-/// the other views, until nothing changes. The strongest is a person, then every other that is apart from those before it in
-/// space and in all pictures but one. A person is seen by three views, or by both of two, and at least 0.28 times as strong as
-/// the first. People whose trunks are less than half a metre apart count as one. The paper knows one person; this is our own.
+/// Each pair of candidates of two views is placed in space by the midlines. A plausible person is searched for in the other views until
+/// nothing changes. The strongest group is the first person. Each other group is a person if it is apart from all earlier ones in space,
+/// and in all pictures but one. A person must be seen by three views, or by both views of two, and be at least 0.28 times as strong as the
+/// first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this method is our own.
 ///
-/// * `cameras`, `views`: the cameras of the views, and the candidates of each.
+/// * `cameras`, `views`: the cameras of the views, and the candidates of each view.
 pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {
     let people = distinct(&views, groups(cameras, &views));
     Found { views, people }
 }
 
-/// Everything that enough views agree on; the same person many times.
+/// Returns all groups on which enough views agree; the same person occurs many times.
 fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     let n_present = views.iter().filter(|view| !view.is_empty()).count();
     let needed = MIN_VIEWS.min(n_present).max(2);
@@ -192,7 +191,7 @@ fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     found
 }
 
-/// The best of the groups, and of the others those that are another person.
+/// Returns the best group, and those of the other groups that are different people.
 fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let mut kept: Vec<Person> = Vec::new();
@@ -207,7 +206,7 @@ fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     kept
 }
 
-/// Returns true if two people are different: apart in space, and sharing a place in at most one picture.
+/// Returns true if two people are different: they are apart in space, and share a place in at most one picture.
 fn differ(views: &[Vec<FoundBody>], one: &Person, other: &Person) -> bool {
     let shared = views.iter().enumerate().filter(|(view, sightings)| {
         let line = one.lines_px[*view].as_ref();
@@ -219,7 +218,7 @@ fn differ(views: &[Vec<FoundBody>], one: &Person, other: &Person) -> bool {
     (one.place - other.place).norm() >= APART_M && n_shared <= 1 && own >= 2
 }
 
-/// Returns true if the rays to the necks, and those to the hips, pass each other so near that the two may be one person.
+/// Returns true if the rays to the necks, and those to the hips, are close enough for the two bodies to be one person.
 fn may_meet(one: &FoundBody, other: &FoundBody) -> bool {
     [NECK, HIPS].into_iter().all(|point| {
         let (Some(a), Some(b)) = (&one.rays[point], &other.rays[point]) else {
@@ -230,7 +229,7 @@ fn may_meet(one: &FoundBody, other: &FoundBody) -> bool {
     })
 }
 
-/// The person that two candidates would be, with those of the other views that see it there.
+/// Returns the person that two candidates would form, with the candidates of the other views that match.
 ///
 /// * `rays`: a buffer.
 fn person<'a>(
@@ -240,7 +239,7 @@ fn person<'a>(
     rays: &mut Vec<&'a Ray>,
 ) -> Option<Person> {
     let mut seen = placed(cameras, views, candidates, rays)?;
-    // The views that were found later move the person, which may then be seen by more of them.
+    // Views found later move the person; more views may then match.
     for _ in 0..MAX_ROUNDS {
         if seen.candidates == *candidates {
             return Some(seen);
@@ -251,7 +250,7 @@ fn person<'a>(
     Some(seen)
 }
 
-/// The person in space that these candidates give, with the candidate of each view that lies where that person projects.
+/// Returns the person in space formed by these candidates, with the candidate of each view at the projection of the person.
 fn placed<'a>(
     cameras: &[&Camera],
     views: &'a [Vec<FoundBody>],
@@ -293,7 +292,7 @@ fn placed<'a>(
     Some(person)
 }
 
-/// The points nearest to the rays of some candidates; `None` if they are parallel or meet behind a camera.
+/// Returns the points nearest to the rays of some candidates; `None` if the rays are parallel or meet behind a camera.
 fn line_in_world<'a>(
     views: &'a [Vec<FoundBody>],
     candidates: &[Option<usize>],
@@ -317,7 +316,7 @@ fn project(camera: &Camera, points: &[Point3<f64>; N_POINTS]) -> Option<Line> {
     Some(projected)
 }
 
-/// The point whose squared distances from rays are least in sum.
+/// Returns the point with the smallest sum of squared distances from the rays.
 fn meeting(rays: &[&Ray]) -> Option<Point3<f64>> {
     let mut normal = Matrix3::zeros();
     let mut target = Vector3::zeros();
@@ -342,7 +341,7 @@ fn distance_to_segment(point: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (point - (a + along * share.clamp(0.0, 1.0))).norm()
 }
 
-/// The candidates of a view of the paper's method; none of a model that does not have the parts of the published ones.
+/// Returns the candidates of a view for the paper's method; empty if the model does not have the parts of the published models.
 pub(crate) fn bodies_of_poses(plan: &ViewPlan, answer: Option<&ViewResult>) -> Vec<FoundBody> {
     let is_body = plan.model().n_parts() == skeleton::N_PARTS;
     let Some(answer) = answer.filter(|_| is_body) else {

@@ -1,4 +1,4 @@
-//! Evidence of a view for the joints of one person: the maps of a network near the joints that were seen.
+//! Evidence of a view for the joints of one person: the maps of a network near the seen joints.
 
 use multiview::JointEvidence;
 use nalgebra::Vector2;
@@ -7,25 +7,25 @@ use posenetwork::PersonMaps;
 use crate::placed::N;
 use crate::sighting::Sighting;
 
-/// Most places of a joint that a view offers.
+/// Maximum number of places that a view offers for a joint.
 const N_MAXIMA: usize = 3;
-/// How far beyond the box around the joints its person is looked for, share of the box's longer side.
+/// Margin around the box of the joints within which the person is searched for, as a share of the box's longer side.
 const BEYOND: f64 = 0.3;
 
 /// The maps of a view near one person, as evidence for joints.
 pub(crate) struct PersonEvidence<'a> {
     maps: PersonMaps<'a>,
-    /// The part of the picture where the person may be: left, top, right, bottom, pixels.
+    /// Part of the picture where the person may be, in pixels: left, top, right, bottom.
     near: [f64; 4],
     maxima: Vec<Vec<([f64; 2], f32)>>,
-    /// By how much every joint had moved from the instant of the frame when the picture was taken, pixels; empty if that was then.
+    /// Displacement of every joint between the instant of the frame and the time of the picture, in pixels; empty if both are the same.
     since_instant: Vec<Vector2<f64>>,
-    /// Height of the window of the network about the person, pixels.
+    /// Height of the network's window around the person, in pixels.
     pub(crate) window_px: f64,
 }
 
 impl<'a> PersonEvidence<'a> {
-    /// The evidence of a person; `None` where no joint is seen.
+    /// Creates the evidence of a person; `None` if no joint is seen.
     pub(crate) fn new(maps: PersonMaps<'a>, sighting: &Sighting) -> Option<Self> {
         let [left, top, right, bottom] = sighting.outline()?;
         let more = BEYOND * (right - left).max(bottom - top);
@@ -41,9 +41,9 @@ impl<'a> PersonEvidence<'a> {
         })
     }
 
-    /// Moves all that it shows to the instant of the frame.
+    /// Moves the evidence to the instant of the frame.
     ///
-    /// * `since_instant`: by joint.
+    /// * `since_instant`: displacement of each joint since the instant.
     pub(crate) fn move_to_instant(&mut self, since_instant: Vec<Vector2<f64>>) {
         for (maxima, by) in self.maxima.iter_mut().zip(&since_instant) {
             for (at, _) in maxima {

@@ -1,4 +1,4 @@
-//! The solution of one person in space, over the maps of networks of all views in place.
+//! Solves one person in space; reads the network maps of all views in place.
 
 use std::sync::Arc;
 
@@ -22,13 +22,14 @@ use crate::skeleton_step::{Kept, Skeleton};
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
-/// Least number of joints that two views see well of a person: half of it is often hidden. Of what was seen in six empty rooms the
-/// seventh best joint had a heat of 0.41 in two views at most, of people who stood, sat or ran before three cameras or four 0.58 at least.
+/// Minimum number of joints of a person that two views must see well; half of a person is often hidden. Measured: in six empty rooms, the
+/// seventh best joint had a heat of at most 0.41 in two views. With people who stood, sat or ran in front of three or four cameras, it had
+/// at least 0.58.
 const WELL_SEEN: usize = 7;
-/// Least number of joints that a view sees of a person in which it has a part.
+/// Minimum number of a person's joints that a view must see to contribute.
 const SEEN: usize = 3;
 
-/// Data that do not change from frame to frame.
+/// Data that does not change from frame to frame.
 #[derive(Debug)]
 pub(crate) struct Rig {
     pub(crate) plans: Vec<Arc<ViewPlan>>,
@@ -39,14 +40,14 @@ pub(crate) struct Rig {
 /// Sightings and maps of a frame.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameViews<'f, 'a> {
-    /// By view.
+    /// Sightings of each view.
     pub(crate) answers: &'f [Option<Sightings>],
-    /// By view the maps of its people. A view without either has no part.
+    /// Maps of the people of each view. A view without sightings or maps does not contribute.
     pub(crate) evidence: &'f [Vec<PersonMaps<'a>>],
     pub(crate) people: &'f FramePeople,
 }
 
-/// The step of one person; keeps sides, bone lengths and motion of the frames before.
+/// The step for one person; remembers sides, bone lengths and motion from the earlier frames.
 #[derive(Debug)]
 pub(crate) struct PersonStep {
     rig: Arc<Rig>,
@@ -84,7 +85,7 @@ impl PersonStep {
         }
     }
 
-    /// Begins a frame, as [`SpaceStep::begin`](crate::SpaceStep::begin).
+    /// Begins a frame, like [`SpaceStep::begin`](crate::SpaceStep::begin).
     pub(crate) fn begin(&mut self, instant_s: Option<f64>) {
         self.seen.begin(instant_s);
         self.solved.begin(instant_s);
@@ -92,9 +93,9 @@ impl PersonStep {
 
     /// Solves for the person in a frame.
     ///
-    /// * `nth`: which of the people of the frame it is.
-    /// * Returns a skeleton without joints if fewer than two views show the person: what networks see in an empty room is nowhere the
-    ///   same in two.
+    /// * `nth`: index of the person among the people of the frame.
+    /// * Returns a skeleton without joints if fewer than two views show the person. False detections in an empty room do not agree in
+    ///   two views.
     pub(crate) fn run(&mut self, frame: &FrameViews<'_, '_>, nth: usize) -> Skeleton {
         let FrameViews {
             answers, people, ..
@@ -137,7 +138,7 @@ impl PersonStep {
         }
     }
 
-    /// The views that show the person by a candidate, at the instant of the frame.
+    /// Returns the views with a candidate that shows the person, at the instant of the frame.
     fn shown<'a>(&mut self, frame: &FrameViews<'_, 'a>, nth: usize) -> Vec<Shown<'a>> {
         let FrameViews {
             answers,
@@ -151,7 +152,7 @@ impl PersonStep {
             else {
                 continue;
             };
-            // A restarted process can repeat a frame and see others in it than the one whose maps arrived before.
+            // A restarted process can repeat a frame and see other people than those whose maps arrived before.
             let (Some(sighting), Some(maps), true) = (
                 answer.people.get(candidate),
                 maps.get(candidate),
@@ -216,7 +217,7 @@ impl PersonStep {
         Some(self.with_sides(&found, used))
     }
 
-    /// Decides left and right of the whole body where those of the views follow the picture.
+    /// Decides left and right of the whole body, if the views label sides as they appear in the picture.
     fn with_sides<'a>(
         &mut self,
         found: &SolvedPerson,
@@ -247,7 +248,7 @@ impl PersonStep {
         }
     }
 
-    /// Returns true if enough joints of a solution are seen well by two views.
+    /// Returns true if two views see enough joints of a solution well.
     fn is_well_seen(&self, found: &SolvedPerson, views: &[PartView<'_>]) -> bool {
         let is_seen = |joint: &usize| {
             let heats = views.iter().map(|view| self.heat_of(*joint, found, view));
@@ -257,7 +258,7 @@ impl PersonStep {
         (0..N).filter(is_seen).count() >= WELL_SEEN
     }
 
-    /// The heat of a joint of a solution in a view, 0 to 1.
+    /// Returns the heat of a joint of a solution in a view, 0 to 1.
     fn heat_of(&self, joint: usize, found: &SolvedPerson, view: &PartView<'_>) -> f64 {
         let at = found.pose.joints[joint];
         at.map_or(0.0, |at| {
@@ -265,15 +266,15 @@ impl PersonStep {
         })
     }
 
-    /// Returns true if a view shows the person of a solution at all. A view of something else has no evidence of the person, and
-    /// its pixels are not those of the person.
+    /// Returns true if a view shows the person of a solution at all. A view of something else provides no evidence of the person, and
+    /// its pixels do not belong to the person.
     fn shows(&self, found: &SolvedPerson, view: &PartView<'_>) -> bool {
         let heats = (0..N).map(|joint| self.heat_of(joint, found, view));
         let seen = heats.filter(|heat| *heat >= self.rig.settings.least_heat / 2.0);
         seen.count() >= SEEN
     }
 
-    /// Where the views that have a part in a solution show it.
+    /// Returns the poses of a solution in the views that contribute to it.
     fn views(
         &self,
         answers: &[Option<Sightings>],
@@ -307,12 +308,13 @@ fn front_seen(sighting: &Sighting) -> FrontEvidence {
     if !sighting.front.iter().all(|number| number.is_finite()) {
         return FrontEvidence::default();
     }
-    // Who stands on the hands was upright for the network. Of who lies it tells nothing of up and down in the picture.
+    // A person in a handstand was upright for the network. For a lying person, the network's evidence says nothing about up and down in
+    // the picture.
     let weight = sighting.trunk_upward().unwrap_or(1.0).powi(2) as f32;
     sighting.front.map(|told| weight * told)
 }
 
-/// Number of pairs of views.
+/// Returns the number of pairs of views.
 fn pairs_of(n_views: usize) -> usize {
     n_views * n_views.saturating_sub(1) / 2
 }

@@ -1,4 +1,4 @@
-//! A person in space as the joints and views of a result.
+//! Converts a person in space to the joints and views of a result.
 
 use geometry::{MAX_VIEWS, TriangulateError, Triangulated};
 use multiview::{FusedPose, SpaceView, ViewPlan};
@@ -8,26 +8,26 @@ use skeleton::{Joint, JointSet, N_PARTS, PARENT, PARSE14};
 
 use crate::fused_view::FusedView;
 
-/// Number of joints.
+/// Number of joints in `skeleton::PARSE14`.
 pub(crate) const N: usize = PARSE14.joints.len();
 
-/// The joints of `skeleton::PARSE14`, metres in the world; `None` for one that no two views show.
+/// The joints of `skeleton::PARSE14`, in metres in the world; `None` for a joint that fewer than two views show.
 pub(crate) type Places = [Option<Point3<f64>>; N];
 
-/// A view with a part in a solution.
+/// A view that contributes to a solution.
 #[derive(Clone, Copy)]
 pub(crate) struct PartView<'a> {
-    /// Its number in the rig.
+    /// Index of the view in the rig.
     pub(crate) view: usize,
-    /// Evidence that it shows, with the names of its sides as the solution has them.
+    /// Evidence of the view, with the sides named as in the solution.
     pub(crate) shown: SpaceView<'a>,
-    /// Height of the window of a network about the person, pixels.
+    /// Height of the network's window around the person, in pixels.
     pub(crate) window_px: f64,
 }
 
 impl PartView<'_> {
-    /// How far off a joint may be in the view, pixels along one axis, by the heat at the solution; `None` where the view does not
-    /// show the place.
+    /// Returns the expected error of a joint in the view, in pixels along one axis, from the heat at the solution; `None` if the view does
+    /// not show the place.
     fn sigma_px(&self, maps: &MapSettings, joint: usize, at: &Point3<f64>) -> Option<f64> {
         let pixel = self.shown.camera.project(at)?;
         let [width, height] = self.shown.camera.intrinsics.size.map(f64::from);
@@ -37,10 +37,11 @@ impl PartView<'_> {
     }
 }
 
-/// The joints at the places of a solution, each with its covariance there: the inverse of the curvature `sum_v J_v^T J_v / s_v^2`, with
-/// `J_v` the derivative of the pixel of view `v` by the place, and `s_v` the error that a network expects of the heat at that pixel.
+/// Returns the joints at the places of a solution, each with its covariance. The covariance is the inverse of the curvature
+/// `sum_v J_v^T J_v / s_v^2`. `J_v` is the derivative of the pixel in view `v` with respect to the place, and `s_v` is the error expected
+/// for the heat at that pixel.
 ///
-/// Residuals and root mean square are those of [`crate::disagreement`].
+/// [`crate::disagreement`] sets the residuals and their root mean square.
 pub(crate) fn joints_at(
     places: &Places,
     views: &[PartView<'_>],
@@ -76,7 +77,7 @@ pub(crate) fn joints_at(
     places.iter().enumerate().map(joint).collect()
 }
 
-/// The joints of a set: each the mean of those of `skeleton::PARSE14` that have its parts.
+/// Returns the joints of a set: each is the mean of the joints of `skeleton::PARSE14` that have its parts.
 pub(crate) fn of_set(
     set: &JointSet,
     of_body: &[Result<Triangulated, TriangulateError>],
@@ -112,11 +113,11 @@ pub(crate) fn of_set(
     set.joints.iter().map(mean).collect()
 }
 
-/// Where a view shows the parts of a person.
+/// Returns where a view shows the parts of a person.
 ///
-/// * `places`: of the joints of `skeleton::PARSE14`.
-/// * `energy`: of the solution.
-/// * `single_score`: of the best candidate of the view.
+/// * `places`: places of the joints of `skeleton::PARSE14`.
+/// * `energy`: energy of the solution.
+/// * `single_score`: score of the best candidate of the view.
 pub(crate) fn shown_in(
     plan: &ViewPlan,
     places: &Places,
@@ -145,15 +146,15 @@ pub(crate) fn shown_in(
     }
 }
 
-/// Where a part lies between two joints.
+/// Position of a part between two joints.
 pub(crate) struct Between {
     /// The next joint towards the head, and the next one away from it.
     pub(crate) joints: [usize; 2],
-    /// How far along, 0 to 1.
+    /// Position between the two joints as a fraction, 0 to 1.
     pub(crate) share: f64,
 }
 
-/// The joint of a part, by number in `skeleton::PARSE14`; `None` for a part between joints.
+/// Returns the joint of a part, as an index in `skeleton::PARSE14`; `None` for a part between joints.
 fn joint_of(part: usize) -> Option<usize> {
     PARSE14.joints.iter().position(|joint| joint.parts == [part])
 }
@@ -175,7 +176,7 @@ pub(crate) fn between(part: usize) -> Between {
     }
 }
 
-/// The first joint among the parts after one, and how many steps away it is.
+/// Returns the first joint among the parts that follow a part, and its distance in steps.
 fn next_joint(mut part: usize, next: impl Fn(usize) -> Option<usize>) -> Option<(usize, u32)> {
     let mut n = 0;
     loop {

@@ -1,4 +1,4 @@
-//! A person as one view sees them, by a network or by keypoints that another program found.
+//! A person as seen by one view, from a network or from keypoints found by another program.
 
 use keypoints::Keypoint;
 use multiview::FrontEvidence;
@@ -8,35 +8,35 @@ use skeleton::{JointSet, N_PARTS, PARSE14, SIDES};
 use crate::placed::{N, between};
 use crate::view_result::ExtraKeypoint;
 
-/// Least heat of a joint that counts for the place of its person, 0 to 1.
+/// Minimum heat of a joint that counts for the position of its person, 0 to 1.
 const FAINT: f32 = 0.02;
 
-/// A person as one view sees them. Left and right are those of the network or of the other program.
+/// A person as seen by one view. Left and right are named as by the network or the other program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
-    /// Where each joint of `skeleton::PARSE14` is seen best, pixels of the frame; `None` for one that is not.
+    /// Best position of each joint of `skeleton::PARSE14`, in pixels of the frame; `None` for a joint that is not seen.
     pub joints: [Option<[f32; 2]>; N],
-    /// How sure that is, 0 to 1; 0 for one that is not seen.
+    /// Confidence in each joint, 0 to 1; 0 for a joint that is not seen.
     pub heats: [f32; N],
-    /// Evidence of all joints, summed ([`posenetwork::JointMaps::score`]).
+    /// Sum of the evidence of all joints ([`posenetwork::JointMaps::score`]).
     pub score: f32,
-    /// Evidence of the picture about the direction in which the person faces; zeros say nothing.
+    /// Evidence of the picture about the direction in which the person faces; zeros mean no evidence.
     pub front: FrontEvidence,
-    /// The extra keypoints.
+    /// Extra keypoints of the person.
     pub extras: Vec<ExtraKeypoint>,
 }
 
 /// The people that one view sees in a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sightings {
-    /// The people, the largest and best seen first; not empty.
+    /// The people, the largest and best seen first; never empty.
     pub people: Vec<Sighting>,
-    /// How long after the instant of the frame the picture was taken, seconds; negative for before.
+    /// Time of the picture after the instant of the frame, in seconds; negative if it was taken before.
     pub skew_s: f64,
 }
 
 impl Sighting {
-    /// A person by the peaks of maps.
+    /// Creates a person from the peaks of maps.
     pub(crate) fn new(peaks: &[Option<Keypoint>], score: f32) -> Self {
         let peak = |joint: usize| peaks.get(joint).copied().flatten();
         let heat = |joint: usize| peak(joint).map_or(0.0, |peak| peak.score.clamp(0.0, 1.0) as f32);
@@ -53,22 +53,22 @@ impl Sighting {
         }
     }
 
-    /// Returns true if half of the joints are seen well: sightings of networks in an empty room have fewer.
+    /// Returns true if half of the joints are seen well. False sightings in an empty room have fewer.
     ///
-    /// * `least_heat`: of a joint that is seen well, 0 to 1.
+    /// * `least_heat`: minimum heat of a joint that is seen well, 0 to 1.
     pub fn is_clear(&self, least_heat: f64) -> bool {
         let well = self.heats.iter().filter(|heat| f64::from(**heat) >= least_heat);
         well.count() >= N / 2
     }
 
-    /// Where a joint is seen, pixels of the frame.
+    /// Returns the position of a joint, in pixels of the frame; `None` if it is not seen.
     pub fn joint(&self, joint: usize) -> Option<[f64; 2]> {
         self.joints[joint].map(|at| at.map(f64::from))
     }
 
-    /// Where the joints are seen, pixels of the frame; NaN for one that is not.
+    /// Returns the positions of the joints, in pixels of the frame; NaN for a joint that is not seen.
     ///
-    /// * `is_exchanged`: whether left and right are exchanged.
+    /// * `is_exchanged`: true to exchange left and right.
     pub fn places(&self, is_exchanged: bool) -> [[f64; 2]; N] {
         let mut places = core::array::from_fn(|joint| self.joint(joint).unwrap_or([f64::NAN; 2]));
         if is_exchanged {
@@ -79,18 +79,19 @@ impl Sighting {
         places
     }
 
-    /// The box around the joints that are seen ([`outline_of`]), pixels of the frame.
+    /// Returns the box around the seen joints ([`outline_of`]), in pixels of the frame.
     pub fn outline(&self) -> Option<[f64; 4]> {
         let seen = (0..N).filter(|joint| self.heats[*joint] >= FAINT);
         outline_of(seen.filter_map(|joint| self.joint(joint)))
     }
 
-    /// The joints of a set, as [`Self::places`].
+    /// Returns the positions of the joints of a set, like [`Self::places`].
     pub fn joints_of_set(&self, set: &JointSet, is_exchanged: bool) -> Vec<[f64; 2]> {
         set.from_parts(&parts_of(&self.places(is_exchanged)))
     }
 
-    /// The cosine of the angle between the trunk in the picture and upward: -1 upside down; `None` where the trunk is not seen.
+    /// Returns the cosine of the angle between the trunk in the picture and the upward direction: -1 upside down; `None` if the trunk is
+    /// not seen.
     pub(crate) fn trunk_upward(&self) -> Option<f64> {
         const NECK: usize = 12;
         const HIPS: [usize; 2] = [2, 3];
@@ -101,9 +102,9 @@ impl Sighting {
     }
 }
 
-/// The parts of the paper's body, of which some lie between two joints.
+/// Returns the parts of the paper's body; some of them lie between two joints.
 ///
-/// * `joints`: of `skeleton::PARSE14`, in any plane.
+/// * `joints`: positions of the joints of `skeleton::PARSE14`, in any plane.
 pub fn parts_of(joints: &[[f64; 2]; PARSE14.joints.len()]) -> Vec<[f64; 2]> {
     let part = |part: usize| {
         let between = between(part);

@@ -5,32 +5,32 @@ use std::sync::Arc;
 use multiview::{ConsensusSettings, FacingSettings, SidesSettings};
 use skeleton::{JointMap, JointSet, PARSE14};
 
-/// How the pose of a view is made from the poses of its pairs.
+/// How the pose of a view is computed from the poses of its pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Combine {
-    /// Their mean: the paper's section 7.
+    /// The mean of the poses: the paper's section 7.
     #[default]
     Mean,
-    /// For every part the result that is consistent over all views ([`multiview::consensus()`]).
+    /// For every part, the result that is consistent over all views ([`multiview::consensus()`]).
     Consensus,
 }
 
-/// Uses of the knowledge of bodies.
+/// How knowledge about human bodies is used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodySettings {
-    /// Leave out joints, and skeletons, that no body has.
+    /// Leave out joints and skeletons that no body can have.
     pub check: bool,
-    /// Move joints to where the bones have the lengths of people: a prior in triangulation.
+    /// Move joints so that the bones have the lengths of people: a prior in triangulation.
     pub prior: bool,
-    /// The prior knows the lengths that this person's bones had in the frames before.
+    /// Let the prior learn this person's bone lengths from the earlier frames.
     pub learn: bool,
-    /// Weight of how unlike a person a skeleton is, in the choice among assumptions: score per squared standard
+    /// Weight of a skeleton's deviation from a person in the choice among assumptions: score per squared standard
     /// deviation ([`skeleton::body::deviation`]).
     pub score: f64,
 }
 
 impl BodySettings {
-    /// Nothing is known: for models of something else than people.
+    /// Uses no knowledge about bodies: for models of something other than people.
     pub const NONE: Self = Self {
         check: false,
         prior: false,
@@ -53,35 +53,35 @@ impl Default for BodySettings {
 /// Settings of the skeleton step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonSettings {
-    /// Which joints to triangulate.
+    /// The joints to triangulate.
     pub joints: &'static JointSet,
-    /// Learned map from parts to these joints; without it a joint is the mean of its own parts.
+    /// Learned map from parts to these joints; without a map, a joint is the mean of its own parts.
     pub joint_map: Option<Arc<JointMap>>,
-    /// How to triangulate.
+    /// Settings of triangulation.
     pub triangulation: geometry::Settings,
-    /// Uncertainty of a joint in one view, cells of the level on which it was fused.
+    /// Uncertainty of a joint in one view, in cells of the level on which the view was fused.
     pub sigma_cells: f64,
-    /// Weight of the expected errors of a joint's parts, where they were predicted; they are added
-    /// to `sigma_cells` as variances. 0: not used.
+    /// Weight of the predicted errors of a joint's parts, if available; they are added
+    /// to `sigma_cells` as variances. 0 ignores them.
     pub error_weight: f64,
-    /// How the pose of a view is made from the poses of its pairs.
+    /// How the pose of a view is computed from the poses of its pairs.
     pub combine: Combine,
-    /// How the views agree on a part. The decision about facing always uses the consensus: a mean
-    /// of poses with different limbs is consistent under no assumption about left and right.
+    /// Settings for the agreement of the views on a part. The decision about facing always uses the consensus: a mean
+    /// of poses with different limbs is inconsistent under every assumption about left and right.
     pub consensus: ConsensusSettings,
-    /// Uses of the knowledge of bodies.
+    /// How knowledge about human bodies is used.
     pub body: BodySettings,
     /// Decide which views see the person from behind.
     pub facing: bool,
-    /// How it is tracked over time which views see the person from the same side.
+    /// Settings for tracking over time which views see the person from the same side.
     pub facing_filter: FacingSettings,
     /// How left and right of all views together are decided.
     pub sides: SidesSettings,
     /// Weight of the agreement of all views in the decision about facing: score per squared cell of
-    /// distance between a part and its reprojection. It is the geometric term over all views.
+    /// distance between a part and its reprojection. This is the geometric term over all views.
     pub agreement: f64,
-    /// Weight of what the views see of the front in that decision: score per nat. A skeleton whose sides fit
-    /// none of what the views see is one with views on the wrong side.
+    /// Weight of the views' front evidence in that decision: score per nat. If the sides of a skeleton fit neither way,
+    /// some views are assumed to be on the wrong side.
     pub front_score: f64,
     /// Distance at which the penalty for disagreement is capped, cells.
     pub max_distance_cells: f64,

@@ -22,35 +22,35 @@ use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
 use crate::{AllViewsResult, PairResult, ViewResult};
 
-/// Which poses a skeleton was triangulated from.
+/// The poses from which a skeleton was triangulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Kept {
-    /// Those that fusion solved for.
+    /// The poses solved by fusion.
     #[default]
     Solved,
-    /// The candidates that fusion started from: they agree better with each other.
+    /// The candidates from which fusion started, because they agree better with each other.
     Start,
 }
 
 /// The result of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
-    /// The joints of the joint set, each with its position or the reason why there is none.
+    /// The joints of the joint set, each with its position or the reason why it has none.
     pub joints: Vec<Result<Triangulated, NoJoint>>,
-    /// The joints as a body; `None` where that was not asked, or nothing was found.
+    /// Assessment of the joints as a body; `None` if it was not requested, or nothing was found.
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
     /// Number of people that the views could mean.
     pub n_people: usize,
-    /// How many pairs were averaged.
+    /// Number of pairs that were averaged.
     pub n_pairs: usize,
-    /// Energy of the chosen assumption about which views see the person from the same side minus that of
-    /// the best other one.
+    /// Margin of the decision about which views see the person from the same side: energy of the chosen assumption minus
+    /// that of the next best one.
     pub facing_margin: f64,
-    /// Exchange of left and right in all views; `None` where that is not decided.
+    /// Exchange of left and right in all views; `None` if it is not decided.
     pub sides: Option<Sides>,
-    /// Which poses the joints were triangulated from.
+    /// The poses from which the joints were triangulated.
     pub kept: Kept,
 }
 
@@ -63,7 +63,7 @@ struct Frame<'a> {
     is_alone: bool,
 }
 
-/// The skeleton step for a rig; keeps the facing of the frame before.
+/// The skeleton step for a rig; remembers the facing of the previous frame.
 #[derive(Debug)]
 pub struct SkeletonStep {
     space: Space,
@@ -93,10 +93,10 @@ impl SkeletonStep {
         }
     }
 
-    /// Begins a frame whose pictures may have been taken at other times than its instant ([`ViewResult::skew_s`]): what the views
-    /// show is then moved there. Without it, or with all pictures of the instant, nothing is moved.
+    /// Begins a frame whose pictures may have been taken at other times than its instant ([`ViewResult::skew_s`]). The points
+    /// of the views are then moved to the instant. Without this call, or if all pictures were taken at the instant, nothing is moved.
     ///
-    /// * `instant_s`: of the frame, seconds; `None` where the rate of the frames is not known.
+    /// * `instant_s`: instant of the frame, in seconds; `None` if the frame rate is unknown.
     pub fn begin(&mut self, instant_s: Option<f64>) {
         self.motion.begin(instant_s);
     }
@@ -152,7 +152,7 @@ impl SkeletonStep {
         let (at_instant, more_px) = self.at_instant(answers, &views);
         let mut expected_px = self.expected_errors(answers, exchanged, self.space.settings.joints);
         add(&mut expected_px, &more_px, self.space.settings.joints);
-        // The check of the body knows nothing of expected errors.
+        // The body check does not use expected errors.
         let mut of_body_px = Vec::new();
         add(&mut of_body_px, &more_px, &PARSE14);
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
@@ -173,7 +173,7 @@ impl SkeletonStep {
         }
     }
 
-    /// The poses of the views at the instant of the frame, and what is to be added to the deviations of their parts, pixels.
+    /// Returns the poses of the views at the instant of the frame, and the deviations to be added to those of their parts, in pixels.
     fn at_instant<'a>(
         &mut self,
         answers: &[Option<ViewResult>],
@@ -187,7 +187,7 @@ impl SkeletonStep {
         )
     }
 
-    /// The joints as a body.
+    /// Assesses the joints as a body.
     fn as_body(
         &mut self,
         joints: Vec<Result<Triangulated, TriangulateError>>,
@@ -197,7 +197,7 @@ impl SkeletonStep {
         let settings = &self.space.settings;
         let set = settings.joints;
         if !self.space.can_exchange() {
-            // The parts are not those of the 14 joints.
+            // The parts differ from those of the 14 joints.
             let joints = joints.into_iter().map(|joint| joint.map_err(NoJoint::from));
             return (joints.collect(), None);
         }
@@ -210,9 +210,8 @@ impl SkeletonStep {
         self.bodies.settle(&settings.body, &of_body, (set, joints))
     }
 
-    /// The weighted expected errors of the joints of every view, pixels of the frame; empty where
-    /// nothing was predicted. The expected error of a joint is the mean over its parts, each capped
-    /// at the diagonal of the frame.
+    /// Returns the weighted expected errors of the joints of every view, in pixels of the frame; empty without a prediction. The expected
+    /// error of a joint is the mean over its parts, each capped at the diagonal of the frame.
     fn expected_errors(
         &self,
         answers: &[Option<ViewResult>],
@@ -226,7 +225,7 @@ impl SkeletonStep {
                 let sigma = f64::from(*sigma).min(width.hypot(height));
                 sigma * self.space.settings.error_weight
             };
-            // The second number is only there because `anatomical` and `from_parts` take points.
+            // The second coordinate is a dummy because `anatomical` and `from_parts` take points.
             let of_parts: Vec<[f64; 2]> = of_parts.map(|part| [weighed(part), 0.0]).collect();
             let of_parts = anatomical(&of_parts, self.space.mirror(view, exchanged));
             let of_joints = joints.from_parts(&of_parts).into_iter();
@@ -236,8 +235,8 @@ impl SkeletonStep {
         views.map(|view| of_view(view).unwrap_or_default()).collect()
     }
 
-    /// The views that see the person from behind, the margin of the decision about which views see the
-    /// same side, and the one about all views.
+    /// Returns the views that see the person from behind, the margin of the decision about which views see the
+    /// same side, and the decision about the sides of all views.
     fn decide_facing(&mut self, frame: &Frame<'_>) -> (Exchanges, f64, Sides) {
         let Frame { answers, fused, .. } = *frame;
         let present = answers.iter().enumerate().fold(0, |mask, (view, answer)| {
@@ -272,7 +271,7 @@ impl SkeletonStep {
         (exchanges, facing.margin, sides)
     }
 
-    /// The solved poses, unless those that fusion started from agree better.
+    /// Returns the solved poses, unless the poses from which fusion started agree better.
     ///
     /// Both are compared by the geometric term over all views ([`agreement`](Self::agreement)), in cells of
     /// the start.
@@ -310,7 +309,7 @@ impl SkeletonStep {
         }
     }
 
-    /// The poses that fusion started from; `None` for a view that was not fused.
+    /// Returns the poses from which fusion started; `None` for a view that was not fused.
     fn starts(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<FusedView>> {
         let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {
@@ -327,9 +326,9 @@ impl SkeletonStep {
         (0..self.space.plans.len()).map(of_view).collect()
     }
 
-    /// The poses of every view, one per pair or that of all views, under a facing assignment.
+    /// Returns the poses of every view under a facing assignment: one per pair, or that of all views.
     ///
-    /// A view that was not fused keeps its own best pose, unless that may be another person's.
+    /// A view that was not fused keeps its own best pose, unless that pose may belong to another person.
     fn candidates(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<Candidates>> {
         let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {
@@ -357,7 +356,7 @@ impl SkeletonStep {
         (0..self.space.plans.len()).map(of_view).collect()
     }
 
-    /// One pose per view, from the consensus of the views.
+    /// Computes one pose per view from the consensus of the views.
     fn agreed(
         &self,
         candidates: &[Option<Candidates>],
@@ -387,7 +386,7 @@ impl SkeletonStep {
         views
     }
 
-    /// The camera and uncertainty of a view, still without points.
+    /// Returns the camera and uncertainty of a view, still without points.
     fn sightings<'a>(&self, view: Option<&FusedView>, plan: &'a ViewPlan) -> Sightings<'a> {
         let cell_px = view.map_or(1.0, |view| view.cell_px);
         Sightings {
@@ -400,14 +399,14 @@ impl SkeletonStep {
 
 /// Adds the deviations of parts to the expected errors of joints, as variances.
 ///
-/// * `more_px`: by view and part; empty for a view that was not moved.
+/// * `more_px`: deviations by view and part, in pixels; empty for a view that was not moved.
 fn add(expected_px: &mut Vec<Vec<f64>>, more_px: &[Vec<f64>], joints: &JointSet) {
     if more_px.is_empty() {
         return;
     }
     expected_px.resize(more_px.len().max(expected_px.len()), Vec::new());
     for (expected, more) in expected_px.iter_mut().zip(more_px) {
-        // The second number is only there because `from_parts` takes points.
+        // The second coordinate is a dummy because `from_parts` takes points.
         let of_parts: Vec<[f64; 2]> = more.iter().map(|more| [*more, 0.0]).collect();
         if of_parts.is_empty() {
             continue;

@@ -1,4 +1,4 @@
-//! The poses of all views under one assumption about their sides, judged in space.
+//! Judges in space the poses of all views under one assumption about their sides.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -16,10 +16,10 @@ use crate::fused_view::FusedView;
 use crate::skeleton_settings::SkeletonSettings;
 use crate::view_result::ViewResult;
 
-/// Points of a view, pixels of the frame.
+/// Points of a view, in pixels of the frame.
 type Points<'a> = Cow<'a, [[f64; 2]]>;
 
-/// The cameras of a rig, and how poses in them are judged.
+/// The cameras of a rig, and the settings for judging poses.
 #[derive(Debug, Clone)]
 pub(crate) struct Space {
     pub(crate) plans: Vec<Arc<ViewPlan>>,
@@ -40,7 +40,7 @@ impl Space {
             Some(part?.in_world)
         });
         let seen = self.seen(answers, views, &joints);
-        // Half of the log-ratio is how much likelier the evidence is than if the views said nothing.
+        // Half of the log-ratio is the gain in log-likelihood over views that provide no evidence.
         let evidence = self.settings.front_score * seen.log_ratio.abs() / 2.0;
         let unlike = self.settings.body.score * skeleton::body::deviation(&joints);
         Judged {
@@ -49,7 +49,7 @@ impl Space {
         }
     }
 
-    /// The mirror permutation of the parts for a view that sees the person from behind.
+    /// Returns the mirror permutation of the parts for a view that sees the person from behind.
     pub(crate) fn mirror(&self, view: usize, exchanged: Exchanges) -> Option<&[usize]> {
         let mirror = self.plans[view].model().spec().mirror.as_deref();
         mirror.filter(|_| is_exchanged(exchanged, view))
@@ -63,7 +63,7 @@ impl Space {
         self.plans.first().is_some_and(has_sides)
     }
 
-    /// Returns the evidence for the sides of a skeleton: that of the views about its front, and how it bends.
+    /// Returns the evidence for the sides of a skeleton: the front evidence of the views, and the bending of the joints.
     fn seen(
         &self,
         answers: &[Option<ViewResult>],
@@ -92,14 +92,14 @@ impl Space {
         Seen { front, log_ratio }
     }
 
-    /// The evidence of a view about the person that it was fused to: that of the nearest candidate.
+    /// Returns the evidence of a view about the person it was fused to, taken from the nearest candidate.
     fn front_evidence(
         &self,
         view: usize,
         answer: &ViewResult,
         fused: &FusedView,
     ) -> Option<FrontEvidence> {
-        // The middle of a pose does not depend on what its parts are called.
+        // The centre of a pose does not depend on the names of its parts.
         let middle = |centres: &[[f64; 2]]| {
             let n = centres.len() as f64;
             let sum = centres.iter().fold([0.0, 0.0], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
@@ -115,7 +115,7 @@ impl Space {
         nearest.map(|nearest| *nearest.1)
     }
 
-    /// The geometric term over all views: the squared distance of every part from its reprojection.
+    /// Returns the geometric term over all views: the squared distance of every part from its reprojection.
     pub(crate) fn agreement(
         &self,
         views: &[Option<FusedView>],
@@ -124,7 +124,7 @@ impl Space {
         let cap = self.settings.max_distance_cells.powi(2);
         let of_view = |residual_px: f64, view: &FusedView| {
             let cells = residual_px / view.cell_px;
-            // A view that cannot see the point counts as the largest disagreement.
+            // A view that cannot see the point counts with the maximum disagreement.
             if cells.is_nan() {
                 cap
             } else {
@@ -147,7 +147,7 @@ impl Space {
     /// Triangulates points of the fused poses.
     ///
     /// * `points`: computes the `n_points` wanted points from the part centres of a view.
-    /// * `expected_px`: expected errors of these points, for the views that have them.
+    /// * `expected_px`: expected errors of these points, for the views that have them, in pixels.
     pub(crate) fn triangulate<'a>(
         &self,
         views: &'a [Option<FusedView>],
@@ -184,14 +184,14 @@ impl Space {
     }
 }
 
-/// How much what a view sees of the front counts: the squared cosine of the angle between the trunk in the picture and the
-/// vertical, 0 upside down. Heads of people who bend were not learned.
+/// Returns the weight of the front evidence of a view: the squared cosine of the angle between the trunk in the picture and the
+/// vertical, 0 upside down. The detector was not trained on the heads of people who bend.
 fn upright(centres_px: &[[f64; 2]]) -> f64 {
     let cosine = trunk_upward(centres_px);
     if cosine > 0.0 { cosine * cosine } else { 0.0 }
 }
 
-/// The cosine of the angle between the trunk in the picture and upward: -1 upside down.
+/// Returns the cosine of the angle between the trunk in the picture and the upward direction: -1 upside down.
 pub(crate) fn trunk_upward(centres_px: &[[f64; 2]]) -> f64 {
     const NECK: usize = 1;
     const HIPS: [usize; 2] = [9, 21];
@@ -204,10 +204,10 @@ pub(crate) fn trunk_upward(centres_px: &[[f64; 2]]) -> f64 {
     -y / x.hypot(y)
 }
 
-/// How good an assumption about the sides of the views is.
+/// Rating of an assumption about the sides of the views.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Judged {
-    /// The agreement of the views, and how likely what they see of the front is; adds to the energy of fusion.
+    /// Agreement of the views, and likelihood of their front evidence; added to the energy of fusion.
     pub(crate) score: f64,
     /// Evidence about the sides of the whole body.
     pub(crate) seen: Seen,
@@ -216,9 +216,9 @@ pub(crate) struct Judged {
 /// Evidence for the sides of a skeleton.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
-    /// The direction in which it faces as it is labelled.
+    /// The direction in which the skeleton faces according to its labels.
     pub(crate) front: Option<Vector3<f64>>,
-    /// Log-likelihood ratio of its labels over the exchanged ones, nats.
+    /// Log-likelihood ratio of the labels over the exchanged ones, in nats.
     pub(crate) log_ratio: f64,
 }
 

@@ -10,27 +10,27 @@ use crate::skeleton_settings::BodySettings;
 /// Settings of the step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpaceStepSettings {
-    /// The energy in space, and its solution.
+    /// Settings of the energy in space and of its solution.
     pub space: SpaceSettings,
-    /// How the maps became evidence.
+    /// Settings by which the maps were turned into evidence.
     pub maps: MapSettings,
-    /// Heat that half of a person's joints have in two views each, 0 to 1.
+    /// Minimum heat of half of a person's joints in two views each, 0 to 1.
     pub least_heat: f64,
-    /// Joints of the result.
+    /// The joints of the result.
     pub joints: &'static JointSet,
-    /// Knowledge about bodies.
+    /// How knowledge about human bodies is used.
     pub body: BodySettings,
-    /// How left and right of the whole body are decided, where those of the views follow the picture; `None` where the views name the
-    /// sides of the body.
+    /// How left and right of the whole body are decided if views label sides as they appear in the picture; `None` if the views
+    /// label the sides of the body.
     pub sides: Option<SidesSettings>,
 }
 
 impl SpaceStepSettings {
-    /// The settings for what views find.
+    /// Returns the settings in space that match the settings of the views.
     ///
-    /// * `least_heat`: mean heat of the joints of a person who is seen in a view, 0 to 1. In space the views have to
-    ///   agree: a person who is seen badly in one does not count there, and half of the joints need twice as much.
-    /// * `as_seen`: left and right follow the picture, so that those of the whole body are to be decided.
+    /// * `least_heat`: minimum mean heat of the joints of a person who is seen in a view, 0 to 1. In space, the views must
+    ///   agree. A view that sees the person badly does not count, and half of the joints need twice this heat.
+    /// * `as_seen`: true if views label sides as they appear in the picture, so that the sides of the whole body must be decided.
     pub fn for_views(least_heat: f64, as_seen: bool) -> Self {
         let maps = MapSettings::default();
         Self {

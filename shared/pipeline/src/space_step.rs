@@ -1,4 +1,4 @@
-//! The step in space: where the joints of people are, over the maps of networks of all views in place.
+//! The step in space: computes the joints of people; reads the network maps of all views in place.
 
 use std::sync::Arc;
 
@@ -12,19 +12,19 @@ use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
-/// Number of people whose bone lengths and sides are remembered; beyond it, those seen longest ago are forgotten.
+/// Maximum number of people whose bone lengths and sides are remembered; those seen longest ago are forgotten first.
 const MOST_REMEMBERED: usize = 32;
 
-/// A person of a frame, solved.
+/// A solved person of a frame.
 #[derive(Debug, Clone)]
 pub struct PersonSkeleton {
-    /// Identity within the run.
+    /// Id of the person within the run.
     pub id: u64,
-    /// The skeleton; without joints where fewer than two views show the person well.
+    /// The skeleton; it has no joints if fewer than two views show the person well.
     pub skeleton: Skeleton,
 }
 
-/// Memory of a person.
+/// State that is remembered for a person.
 #[derive(Debug)]
 struct Remembered {
     id: u64,
@@ -33,7 +33,7 @@ struct Remembered {
     last: u64,
 }
 
-/// The step in space, for a rig whose views have the maps of networks; keeps sides, bone lengths and motion of every person.
+/// The step in space, for a rig whose views have network maps; remembers sides, bone lengths and motion of every person.
 #[derive(Debug)]
 pub struct SpaceStep {
     rig: Arc<Rig>,
@@ -63,10 +63,10 @@ impl SpaceStep {
         }
     }
 
-    /// Begins a frame whose pictures may have been taken at other times than its instant ([`Sightings::skew_s`]): what the views
-    /// show is then moved there. Without it, or with all pictures of the instant, nothing is moved.
+    /// Begins a frame whose pictures may have been taken at other times than its instant ([`Sightings::skew_s`]). The points
+    /// of the views are then moved to the instant. Without this call, or if all pictures were taken at the instant, nothing is moved.
     ///
-    /// * `instant_s`: of the frame, seconds; `None` where the rate of the frames is not known.
+    /// * `instant_s`: instant of the frame, in seconds; `None` if the frame rate is unknown.
     pub fn begin(&mut self, instant_s: Option<f64>) {
         self.instant_s = instant_s;
         self.n_frames += 1;
@@ -74,7 +74,8 @@ impl SpaceStep {
 
     /// Solves for the people of a frame, each separately, in their order.
     ///
-    /// * `answers`: by view; `evidence`: by view the maps of its people. A view without either has no part.
+    /// * `answers`: sightings of each view; `evidence`: maps of the people of each view. A view without sightings or maps does not
+    ///   contribute.
     pub fn run(
         &mut self,
         answers: &[Option<Sightings>],
@@ -99,7 +100,7 @@ impl SpaceStep {
         solved
     }
 
-    /// The step of a person, a new one for a new person.
+    /// Returns the step of a person; a new person gets a new step.
     fn remembered(&mut self, id: u64) -> &mut PersonStep {
         let known = self.people.iter().position(|person| person.id == id);
         let index = known.unwrap_or_else(|| {

@@ -1,61 +1,61 @@
-//! Where the people of a view are looked for in the next frame.
+//! Where to look for the people of a view in the next frame.
 
 use posenetwork::Turn;
 
-/// Which share of the way to the box around a pose a side moves in a frame, inward.
+/// Share of the distance to the box around the pose by which a side moves inward per frame.
 const INWARD: f64 = 0.5;
-/// A pose is much worse than usual if this many joints are lost that were seen at their best.
+/// A pose is much worse than usual if it loses the equivalent of this many perfectly seen joints.
 pub(crate) const MUCH_WORSE: f32 = 1.5;
-/// Weight of a new score in the usual one.
+/// Weight of a new score in the usual score.
 const NEW_SCORE: f32 = 0.1;
-/// Amount by which a box is enlarged to see whether there is more of a person, share of the longer side.
+/// Amount by which a box is enlarged to check for more of a person, as a share of the longer side.
 const WIDER: f64 = 0.25;
-/// Amount by which it is enlarged for a person who may have moved on, share of the longer side for every time for which
-/// people are followed without a frame (0.4 s, in which who runs gets half of the own height on); and by how much at most.
+/// Amount by which a box is enlarged for a person who may have moved on, and its maximum, as shares of the longer side. It applies per
+/// maximum gap between frames (0.4 s); in that time, a running person moves by half of the body height.
 const MOVED: f64 = 0.5;
 const MOST_MOVED: f64 = 1.0;
-/// A person who has moved by less is where the last look saw them, share of the height of the network's window: less than the
-/// network is off by.
+/// Maximum displacement of a person who stands still, as a share of the height of the network's window; less than the error
+/// of the network.
 const STILL: f64 = 0.01;
-/// A person who was seen this many times [`STILL`] from the last place has moved, whatever the mean velocity.
+/// A person whose last step exceeds this multiple of [`STILL`] has moved, whatever the mean velocity.
 const MOST_STEP: f64 = 3.0;
-/// Weight of the earlier velocity after a frame: from look to look the network errs by more than a person who stands moves.
+/// Weight of the earlier velocity after a frame: between looks, the error of the network exceeds the motion of a standing person.
 const KEPT: f64 = 0.7;
 
-/// Where a person is looked for in the next frame.
+/// Where to look for a person in the next frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Track {
-    /// The box, pixels.
+    /// The box, in pixels: left, top, right, bottom.
     pub(crate) outline: [f64; 4],
-    /// How the picture is turned for the network.
+    /// Rotation of the picture for the network.
     pub(crate) turn: Turn,
-    /// The score that the person's poses usually have.
+    /// Usual score of the person's poses.
     pub(crate) usual_score: f32,
-    /// True if this frame's score is so much lower that the box may not fit.
+    /// True if the score of this frame is so much lower than usual that the box may not fit.
     pub(crate) is_doubtful: bool,
-    /// Index of the person among those of the frame.
+    /// Index of the person among the people of the frame.
     pub(crate) index: usize,
-    /// Frames since the person was last looked at.
+    /// Number of frames since the last look at the person.
     pub(crate) n_held: u64,
     /// How the person moves in the picture; `None` after one look.
     pub(crate) pace: Option<Pace>,
-    /// True if the person is seen in this frame already.
+    /// True if the person has already been seen in this frame.
     pub(crate) is_seen: bool,
 }
 
-/// How a person moves in the picture, shares of the height of the network's window.
+/// Motion of a person in the picture, as shares of the height of the network's window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pace {
-    /// Mean velocity for each frame; the last looks count most.
+    /// Mean velocity per frame, weighted towards the last looks.
     velocity: [f64; 2],
-    /// Distance of the last two sights.
+    /// Distance between the last two sights.
     step: f64,
 }
 
 impl Pace {
-    /// The pace after another look.
+    /// Returns the pace after another look.
     ///
-    /// * `moved`: since the look before; `n_frames`: from that one to this.
+    /// * `moved`: displacement since the last look; `n_frames`: number of frames since the last look.
     pub(crate) fn next(before: Option<Self>, moved: [f64; 2], n_frames: u64) -> Self {
         let n_frames = n_frames.max(1) as f64;
         let now = moved.map(|moved| moved / n_frames);
@@ -76,15 +76,15 @@ impl Pace {
 }
 
 impl Track {
-    /// Where a person is looked for next.
+    /// Returns where to look for a person next.
     ///
-    /// In the box around the pose, but a side moves inward step by step: a pose that leaves out the head or a leg in one frame does not
-    /// put it beyond the edge of the next one. One that is much worse than the person's poses usually are moves no side at all.
+    /// The result is the box around the pose, but sides move inward step by step. So if a pose leaves out the head or a leg in one frame,
+    /// the next box still contains it. A pose that is much worse than usual moves no side.
     ///
-    /// * `looked_at`: the box of this frame, and how the picture was turned; `usual_score`: of the person's poses before; `None` for
+    /// * `looked_at`: the box of this frame, and the rotation of the picture; `usual_score`: usual score of the person's poses; `None` for
     ///   a new person.
-    /// * `around`, `score`: the box around the pose that was seen, and its score.
-    /// * `most_lost`: by how much a score may be lower than usual.
+    /// * `around`, `score`: the box around the seen pose, and its score.
+    /// * `most_lost`: maximum amount by which a score may be below the usual score.
     pub(crate) fn next(
         ((looked_at, turn), usual_score): (([f64; 4], Turn), Option<f32>),
         (around, score): ([f64; 4], f32),
@@ -115,25 +115,25 @@ impl Track {
 
     /// Returns true if the person has hardly moved since the last look.
     ///
-    /// * `n_frames`: from the last look to this frame.
+    /// * `n_frames`: number of frames from the last look to this frame.
     pub(crate) fn is_still(&self, n_frames: u64) -> bool {
         !self.is_doubtful && self.pace.is_some_and(|pace| pace.is_still(n_frames))
     }
 }
 
-/// A box that shows more around a person of the frame before.
+/// Returns a box that shows more around a person of the previous frame.
 pub(crate) fn wider(outline: [f64; 4]) -> [f64; 4] {
     enlarged(outline, WIDER)
 }
 
-/// A box in which a person of the frame before still is.
+/// Returns a box that still contains a person of an earlier frame.
 ///
-/// * `apart`: how many times the longest time for which people are followed without a frame has passed.
+/// * `apart`: time since that frame, as a multiple of the maximum gap between frames.
 pub(crate) fn moved(outline: [f64; 4], apart: f64) -> [f64; 4] {
     enlarged(outline, (MOVED * apart).min(MOST_MOVED))
 }
 
-/// A box enlarged all around, by a share of its longer side.
+/// Enlarges a box on all sides by a share of its longer side.
 fn enlarged([left, top, right, bottom]: [f64; 4], share: f64) -> [f64; 4] {
     let more = share * (right - left).max(bottom - top);
     [left - more, top - more, right + more, bottom + more]

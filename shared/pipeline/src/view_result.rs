@@ -1,31 +1,31 @@
-//! Result of one view for a frame.
+//! The result of one view for a frame.
 
 use fmp::{Pose, Responses};
 use multiview::FrontEvidence;
 
-/// Where a keypoint that is not a joint was found, and the standard deviation of the place along one axis, both pixels
-/// of the frame; `None` where it was not.
+/// Position of a keypoint that is not a joint, and its standard deviation along one axis, both in pixels
+/// of the frame; `None` if the keypoint was not found.
 pub type ExtraKeypoint = Option<([f64; 2], f64)>;
 
-/// The single-view result of one frame, besides its evidence.
+/// The single-view result of one frame, without its evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewResult {
     /// Distinct poses, best first; never empty.
     pub candidates: Vec<Pose>,
-    /// Evidence of the picture about the direction in which the person of every candidate faces; empty without a detector of it.
+    /// Evidence of the picture about the direction in which the person of every candidate faces; empty without an orientation detector.
     pub front: Vec<FrontEvidence>,
-    /// Expected error of every part, pixels of the frame, if there is a prediction.
+    /// Expected error of every part, in pixels of the frame, if predicted.
     pub sigma_px: Option<Vec<f32>>,
-    /// Thresholds that came with the prediction, pixels of the frame; used where the settings have
+    /// Thresholds that came with the prediction, in pixels of the frame; used if the settings contain
     /// none.
     pub tau_px: Option<Vec<f32>>,
-    /// How long after the instant of the frame the picture was taken, seconds; negative for before.
+    /// Time of the picture after the instant of the frame, in seconds; negative if it was taken before.
     pub skew_s: f64,
 }
 
 impl ViewResult {
-    /// Returns true if all its poses lie where there is evidence. They may not: a restarted process can repeat a frame with
-    /// another search window than the process whose evidence arrived before.
+    /// Returns true if the evidence covers all poses of the result. It may not: a restarted process can repeat a frame with a different
+    /// search window from that of the evidence that arrived before.
     pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
         self.candidates.iter().all(|pose| evidence.covers(pose))
     }

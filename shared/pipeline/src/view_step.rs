@@ -13,19 +13,19 @@ use viewquality::orientation::Detector;
 
 use crate::view_result::ViewResult;
 
-/// Which levels of the pyramid a view offers as evidence.
+/// The levels of the pyramid that a view offers as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EvidenceWindow {
-    /// Every level.
+    /// All levels are offered.
     #[default]
     All,
-    /// The levels that are at most this far from the level of any candidate. All candidates count,
+    /// The levels within this distance of the level of any candidate. All candidates count,
     /// not only the best one, so that fusion can correct a view whose best candidate is wrong.
     Around(u16),
 }
 
 impl EvidenceWindow {
-    /// The searched levels that are offered as evidence for these candidates, ascending.
+    /// Returns the searched levels that are offered as evidence for these candidates, in ascending order.
     pub fn levels(self, searched: Range<u16>, candidates: &[Pose]) -> Vec<u16> {
         let offered = |level: u16| match self {
             Self::All => true,
@@ -42,13 +42,13 @@ impl EvidenceWindow {
 pub struct ViewSettings {
     /// Levels offered as evidence.
     pub window: EvidenceWindow,
-    /// Largest number of candidates.
+    /// Maximum number of candidates.
     pub n_candidates: usize,
-    /// Smallest mean distance between the part centres of two candidates, box sides.
+    /// Minimum mean distance between the part centres of two candidates, in box sides.
     pub min_separation: f64,
-    /// How poses are tracked from frame to frame; without it every frame is searched in full.
+    /// Settings for tracking poses from frame to frame; `None` searches every frame in full.
     pub track: Option<TrackSettings>,
-    /// Detector of the direction in which a person faces; without it the direction is unknown.
+    /// Detector of the direction in which a person faces; if `None`, the direction is unknown.
     pub orientation: Option<Arc<Detector>>,
 }
 
@@ -64,39 +64,39 @@ impl Default for ViewSettings {
     }
 }
 
-/// The result of the single-view step, besides the responses it wrote.
+/// The result of the single-view step, without the responses, which are written separately.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewEstimate {
     /// Distinct poses, best first.
     pub candidates: Vec<Pose>,
-    /// Evidence of the picture about the direction in which the person of every candidate faces; empty: nothing was asked.
+    /// Evidence of the picture about the direction in which the person of every candidate faces; empty without a detector.
     pub front: Vec<FrontEvidence>,
-    /// Levels whose responses are offered as evidence, ascending.
+    /// Levels whose responses are offered as evidence, in ascending order.
     pub levels: Vec<u16>,
     /// How well each part of the best pose fits at its position; empty without a pose.
     pub local: Vec<LocalScore>,
     /// Upper bounds of the scores on every level.
     pub bounds: Bounds,
-    /// The part of the image that was searched and that the responses cover.
+    /// The part of the image that was searched; the responses cover it.
     pub scope: Scope,
-    /// Says where it was computed.
+    /// Where the result was computed.
     pub computed_on: ComputedOn,
 }
 
 /// Where a frame was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ComputedOn {
-    /// On the processor, as it was meant to be.
+    /// On the processor, as configured.
     #[default]
     Processor,
-    /// On the GPU.
+    /// On the GPU, as configured.
     Gpu,
     /// On the processor, because the GPU was lost.
     ProcessorForGpu,
 }
 
 impl ViewEstimate {
-    /// The result of a picture that was taken at the instant of its frame; `None` if nobody was found.
+    /// Returns the result, for a picture taken at the instant of its frame; `None` if nobody was found.
     pub(crate) fn result(&self, sigma_px: Option<Vec<f32>>) -> Option<ViewResult> {
         (!self.candidates.is_empty()).then(|| ViewResult {
             candidates: self.candidates.clone(),
@@ -116,15 +116,15 @@ pub struct ViewStep {
     layout: Arc<Layout>,
     settings: ViewSettings,
     looking: Mutex<viewquality::orientation::Workspace>,
-    /// Searches whole frames, while it can.
+    /// Searches whole frames while the GPU is available.
     gpu: Option<gpu::View>,
 }
 
-/// The candidates of a frame, and what its evidence is.
+/// The candidates of a frame, and the levels of its evidence.
 type Searched = (gpu::Found, Vec<u16>);
 
 impl ViewStep {
-    /// Prepares the step.
+    /// Prepares the step for frames of one size.
     pub fn new(model: Arc<Model>, layout: Arc<Layout>, settings: ViewSettings) -> Self {
         Self {
             extractor: Extractor::new(Arc::clone(&model)),
@@ -136,11 +136,11 @@ impl ViewStep {
         }
     }
 
-    /// Searches whole frames on a GPU; parts of frames, and all frames once it is lost, on the processor.
+    /// Searches whole frames on a GPU. Parts of frames, and all frames after the GPU is lost, are searched on the processor.
     ///
     /// # Errors
     ///
-    /// [`gpu::Unsuitable`], with the step as it was: the GPU cannot do it.
+    /// [`gpu::Unsuitable`] if the GPU cannot be used; also returns the unchanged step.
     pub fn on_gpu(self, device: &Arc<gpu::Device>) -> Result<Self, (Box<Self>, gpu::Unsuitable)> {
         let model = Arc::clone(self.solver.model());
         match gpu::View::new(device, model, Arc::clone(&self.layout)) {
@@ -152,12 +152,12 @@ impl ViewStep {
         }
     }
 
-    /// The pyramid of the frames.
+    /// Returns the pyramid of the frames.
     pub fn layout(&self) -> &Arc<Layout> {
         &self.layout
     }
 
-    /// The box around the boxes of a pose's parts: left, top, right, bottom, pixels of the image.
+    /// Returns the bounding box of all part boxes of a pose: left, top, right, bottom, in pixels of the image.
     pub fn bounding_box(&self, pose: &Pose) -> [f64; 4] {
         pose.bounding_box(self.solver.model(), &self.layout)
     }
@@ -170,12 +170,12 @@ impl ViewStep {
     /// Solves one frame within a scope.
     ///
     /// * `scope`: from [`Tracker::scope`], or [`Scope::whole`].
-    /// * `responses`: at least [`Layout::n_values`] values of the scope; those of the levels that the estimate offers are
-    ///   overwritten; may lie in shared memory.
+    /// * `responses`: at least [`Layout::n_values`] values of the scope, possibly in shared memory. The values of the levels offered as
+    ///   evidence are overwritten.
     ///
     /// # Panics
     ///
-    /// If the image, the scope or `responses` has another size than the layout.
+    /// If the size of the image, the scope or `responses` does not match the layout.
     pub fn run(&self, image: Rgb8View<'_>, scope: Scope, responses: &mut [f32]) -> ViewEstimate {
         let whole = scope == Scope::whole(&self.layout);
         let gpu = self.gpu.as_ref().filter(|_| whole);
@@ -236,7 +236,7 @@ impl ViewStep {
         Ok((found, levels))
     }
 
-    /// In which direction the person of every candidate faces; nothing without a detector.
+    /// Returns the evidence of the direction in which the person of every candidate faces; empty without a detector.
     fn front(&self, image: Rgb8View<'_>, candidates: &[Pose]) -> Vec<FrontEvidence> {
         let Some(detector) = &self.settings.orientation else {
             return Vec::new();
@@ -253,7 +253,7 @@ impl ViewStep {
         candidates.iter().map(&mut of_candidate).collect()
     }
 
-    /// Returns true if the result near the last pose is unreliable, so that the frame must be searched in full; see
+    /// Returns true if the result near the last pose is unreliable, so that the frame must be searched in full. See
     /// [`Tracker::needs_full_search`].
     pub fn needs_full_search(&self, tracker: &Tracker, found: &ViewEstimate) -> bool {
         tracker.needs_full_search(&self.layout, &found.scope, found.candidates.first())

@@ -1,4 +1,4 @@
-//! Who is in a frame: the candidates of every view that are one person, by identities that last.
+//! Identifies the people of a frame: groups the candidates of all views into people with lasting ids.
 
 use ::people::{Detection, Keypoint, Memory, Person, Remembered, Settings, State, Tracker, View};
 use geometry::Camera;
@@ -8,41 +8,41 @@ use crate::following::Follow;
 use crate::network_step::NetworkSettings;
 use crate::sighting::{Sighting, Sightings};
 
-/// The window of a network about a person, as a multiple of the longer side of the box around the joints.
+/// Size of a network's window around a person, as a multiple of the longer side of the box around the joints.
 const WINDOW: f64 = 1.25;
-/// Identities of a process that was restarted, and has no memory, begin after as many for each restart: none is used twice.
+/// Number of ids reserved per process: a restarted process without memory starts after them, so no id is used twice.
 const IDS_OF_A_PROCESS: u64 = 1000;
 
 /// A person of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KnownPerson {
-    /// Identity within the run, from 1.
+    /// Id within the run, counted from 1.
     pub id: u64,
-    /// Index of the person among the candidates of every view; `None` where the view does not show the person.
+    /// Index of the person among the candidates of every view; `None` if the view does not show the person.
     pub candidates: Vec<Option<usize>>,
 }
 
 /// The people of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FramePeople {
-    /// The people, the followed person first, even where no view sees that person but others are there.
+    /// The people, the followed person first. If only other people are seen, the followed person is still listed.
     pub people: Vec<KnownPerson>,
-    /// Number of people that several views agree on.
+    /// Number of people on which several views agree.
     pub n_seen: usize,
 }
 
 /// Settings of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WhoSettings {
-    /// Which of several people comes first.
+    /// The rule for which of several people comes first.
     pub follow: Follow,
-    /// True if left and right follow the picture, so that two views may have them exchanged.
+    /// True if views label sides as they appear in the picture, so that two views may disagree.
     pub as_seen: bool,
-    /// Heat that half of the joints of a new person have in two views, 0 to 1.
+    /// Minimum heat of half of the joints of a new person in two views, 0 to 1.
     pub least_heat: f64,
-    /// Most people at once.
+    /// Maximum number of people at the same time.
     pub n_people: usize,
-    /// How often the process was restarted.
+    /// Number of restarts of the process.
     pub n_restarts: u64,
 }
 
@@ -58,19 +58,19 @@ impl Default for WhoSettings {
     }
 }
 
-/// The step that says who is who, from what the views see alone.
+/// The step that identifies people, from the findings of the views only.
 #[derive(Debug)]
 pub struct WhoStep {
     tracker: Tracker,
     follow: Follow,
-    /// Identity of the person who is followed; 0 before the first.
+    /// Id of the followed person; 0 before the first person.
     followed: u64,
 }
 
 impl WhoStep {
     /// Prepares the step.
     ///
-    /// * `cameras`: of the views, in the rig's order.
+    /// * `cameras`: the cameras of the views, in the rig's order.
     pub fn new(cameras: Vec<Camera>, settings: WhoSettings) -> Self {
         let memory = Memory {
             last_id: settings.n_restarts * IDS_OF_A_PROCESS,
@@ -79,7 +79,7 @@ impl WhoStep {
         Self::remembering(cameras, settings, &memory, 0)
     }
 
-    /// Prepares the step to go on where another one ended, with its people and their identities; `None` if the numbers are not those of
+    /// Prepares the step to continue the work of an earlier one, with its people and ids; `None` if the numbers do not come from
     /// [`memory`](Self::memory).
     pub fn resume(cameras: Vec<Camera>, settings: WhoSettings, memory: &[f64]) -> Option<Self> {
         let (followed, memory) = memory.split_first()?;
@@ -90,7 +90,7 @@ impl WhoStep {
         Some(Self::remembering(cameras, settings, &memory, followed))
     }
 
-    /// Returns everything that another step has to know to go on from here, as plain numbers.
+    /// Returns the state that another step needs to continue from here, as plain numbers.
     pub fn memory(&self) -> Vec<f64> {
         let mut numbers = self.tracker.memory().to_numbers();
         numbers.insert(0, self.followed as f64);
@@ -118,8 +118,8 @@ impl WhoStep {
 
     /// Returns the people of the next frame.
     ///
-    /// * `time_s`: when the frame was taken; not before the last one.
-    /// * `answers`: by view.
+    /// * `time_s`: time at which the frame was taken, in seconds; not before that of the last frame.
+    /// * `answers`: the sightings of each view.
     pub fn run(&mut self, time_s: f64, answers: &[Option<Sightings>]) -> FramePeople {
         let views: Vec<View> = answers.iter().map(|seen| view(seen.as_ref())).collect();
         let mut found = self.tracker.step(time_s, &views);
@@ -130,7 +130,7 @@ impl WhoStep {
         self.choose(&found, answers);
         let followed = self.followed;
         found.retain(|person| is_seen(person) || (person.id == followed && n_seen > 0));
-        // The order of identities, but for the one who is followed.
+        // Sort by id, but put the followed person first.
         found.sort_by_key(|person| (person.id != followed, person.id));
         let known = |person: Person| KnownPerson {
             candidates: if is_seen(&person) {
@@ -164,7 +164,7 @@ impl WhoStep {
             }
         };
         let sizes = found.iter().map(|person| (size(person), person.id));
-        // Of equal ones the first.
+        // Among equal sizes, take the first.
         let largest = sizes.rev().max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, id)) = largest.filter(|(size, _)| *size > 0.0) {
             self.followed = id;
@@ -172,7 +172,7 @@ impl WhoStep {
     }
 }
 
-/// The longer side of the box around a person, pixels.
+/// Returns the longer side of the box around a person, in pixels.
 fn longer_px(sighting: &Sighting) -> f64 {
     let [left, top, right, bottom] = sighting.outline().unwrap_or_default();
     (right - left).max(bottom - top)

@@ -1,4 +1,4 @@
-//! The single-view step on any Vulkan adapter, software too; skipped where there is none.
+//! The single-view step on any Vulkan adapter, including software adapters; skipped if there is none.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
@@ -26,7 +26,7 @@ fn step() -> ViewStep {
     ViewStep::new(model, layout, settings)
 }
 
-/// A picture without two equal regions.
+/// Returns a picture in which no two regions are equal.
 fn pixels() -> Vec<u8> {
     let pixel = |at: usize| ((at * at / 7) % 251) as u8;
     (0..SIZE[0] * SIZE[1] * 3).map(pixel).collect()

@@ -16,17 +16,17 @@ pub(crate) struct Backdrop {
     pub(crate) pixels: Vec<Pixel>,
     /// 1 / depth of every sample.
     pub(crate) near: Vec<f32>,
-    /// The picture without the person, RGB.
+    /// The picture without the person, in RGB.
     pub(crate) bytes: Vec<u8>,
 }
 
 /// A pixel of the background.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pixel {
-    /// Light that reaches the camera without the key lamp, and that of the key lamp.
+    /// Light that reaches the camera without the key lamp, and light of the key lamp.
     pub(crate) base: Linear,
     pub(crate) key: Linear,
-    /// Coordinates perpendicular to the rays of the key lamp, and along them towards it, metres.
+    /// Coordinates perpendicular to the rays of the key lamp, and along the rays towards the lamp, in metres.
     pub(crate) across: Vector2<f32>,
     pub(crate) to_lamp: f32,
 }
@@ -81,8 +81,8 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    /// Undistorted normalised points of a lattice of pixel centres, one more than the picture has to the right
-    /// and below; NaN outside the valid range of the lens.
+    /// Undistorted normalised points of a lattice of pixel centres, with one more column and row than the picture;
+    /// NaN outside the valid range of the lens.
     fn directions(&self, width: usize, height: usize) -> Vec<Point2<f32>> {
         let nothing = Point2::new(f32::NAN, f32::NAN);
         let at = |i: usize| {
@@ -94,9 +94,9 @@ impl View<'_> {
         (0..(width + 1) * (height + 1)).map(at).collect()
     }
 
-    /// The mean of the samples of a pixel.
+    /// Returns the mean of the samples of a pixel.
     ///
-    /// * `here`, right and below: normalised points, between which the samples are placed.
+    /// * `here`, `right` and `below`: normalised points between which the samples are placed.
     /// * `set_near`: receives 1 / depth of every sample.
     fn pixel(
         &self,
@@ -138,7 +138,7 @@ fn lit(room: &Room, hit: &Hit, sub: usize) -> (Linear, Linear) {
     }
     let around = room.light.around(&hit.normal) * (1.0 - hit.dim);
     let direct = room.light.direct(&hit.normal);
-    // Every sample uses another part of the lamp, which makes the edges of shadows soft.
+    // Every sample uses a different part of the lamp, which softens the edges of shadows.
     let spread = 0.05;
     let [u, v] = [(sub % SUB) as f32 - 0.5, (sub / SUB) as f32 - 0.5];
     let towards = room.light.to_key + Vector3::new(u + v, u - v, 0.0) * spread;

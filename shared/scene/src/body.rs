@@ -1,7 +1,7 @@
 //! The anatomical skeleton: bones, joint limits and forward kinematics.
 //!
-//! The frame of the body: x forward, y to the person's left, z up. With all angles at 0 the person
-//! stands with hanging arms, and the frame of every bone is that of the body, at the bone's joint.
+//! The frame of the body has x forward, y to the person's left, and z up. With all angles at 0, the person
+//! stands with hanging arms, and the frame of every bone has its origin at the bone's joint and the axes of the body.
 
 mod limits;
 
@@ -17,12 +17,12 @@ pub(crate) const ABDOMEN: usize = 1;
 pub(crate) const CHEST: usize = 2;
 pub(crate) const NECK: usize = 3;
 pub(crate) const HEAD: usize = 4;
-/// First bone of an arm: collar, upper arm, forearm, hand follow each other. Left first.
+/// First bone of each arm: collar, upper arm, forearm and hand follow each other. Left first.
 pub(crate) const COLLAR: [usize; 2] = [5, 9];
 pub(crate) const UPPER_ARM: [usize; 2] = [6, 10];
 pub(crate) const FOREARM: [usize; 2] = [7, 11];
 pub(crate) const HAND: [usize; 2] = [8, 12];
-/// First bone of a leg: thigh, shin, foot follow each other. Left first.
+/// First bone of each leg: thigh, shin and foot follow each other. Left first.
 pub(crate) const THIGH: [usize; 2] = [13, 16];
 pub(crate) const SHIN: [usize; 2] = [14, 17];
 pub(crate) const FOOT: [usize; 2] = [15, 18];
@@ -55,7 +55,7 @@ pub(crate) const PARENT: [Option<usize>; N_BONES] = [
     Some(17),
 ];
 
-/// +1 for bones of the left side, -1 for those of the right, 0 in the middle.
+/// +1 for bones of the left side, -1 for bones of the right side, 0 in the middle.
 pub(crate) fn side_of(bone: usize) -> f64 {
     match bone {
         5..=8 | 13..=15 => 1.0,
@@ -64,14 +64,14 @@ pub(crate) fn side_of(bone: usize) -> f64 {
     }
 }
 
-/// Degrees of flexion, abduction and twist of every joint; those of the root are ignored.
+/// Flexion, abduction and twist of every joint in degrees; the values of the root are ignored.
 ///
-/// Flexion: the trunk, neck and head nod forward, arms and legs swing forward, elbows and knees fold,
-/// toes rise. Abduction: limbs away from the middle, collars up, the trunk bends to the right. Twist:
-/// inward rotation reversed (the front of the limb turns outward); the trunk turns left.
+/// Flexion: the trunk, neck and head nod forward, arms and legs swing forward, elbows and knees fold, and
+/// toes rise. Abduction: limbs move away from the middle, collars up, and the trunk bends to the right. Twist is the
+/// opposite of inward rotation (the front of the limb turns outward); the trunk turns left.
 pub(crate) type Angles = [[f64; 3]; N_BONES];
 
-/// Angles within the limits of the joints.
+/// Clamps angles to the limits of the joints.
 pub(crate) fn clamped(angles: &Angles) -> Angles {
     core::array::from_fn(|bone| {
         core::array::from_fn(|axis| {
@@ -81,22 +81,22 @@ pub(crate) fn clamped(angles: &Angles) -> Angles {
     })
 }
 
-/// Where a person is, and how the joints are turned.
+/// Place of a person, and the rotations of the joints.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pose {
-    /// Frame of the pelvis in the frame that the person stands in.
+    /// Frame of the pelvis in the frame of the room.
     pub(crate) root: Isometry3<f64>,
     pub(crate) angles: Angles,
 }
 
-/// Lengths of a skeleton, metres.
+/// Lengths of a skeleton, in metres.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bones {
-    /// From the joint of the parent to the joint of the bone, in the parent's frame.
+    /// Vector from the joint of the parent to the joint of the bone, in the parent's frame.
     pub(crate) offset: [Vector3<f64>; N_BONES],
     /// Top of the head in the frame of the head.
     pub(crate) head_top: Vector3<f64>,
-    /// Tip of the toes and back of the heel, on the sole, in the frame of the foot.
+    /// Tip of the toes and back of the heel on the sole, in the frame of the foot.
     pub(crate) sole: [Vector3<f64>; 2],
     /// Tip of the hand in its frame.
     pub(crate) fingertip: Vector3<f64>,
@@ -105,9 +105,9 @@ pub(crate) struct Bones {
 /// The individual proportions of a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Proportions {
-    /// Standing height, metres.
+    /// Standing height, in metres.
     pub(crate) height: f64,
-    /// Length of the legs and of the arms, and widths of shoulders and hips, 1 for the mean.
+    /// Length of the legs and of the arms, and widths of shoulders and hips, relative to the mean.
     pub(crate) legs: f64,
     pub(crate) arms: f64,
     pub(crate) shoulders: f64,
@@ -115,12 +115,12 @@ pub(crate) struct Proportions {
 }
 
 impl Bones {
-    /// Shares of the height after Drillis & Contini (1966), as reprinted in Winter, *Biomechanics and
-    /// Motor Control of Human Movement*; joints of the trunk between them by eye.
+    /// Creates a skeleton with shares of the height after Drillis & Contini (1966), as reprinted in Winter, *Biomechanics and
+    /// Motor Control of Human Movement*. The joints within the trunk are placed by eye.
     pub(crate) fn new(of: &Proportions) -> Self {
         let h = of.height;
         let leg = of.legs;
-        // The height stays the same: longer legs mean a shorter trunk.
+        // The height stays the same, so longer legs mean a shorter trunk.
         let trunk = (0.818 - 0.53 * leg - 0.0) / (0.818 - 0.53);
         let v = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * h;
         let mut offset = [Vector3::zeros(); N_BONES];
@@ -145,7 +145,7 @@ impl Bones {
         }
     }
 
-    /// The frames of all bones, in the frame that the pose stands in.
+    /// Returns the frames of all bones, in the frame of the pose.
     pub(crate) fn frames(&self, pose: &Pose) -> [Isometry3<f64>; N_BONES] {
         let mut frames = [pose.root; N_BONES];
         for bone in 1..N_BONES {
@@ -157,15 +157,15 @@ impl Bones {
         frames
     }
 
-    /// Height of the lowest point of the body.
+    /// Returns the height of the lowest point of the body.
     ///
-    /// * `height`: of the person, metres.
+    /// * `height`: height of the person, in metres.
     pub(crate) fn lowest(&self, frames: &[Isometry3<f64>; N_BONES], height: f64) -> f64 {
         let scale = height / 1.75;
         let soles = FOOT
             .iter()
             .flat_map(|&foot| self.sole.map(|sole| (frames[foot] * Point3::from(sole)).z));
-        // Radii of the body around the joints, metres for a man of 1.75 m.
+        // Radii of the body around the joints, in metres for a man of 1.75 m.
         let round = [(PELVIS, 0.105), (CHEST, 0.112), (HEAD, 0.09)].into_iter();
         let limbs = [
             (UPPER_ARM, 0.05),
@@ -178,14 +178,14 @@ impl Bones {
         soles.chain(joints).fold(f64::INFINITY, f64::min)
     }
 
-    /// Tip of the nose, left and right heel, left and right big toe, where annotators of feet mark them: on the skin or shoe, at
+    /// Tip of the nose, left and right heel, left and right big toe. They are placed as by annotators of feet: on the skin or shoe, at
     /// half the height of the toes.
     pub(crate) fn extras(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; N_EXTRAS] {
         let at = |bone: usize, place: Vector3<f64>| frames[bone] * Point3::from(place);
         let [toe, heel] = self.sole;
         let h = -heel.x / 0.036;
         let heel = heel + Vector3::new(0.0, 0.0, 0.015 * h);
-        // Towards the other foot.
+        // The big toe is shifted towards the other foot.
         let toe = |aside: f64| toe + Vector3::new(-0.008, aside * 0.010, 0.013) * h;
         [
             at(HEAD, Vector3::new(0.068, 0.0, 0.008) * h),
@@ -196,7 +196,7 @@ impl Bones {
         ]
     }
 
-    /// The 14 joints of `skeleton::PARSE14`, in its order.
+    /// Returns the 14 joints of `skeleton::PARSE14`, in its order.
     pub(crate) fn joints(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; 14] {
         let joint = |bone: usize| Point3::from(frames[bone].translation.vector);
 
@@ -219,16 +219,16 @@ impl Bones {
     }
 }
 
-/// Keypoints beside the joints: see [`Scene::extras`](crate::Scene::extras).
+/// Number of extra keypoints: see [`Scene::extras`](crate::Scene::extras).
 pub const N_EXTRAS: usize = 5;
 
-/// The rotation of a joint: twist about the bone first, then abduction, then flexion.
+/// Returns the rotation of a joint: twist about the bone first, then abduction, then flexion.
 fn rotation(bone: usize, degrees: [f64; 3]) -> UnitQuaternion<f64> {
     let [flexion, abduction, twist] = degrees.map(f64::to_radians);
     let side = side_of(bone);
     let mirror = if side < 0.0 { -1.0 } else { 1.0 };
     // A positive rotation about y bends the trunk forward and a knee backward; the other joints swing forward with a
-    // negative one.
+    // negative rotation.
     let forward = match bone {
         ABDOMEN | CHEST | NECK | HEAD | 14 | 17 => flexion,
         _ => -flexion,

@@ -1,4 +1,4 @@
-//! Other people, who stand around the subject, or walk and pass.
+//! Other people, who stand around the subject, or walk and pass it.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -12,14 +12,14 @@ use crate::subject::Subject;
 use crate::truth::N_JOINTS;
 use crate::wear::Wear;
 
-/// Distance from the middle of the stage, metres: beyond the path of a person who walks there.
+/// Range of distances from the middle of the stage, in metres: outside the path of a person who walks there.
 const AWAY_M: [f64; 2] = [1.7, 2.1];
 
-/// Centre of the way of a person who passes, metres from the middle of the stage, around which the subject walks.
+/// Range of distances of a passer's path centre from the middle of the stage, around which the subject walks, in metres.
 const BESIDE_M: [f64; 2] = [0.4, 0.9];
-/// People who pass each other are not nearer, trunk to trunk, where such a way is found.
+/// Minimum distance between the trunks of people who pass each other, if a path with this distance is found, in metres.
 const NEAREST_M: f64 = 0.6;
-/// Number of paths that are tried, and the time for which each is checked, seconds.
+/// Number of paths that are tried, and the duration and the interval of their check, in seconds.
 const N_WAYS: u64 = 60;
 const WATCHED_S: f64 = 20.0;
 const WATCHED_EVERY_S: f64 = 0.2;
@@ -31,7 +31,7 @@ pub(crate) struct Bystander {
     way: Way,
 }
 
-/// How a person moves, and from where.
+/// Motion of a person, and its place on the stage.
 #[derive(Debug)]
 struct Way {
     motion: Box<Motion>,
@@ -39,13 +39,13 @@ struct Way {
 }
 
 impl Way {
-    /// The frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of all bones at a time, in the frame of the stage.
     fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         let frames = self.motion.bones.frames(&self.motion.pose(seconds));
         frames.map(|frame| self.on_stage * frame)
     }
 
-    /// A person who walks around a place beside the middle.
+    /// Creates a person who walks around a place beside the middle.
     fn walking(subject: &Subject, mut random: Random) -> Self {
         let bearing = random.range(0.0, core::f64::consts::TAU);
         let away = random.range(BESIDE_M[0], BESIDE_M[1]);
@@ -58,9 +58,9 @@ impl Way {
 }
 
 impl Bystander {
-    /// Somebody who stands.
+    /// Creates a person who stands.
     ///
-    /// * `number`: among those of the scene, from 0.
+    /// * `number`: index among the standing people of the scene.
     pub(crate) fn standing(settings: &Settings, number: u64) -> Self {
         let mut random =
             Random::new(settings.subject).fork("others").nth(settings.seed).nth(number);
@@ -77,10 +77,10 @@ impl Bystander {
         Self::new(&subject, way)
     }
 
-    /// Somebody who walks and passes the others.
+    /// Creates a person who walks and passes the others.
     ///
-    /// * `number`: among those of the scene, from 0.
-    /// * `trunks`: where the trunks of the others are at a time, metres on the stage.
+    /// * `number`: index among the passers of the scene.
+    /// * `trunks`: returns the trunk positions of the others at a time, in metres on the stage.
     pub(crate) fn passing(
         settings: &Settings,
         number: u64,
@@ -123,12 +123,12 @@ impl Bystander {
         }
     }
 
-    /// The frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of all bones at a time, in the frame of the stage.
     pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         self.way.frames(seconds)
     }
 
-    /// The joints of `skeleton::PARSE14` at a time, in the frame of the stage.
+    /// Returns the joints of `skeleton::PARSE14` at a time, in the frame of the stage.
     pub(crate) fn joints(&self, seconds: f64) -> [Point3<f64>; N_JOINTS] {
         self.way.motion.bones.joints(&self.frames(seconds))
     }

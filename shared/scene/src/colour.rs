@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 /// Red, green and blue as linear light.
 pub(crate) type Linear = Vector3<f32>;
 
-/// Linear light of an sRGB colour, `[r, g, b]` of 0 to 255.
+/// Converts an sRGB colour `[r, g, b]`, 0 to 255, to linear light.
 pub(crate) fn srgb(bytes: [u8; 3]) -> Linear {
     Vector3::from(bytes.map(|byte| {
         let share = f32::from(byte) / 255.0;
@@ -17,13 +17,13 @@ pub(crate) fn srgb(bytes: [u8; 3]) -> Linear {
     }))
 }
 
-/// sRGB bytes of linear light by table, exact to one grey level (see the test).
+/// Table that converts linear light to sRGB bytes, exact to one grey level (see the test).
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {
     table: Vec<u8>,
 }
 
-/// Entries of the table; shares are looked up by their square root, which spreads the dark ones.
+/// Number of entries of the table. The index is the square root of the light, which spreads the dark values.
 const N_ENTRIES: usize = 4096;
 
 impl Curve {
@@ -46,7 +46,7 @@ impl Curve {
     }
 }
 
-/// The sRGB transfer curve (IEC 61966-2-1), from and to 0..1.
+/// Returns the sRGB transfer curve (IEC 61966-2-1), from and to 0..1.
 pub(crate) fn written(share: f32) -> f32 {
     if share <= 0.003_130_8 {
         12.92 * share

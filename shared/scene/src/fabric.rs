@@ -9,20 +9,20 @@ use crate::random::{Random, noise};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Pattern {
     Plain,
-    /// Around the body; number per metre.
+    /// Stripes around the body; number per metre.
     Stripes(f32),
-    /// Along the body; number per metre.
+    /// Stripes along the body; number per metre.
     Bars(f32),
     Checks(f32),
-    /// Threads of two colours.
+    /// A mixture of threads of two colours.
     Melange,
     Blotches(f32),
-    /// One broad stripe at this height, metres above the hips.
+    /// One broad stripe at this height above the hips, in metres.
     Band(f32),
 }
 
 impl Pattern {
-    /// The choice for tops; plain ones are more frequent.
+    /// The patterns to choose from for tops; plain ones are more frequent.
     pub(crate) const ON_TOPS: &'static [Self] = &[
         Self::Plain,
         Self::Plain,
@@ -52,7 +52,7 @@ pub(crate) struct Fabric {
     colour: Linear,
     second: Linear,
     pattern: Pattern,
-    /// How much folds turn the normal.
+    /// Strength with which folds change the normal.
     folds: f32,
     seed: u32,
 }
@@ -99,10 +99,10 @@ impl Fabric {
         }
     }
 
-    /// The colour at a point.
+    /// Returns the colour at a point.
     ///
-    /// * `at`: around the body and along it, metres of the cloth.
-    /// * `place`: of the body at rest, metres.
+    /// * `at`: position around the body and along it, in metres of the cloth.
+    /// * `place`: position on the body at rest, in metres.
     pub(crate) fn colour(&self, at: Vector2<f32>, place: &Vector3<f32>) -> Linear {
         let odd = |value: f32| value.rem_euclid(1.0) < 0.5;
         let second = match self.pattern {
@@ -122,7 +122,7 @@ impl Fabric {
         (self.colour + (self.second - self.colour) * second) * worn
     }
 
-    /// Returns the addition of folds to the normal, in the frame of the body at rest.
+    /// Returns the contribution of folds to the normal, in the frame of the body at rest.
     pub(crate) fn folds(&self, place: &Vector3<f32>) -> Vector3<f32> {
         // Folds run across limbs more than along them.
         let at = Vector3::new(place.x * 13.0, place.y * 13.0, place.z * 22.0);

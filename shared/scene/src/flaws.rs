@@ -1,4 +1,4 @@
-//! Flaws of cameras: noise, blur, exposure, clock offsets, dropped frames, calibration errors. None by default.
+//! Flaws of cameras: noise, blur, exposure, clock offsets, dropped frames, calibration errors. There are none by default.
 
 use footage::Size;
 use geometry::{Camera, Rig, RigError};
@@ -10,33 +10,33 @@ use crate::random::Random;
 /// The flaws of the cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Flaws {
-    /// Standard deviation of the noise of every value of a pixel, grey levels.
+    /// Standard deviation of the noise of every value of a pixel, in grey levels.
     pub noise: f64,
-    /// Standard deviation of the Gaussian blur, pixels.
+    /// Standard deviation of the Gaussian blur, in pixels.
     pub blur_px: f64,
     /// Exposure in stops (doublings of the light); negative is darker.
     pub exposure_stops: f64,
-    /// Largest clock offset of a camera, either way, seconds; the first camera has none.
+    /// Maximum clock offset of a camera in either direction, in seconds; the first camera has no offset.
     pub desync_s: f64,
     /// Probability that a camera drops a frame.
     pub drop: f64,
-    /// The written rig turns every camera by this angle about a random axis, degrees.
+    /// Angle by which every camera is rotated in the written rig, about a random axis, in degrees.
     pub calibration_degrees: f64,
-    /// The written rig moves every camera this far in a random direction, millimetres.
+    /// Distance by which every camera is moved in the written rig, in a random direction, in millimetres.
     pub calibration_mm: f64,
 }
 
-/// A flaw that is out of range.
+/// The error for a flaw that is out of range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{what} is {got}, expected {low} to {high}")]
 pub struct FlawError {
-    /// Which.
+    /// Name of the flaw.
     pub what: &'static str,
-    /// The value.
+    /// The given value.
     pub got: f64,
-    /// Least.
+    /// Minimum accepted value.
     pub low: f64,
-    /// Most.
+    /// Maximum accepted value.
     pub high: f64,
 }
 
@@ -52,7 +52,7 @@ impl Flaws {
         "calibration-mm",
     ];
 
-    /// The flaw of that name.
+    /// Returns the flaw with that name.
     pub fn by_name_mut(&mut self, name: &str) -> Option<&mut f64> {
         let all = [
             &mut self.noise,
@@ -70,7 +70,7 @@ impl Flaws {
     ///
     /// # Errors
     ///
-    /// [`FlawError`] of the first value out of range.
+    /// [`FlawError`] for the first value out of range.
     pub fn check(mut self) -> Result<(), FlawError> {
         let limits = [
             (0.0, 128.0),
@@ -95,12 +95,12 @@ impl Flaws {
         Ok(())
     }
 
-    /// Returns true if a camera's frame is dropped. The first never is.
+    /// Returns true if a camera's frame is dropped. The first frame is never dropped.
     pub(crate) fn drops(&self, random: Random, camera: usize, frame: u64) -> bool {
         frame > 0 && random.fork("drop").nth(camera as u64).nth(frame).chance(self.drop)
     }
 
-    /// The clock offset of a camera, seconds.
+    /// Returns the clock offset of a camera, in seconds.
     pub(crate) fn late_s(&self, random: Random, camera: usize) -> f64 {
         if camera == 0 {
             return 0.0;
@@ -108,7 +108,7 @@ impl Flaws {
         self.desync_s * random.fork("desync").nth(camera as u64).range(-1.0, 1.0)
     }
 
-    /// The rig with the calibration error.
+    /// Applies the calibration error to a rig.
     pub(crate) fn written(&self, rig: &Rig, random: Random) -> Result<Rig, RigError> {
         let wrong = |(nth, camera): (usize, &Camera)| {
             let mut random = random.fork("calibration").nth(nth as u64);

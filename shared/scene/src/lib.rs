@@ -1,20 +1,21 @@
 //! Synthetic scenes: rendered people in rendered rooms, seen by calibrated cameras, with the true joint positions.
 //!
-//! [`Settings`] hold everything: the cameras, the number of the subject, the action, the seed, the flaws of the
-//! cameras. A [`Scene`] is made of them; a [`View`] of it makes the pictures of one camera and the ground truth
-//! of each ([`truth`]). An [`Address`] is one camera of a scene in one line, `synth://...`, for a process that
-//! shows one camera live. The same settings give the same bits, in whatever order and wherever pictures are made.
+//! [`Settings`] define a scene completely: the cameras, the number of the subject, the action, the seed, and the flaws of the
+//! cameras. A [`Scene`] is created from them. A [`View`] of the scene renders the pictures of one camera and the ground truth
+//! of each picture ([`truth`]). An [`Address`] describes one camera of a scene in one line, `synth://...`, for a process that
+//! shows one camera live. The same settings give bit-identical pictures, regardless of the order and the process in which they are
+//! rendered.
 //!
 //! The *stage* is the place where the person acts, and its frame of reference: origin on the floor, z up.
 //!
 //! # How it works
 //!
-//! A person is a union of some forty smooth solids on the bones of an anatomical skeleton; its surface is
-//! made once and follows the bones. Every corner of its small triangles is projected by the camera itself,
-//! distortion included, and a z-buffer with four samples a pixel finds what is seen. The room, cast as rays
-//! through the same camera, does not move and is made once for a camera. One lamp throws soft shadows.
+//! A person is a union of some forty smooth solids on the bones of an anatomical skeleton. The surface is created once and follows the
+//! bones. Every corner of its small triangles is projected by the camera itself, including distortion. A z-buffer with four samples per
+//! pixel determines the visible surface. The room is rendered by casting rays through the same camera; it does not move, so this is done
+//! once per camera. One lamp casts soft shadows.
 //!
-//! Published software renderers (`euc`, `retrofire`) have no lens distortion and are larger than `raster`.
+//! Published software renderers (`euc`, `retrofire`) do not support lens distortion and are larger than `raster`.
 #![forbid(unsafe_code)]
 
 mod colour;

@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use crate::colour::Linear;
 use crate::random::Random;
 
-/// Light in the frame of the stage, z up.
+/// The light of a room, in the frame of the stage, z up.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Light {
     /// Unit vector to the key lamp, which casts shadows and whose rays are parallel.
@@ -13,7 +13,7 @@ pub(crate) struct Light {
     pub(crate) key: Linear,
     to_fill: Vector3<f32>,
     fill: Linear,
-    /// From above and from below.
+    /// Ambient light from above and from below.
     sky: Linear,
     ground: Linear,
     /// Two axes perpendicular to the rays of the key lamp.
@@ -21,7 +21,7 @@ pub(crate) struct Light {
 }
 
 impl Light {
-    /// Random lamps.
+    /// Creates random lamps.
     pub(crate) fn new(mut random: Random) -> Self {
         let bearing = random.range(0.0, core::f64::consts::TAU);
         let height = random.range(48.0, 70.0_f64).to_radians();
@@ -47,19 +47,19 @@ impl Light {
         }
     }
 
-    /// Light without that of the key lamp, on a surface of that normal.
+    /// Returns the light on a surface with that normal, without the key lamp.
     pub(crate) fn around(&self, normal: &Vector3<f32>) -> Linear {
         let up = 0.5 + 0.5 * normal.z;
         let fill = normal.dot(&self.to_fill).max(0.0);
         self.ground + (self.sky - self.ground) * up + self.fill * fill
     }
 
-    /// Light of the key lamp on a surface of that normal, if it is not in shadow.
+    /// Returns the light of the key lamp on a surface with that normal, if it is not in shadow.
     pub(crate) fn direct(&self, normal: &Vector3<f32>) -> Linear {
         self.key * normal.dot(&self.to_key).max(0.0)
     }
 
-    /// The coordinates of a point perpendicular to the rays of the key lamp, and along them towards it, metres.
+    /// Returns the coordinates of a point perpendicular to the rays of the key lamp, and along the rays towards the lamp, in metres.
     pub(crate) fn beam(&self, at: &Vector3<f32>) -> (Vector2<f32>, f32) {
         let [a, b] = self.across;
         (Vector2::new(at.dot(&a), at.dot(&b)), at.dot(&self.to_key))

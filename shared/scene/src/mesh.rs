@@ -7,13 +7,13 @@ use nalgebra::{Isometry3, Matrix3, Matrix3x4, Point3, Vector3};
 use crate::body::{Bones, N_BONES, THIGH};
 use crate::shape::{BodyShape, FAR, Grid};
 
-/// Distance of the lattice on which the surface is made, metres.
+/// Spacing of the lattice on which the surface is created, in metres.
 const STEP: f32 = 0.012;
 
-/// Within about this difference of distances (metres) a point follows two bones.
+/// A point follows two bones if their distances differ by less than about this, in metres.
 const SHARED: f32 = 0.02;
 
-/// Bones that a point may follow.
+/// Maximum number of bones that a point follows.
 const N_WEIGHTS: usize = 4;
 
 /// The surface at rest.
@@ -21,9 +21,9 @@ const N_WEIGHTS: usize = 4;
 pub(crate) struct Mesh {
     pub(crate) points: Vec<Point3<f32>>,
     pub(crate) normals: Vec<Vector3<f32>>,
-    /// Anticlockwise seen from outside.
+    /// Triangles, anticlockwise as seen from outside.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Bones and their shares, which sum to 1.
+    /// Bones and their weights, which sum to 1.
     weights: Vec<[(u8, f32); N_WEIGHTS]>,
     rest_from_body: [Isometry3<f64>; N_BONES],
 }
@@ -41,7 +41,7 @@ impl Mesh {
         shape.fill(&mut grid);
         let (mut points, triangles) = nets::surface(&grid);
         for point in &mut points {
-            // Newton's steps onto the surface, which the lattice has smoothed.
+            // Newton steps move the points onto the surface, which the lattice has smoothed.
             for _ in 0..2 {
                 let off = shape.distance(point).clamp(-STEP, STEP);
                 *point -= shape.normal(point) * off;
@@ -60,7 +60,7 @@ impl Mesh {
 
     /// Moves every point as its bones move (linear blend skinning).
     ///
-    /// * `frames`: of the bones; the points are in the same frame of reference.
+    /// * `frames`: frames of the bones; the points are in the same frame of reference.
     pub(crate) fn pose(&self, frames: &[Isometry3<f64>; N_BONES], posed: &mut Posed) {
         let moves: [Matrix3x4<f32>; N_BONES] = core::array::from_fn(|bone| {
             let it = frames[bone] * self.rest_from_body[bone].inverse();
@@ -83,12 +83,12 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// The bone that a point follows most.
+    /// Returns the bone that a point follows most.
     pub(crate) fn bone(&self, point: usize) -> usize {
         usize::from(self.weights[point][0].0)
     }
 
-    /// By bone, the rotation of directions at rest.
+    /// For every bone, the rotation of directions from the rest pose.
     pub(crate) fn turns(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Matrix3<f32>; N_BONES] {
         core::array::from_fn(|bone| {
             let turn = frames[bone].rotation * self.rest_from_body[bone].rotation.inverse();
@@ -97,7 +97,7 @@ impl Mesh {
     }
 }
 
-/// Which bones a point follows: those whose solids it lies on, blended where two are equally near.
+/// Returns the bones that a point follows: those whose solids contain it, blended if two are equally near.
 fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
     let mut distances = shape.by_bone(at);
     // A point of one leg never follows the other leg.
@@ -124,7 +124,7 @@ fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
     shares
 }
 
-/// The surface of a person at rest.
+/// Returns the surface of a person at rest.
 pub(crate) fn of(subject: &crate::subject::Subject, bones: &Bones) -> (BodyShape, Mesh) {
     let shape = BodyShape::new(subject, bones);
     let mesh = Mesh::new(&shape);

@@ -1,4 +1,4 @@
-//! Generated motion: from an action, a subject and a seed to a pose at any time.
+//! Generated motion: computes the pose at any time from an action, a subject and a seed.
 
 mod gait;
 mod keys;
@@ -15,9 +15,9 @@ use stance::Stance;
 /// Action of the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Action {
-    /// Around the middle of the room.
+    /// Walking around the middle of the room.
     Walking,
-    /// The same, faster.
+    /// Jogging around the middle of the room.
     Jogging,
     /// Guard, straight punches, hooks and uppercuts.
     Boxing,
@@ -38,7 +38,7 @@ pub enum Action {
 }
 
 impl Action {
-    /// All of them.
+    /// All actions.
     pub const ALL: [Self; 10] = [
         Self::Walking,
         Self::Jogging,
@@ -52,7 +52,7 @@ impl Action {
         Self::Lying,
     ];
 
-    /// Its name on the command line and in files.
+    /// Returns the name of the action on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Walking => "walking",
@@ -68,7 +68,7 @@ impl Action {
         }
     }
 
-    /// The action of that name, if there is one.
+    /// Returns the action with that name, if there is one.
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
@@ -87,14 +87,14 @@ pub(crate) struct Motion {
 struct Actor {
     subject: Subject,
     random: Random,
-    /// Direction that the person faces at first, radians from x to y.
+    /// Initial direction that the person faces, in radians from x to y.
     heading: f64,
-    /// Where the person stands, or the centre of the path, metres.
+    /// Place of the person, or the centre of the path, in metres.
     place: [f64; 2],
 }
 
 impl Motion {
-    /// An action. The same subject, action and seed move the same way.
+    /// Creates the motion of an action. The same subject, action and seed move the same way.
     pub(crate) fn new(subject: &Subject, action: Action, seed: u64) -> Self {
         let random = Random::new(seed).fork("motion").nth(subject.number).fork(action.name());
         let mut stage = random.fork("stage");
@@ -113,7 +113,7 @@ impl Motion {
         }
     }
 
-    /// The pose at a time, in the frame of the stage: metres, z up, the floor at 0.
+    /// Returns the pose at a time, in the frame of the stage: in metres, z up, the floor at 0.
     pub(crate) fn pose(&self, seconds: f64) -> Pose {
         let action = self.action;
         let mut stance = match action {
@@ -125,7 +125,7 @@ impl Motion {
         self.grounded(&stance)
     }
 
-    /// Standing height of the person, metres.
+    /// Returns the standing height of the person, in metres.
     pub(crate) fn height(&self) -> f64 {
         self.actor.subject.proportions.height
     }
@@ -135,7 +135,7 @@ impl Motion {
         keys::furniture(self, self.action)
     }
 
-    /// Puts the person's lowest point on the floor, and the feet (or the pelvis) where they belong.
+    /// Moves the person's lowest point to the floor, and the feet (or the pelvis) to their place.
     fn grounded(&self, stance: &Stance) -> Pose {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), stance.heading)
             * UnitQuaternion::from_euler_angles(stance.roll.to_radians(), 0.0, 0.0)

@@ -36,7 +36,7 @@ pub(crate) struct Painter {
 #[derive(Debug, Clone)]
 struct Body {
     posed: Posed,
-    /// By bone, the rotation of directions at rest.
+    /// For every bone, the rotation of directions from the rest pose.
     turns: [Matrix3<f32>; N_BONES],
     first_triangle: usize,
     first_corner: usize,
@@ -53,7 +53,7 @@ impl Default for Body {
     }
 }
 
-/// A person of a picture.
+/// A person in a picture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Person<'a> {
     pub(crate) figure: &'a Figure,
@@ -63,7 +63,7 @@ pub(crate) struct Person<'a> {
 /// The input of a picture, all in the frame of the stage.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Input<'a> {
-    /// The subject, then others.
+    /// The people, the subject first.
     pub(crate) people: &'a [Person<'a>],
     pub(crate) camera: &'a Camera,
     pub(crate) backdrop: &'a Backdrop,
@@ -82,7 +82,7 @@ impl Painter {
         }
     }
 
-    /// Determines which samples see a person, and which.
+    /// Determines the person seen by every sample, if any.
     pub(crate) fn draw(&mut self, of: &Input<'_>) {
         let camera = of.camera;
         self.eye = camera.centre_in_world().coords.cast();
@@ -113,7 +113,7 @@ impl Painter {
         }
     }
 
-    /// Writes the picture, after [`draw`](Self::draw): RGB, row major.
+    /// Writes the picture, after [`draw`](Self::draw), in RGB, row major.
     pub(crate) fn paint(&mut self, of: &Input<'_>, rgb: &mut [u8]) {
         rgb.copy_from_slice(&of.backdrop.bytes);
         let bodies = self.bodies.iter().zip(of.people);
@@ -146,7 +146,7 @@ impl Painter {
         triangle != NOTHING && (triangle as usize) < end
     }
 
-    /// The number of samples that see each person, the subject first, after [`draw`](Self::draw).
+    /// Returns the number of samples that see each person, the subject first, after [`draw`](Self::draw).
     pub(crate) fn seen(&self) -> Vec<usize> {
         let mut seen = vec![0; self.bodies.len()];
         for triangle in self.samples.triangle.iter().filter(|nearest| **nearest != NOTHING) {
@@ -156,7 +156,7 @@ impl Painter {
         seen
     }
 
-    /// Writes how much of every pixel the subject covers, after [`draw`](Self::draw): 0 to 255.
+    /// Writes the coverage of every pixel by the subject, 0 to 255, after [`draw`](Self::draw).
     pub(crate) fn mask(&self, mask: &mut [u8]) {
         mask.fill(0);
         let [x1, y1, x2, y2] = self.samples.touched;
@@ -174,7 +174,7 @@ impl Painter {
         (0..SUB * SUB).map(move |sub| (y * SUB + sub / SUB) * width + x * SUB + sub % SUB)
     }
 
-    /// The mean of the samples of a pixel, where any of them sees a person.
+    /// Returns the mean of the samples of a pixel, if any of them sees a person.
     fn pixel(&self, of: &Input<'_>, x: usize, y: usize) -> Option<Linear> {
         let n = self.of_pixel(x, y).filter(|i| self.samples.triangle[*i] != NOTHING).count();
         if n == 0 {
@@ -195,7 +195,7 @@ impl Painter {
         Some((sum + behind * (all - n as f32)) / all)
     }
 
-    /// The light reflected to the camera by a place of the body.
+    /// Returns the light reflected to the camera by a place of the body.
     fn shade(&self, of: &Input<'_>, triangle: usize, place: Point2<f32>) -> Linear {
         let after = self.bodies.partition_point(|body| body.first_triangle <= triangle);
         let body = &self.bodies[after - 1];

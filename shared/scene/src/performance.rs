@@ -11,14 +11,14 @@ use crate::room::Block;
 #[derive(Debug)]
 pub(crate) struct Performance {
     pub(crate) bones: Bones,
-    /// Standing height of the person, metres.
+    /// Standing height of the person, in metres.
     pub(crate) height: f64,
-    /// Its name in the ground truth.
+    /// Name of the action in the ground truth.
     pub(crate) name: String,
     pub(crate) course: Course,
 }
 
-/// How the person moves.
+/// Source of the person's motion.
 #[derive(Debug)]
 pub(crate) enum Course {
     Acted(Box<Motion>),
@@ -26,7 +26,7 @@ pub(crate) enum Course {
 }
 
 impl Performance {
-    /// The frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of all bones at a time, in the frame of the stage.
     pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         match &self.course {
             Course::Acted(motion) => self.bones.frames(&motion.pose(seconds)),

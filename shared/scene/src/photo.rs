@@ -19,7 +19,7 @@ impl Photo {
         Ok(Self { size, rgb })
     }
 
-    /// The colour at fractions of the width and the height, interpolated bilinearly.
+    /// Returns the colour at fractions of the width and the height, with bilinear interpolation.
     pub(crate) fn at(&self, share: Vector2<f32>) -> Linear {
         let Size { width, height } = self.size;
         if width == 0 || height == 0 {
@@ -38,11 +38,11 @@ impl Photo {
     }
 }
 
-/// The photographs of a folder, by name.
+/// Returns the photographs in a folder, sorted by name.
 ///
 /// # Errors
 ///
-/// [`FootageError`] if the folder cannot be read, or has none.
+/// [`FootageError`] if the folder cannot be read, or contains no photographs.
 pub fn photos_in(folder: &Path) -> Result<Vec<PathBuf>, FootageError> {
     let failed = |source: std::io::Error| FootageError::Io {
         path: folder.to_owned(),

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-/// A generator of numbers that depend on the seed alone (splitmix64, Steele et al. 2014).
+/// A generator of numbers that depend only on the seed (splitmix64, Steele et al. 2014).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Random(u64);
 
@@ -19,12 +19,12 @@ impl Random {
         Self(mix(seed.wrapping_add(GOLDEN)))
     }
 
-    /// Another generator for a purpose of its own, so that one more throw here changes nothing there.
+    /// Returns another generator for a separate purpose, so that an additional draw here changes nothing there.
     pub(crate) fn fork(self, purpose: &str) -> Self {
         Self(mix(self.0 ^ formats::checksum::fnv1a(purpose.as_bytes())))
     }
 
-    /// Another generator, for the n-th of many.
+    /// Returns another generator, for the n-th of many items.
     pub(crate) fn nth(self, n: u64) -> Self {
         Self(mix(self.0 ^ mix(n.wrapping_add(GOLDEN))))
     }
@@ -34,28 +34,28 @@ impl Random {
         mix(self.0)
     }
 
-    /// At least 0, less than 1.
+    /// Draws a number that is at least 0 and less than 1.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// At least `low`, less than `high`.
+    /// Draws a number that is at least `low` and less than `high`.
     pub(crate) fn range(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Mean 0, deviation 1, never beyond 3.5 (sum of twelve uniform numbers, cut off).
+    /// Draws a number with mean 0 and standard deviation 1, never beyond 3.5 (sum of twelve uniform numbers, clipped).
     pub(crate) fn normal(&mut self) -> f64 {
         let sum: f64 = (0..12).map(|_| self.unit()).sum();
         (sum - 6.0).clamp(-3.5, 3.5)
     }
 
-    /// True with that probability.
+    /// Returns true with that probability.
     pub(crate) fn chance(&mut self, probability: f64) -> bool {
         self.unit() < probability
     }
 
-    /// One of several. `from` must not be empty.
+    /// Draws one of several items. `from` must not be empty.
     pub(crate) fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
         &from[(self.bits() % from.len() as u64) as usize]
     }
@@ -72,7 +72,7 @@ fn lattice(x: i32, y: i32, z: i32, seed: u32) -> f32 {
     (h >> 8) as f32 / (1 << 23) as f32 - 1.0
 }
 
-/// Smooth noise between -1 and 1, one feature a unit of length (value noise on a cubic lattice).
+/// Smooth noise between -1 and 1, with one feature per unit of length (value noise on a cubic lattice).
 pub(crate) fn noise(at: &Vector3<f32>, seed: u32) -> f32 {
     let cell = at.map(f32::floor);
     let f = (at - cell).map(|t| t * t * (3.0 - 2.0 * t));

@@ -1,29 +1,29 @@
-//! The rasteriser: which triangle is nearest at every sample, four samples per pixel.
+//! The rasteriser: finds the nearest triangle at every sample, with four samples per pixel.
 
 #[cfg(test)]
 mod reference;
 
 use nalgebra::{Point2, Point3, Vector3};
 
-/// Samples along the side of a pixel.
+/// Number of samples along the side of a pixel.
 pub(crate) const SUB: usize = 2;
 
-/// A projected corner: pixels, and 1 / depth; 0 if it is behind the camera.
+/// A projected corner: position in pixels, and 1 / depth; 1 / depth is 0 if the corner is behind the camera.
 pub(crate) type Corner = Vector3<f32>;
 
-/// No triangle.
+/// Index that means no triangle.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
 /// The z-buffer: the nearest triangle of every sample and its distance.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Samples {
-    /// Samples a row.
+    /// Number of samples per row.
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// 1 / depth of what is nearest, 1 / metres.
+    /// 1 / depth of the nearest surface, in 1 / metres.
     pub(crate) near: Vec<f32>,
     pub(crate) triangle: Vec<u32>,
-    /// Columns and rows of samples that triangles have touched: `[x1, y1, x2, y2]`, the last excluded.
+    /// Columns and rows of the samples touched by triangles: `[x1, y1, x2, y2]`, the last excluded.
     pub(crate) touched: [usize; 4],
 }
 
@@ -38,18 +38,18 @@ impl Samples {
         self.touched = [width, height, 0, 0];
     }
 
-    /// Where a sample lies on the picture, pixels.
+    /// Returns the position of a sample in the picture, in pixels.
     pub(crate) fn place(column: usize, row: usize) -> Point2<f32> {
         let at = |value: usize| (value as f32 + 0.5) / SUB as f32 - 0.5;
         Point2::new(at(column), at(row))
     }
 
-    /// Draws one triangle, seen from its front (clockwise on the picture, whose rows point down).
+    /// Draws one triangle, seen from its front (clockwise in the picture, whose rows point down).
     pub(crate) fn draw(&mut self, index: u32, corners: [&Corner; 3]) {
         if corners.iter().any(|corner| corner.z <= 0.0) {
             return;
         }
-        // In samples: the centre of sample i lies at i.
+        // Converts pixels to samples: the centre of sample i is at i.
         let grown = |value: f32| (value + 0.5) * SUB as f32 - 0.5;
         let [a, b, c] = corners.map(|corner| Point2::new(grown(corner.x), grown(corner.y)));
         let area = (b - a).perp(&(c - a));
@@ -97,7 +97,7 @@ impl Samples {
 /// Samples on an edge belong to both sides, so that rounding leaves no gaps.
 const EDGE: f32 = 1e-5;
 
-/// The shares of the corners at a place of the picture, corrected for depth; they sum to 1.
+/// Returns the weights of the corners at a place in the picture, corrected for depth; they sum to 1.
 pub(crate) fn shares(corners: [&Corner; 3], at: Point2<f32>) -> [f32; 3] {
     let [a, b, c] = corners.map(|corner| Point2::new(corner.x, corner.y));
     let area = (b - a).perp(&(c - a));
@@ -115,12 +115,12 @@ pub(crate) fn shares(corners: [&Corner; 3], at: Point2<f32>) -> [f32; 3] {
     weighted.map(|weighted| weighted / sum)
 }
 
-/// A value interpolated between those of the corners.
+/// Interpolates between the values of the corners.
 pub(crate) fn between(values: [&Vector3<f32>; 3], shares: [f32; 3]) -> Vector3<f32> {
     values[0] * shares[0] + values[1] * shares[1] + values[2] * shares[2]
 }
 
-/// The same for points.
+/// Like [`between`], for points.
 pub(crate) fn point_between(values: [&Point3<f32>; 3], shares: [f32; 3]) -> Point3<f32> {
     Point3::from(between(values.map(|value| &value.coords), shares))
 }

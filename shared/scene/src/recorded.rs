@@ -1,4 +1,4 @@
-//! Recorded motion, put on the skeleton of a subject.
+//! Recorded motion, transferred to the skeleton of a subject.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use statistics::Sorted;
@@ -12,30 +12,30 @@ use crate::truth::N_JOINTS;
 /// Joint positions over time, from motion capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// Its name, used in the place of the name of an action.
+    /// Name of the recording, used instead of the name of an action.
     pub name: String,
-    /// Postures a second.
+    /// Number of postures per second.
     pub rate_hz: f64,
-    /// At least one.
+    /// The postures; at least one.
     pub postures: Vec<Posture>,
 }
 
-/// Joint positions at one time: metres, z up.
+/// Joint positions at one time, in metres, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Posture {
     /// The joints of `skeleton::PARSE14`.
     pub joints: [[f64; 3]; N_JOINTS],
-    /// The toes of the right and of the left foot, if they are known; feet follow the shins without them.
+    /// The toes of the right and of the left foot, if known; without them, feet follow the shins.
     pub toes: Option<[[f64; 3]; 2]>,
 }
 
 impl Recording {
-    /// From the first posture to the last, seconds.
+    /// Returns the duration from the first posture to the last, in seconds.
     pub fn seconds(&self) -> f64 {
         self.postures.len().saturating_sub(1) as f64 / self.rate_hz
     }
 
-    /// The posture at a time, interpolated linearly; constant before the first and after the last.
+    /// Returns the posture at a time, interpolated linearly; constant before the first and after the last.
     fn at(&self, seconds: f64) -> Posture {
         let last = self.postures.len() - 1;
         let place = (seconds * self.rate_hz).clamp(0.0, last as f64);
@@ -66,7 +66,7 @@ const HEAD_JOINT: usize = 13;
 /// Share of the postures whose lowest point may be below the floor, because recordings are not exact.
 const BELOW_FLOOR: f64 = 0.05;
 
-/// A recording transferred to a subject: directions are those of the recording, lengths the subject's.
+/// A recording transferred to a subject, with the directions of the recording and the lengths of the subject.
 ///
 /// The path is scaled like the legs, moved to the middle of the room, and put on the floor. Joint limits are
 /// not applied.
@@ -74,14 +74,14 @@ const BELOW_FLOOR: f64 = 0.05;
 pub(crate) struct Recorded {
     recording: Recording,
     bones: Bones,
-    /// Lengths of the subject per length of the recorded person.
+    /// Lengths of the subject relative to those of the recorded person.
     scale: f64,
-    /// From the scaled recording to the stage.
+    /// Vector from the scaled recording to the stage.
     shift: Vector3<f64>,
 }
 
 impl Recorded {
-    /// * `height`: of the subject, metres.
+    /// * `height`: height of the subject, in metres.
     pub(crate) fn new(recording: &Recording, bones: &Bones, height: f64) -> Self {
         let mut recorded = Self {
             scale: leg(bones) / recorded_leg(recording),
@@ -107,7 +107,7 @@ impl Recorded {
         recorded
     }
 
-    /// The frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of all bones at a time, in the frame of the stage.
     pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         self.posed(&self.recording.at(seconds))
     }
@@ -127,12 +127,12 @@ impl Recorded {
     }
 }
 
-/// Length of a leg, metres.
+/// Returns the length of a leg, in metres.
 fn leg(bones: &Bones) -> f64 {
     bones.offset[SHIN[LEFT]].norm() + bones.offset[FOOT[LEFT]].norm()
 }
 
-/// Median length of the recorded legs, metres.
+/// Returns the median length of the recorded legs, in metres.
 fn recorded_leg(recording: &Recording) -> f64 {
     let length = |posture: &Posture, side: usize| {
         let [hip, knee, ankle] =
@@ -146,7 +146,7 @@ fn recorded_leg(recording: &Recording) -> f64 {
         .map_or(1e-3, |upper_median| upper_median.max(1e-3))
 }
 
-/// The rotations of all bones, in the frame of the recording.
+/// Returns the rotations of all bones, in the frame of the recording.
 fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     let joint = |i: usize| Vector3::from(posture.joints[i]);
     let across = |pair: [usize; 2]| joint(pair[LEFT]) - joint(pair[RIGHT]);
@@ -165,7 +165,7 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     for side in [LEFT, RIGHT] {
         turns[COLLAR[side]] = turns[CHEST];
         let arm = [SHOULDERS, ELBOWS, WRISTS].map(|pair| joint(pair[side]));
-        // Elbows fold forward, knees backward.
+        // Elbows fold forward, and knees backward.
         let [upper, fore] = hinged(&turns[CHEST], arm, -1.0);
         turns[UPPER_ARM[side]] = upper;
         turns[FOREARM[side]] = fore;
@@ -185,9 +185,9 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     turns
 }
 
-/// The rotations of the two bones of a limb, which hang down at rest, from its three joints.
+/// Returns the rotations of the two bones of a limb, which hang down at rest, from the positions of its three joints.
 ///
-/// The axis of the hinge between them follows from the bend; for a straight limb it is that of the trunk.
+/// The axis of the hinge between them follows from the bend; for a straight limb, it is that of the trunk.
 ///
 /// * `fold`: 1 if the hinge folds backward, -1 if forward.
 fn hinged(
@@ -202,7 +202,7 @@ fn hinged(
         .unwrap_or_else(UnitQuaternion::identity);
     let straight = carried * (trunk * Vector3::y());
     let bend = fold * upper.cross(&lower);
-    // Blended from 9 to 27 degrees of bend.
+    // The axis is blended from 9 to 27 degrees of bend.
     let share = ((bend.norm() - 0.15) / 0.3).clamp(0.0, 1.0);
     let share = share * share * (3.0 - 2.0 * share);
     let axis = straight * (1.0 - share) + unit(bend, straight) * share;
@@ -210,7 +210,7 @@ fn hinged(
     [upper, turned(down, lower, upper * Vector3::y())]
 }
 
-/// The rotation that takes `from` to the direction of `along`, and the axis y as near to `left` as that allows.
+/// Returns the rotation that takes `from` to the direction of `along`, and the y axis as close to `left` as possible.
 fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQuaternion<f64> {
     let basis = |along: Vector3<f64>, left: Vector3<f64>| {
         let along = unit(along, Vector3::z());
@@ -227,7 +227,7 @@ fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQu
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn))
 }
 
-/// The unit vector of that direction, or `other` for a zero vector.
+/// Returns the unit vector in the direction of `it`, or `other` for a zero vector.
 fn unit(it: Vector3<f64>, other: Vector3<f64>) -> Vector3<f64> {
     it.try_normalize(1e-9).unwrap_or(other)
 }

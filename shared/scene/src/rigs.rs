@@ -1,4 +1,4 @@
-//! Cameras around the stage: those of public data sets, rings of n cameras, or those of a rig file.
+//! Cameras around the stage: those of public data sets, rings of n cameras, or the cameras of a rig file.
 
 use std::path::PathBuf;
 
@@ -11,24 +11,24 @@ use nalgebra::{
 /// The choice of the cameras.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RigChoice {
-    /// The three colour cameras of HumanEva-I as they stood for subject S1, 640x480.
+    /// The three colour cameras of HumanEva-I in their positions for subject S1, 640x480.
     HumanEva,
     /// The four cameras of UMPM, 644x486.
     Umpm,
     /// `n` cameras of 640x480 evenly around the stage.
     Ring {
-        /// How many.
+        /// Number of cameras.
         n: usize,
-        /// Metres from the middle.
+        /// Distance from the middle, in metres.
         radius: f64,
-        /// Metres above the floor.
+        /// Height above the floor, in metres.
         height: f64,
     },
     /// A rig file of any format that `geometry::files` reads.
     File(PathBuf),
 }
 
-/// Why there is no rig.
+/// Reason why a rig could not be created.
 #[derive(Debug, thiserror::Error)]
 pub enum RigChoiceError {
     /// The text has none of the known forms.
@@ -36,20 +36,20 @@ pub enum RigChoiceError {
         "{text:?} is not a rig: expected humaneva, umpm, ring:N[:RADIUS[:HEIGHT]] or a rig file"
     )]
     Form {
-        /// The text.
+        /// The given text.
         text: String,
     },
-    /// The file of a preset.
+    /// The file of a preset cannot be read.
     #[error("a preset cannot be read")]
     Preset(#[from] ParseError),
-    /// The rig file.
+    /// The rig file cannot be read.
     #[error("the rig file cannot be read")]
     File(#[from] RigFileError),
-    /// The cameras are no valid rig.
-    #[error("no rig")]
+    /// The cameras do not form a valid rig.
+    #[error("the cameras do not form a valid rig")]
     Rig(#[from] RigError),
-    /// Without an up direction the floor is unknown.
-    #[error("the rig does not say which way is up")]
+    /// The rig has no up direction, so the floor is unknown.
+    #[error("the rig has no up direction")]
     NoUp,
 }
 
@@ -100,7 +100,7 @@ impl RigChoice {
         }
     }
 
-    /// The cameras.
+    /// Loads or creates the cameras.
     ///
     /// # Errors
     ///
@@ -126,18 +126,18 @@ impl std::fmt::Display for RigChoice {
     }
 }
 
-/// The cameras of HumanEva-I: the file documents which of the lenses are published and which estimated.
+/// Returns the cameras of HumanEva-I; the file documents which lenses are published and which are estimated.
 pub(crate) fn humaneva() -> Result<Rig, RigChoiceError> {
     let text = include_str!("../../../configs/rigs/humaneva-s1.toml");
     Ok(geometry::files::own::parse(text, &ReadOptions::default())?)
 }
 
-/// Assumed height above the floor of the point at which the cameras of UMPM look, metres.
+/// Assumed height above the floor of the point at which the cameras of UMPM look, in metres.
 const UMPM_FOCUS: f64 = 0.95;
 
-/// The cameras of UMPM, turned so that z is up and the floor lies at 0.
+/// Returns the cameras of UMPM, rotated so that z is up and the floor is at 0.
 ///
-/// Their calibration has no up direction: the image rows are assumed to be level.
+/// Their calibration has no up direction, so the image rows are assumed to be level.
 fn umpm() -> Result<Rig, RigChoiceError> {
     let text = include_str!("../../../configs/rigs/umpm-triangle.toml");
     let rig = geometry::files::own::parse(text, &ReadOptions::default())?;
@@ -172,7 +172,7 @@ fn umpm() -> Result<Rig, RigChoiceError> {
     )?)
 }
 
-/// The rotation that takes z to `up`.
+/// Returns the rotation that takes z to `up`.
 fn upright(up: &UnitVector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&Vector3::z(), up).unwrap_or_else(|| {
         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI)
@@ -219,15 +219,15 @@ trait OrX {
 }
 
 impl OrX for Vector3<f64> {
-    /// Returns a vector of length 1; x for a vector of no length.
+    /// Returns a unit vector; x for a zero vector.
     fn normalize_or_x(self) -> Self {
         self.try_normalize(1e-9).unwrap_or(Self::x())
     }
 }
 
-/// The pose of the stage: the frame with its origin on the floor, z up.
+/// Returns the pose of the stage: the frame with its origin on the floor, z up.
 ///
-/// The floor is at 0 if the world's z is up and the focus of the cameras is up to 2 m above that; otherwise it is
+/// The floor is at 0 if the world's z is up and the focus of the cameras is at most 2 m above 0. Otherwise, it is
 /// 0.95 m below the focus.
 ///
 /// # Errors
@@ -321,7 +321,7 @@ mod tests {
     }
 
     proptest! {
-        /// Valid texts only, so that the assertion is reached.
+        /// The strategy generates only valid texts, so that the assertion is reached.
         #[test]
         fn a_parsed_choice_is_written_and_parsed_to_the_same(
             text in "humaneva|umpm|ring:[1-9](:[2-9](\\.[0-9]{1,6})?(:[1-9](\\.[0-9]{1,6})?)?)?|\\PC{0,9}[./]\\PC{0,9}",

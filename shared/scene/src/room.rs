@@ -13,19 +13,19 @@ pub(crate) use material::Material;
 /// An upright box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Block {
-    /// Middle, metres in the frame of the stage.
+    /// Centre, in metres in the frame of the stage.
     pub(crate) centre: [f32; 3],
-    /// Half of the sizes along its own axes.
+    /// Half of the side lengths along the block's own axes, in metres.
     pub(crate) half: [f32; 3],
-    /// Sine and cosine of the turn about the vertical.
+    /// Sine and cosine of the rotation about the vertical.
     turn: [f32; 2],
-    /// Radius of the bounding ball, metres.
+    /// Radius of the bounding ball, in metres.
     reach: f32,
     pub(crate) material: Material,
 }
 
 impl Block {
-    /// * `yaw`: turn about the vertical, radians.
+    /// * `yaw`: rotation about the vertical, in radians.
     pub(crate) fn new(centre: [f32; 3], half: [f32; 3], yaw: f32, material: Material) -> Self {
         let (sin, cos) = yaw.sin_cos();
         Self {
@@ -37,7 +37,7 @@ impl Block {
         }
     }
 
-    /// Larger by a distance to every side.
+    /// Returns the block enlarged by a distance on every side.
     fn grown(&self, by: f32) -> Self {
         Self {
             half: self.half.map(|half| half + by),
@@ -47,10 +47,10 @@ impl Block {
     }
 }
 
-/// Something flat on a wall.
+/// A flat object on a wall.
 #[derive(Debug, Clone, Copy)]
 struct Panel {
-    /// Middle and half of the sizes, along the wall and up, metres.
+    /// Centre and half of the size, along the wall and up, in metres.
     middle: [f32; 2],
     half: [f32; 2],
     material: Material,
@@ -63,31 +63,31 @@ pub(crate) struct Room {
     high: Vector3<f32>,
     floor: Material,
     wall: Material,
-    /// Panels of the walls of -x, +x, -y, +y.
+    /// Panels of the walls at -x, +x, -y, +y.
     panels: [Vec<Panel>; 4],
     blocks: Vec<Block>,
     pub(crate) light: Light,
 }
 
-/// Where a ray ends.
+/// The end of a ray.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hit {
-    /// Metres along the ray (in lengths of its direction).
+    /// Distance along the ray, in lengths of its direction vector.
     pub(crate) along: f32,
     pub(crate) at: Vector3<f32>,
     pub(crate) normal: Vector3<f32>,
     pub(crate) colour: Linear,
-    /// Shines by itself: light does not change it.
+    /// True if the surface emits light and is not affected by the lamps.
     pub(crate) shines: bool,
-    /// Share of the ambient light that corners take away.
+    /// Share of the ambient light that is blocked by corners.
     pub(crate) dim: f32,
 }
 
 impl Room {
-    /// A random room that contains the cameras.
+    /// Creates a random room that contains the cameras.
     ///
-    /// * `cameras`: their places; no random furniture stands between them and the stage.
-    /// * `furniture`: that of the action, at its place.
+    /// * `cameras`: positions of the cameras; no random furniture is placed between them and the stage.
+    /// * `furniture`: furniture of the action, at its place.
     pub(crate) fn new(random: Random, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Self {
         furnish::room(random, cameras, furniture)
     }
@@ -113,7 +113,7 @@ impl Room {
         hit
     }
 
-    /// Returns true if furniture stands between a point and the key lamp.
+    /// Returns true if furniture is between a point and the key lamp.
     pub(crate) fn is_shaded(&self, at: &Vector3<f32>, towards: &Vector3<f32>) -> bool {
         let from = Point3::from(at + towards * 2e-3);
         self.blocks.iter().any(|block| block.enter(&from, towards).is_some())
@@ -180,7 +180,7 @@ impl Room {
 }
 
 impl Block {
-    /// Where a ray from outside enters: distance along it, the normal, and the place in the block's own frame.
+    /// Returns where a ray from outside enters: the distance along the ray, the normal, and the place in the block's own frame.
     fn enter(
         &self,
         from: &Point3<f32>,
@@ -190,7 +190,7 @@ impl Block {
         let off = Vector3::from(self.centre) - from.coords;
         let along = off.dot(direction);
         let length2 = direction.norm_squared();
-        // The ray misses the bounding ball, or the ball lies behind.
+        // The ray misses the bounding ball, or the ball is behind the ray.
         if off.norm_squared() * length2 - along * along > self.reach * self.reach * length2
             || along < -self.reach * length2.sqrt()
         {

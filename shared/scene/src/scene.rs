@@ -24,24 +24,24 @@ use crate::subject::Subject;
 use crate::truth::{Header, N_JOINTS, View as ViewTruth};
 use crate::wear::Wear;
 
-/// Why there is no scene.
+/// Reason why a scene could not be created.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// The rig.
-    #[error("the rig of the scene")]
+    /// The rig cannot be loaded.
+    #[error("the rig of the scene is not usable")]
     Rig(#[from] RigChoiceError),
-    /// A photograph for the background.
-    #[error("a background")]
+    /// A photograph for the background cannot be read.
+    #[error("a background cannot be used")]
     Backdrop(#[from] FootageError),
-    /// With the requested calibration error the cameras are no valid rig.
-    #[error("the calibration error")]
+    /// With the requested calibration error, the cameras do not form a valid rig.
+    #[error("the rig is not valid with the calibration error")]
     Calibration(#[from] RigError),
-    /// No such camera.
+    /// The rig has no such camera.
     #[error("there is no camera {name:?}, only {}", known.join(", "))]
     NoCamera {
-        /// Name that was asked for.
+        /// Requested name.
         name: String,
-        /// Names of the rig.
+        /// Names of the cameras of the rig.
         known: Vec<String>,
     },
 }
@@ -59,14 +59,14 @@ pub struct Scene {
     random: Random,
 }
 
-/// Thickness of the body around a joint: a surface nearer to the camera by more occludes it. Metres for a person
-/// of 1.75 m, in the order of `skeleton::PARSE14`.
+/// Thickness of the body around a joint. A surface that is nearer to the camera by more than this occludes the joint. In metres for a
+/// person of 1.75 m, in the order of `skeleton::PARSE14`.
 const TISSUE: [f64; N_JOINTS] = [
     0.07, 0.085, 0.16, 0.16, 0.085, 0.07, 0.055, 0.07, 0.10, 0.10, 0.07, 0.055, 0.10, 0.13,
 ];
 
 impl Scene {
-    /// Makes a scene: the surface of the person and the room.
+    /// Creates a scene, including the surface of the person and the room.
     ///
     /// # Errors
     ///
@@ -83,7 +83,7 @@ impl Scene {
         Self::build(settings, &subject, performance)
     }
 
-    /// Makes a scene of a recording: the subject does what was recorded, in the middle of the room, scaled to the
+    /// Creates a scene from a recording. The subject repeats the recorded motion in the middle of the room, scaled to the
     /// subject's size. The action of the settings is ignored.
     ///
     /// # Errors
@@ -140,7 +140,7 @@ impl Scene {
         })
     }
 
-    /// Returns the settings that the scene was made of.
+    /// Returns the settings of the scene.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -150,21 +150,21 @@ impl Scene {
         &self.performance.name
     }
 
-    /// The cameras that take the pictures.
+    /// Returns the cameras that take the pictures.
     pub fn rig(&self) -> &Rig {
         &self.rig
     }
 
-    /// The cameras with the requested calibration error.
+    /// Returns the cameras with the requested calibration error.
     ///
     /// # Errors
     ///
-    /// [`RigError`] if the error is so large that no rig is left.
+    /// [`RigError`] if the error is so large that the rig becomes invalid.
     pub fn written_rig(&self) -> Result<Rig, RigError> {
         self.settings.flaws.written(&self.rig, self.random)
     }
 
-    /// The first line of the truth.
+    /// Returns the first line of the truth.
     pub fn header(&self) -> Header {
         let up = self.world_from_stage.rotation * Vector3::z();
         Header {
@@ -175,19 +175,19 @@ impl Scene {
         }
     }
 
-    /// Nominal time of a frame, seconds.
+    /// Nominal time of a frame, in seconds.
     pub fn seconds(&self, frame: u64) -> f64 {
         frame as f64 / self.settings.rate_hz
     }
 
-    /// The joints of `skeleton::PARSE14` at a time, metres in the world.
+    /// Returns the joints of `skeleton::PARSE14` at a time, in metres in the world.
     pub fn joints(&self, seconds: f64) -> [[f64; 3]; N_JOINTS] {
         let frames = self.performance.frames(seconds);
         let joints = self.performance.bones.joints(&frames);
         joints.map(|joint| (self.world_from_stage * joint).coords.into())
     }
 
-    /// The same of every other person.
+    /// Returns the joints of every other person at a time, in metres in the world.
     pub fn other_joints(&self, seconds: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
         let in_world = |joints: [Point3<f64>; N_JOINTS]| {
             joints.map(|joint| (self.world_from_stage * joint).coords.into())
@@ -196,14 +196,14 @@ impl Scene {
         others.map(|other| in_world(other.joints(seconds))).collect()
     }
 
-    /// Nose, left and right heel, left and right big toe at a time, metres in the world.
+    /// Returns the nose, the heels (left, right) and the big toes (left, right) at a time, in metres in the world.
     pub fn extras(&self, seconds: f64) -> [[f64; 3]; N_EXTRAS] {
         let frames = self.performance.frames(seconds);
         let extras = self.performance.bones.extras(&frames);
         extras.map(|extra| (self.world_from_stage * extra).coords.into())
     }
 
-    /// Number of a camera by its name in the rig or its number.
+    /// Returns the index of a camera, given its name in the rig or its index.
     ///
     /// # Errors
     ///
@@ -212,7 +212,7 @@ impl Scene {
         camera_of(&self.rig, name)
     }
 
-    /// When a camera took the picture of a frame, and whether it repeats that of an earlier one.
+    /// Returns the time at which a camera took the picture of a frame, and whether the picture repeats an earlier one.
     fn taken(&self, camera: usize, frame: u64) -> (f64, bool) {
         let flaws = &self.settings.flaws;
         let mut shown = frame;
@@ -225,7 +225,7 @@ impl Scene {
     }
 }
 
-/// Those who stand around, then those who pass.
+/// Returns the other people: those who stand, then those who pass.
 fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
     let standing = 0..settings.others;
     let mut others: Vec<Bystander> =
@@ -243,7 +243,7 @@ fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
     others
 }
 
-/// Number of a camera of a rig by its name or its number, from 0.
+/// Returns the index of a camera of a rig, given its name or its index, counted from 0.
 ///
 /// # Errors
 ///
@@ -258,7 +258,7 @@ pub fn camera_of(rig: &Rig, name: &str) -> Result<usize, SceneError> {
     })
 }
 
-/// How long after the instants of the frames the camera of an address takes its pictures, milliseconds; 0 for a camera that the rig
+/// Returns the time from the instants of the frames to the pictures of an address's camera, in milliseconds; 0 for a camera that the rig
 /// does not have.
 pub fn skew_ms_of(address: &Address) -> f64 {
     let Settings { rig, skews_ms, .. } = &address.settings;
@@ -267,21 +267,21 @@ pub fn skew_ms_of(address: &Address) -> f64 {
     nth.and_then(|nth| skews_ms.get(nth)).copied().unwrap_or(0.0)
 }
 
-/// One camera of a scene: makes its pictures, in buffers of its own.
+/// One camera of a scene; renders its pictures in its own buffers.
 ///
-/// Cloning is cheap but for those buffers: the background is shared.
+/// Cloning is cheap except for these buffers: the background is shared.
 #[derive(Debug, Clone)]
 pub struct View {
     scene: Arc<Scene>,
     camera: usize,
-    /// In the frame of the stage.
+    /// The camera in the frame of the stage.
     on_stage: Camera,
     backdrop: Arc<Backdrop>,
     painter: Painter,
 }
 
 impl View {
-    /// Renders the background, which takes as long as some pictures.
+    /// Renders the background, which takes as long as several pictures.
     ///
     /// # Errors
     ///
@@ -311,14 +311,14 @@ impl View {
         })
     }
 
-    /// Width and height of the pictures.
+    /// Returns the width and height of the pictures.
     pub fn size(&self) -> Size {
         self.backdrop.size
     }
 
-    /// Makes the picture of a frame, and its ground truth.
+    /// Renders the picture of a frame, and returns its ground truth.
     ///
-    /// * `rgb`: `width * height * 3` bytes, all of them written.
+    /// * `rgb`: `width * height * 3` bytes, all of which are written.
     ///
     /// # Panics
     ///
@@ -337,14 +337,14 @@ impl View {
         self.ground_truth(&frames, seconds, repeated)
     }
 
-    /// The ground truth of the picture of a frame, without the picture.
+    /// Returns the ground truth of the picture of a frame, without the picture.
     pub fn truth(&mut self, frame: u64) -> ViewTruth {
         let (seconds, repeated) = self.scene.taken(self.camera, frame);
         let frames = self.draw(seconds, None);
         self.ground_truth(&frames, seconds, repeated)
     }
 
-    /// How much of every pixel of the last picture the person covers, 0 to 255, row major.
+    /// Returns the coverage of every pixel of the last picture by the person, 0 to 255, row major.
     pub fn mask(&self) -> Vec<u8> {
         let size = self.size();
         let mut mask = vec![0; size.width * size.height];
@@ -352,13 +352,14 @@ impl View {
         mask
     }
 
-    /// How much of the last picture shows each person, the subject first, then others in the order of [`Scene::other_joints`]: pixels.
+    /// Returns the visible area of each person in the last picture, in pixels: the subject first, then the others in the order of
+    /// [`Scene::other_joints`].
     pub fn seen_px(&self) -> Vec<f64> {
         let samples = self.painter.seen().into_iter();
         samples.map(|n| n as f64 / (SUB * SUB) as f64).collect()
     }
 
-    /// Determines what is seen of the people, and writes the picture if it is wanted; returns the bones of the subject.
+    /// Determines the visible parts of the people, and writes the picture if requested; returns the bones of the subject.
     fn draw(&mut self, seconds: f64, rgb: Option<&mut [u8]>) -> [Isometry3<f64>; N_BONES] {
         let scene = &self.scene;
         let frames = scene.performance.frames(seconds);
@@ -417,7 +418,7 @@ impl View {
         }
     }
 
-    /// Returns true if nothing occludes a joint but the body around it.
+    /// Returns true if nothing occludes a joint except the body around it.
     fn is_visible(&self, joint: usize, at: &Point3<f64>, pixel: Option<[f64; 2]>) -> bool {
         let Some([x, y]) = pixel else { return false };
         let samples = &self.painter.samples;
@@ -433,7 +434,7 @@ impl View {
         in_front < TISSUE[joint] * self.scene.performance.height / 1.75
     }
 
-    /// The bounding box of the samples that see the person, pixels.
+    /// Returns the bounding box of the samples that see the person, in pixels.
     fn outline(&self) -> Option<[f64; 4]> {
         let samples = &self.painter.samples;
         let [x1, y1, x2, y2] = samples.touched;

@@ -1,4 +1,4 @@
-//! The settings of a scene, and the address that holds all of them in one line.
+//! The settings of a scene, and the address that contains all of them in one line.
 
 use std::path::{Path, PathBuf};
 
@@ -6,36 +6,36 @@ use crate::flaws::{FlawError, Flaws};
 use crate::motion::Action;
 use crate::rigs::{RigChoice, RigChoiceError};
 
-/// Everything that decides what the cameras see. The same settings give the same pictures, bit for bit.
+/// The complete settings of a scene. The same settings give the same pictures, bit for bit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// The cameras.
+    /// The cameras of the scene.
     pub rig: RigChoice,
-    /// Number of the subject: shape, clothes, style of movement.
+    /// Number of the subject, which determines shape, clothes and style of movement.
     pub subject: u64,
     /// Action of the subject.
     pub action: Action,
-    /// How many other people stand around, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
+    /// Number of other people who stand around, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
     pub others: u64,
-    /// How many other people walk and pass the subject, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
+    /// Number of other people who walk and pass the subject, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
     pub passers: u64,
     /// Seed of the random choices: the performance, the room, the lamps.
     pub seed: u64,
-    /// Frames a second.
+    /// Number of frames per second.
     pub rate_hz: f64,
-    /// Folder of photographs to use instead of the room, a random one for every camera.
+    /// Folder of photographs to use instead of the room; every camera gets a random one.
     pub backdrop: Option<PathBuf>,
     /// The flaws of the cameras.
     pub flaws: Flaws,
-    /// How long after the instants of the frames every camera takes its pictures, milliseconds, in the order of the rig; those that
-    /// are not named take them then.
+    /// Time from the instant of a frame to the picture of each camera, in milliseconds, in the order of the rig. Cameras
+    /// without an entry take their pictures at the instant.
     pub skews_ms: Vec<f64>,
 }
 
 impl Settings {
-    /// Most other people of each kind.
+    /// Maximum number of other people of each kind.
     pub const MOST_OTHERS: u64 = 4;
-    /// Most milliseconds that a picture is taken before or after the instant of its frame.
+    /// Maximum time between a picture and the instant of its frame, in milliseconds.
     pub const MOST_SKEW_MS: f64 = 1000.0;
 
     /// Reads [`Self::skews_ms`]: numbers separated by commas.
@@ -49,7 +49,7 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// Subject 1 walks in front of the cameras of HumanEva, 30 frames a second, no flaws.
+    /// Subject 1 walks in front of the cameras of HumanEva, 30 frames per second, no flaws.
     fn default() -> Self {
         Self {
             rig: RigChoice::HumanEva,
@@ -66,42 +66,42 @@ impl Default for Settings {
     }
 }
 
-/// Why an address is invalid.
+/// Reason why an address is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum AddressError {
-    /// It does not begin with `synth://`.
+    /// The address does not begin with `synth://`.
     #[error("an address of a scene begins with synth://")]
     Scheme,
-    /// The rig.
-    #[error("the rig of the address")]
+    /// The rig is invalid.
+    #[error("the rig of the address is not usable")]
     Rig(#[from] RigChoiceError),
-    /// An unknown key.
+    /// A key is unknown.
     #[error("unknown key {key:?}, expected one of {}", Address::KEYS.join(", "))]
     Key {
-        /// The key.
+        /// The unknown key.
         key: String,
     },
-    /// A key without `=`, or twice.
+    /// A key has no `=`, or occurs twice.
     #[error("{text:?} is not key=value, or repeats a key")]
     Pair {
-        /// The text.
+        /// Text of the pair.
         text: String,
     },
-    /// An invalid value.
+    /// A value is invalid.
     #[error("{key}={value}: expected {expected}")]
     Value {
-        /// The key.
+        /// Key of the value.
         key: String,
-        /// The value.
+        /// The invalid value.
         value: String,
-        /// Description of the values that are accepted.
+        /// Description of the accepted values.
         expected: String,
     },
-    /// An invalid flaw.
-    #[error("a flaw of the address")]
+    /// A flaw is invalid.
+    #[error("a flaw of the address is not valid")]
     Flaw(#[from] FlawError),
-    /// No camera is named.
-    #[error("the address names no camera: camera=NAME or camera=0, 1, ...")]
+    /// The address does not name a camera.
+    #[error("the address names no camera: add camera=NAME or camera=0, 1, ...")]
     NoCamera,
 }
 
@@ -115,9 +115,9 @@ pub enum AddressError {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Address {
-    /// The scene.
+    /// Settings of the scene.
     pub settings: Settings,
-    /// Name of the camera in the rig, or its number there, from 0.
+    /// Name of the camera in the rig, or its index, counted from 0.
     pub camera: String,
     /// Number of frames.
     pub n_frames: u64,
@@ -126,7 +126,7 @@ pub struct Address {
 const SCHEME: &str = "synth://";
 
 impl Address {
-    /// Keys of an address, those of the flaws last; `camera` is required.
+    /// Keys of an address, with those of the flaws last; `camera` is required.
     pub const KEYS: [&'static str; 17] = [
         "camera",
         "action",
@@ -147,16 +147,16 @@ impl Address {
         "calibration-mm",
     ];
 
-    /// Returns true if a text begins like an address, valid or not.
+    /// Returns true if a text begins like an address, whether valid or not.
     pub fn is_address(text: &str) -> bool {
         text.starts_with(SCHEME)
     }
 
-    /// Reads an address. Missing keys are as in [`Settings::default`]; 300 frames.
+    /// Reads an address. Missing keys have the values of [`Settings::default`], and 300 frames.
     ///
     /// # Errors
     ///
-    /// [`AddressError`], the first from the left.
+    /// [`AddressError`] for the first error from the left.
     pub fn parse(text: &str) -> Result<Self, AddressError> {
         let rest = text.strip_prefix(SCHEME).ok_or(AddressError::Scheme)?;
         let (rig, query) = rest.split_once('?').unwrap_or((rest, ""));
@@ -187,7 +187,7 @@ impl Address {
         Ok(address)
     }
 
-    /// The address with relative paths taken as relative to `base`; any other text is returned unchanged.
+    /// Returns the address with relative paths interpreted relative to `base`; any other text is returned unchanged.
     #[must_use]
     pub fn relative_to(text: &str, base: &Path) -> String {
         let Ok(mut address) = Self::parse(text) else {
@@ -253,7 +253,7 @@ impl Address {
 }
 
 impl std::fmt::Display for Address {
-    /// The address; flaws that are 0 are left out.
+    /// Writes the address; flaws that are 0 are left out.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Settings {
             rig,
@@ -332,7 +332,7 @@ mod tests {
         }
     }
 
-    /// Pairs that are valid wherever they stand, but for a key that comes twice.
+    /// Pairs that are valid at any position, unless a key occurs twice.
     fn pair() -> impl Strategy<Value = String> {
         prop_oneof![
             "action=(walking|boxing|throw-catch)",
@@ -347,7 +347,7 @@ mod tests {
     }
 
     proptest! {
-        /// Valid texts in any spelling, so that the assertion is reached.
+        /// The strategy generates only valid texts, in any spelling, so that the assertion is reached.
         #[test]
         fn a_parsed_address_is_written_and_parsed_to_the_same(
             rig in "humaneva|umpm|ring:[1-9](:[2-9](\\.[0-9]{1,3})?)?|[a-z]{1,5}/[a-z]{1,5}\\.toml",

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 use crate::light::Light;
 
-/// Width of a cell, metres.
+/// Width of a cell, in metres.
 const CELL: f32 = 0.011;
 
 /// The surface of a body.
@@ -20,12 +20,12 @@ pub(crate) struct Shadow {
     low: Vector2<f32>,
     width: usize,
     height: usize,
-    /// Nearness to the lamp of the nearest point of the body; minus infinity where there is none.
+    /// Coordinate towards the lamp of the nearest point of a body; minus infinity if there is none.
     near: Vec<f32>,
 }
 
 impl Shadow {
-    /// Draws the bodies.
+    /// Draws the bodies into the shadow map.
     pub(crate) fn cast(&mut self, light: &Light, bodies: &[Surface<'_>]) {
         let points = bodies.iter().flat_map(|body| body.points);
         let beams: Vec<(Vector2<f32>, f32)> =
@@ -78,10 +78,10 @@ impl Shadow {
         }
     }
 
-    /// Share of the lamp's light that the body blocks at a point, 0 to 1: the mean over a square of cells.
+    /// Returns the share of the lamp's light that the bodies block at a point, 0 to 1: the mean over a square of cells.
     ///
-    /// * `reach`: cells to every side; more for a larger lamp.
-    /// * `bias`: surfaces that are nearer to the lamp by less cast no shadow, metres.
+    /// * `reach`: number of cells to every side; more for a larger lamp.
+    /// * `bias`: minimum distance towards the lamp at which a surface casts a shadow, in metres.
     pub(crate) fn share(&self, across: Vector2<f32>, near: f32, reach: usize, bias: f32) -> f32 {
         let at = (across - self.low) / CELL;
         let border = reach as f32 + 1.0;
@@ -113,7 +113,7 @@ impl Shadow {
     }
 }
 
-/// Weight of a cell along one axis of the square, whose first and last cells are covered in part.
+/// Returns the weight of a cell along one axis of the square, which covers its first and last cells only in part.
 fn weight(nth: i64, taps: i64, part: f32) -> f32 {
     match nth {
         0 => 1.0 - part,

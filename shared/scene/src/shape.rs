@@ -9,17 +9,17 @@ use crate::body::{Angles, Bones, N_BONES, Pose, THIGH, UPPER_ARM};
 use crate::subject::Subject;
 use solid::Solid;
 
-/// A solid on a bone.
+/// A solid attached to a bone.
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
     pub(crate) bone: usize,
     solid: Solid,
 }
 
-/// Radius over which solids are blended, metres.
+/// Radius over which solids are blended, in metres.
 const BLEND: f32 = 0.028;
 
-/// A body in the pose in which its surface is made.
+/// A body in the pose in which its surface is created.
 #[derive(Debug, Clone)]
 pub(crate) struct BodyShape {
     pieces: Vec<Piece>,
@@ -28,7 +28,7 @@ pub(crate) struct BodyShape {
     pub(crate) height: f32,
 }
 
-/// The pose in which the surface is made: arms and legs apart, so that they do not touch.
+/// Returns the pose in which the surface is created: arms and legs are apart, so that they do not touch.
 pub(crate) fn rest_pose() -> Pose {
     let mut angles: Angles = [[0.0; 3]; N_BONES];
     for side in 0..2 {
@@ -56,7 +56,7 @@ impl BodyShape {
         }
     }
 
-    /// Smallest and largest coordinates.
+    /// Returns the minimum and maximum coordinates.
     pub(crate) fn bounds(&self) -> [Vector3<f32>; 2] {
         let all = self.pieces.iter().map(|piece| piece.solid.bounds());
         all.fold(
@@ -65,7 +65,7 @@ impl BodyShape {
         )
     }
 
-    /// Signed distance to the surface, metres, negative inside; accurate near the surface only.
+    /// Signed distance to the surface, in metres, negative inside; accurate only near the surface.
     pub(crate) fn distance(&self, at: &Point3<f32>) -> f32 {
         let near = self.pieces.iter();
         near.fold(FAR, |sum, it| {
@@ -77,7 +77,7 @@ impl BodyShape {
         })
     }
 
-    /// Lowers the distances of a grid of points to those of every piece in turn.
+    /// Reduces the distances of a grid of points to those from every solid in turn.
     pub(crate) fn fill(&self, grid: &mut Grid) {
         for piece in &self.pieces {
             let [low, high] = piece.solid.bounds();
@@ -87,7 +87,7 @@ impl BodyShape {
         }
     }
 
-    /// The direction away from the body, of length 1 or 0.
+    /// Returns the direction away from the body, with length 1 or 0.
     pub(crate) fn normal(&self, at: &Point3<f32>) -> Vector3<f32> {
         const STEP: f32 = 2e-3;
         let slope = |axis: usize| {
@@ -99,7 +99,7 @@ impl BodyShape {
         gradient.try_normalize(1e-9).unwrap_or_default()
     }
 
-    /// Distance to the nearest piece of every bone; [`FAR`] where it is farther.
+    /// Returns the distance to the nearest solid of every bone, at most [`FAR`].
     pub(crate) fn by_bone(&self, at: &Point3<f32>) -> [f32; N_BONES] {
         let mut distances = [FAR; N_BONES];
         for piece in &self.pieces {
@@ -112,10 +112,10 @@ impl BodyShape {
     }
 }
 
-/// Larger distances are clipped to this.
+/// Maximum distance; larger distances are clipped.
 pub(crate) const FAR: f32 = 0.08;
 
-/// The smaller of two, rounded where they are nearly equal (Quilez, polynomial smooth minimum).
+/// Returns the smaller of two values, rounded where they are nearly equal (Quilez, polynomial smooth minimum).
 fn smooth_min(a: f32, b: f32) -> f32 {
     let overlap = (BLEND - (a - b).abs()).max(0.0) / BLEND;
     a.min(b) - 0.25 * BLEND * overlap * overlap
@@ -131,7 +131,7 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// A lattice around a box, with a border of its own.
+    /// Creates a lattice around a box, with an additional border.
     pub(crate) fn around([low, high]: [Vector3<f32>; 2], step: f32) -> Self {
         let origin = Point3::from(low.add_scalar(-2.5 * step));
         let extent = (high - low).add_scalar(5.0 * step) / step;

@@ -1,4 +1,4 @@
-//! A synthetic person by number: sizes, skin, hair, clothes and style of movement.
+//! A synthetic person, identified by a number: sizes, skin, hair, clothes and style of movement.
 
 use crate::body::Proportions;
 use crate::colour::{Linear, srgb};
@@ -10,11 +10,11 @@ use crate::random::Random;
 pub(crate) struct Subject {
     pub(crate) number: u64,
     pub(crate) proportions: Proportions,
-    /// Thickness of trunk and limbs, 1 for the mean.
+    /// Thickness of trunk and limbs, relative to the mean.
     pub(crate) girth: f32,
-    /// Depth of the belly beyond that.
+    /// Additional depth of the belly.
     pub(crate) belly: f32,
-    /// 0 for the shape of a man, 1 for that of a woman.
+    /// Shape of the body: 0 for a man, 1 for a woman.
     pub(crate) curves: f32,
     pub(crate) skin: Linear,
     pub(crate) hair: Hair,
@@ -28,9 +28,9 @@ pub(crate) struct Subject {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hair {
     pub(crate) colour: Linear,
-    /// Thickness over the skull, metres; 0 is bald.
+    /// Thickness over the skull, in metres; 0 is bald.
     pub(crate) thickness: f32,
-    /// How far it hangs below the ears, metres.
+    /// Length of the hair below the ears, in metres.
     pub(crate) length: f32,
     pub(crate) beard: bool,
 }
@@ -39,11 +39,11 @@ pub(crate) struct Hair {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Top {
     pub(crate) fabric: Fabric,
-    /// Share of the arm that is covered, from the shoulder.
+    /// Covered share of the arm, from the shoulder.
     pub(crate) sleeve: f32,
-    /// How far it hangs below the hip joints (negative: above), metres.
+    /// Length below the hip joints, in metres; negative if the hem is above them.
     pub(crate) hem: f32,
-    /// Between skin and cloth, metres.
+    /// Distance between skin and cloth, in metres.
     pub(crate) slack: f32,
 }
 
@@ -51,7 +51,7 @@ pub(crate) struct Top {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bottom {
     pub(crate) fabric: Fabric,
-    /// Share of the leg that is covered, from the hip.
+    /// Covered share of the leg, from the hip.
     pub(crate) leg: f32,
     pub(crate) slack: f32,
     pub(crate) is_skirt: bool,
@@ -63,7 +63,7 @@ pub(crate) struct Style {
     pub(crate) tempo: f64,
     pub(crate) energy: f64,
     pub(crate) arm_swing: f64,
-    /// Degrees that the elbows, the trunk and the shoulders are bent all the time.
+    /// Constant bend of the elbows, the trunk and the shoulders, in degrees.
     pub(crate) elbows: f64,
     pub(crate) stoop: f64,
     pub(crate) arms_out: f64,

@@ -1,4 +1,4 @@
-//! The ground truth of a sequence, as lines of JSON: where the joints are, and what every camera sees of them.
+//! The ground truth of a sequence, as lines of JSON: the joints, and their projections in every camera.
 //!
 //! The format is documented in `TRUTH.md` beside this crate.
 
@@ -9,16 +9,16 @@ use skeleton::JointSet;
 const FORMAT: &str = "parallax-truth";
 const VERSION: u32 = 2;
 
-/// Number of joints, those of `skeleton::PARSE14`.
+/// Number of joints in `skeleton::PARSE14`.
 pub const N_JOINTS: usize = 14;
 
 /// The first line: the description of the sequence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
-    /// `"parallax-truth"`.
+    /// The format name, `"parallax-truth"`.
     pub format: String,
-    /// 2.
+    /// The format version, 2.
     pub version: u32,
     /// Number of the subject.
     pub subject: u64,
@@ -26,9 +26,9 @@ pub struct Header {
     pub action: String,
     /// Seed of the random choices.
     pub seed: u64,
-    /// Frames a second.
+    /// Number of frames per second.
     pub frame_rate_hz: f64,
-    /// Against gravity, in the world, of length 1.
+    /// Direction against gravity in the world, as a unit vector.
     pub up: [f64; 3],
     /// Names of the joints.
     pub joints: Vec<String>,
@@ -40,46 +40,46 @@ pub struct Header {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
-    /// From 0.
+    /// Number of the frame, counted from 0.
     pub frame: u64,
-    /// Nominal time, `frame / frame_rate_hz`.
+    /// Nominal time in seconds, `frame / frame_rate_hz`.
     pub seconds: f64,
-    /// The joints of `skeleton::PARSE14` at that time, metres in the world.
+    /// The joints of `skeleton::PARSE14` at that time, in metres in the world.
     pub joints: [[f64; 3]; N_JOINTS],
-    /// The same of every other person.
+    /// The joints of every other person at that time, in metres in the world.
     pub others: Vec<[[f64; 3]; N_JOINTS]>,
-    /// One for every camera of the header.
+    /// The pictures, one for every camera of the header.
     pub views: Vec<View>,
 }
 
-/// One picture.
+/// The truth of one picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct View {
     /// Name of the camera.
     pub camera: String,
-    /// When the picture was taken.
+    /// Time at which the picture was taken, in seconds.
     pub seconds: f64,
-    /// The camera dropped this frame: an earlier picture is repeated.
+    /// True if the camera dropped this frame, so that an earlier picture is repeated.
     pub repeated: bool,
-    /// The person's back is turned to the camera.
+    /// True if the person's back is turned to the camera.
     pub from_behind: bool,
-    /// The joints on the picture, pixels, as they were when it was taken; `None` behind the camera.
+    /// The joints in the picture, in pixels, at the time the picture was taken; `None` behind the camera.
     pub pixels: [Option<[f64; 2]>; N_JOINTS],
-    /// For every joint true if it can be seen.
+    /// For every joint, true if it is visible.
     pub visible: [bool; N_JOINTS],
-    /// Bounding box of the visible part of the person, `[x1, y1, x2, y2]` pixels.
+    /// Bounding box of the visible part of the person, `[x1, y1, x2, y2]` in pixels.
     #[serde(rename = "box")]
     pub outline: Option<[f64; 4]>,
 }
 
-/// Why a line is invalid.
+/// Reason why a line is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
-    /// Not JSON, or not with these keys.
+    /// The line is not JSON, or does not have these keys.
     #[error("not a line of a truth file")]
     Syntax(#[from] serde_json::Error),
-    /// Another format or version.
+    /// The file has another format or version.
     #[error("{format:?} version {version}, expected {FORMAT:?} version {VERSION}")]
     Version {
         /// The format in the line.
@@ -87,26 +87,26 @@ pub enum TruthError {
         /// The version in the line.
         version: u32,
     },
-    /// Other joints than those of `skeleton::PARSE14`.
+    /// The joints differ from those of `skeleton::PARSE14`.
     #[error("joint {nth} is {got:?}, expected {expected:?}")]
     Joint {
-        /// From 1.
+        /// Position of the joint, counted from 1.
         nth: usize,
-        /// The name in the line; empty if there are too few.
+        /// The name in the line; empty if there are too few names.
         got: String,
-        /// Its name in `skeleton::PARSE14`; empty if there are too many.
+        /// The name in `skeleton::PARSE14`; empty if there are too many names in the line.
         expected: String,
     },
-    /// More or fewer views than cameras, or of other names.
-    #[error("the views of frame {frame} are not the cameras of the header")]
+    /// The views differ from the cameras in number or name.
+    #[error("the views of frame {frame} do not match the cameras of the header")]
     Views {
-        /// Which frame.
+        /// Number of the frame.
         frame: u64,
     },
 }
 
 impl Header {
-    /// A header with the joints of `skeleton::PARSE14`.
+    /// Creates a header with the joints of `skeleton::PARSE14`.
     pub fn new(subject: u64, action: &str, seed: u64) -> Self {
         Self {
             format: FORMAT.to_owned(),
@@ -125,7 +125,7 @@ impl Header {
     ///
     /// # Errors
     ///
-    /// [`TruthError`], all but `Views`.
+    /// [`TruthError`], except `Views`.
     pub fn parse(line: &str) -> Result<Self, TruthError> {
         let header: Self = serde_json::from_str(line)?;
         if (header.format.as_str(), header.version) != (FORMAT, VERSION) {
@@ -149,7 +149,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Writes it, without the end of the line.
+    /// Returns the header as a line, without the end of the line.
     ///
     /// # Errors
     ///
@@ -164,7 +164,7 @@ impl Frame {
     ///
     /// # Errors
     ///
-    /// [`TruthError::Syntax`], and [`TruthError::Views`] if there is not one view for every camera.
+    /// [`TruthError::Syntax`], and [`TruthError::Views`] if there is not exactly one view for every camera.
     pub fn parse(line: &str, header: &Header) -> Result<Self, TruthError> {
         let frame: Self = serde_json::from_str(line)?;
         let cameras = frame.views.iter().map(|view| &view.camera);
@@ -174,7 +174,7 @@ impl Frame {
         Ok(frame)
     }
 
-    /// Writes it, without the end of the line.
+    /// Returns the frame as a line, without the end of the line.
     ///
     /// # Errors
     ///
@@ -183,14 +183,14 @@ impl Frame {
         serde_json::to_string(self)
     }
 
-    /// The joints of another set, metres in the world.
+    /// Returns the joints of another set, in metres in the world.
     pub fn in_set(&self, set: &JointSet) -> Vec<[f64; 3]> {
         in_set(&self.joints, set)
     }
 }
 
 impl View {
-    /// The joints of another set on the picture; `None` if any joint is behind the camera.
+    /// Returns the joints of another set in the picture; `None` if any joint is behind the camera.
     pub fn in_set(&self, set: &JointSet) -> Option<Vec<[f64; 2]>> {
         let mut joints = [[0.0; 2]; N_JOINTS];
         for (joint, pixel) in joints.iter_mut().zip(self.pixels) {
@@ -204,7 +204,7 @@ fn names() -> impl Iterator<Item = &'static str> {
     skeleton::PARSE14.joints.iter().map(|joint| joint.name)
 }
 
-/// Converts joints to another set, by way of the parts that every set is made of.
+/// Converts joints to another set, via the parts of which every set consists.
 fn in_set<const D: usize>(joints: &[[f64; D]; N_JOINTS], set: &JointSet) -> Vec<[f64; D]> {
     let mut parts = [[0.0; D]; skeleton::N_PARTS];
     for (joint, at) in skeleton::PARSE14.joints.iter().zip(joints) {

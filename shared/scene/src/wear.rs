@@ -12,9 +12,9 @@ use crate::subject::Subject;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Finish {
     pub(crate) colour: Linear,
-    /// Share of the light that is mirrored.
+    /// Share of the light that is reflected specularly.
     pub(crate) gloss: f32,
-    /// Added to the normal of the body at rest.
+    /// Vector added to the normal of the body at rest.
     pub(crate) bump: Vector3<f32>,
 }
 
@@ -22,7 +22,7 @@ pub(crate) struct Finish {
 #[derive(Debug, Clone)]
 pub(crate) struct Wear {
     subject: Subject,
-    /// Shoulder to wrist and hip to ankle of both sides, at rest.
+    /// Shoulder to wrist, and hip to ankle, on both sides at rest.
     arms: [[Point3<f32>; 2]; 2],
     legs: [[Point3<f32>; 2]; 2],
     head_from_rest: Isometry3<f32>,
@@ -46,9 +46,9 @@ impl Wear {
         }
     }
 
-    /// The material at a point of the body at rest.
+    /// Returns the material at a point of the body at rest.
     ///
-    /// * `bone`: that the point follows.
+    /// * `bone`: the bone that the point follows.
     pub(crate) fn finish(&self, at: &Point3<f32>, bone: usize) -> Finish {
         debug_assert!(bone < N_BONES, "a bone");
         let side = usize::from(at.y < 0.0);
@@ -87,7 +87,7 @@ impl Wear {
         let above = at.z - self.hips;
         let around = at.y.atan2(at.x) * 0.15;
         let along = Vector2::new(around, above);
-        // The neckline is cut lower in front.
+        // The neckline is lower in front.
         let neckline = self.scale * (0.505 - 0.25 * (at.x - 0.02).max(0.0));
         if above > neckline - 1.6 * (at.y.abs() - 0.07).min(0.0).abs() * f32::from(at.x > 0.0) * 0.2
             && at.y.abs() < 0.085 * self.scale
@@ -106,7 +106,7 @@ impl Wear {
         self.cloth(above > hem, along, at)
     }
 
-    /// Share along a limb, and metres around and along it.
+    /// Returns the position along a limb as a share, and positions around and along it in metres.
     fn along(limb: &[Point3<f32>; 2], at: &Point3<f32>) -> (f32, Vector2<f32>) {
         let axis = limb[1] - limb[0];
         let from = at - limb[0];

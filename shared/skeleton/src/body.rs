@@ -1,28 +1,27 @@
-//! Bodies as they are: how long people's bones are, and what follows for a skeleton found in space.
+//! Human bodies: how long people's bones are, and how this limits a skeleton found in space.
 //!
-//! The pictures say where joints may be; this crate says which of that can be a person. It knows the lengths of
+//! The pictures show where joints may be; this crate decides which of these can be a person. It knows the lengths of
 //! bones as shares of the stature, with their spread among people and the published source of every number
-//! ([`Kind::proportion`]), and answers five questions:
+//! ([`Kind::proportion`]). It answers five questions:
 //!
 //! | question | answer |
 //! |---|---|
 //! | how tall is the person? | [`stature`] |
 //! | is this skeleton a person, and which joints are impossible? | [`check`] |
-//! | which of many starts looks most like a person? | [`deviation`]: cheap, for many calls a frame |
-//! | how long are the bones of this very person? | [`Lengths`], learned over a run |
+//! | which of many starts looks most like a person? | [`deviation`]: cheap, for many calls per frame |
+//! | how long are the bones of this individual? | [`Lengths`], learned over a run |
 //! | where are the joints, if bones keep their lengths? | [`refine`]: a soft prior in triangulation |
 //!
-//! Joints are the 14 of `crate::PARSE14` in its order, in metres in the world. A joint that is not finite, or
-//! farther than 1000 km from the origin, counts as missing everywhere. Nothing here knows up or down: a body lying or
-//! hanging is a body. Nothing is allocated but by [`Lengths::default`]; the same input gives the same bits.
+//! The joints are the 14 joints of `crate::PARSE14` in its order, in metres in the world. A joint that is not finite, or
+//! farther than 1000 km from the origin, is treated as missing. The functions do not use the vertical, so a body may also lie or
+//! hang. Only [`Lengths::default`] allocates memory. The same input gives bit-identical results.
 //!
 //! # What is published, and what is our own choice
 //!
-//! Published: the shares of the stature and their spread among adults, statures of adults and children. Our own:
-//! the shares of a small child (composed from what is published, see [`Kind::proportion`]), how differently detectors
-//! and data sets place the same joint ([`Proportion::place`]), what postures change ([`Proportion::posture`]), and the
-//! error of a measured length ([`MEASUREMENT_SD`]).
-//! The limits are wide on purpose: the detector errs by 5 to 15 cm, and what is called impossible is taken away.
+//! Published: the shares of the stature and their spread among adults, and the statures of adults and children. Our own choice: the shares
+//! of a small child (derived from published data, see [`Kind::proportion`]), the differences between detectors and data sets in placing a
+//! joint ([`Proportion::place`]), the effect of posture ([`Proportion::posture`]), and the error of a measured length ([`MEASUREMENT_SD`]).
+//! The limits are deliberately wide: the detector's error is 5 to 15 cm, and joints that count as impossible are removed.
 
 mod bone;
 mod check;
@@ -47,11 +46,11 @@ pub use refine::{Refined, refine};
 pub use stature::{MIN_BONES, STATURES, Stature, stature};
 pub use verdict::{Reason, Verdict};
 
-/// Number of joints, those of `crate::PARSE14`.
+/// Number of joints in `crate::PARSE14`.
 pub const N_JOINTS: usize = 14;
 
-/// The joints of `crate::PARSE14` in its order, metres in the world; `None` where a joint is missing.
+/// The joints of `crate::PARSE14` in its order, in metres in the world; `None` for a missing joint.
 pub type Joints = [Option<Point3<f64>>; N_JOINTS];
 
-/// The covariance of every joint, square metres in the world; `None` where it is unknown.
+/// The covariance of every joint, in square metres in the world; `None` if it is unknown.
 pub type Covariances = [Option<Matrix3<f64>>; N_JOINTS];

@@ -24,15 +24,15 @@ impl JointSet {
     /// The three joint sets, the default first.
     pub const ALL: [&'static Self; 3] = [&PARSE14, &UMPM15, &HUMANEVA20];
 
-    /// The joint set with that name, if there is one.
+    /// Returns the joint set with that name, if there is one.
     #[must_use]
     pub fn by_name(name: &str) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|set| set.name == name)
     }
 
-    /// The joints of a pose, from the centres of its 26 parts.
+    /// Returns the joints of a pose, computed from the centres of its 26 parts.
     ///
-    /// * `centres`: one value per part; any space that can be averaged (2D pixels, 3D metres).
+    /// * `centres`: one value per part; any type that can be averaged (2D pixels, 3D metres).
     /// * Returns one value per joint.
     ///
     /// # Panics
@@ -62,7 +62,7 @@ pub struct JointMap {
 }
 
 impl JointMap {
-    /// Creates the map from one row of weights per joint, one weight per part; a row sums to 1.
+    /// Creates the map from one row of weights per joint, with one weight per part; each row sums to 1.
     ///
     /// * Returns `None` if there are no rows, or if their lengths differ.
     #[must_use]
@@ -72,9 +72,9 @@ impl JointMap {
         fits.then_some(Self { weights })
     }
 
-    /// The joints of a pose, from the centres of its parts.
+    /// Returns the joints of a pose, computed from the centres of its parts.
     ///
-    /// * `centres`: one value per part; any space that can be averaged (2D pixels, 3D metres).
+    /// * `centres`: one value per part; any type that can be averaged (2D pixels, 3D metres).
     #[must_use]
     pub fn from_parts<const D: usize>(&self, centres: &[[f64; D]]) -> Vec<[f64; D]> {
         let joint = |row: &Vec<f64>| {
@@ -131,10 +131,10 @@ pub static PARSE14: JointSet = JointSet {
     ],
 };
 
-/// Joints of [`PARSE14`] on the right side, each with the same of the left.
+/// Pairs of joints of [`PARSE14`]: each joint of the right side with the same joint of the left side.
 pub const SIDES: [[usize; 2]; 6] = [[0, 5], [1, 4], [2, 3], [6, 11], [7, 10], [8, 9]];
 
-/// The same joint of [`PARSE14`] on the other side; itself for one in the middle.
+/// The same joint of [`PARSE14`] on the other side; a joint in the middle maps to itself.
 pub const MIRRORED: [usize; crate::body::N_JOINTS] = {
     let mut mirror = [0; crate::body::N_JOINTS];
     let mut joint = 0;
@@ -151,7 +151,7 @@ pub const MIRRORED: [usize; crate::body::N_JOINTS] = {
     mirror
 };
 
-/// The 15 joints of UMPM; the pelvis is the middle of the hips.
+/// The 15 joints of UMPM; the pelvis is the midpoint of the hips.
 pub static UMPM15: JointSet = JointSet {
     name: "umpm15",
     joints: &[
@@ -189,7 +189,7 @@ pub static UMPM15: JointSet = JointSet {
     ],
 };
 
-/// The 20 joint ends of `HumanEva`; elbows and knees appear as an end of two limbs.
+/// The 20 joint ends of `HumanEva`; each elbow and knee appears twice, as an end of two limbs.
 pub static HUMANEVA20: JointSet = JointSet {
     name: "humaneva20",
     joints: &[

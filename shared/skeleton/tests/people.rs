@@ -1,4 +1,4 @@
-//! The synthetic people of `scene`, in all their actions: every one of them is somebody, whole, and of about their stature.
+//! Tests on the simulated people of `scene` in all their actions: each one must be accepted as a whole person of about the right stature.
 
 use nalgebra::Point3;
 use scene::{Action, Scene, Settings};

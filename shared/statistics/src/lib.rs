@@ -1,4 +1,4 @@
-//! Numbers about numbers: percentiles and medians, and errors against a reference with their intervals ([`score`]). Pure.
+//! Statistics: percentiles and medians, and errors against a reference with confidence intervals ([`score`]). All functions are pure.
 #![forbid(unsafe_code)]
 
 pub mod score;

@@ -1,8 +1,8 @@
 //! Errors against a reference: PCP, PCK, and distances.
 //!
-//! In three dimensions: [`segment_errors`] (PCP3D, the paper's eq. 13), [`joint_errors`] and [`aligned`]
-//! (MPJPE and its Procrustes form, 3D PCK), [`Changes`] against a baseline, and [`Bootstrap`] intervals of
-//! any of them.
+//! In three dimensions, there are [`segment_errors`] (PCP3D, the paper's eq. 13), [`joint_errors`] and [`aligned`]
+//! (MPJPE and its Procrustes form, 3D PCK), [`Changes`] against a baseline, and [`Bootstrap`] intervals for
+//! all of them.
 
 mod offsets;
 mod pck;

@@ -1,13 +1,13 @@
-//! Percentiles and medians, each definition under its own name.
+//! Percentiles and medians; each definition has its own name.
 
 use core::cmp::Ordering;
 
-/// Numbers that can be put in order: `f32` and `f64`.
+/// Numbers that can be sorted: `f32` and `f64`.
 pub trait Number: Copy + sealed::Sealed {
-    /// IEEE 754's total order.
+    /// Compares by the total order of IEEE 754.
     fn order(&self, other: &Self) -> Ordering;
 
-    /// The middle between two.
+    /// Returns the midpoint between two numbers.
     #[must_use]
     fn middle(self, other: Self) -> Self;
 }
@@ -38,10 +38,10 @@ impl Number for f64 {
     }
 }
 
-/// A sample in ascending order, to read percentiles and medians off.
+/// A sample in ascending order that provides percentiles and medians.
 ///
-/// All of them are `None` for an empty sample. The definitions differ where a percentile lies between two values;
-/// what is stored or compared keeps to the one it was made with.
+/// All of them are `None` for an empty sample. The definitions differ if a percentile lies between two values.
+/// Stored or compared values must always use the definition with which they were computed.
 ///
 /// ```
 /// let sample = statistics::Sorted::new([4.0, 1.0, 3.0, 2.0]);
@@ -59,35 +59,35 @@ pub struct Sorted<T = f64> {
 impl<T: Number> Sorted<T> {
     /// Sorts a sample.
     ///
-    /// * `values`: in any order. NaN sorts behind all numbers, or before them if its sign is negative.
+    /// * `values`: the values in any order. NaN is sorted after all numbers, or before them if its sign is negative.
     pub fn new(values: impl Into<Vec<T>>) -> Self {
         let mut values = values.into();
         values.sort_by(T::order);
         Self { values }
     }
 
-    /// The values, ascending.
+    /// Returns the values, in ascending order.
     pub fn values(&self) -> &[T] {
         &self.values
     }
 
-    /// The middle value; the mean of the two middle ones of an even number.
+    /// Returns the middle value; for an even number of values, the mean of the two middle values.
     pub fn median(&self) -> Option<T> {
         Some(self.lower_median()?.middle(self.upper_median()?))
     }
 
-    /// The middle value; the lower of the two middle ones of an even number.
+    /// Returns the middle value; for an even number of values, the lower of the two middle values.
     pub fn lower_median(&self) -> Option<T> {
         let last = self.values.len().checked_sub(1)?;
         self.values.get(last / 2).copied()
     }
 
-    /// The middle value; the upper of the two middle ones of an even number.
+    /// Returns the middle value; for an even number of values, the upper of the two middle values.
     pub fn upper_median(&self) -> Option<T> {
         self.values.get(self.values.len() / 2).copied()
     }
 
-    /// The smallest value that at least a share of the sample does not exceed (nearest rank): always a value of the
+    /// Returns the smallest value for which at least a given share of the sample is no larger (nearest rank). It is always a value of the
     /// sample.
     ///
     /// * `share`: 0.9 is the 90th percentile; 0 the smallest value, 1 the largest.
@@ -99,7 +99,7 @@ impl<T: Number> Sorted<T> {
 }
 
 impl Sorted<f64> {
-    /// The percentile, linear between neighbours (definition 7 of Hyndman and Fan 1996).
+    /// Returns the percentile, interpolated linearly between neighbours (definition 7 of Hyndman and Fan 1996).
     ///
     /// * `share`: 0.9 is the 90th percentile; 0 the smallest value, 1 the largest.
     pub fn interpolated(&self, share: f64) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! How long something takes: the shortest and the median of many times.
+//! Measures times: the shortest and the median of many runs.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use rustix::time::{ClockId, clock_gettime};
 
 use crate::stages::Times;
 
-/// Times one thread by the processor time that it had, several by the clock on the wall.
+/// Measures a single thread by its processor time, and several threads by wall-clock time.
 #[derive(Debug)]
 pub(crate) struct Clock {
     alone: bool,
@@ -21,7 +21,7 @@ impl Clock {
         }
     }
 
-    /// Does `work` until the time is used up, at least once and at most 400 times.
+    /// Runs `work` until the time is used up, at least once and at most 400 times.
     pub(crate) fn measure(&self, mut work: impl FnMut()) -> Times {
         let begin = Instant::now();
         if !self.budget.is_zero() {

@@ -1,4 +1,4 @@
-//! Lower limit of the time of every stage: its arithmetic alone, at the peak rate of the machine.
+//! Lower limits of the time of every stage: only its arithmetic, at the peak rate of the machine.
 
 use fmp::{LevelLayout, N_CHANNELS, Springs};
 use kernels::{Isa, Peak};
@@ -9,14 +9,14 @@ use crate::readable::Ranges;
 use crate::stages::StageTimes;
 use crate::workload::Workload;
 
-/// The floors of all stages.
+/// The lower limits of all stages.
 pub(crate) struct Floors {
     pub(crate) ms: StageTimes,
-    /// The peak rates from which they were computed.
+    /// The peak rates from which the limits were computed.
     pub(crate) peaks: Peaks,
 }
 
-/// Single values that one thread computes in a nanosecond.
+/// Number of single-precision values that one thread computes per nanosecond.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Peaks {
     pub(crate) isa: &'static str,
@@ -25,7 +25,7 @@ pub(crate) struct Peaks {
 }
 
 impl Floors {
-    /// Counts operations, and measures the peaks beside the stages.
+    /// Counts the operations of the stages, and measures the peak rates.
     pub(crate) fn new(workload: &Workload, ranges: &Ranges, isa: Isa, quick: bool) -> Self {
         let n = if quick { 300 } else { 3000 };
         let [multiply_add, max_plus] =
@@ -46,7 +46,7 @@ impl Floors {
     }
 }
 
-/// Single values that one thread computes in a millisecond.
+/// Returns the number of single-precision values that one thread computes per millisecond.
 fn per_ms(quick: bool, run: impl Fn() -> u64) -> f64 {
     let clock = Clock::new(1, quick);
     let mut n = 0;
@@ -58,7 +58,7 @@ fn pixels(it: &LevelLayout) -> f64 {
     (it.image_size[0] * it.image_size[1]) as f64
 }
 
-/// Multiplications and additions of resizing and halving, in halves of a double value.
+/// Returns the multiplications and additions of resizing and halving; one double-precision operation counts as two.
 fn shrinking(workload: &Workload) -> f64 {
     let [width, height] = workload.layout.image_size.map(|image_size| image_size as f64);
     let level = |(at, it): (usize, &LevelLayout)| {
@@ -74,8 +74,8 @@ fn shrinking(workload: &Workload) -> f64 {
     workload.layout.levels.iter().enumerate().map(level).sum()
 }
 
-/// Per pixel the gradient in three planes and nine scalar products compared, in double; four
-/// shares. Per cell 27 values under four norms.
+/// Returns the operations of the features. Per pixel: the gradient in three planes, nine scalar products with comparisons, in double
+/// precision, and four shares. Per cell: 27 values under four norms.
 fn describing(workload: &Workload) -> f64 {
     let per_pixel = 2.0 * (3.0 * 9.0 + 9.0 * 7.0 + 10.0) + 4.0 * 2.0;
     let cell = (workload.model.spec().cell_px as f64).powi(2);
@@ -84,10 +84,10 @@ fn describing(workload: &Workload) -> f64 {
     levels.map(|level| pixels(level) * (per_pixel + per_cell / cell)).sum()
 }
 
-/// Multiply-adds of the filters in the cheapest known form: the definition, or tiles of some
-/// cells a side multiplied point by point (without the transforms).
+/// Returns the multiply-adds of the filters in the cheapest known form: by definition, or by tiles with a side of some
+/// cells that are multiplied point by point (without the transforms).
 ///
-/// * `tiles`: sides of the tiles that are offered, cells.
+/// * `tiles`: sides of the available tiles, in cells.
 fn products(workload: &Workload, tiles: &[usize]) -> f64 {
     let per_cell = |side: usize| {
         let tiled = tiles.iter().copied().filter(|tile| *tile > side);
@@ -100,7 +100,7 @@ fn products(workload: &Workload, tiles: &[usize]) -> f64 {
     levels.map(|level| (level.rows * level.cols) as f64 * filters).sum()
 }
 
-/// Candidates of both passes of every transform in the window outside of which none can win, and of
+/// Returns the number of candidates in both passes of every transform, within the window outside of which none can win, and in
 /// the choice among the child's types.
 fn candidates(workload: &Workload, ranges: &Ranges) -> f64 {
     let window = |range: f64, quadratic: f64, side: usize| {

@@ -1,9 +1,9 @@
-//! Every stage of the single-view method on one frame: milliseconds, how near they are to what the
-//! machine could do, and how far from the readable reference and from other programs.
+//! Benchmark of every stage of the single-view method on one frame. It shows milliseconds, compared with the peak of the
+//! machine, with the readable reference and with other programs.
 //!
 //! Workloads: 172 x 224 pixels with 26 parts, 6 types each and filters of 5 x 5 cells (PARSE) or
-//! 6 x 6 (HumanEva), and 640 x 480 with 6 x 6. Real models and images where `../shared` lies beside
-//! the clone, made-up ones elsewhere. `scripts/bench --help` explains the columns.
+//! 6 x 6 (HumanEva), and 640 x 480 with 6 x 6. Real models and images are used if `../shared` exists beside
+//! the clone, synthetic ones otherwise. `scripts/bench --help` explains the columns.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 

@@ -4,13 +4,13 @@ use kernels::Isa;
 
 use crate::stages::Stage;
 
-/// See `scripts/bench --help`.
+/// The parsed options; see `scripts/bench --help`.
 #[derive(Debug, Default)]
 pub(crate) struct Options {
     pub(crate) quick: bool,
     pub(crate) json: bool,
     pub(crate) record: bool,
-    /// Empty: all of them.
+    /// The stages to measure; empty means all.
     stages: Vec<String>,
     images: Vec<String>,
     isas: Vec<String>,
@@ -19,7 +19,7 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The error is a text for the user.
+    /// Parses the arguments; the error is a text for the user.
     pub(crate) fn parse(mut args: impl Iterator<Item = String>) -> Result<Self, String> {
         let mut options = Self {
             commit: "unknown".to_owned(),
@@ -39,7 +39,7 @@ impl Options {
                     options.threads.push(n.map_err(|error| format!("--threads: {error}"))?);
                 }
                 "--commit" => options.commit = value()?,
-                // What cargo adds of its own.
+                // Cargo adds this option.
                 "--bench" => {}
                 other => return Err(format!("unknown option {other}: see scripts/bench --help")),
             }
@@ -65,7 +65,7 @@ impl Options {
         self.images.is_empty() || self.images.iter().any(|image| image == name)
     }
 
-    /// The portable one is slow where it lacks the multiply-add, so it must be asked for.
+    /// Returns the portable instruction set is slow where it lacks multiply-add, so it must be requested.
     pub(crate) fn wants_isa(&self, isa: Isa) -> bool {
         if self.isas.is_empty() {
             return self.quick || isa.name() != "portable" || Isa::available().len() == 1;

@@ -1,4 +1,4 @@
-//! Time of the readable reference on one thread, and the ranges of the scores of the parts.
+//! Time of the readable reference on one thread, and the score ranges of the parts.
 
 use std::hint::black_box;
 
@@ -8,18 +8,18 @@ use crate::clock::Clock;
 use crate::stages::StageTimes;
 use crate::workload::Workload;
 
-/// Milliseconds of the reference, and what the floors need to know of the scores.
+/// Milliseconds of the reference, and the score ranges that the lower limits need.
 pub(crate) struct Readable {
     pub(crate) ms: StageTimes,
     pub(crate) ranges: Ranges,
 }
 
-/// Difference of the largest and smallest score of every part and type on one level, with the
+/// Difference between the largest and the smallest score of every part and type on one level, with the
 /// messages of the part's children added.
 pub(crate) type Ranges = Vec<Vec<f64>>;
 
 impl Readable {
-    /// Runs it once. Filters and messages run on one level, the first of the second octave, and are
+    /// Runs the reference once. Filters and messages run on one level, the first of the second octave, and their times are
     /// scaled by its share of the cells.
     pub(crate) fn measure(workload: &Workload) -> Self {
         let Workload { model, layout, .. } = workload;

@@ -1,4 +1,4 @@
-//! The stages, each on buffers that are there already.
+//! The stages, each measured on existing buffers.
 
 use std::hint::black_box;
 use std::sync::{Arc, Mutex};
@@ -11,12 +11,12 @@ use crate::clock::Clock;
 use crate::options::Options;
 use crate::workload::{OtherView, Workload};
 
-/// Milliseconds.
+/// Times in milliseconds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Times {
     pub(crate) min: f64,
     pub(crate) median: f64,
-    /// Processor time of all threads, smallest.
+    /// Smallest processor time of all threads together.
     pub(crate) cpu: f64,
 }
 
@@ -30,7 +30,7 @@ impl Times {
     }
 }
 
-/// Milliseconds on one thread of the stages that others are made of.
+/// Milliseconds on one thread of the elementary stages.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StageTimes {
     pub(crate) shrink: f64,
@@ -40,7 +40,7 @@ pub(crate) struct StageTimes {
 }
 
 impl StageTimes {
-    /// Those of a stage together, if it is made of them.
+    /// Returns the total of the elementary stages that make up a stage, if there are any.
     pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
         let extract = self.shrink + self.hog + self.filters;
         match stage {
@@ -95,7 +95,7 @@ struct Arena {
     hog: HogWorkspace,
 }
 
-/// One workload on one instruction set and a number of threads.
+/// One workload on one instruction set with a number of threads.
 pub(crate) struct Bench<'a> {
     workload: &'a Workload,
     isa: Isa,
@@ -119,7 +119,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Measures the stages that are wanted.
+    /// Measures the requested stages.
     pub(crate) fn run(&self, clock: &Clock, options: &Options) -> Vec<(Stage, Times)> {
         match &self.pool {
             Some(pool) => pool.install(|| self.run_here(clock, options)),
@@ -178,7 +178,7 @@ impl<'a> Bench<'a> {
         all
     }
 
-    /// A frame of which only what is near the best pose is searched, by the default settings.
+    /// Measures a frame that is searched only near the best pose, with the default settings.
     fn tracked(&self, clock: &Clock, values: &mut [f32]) -> Times {
         let Workload { model, layout, .. } = self.workload;
         let mut tracker = Tracker::new(Some(TrackSettings::default()));
@@ -199,8 +199,8 @@ impl<'a> Bench<'a> {
         clock.measure(|| frame(1))
     }
 
-    /// Images of all levels, and their features if they are wanted: level after level in the same
-    /// buffers, as the extractor does it.
+    /// Measures the images of all levels and, if requested, their features: level after level in the same
+    /// buffers, like the extractor.
     fn images(&self, clock: &Clock, features: bool) -> Times {
         let Workload { model, layout, .. } = self.workload;
         let interval = model.spec().interval;

@@ -1,4 +1,4 @@
-//! Models and images to work on.
+//! Models and images for the benchmark.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ const N_TYPES: usize = 6;
 
 /// One model and one image.
 pub(crate) struct Workload {
-    /// Side of the filters, cells.
+    /// Side of the filters, in cells.
     pub(crate) filter: usize,
     pub(crate) model: Arc<Model>,
     pub(crate) layout: Layout,
@@ -21,7 +21,7 @@ pub(crate) struct Workload {
 }
 
 impl Workload {
-    /// The three of the module; a small one where they shall only be shown to work.
+    /// Returns the three workloads of the benchmark; for a quick check, a single small one.
     pub(crate) fn all(quick: bool) -> Vec<Self> {
         if quick {
             return vec![Self::new([48, 52], 3, ["", ""])];
@@ -51,7 +51,7 @@ impl Workload {
         }
     }
 
-    /// `width x height`.
+    /// Returns the image size as `width x height`.
     pub(crate) fn image_name(&self) -> String {
         let [width, height] = self.layout.image_size;
         format!("{width}x{height}")
@@ -63,14 +63,14 @@ impl Workload {
     }
 }
 
-/// A file of the folder beside the clone, if it is there.
+/// Path of a file in the folder beside the clone, if it exists.
 fn real(name: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let path = root.join(name);
     path.is_file().then_some(path)
 }
 
-/// Numbers in -1..1 that look random and depend on the seed only.
+/// Pseudorandom numbers in -1..1 that depend only on the seed.
 fn noise(seed: u64) -> impl Iterator<Item = f64> {
     let mut state = seed;
     std::iter::repeat_with(move || {
@@ -79,7 +79,7 @@ fn noise(seed: u64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// The published models' tree, springs about as loose and responses about as large as theirs.
+/// Returns a model with the published models' tree, and with springs and responses of similar size.
 fn made_up_model(side: usize) -> Model {
     let mut noise = noise(side as u64);
     let mut filter = || Filter {
@@ -128,9 +128,9 @@ fn made_up_pixels([width, height]: [usize; 2]) -> Vec<u8> {
     (0..3 * width * height).map(&mut pixel).collect()
 }
 
-/// Contribution of another view: one map for all parts, and a type that is preferred.
+/// Contribution of another view: one map for all parts, and a preferred type.
 pub(crate) struct OtherView {
-    /// One per level.
+    /// Maps of the levels.
     maps: Vec<Vec<f32>>,
 }
 

@@ -5,22 +5,22 @@ use formats::mat5::{ContainerError, Numbers, Structs, Value};
 use super::released::{Released, ReleasedPart, SpringIds, filter_from_planes};
 use crate::{Filter, Model, ModelError, ModelSpec, N_CHANNELS, Spring};
 
-/// Why a MATLAB file was rejected as a model.
+/// Reason why a MATLAB file was rejected as a model.
 #[derive(Debug, thiserror::Error)]
 pub enum MatError {
-    /// Not a MATLAB file that can be read.
+    /// The file is not a readable MATLAB file.
     #[error("not a readable MATLAB level 5 file")]
     Container(#[from] ContainerError),
     /// A field is missing.
     #[error("`{field}` is missing")]
     Missing {
-        /// Its path in the file.
+        /// Path of the field in the file.
         field: String,
     },
-    /// A field has another type.
+    /// A field has the wrong type.
     #[error("`{field}` is not {expected}")]
     Kind {
-        /// Its path in the file.
+        /// Path of the field in the file.
         field: String,
         /// The expected type.
         expected: &'static str,
@@ -28,19 +28,19 @@ pub enum MatError {
     /// The size of an array does not match the rest of the model.
     #[error("`{field}` is {}, expected {}", times(.got), times(.expected))]
     Size {
-        /// Its path in the file.
+        /// Path of the field in the file.
         field: String,
-        /// Its sizes.
+        /// Size of the array.
         got: Vec<usize>,
-        /// The accepted sizes.
+        /// Accepted size.
         expected: Vec<usize>,
     },
     /// A number is out of range.
     #[error("`{field}` holds {value}, expected {expected}")]
     Number {
-        /// Its path in the file.
+        /// Path of the field in the file.
         field: String,
-        /// The number.
+        /// The number that was found.
         value: f64,
         /// The accepted values.
         expected: String,
@@ -52,14 +52,13 @@ pub enum MatError {
 
 /// Reads a model of Yang & Ramanan's release 1.3 or 1.4.
 ///
-/// The releases differ in `defid`: one spring per type of the child (1.3), or one per pair of types,
-/// `[parent type, child type]`, with 0 where the pair never occurs (1.4; its `biasid` may hold 0
-/// too). Parents are `components{1}(i).parent`; `pa` or `parent` of the model, where there is one,
-/// must agree. `len` and `obj` are not looked at. Only models with one component are read.
+/// The releases differ in `defid`. Release 1.3 has one spring per type of the child. Release 1.4 has one per pair of types, `[parent type,
+/// child type]`, with 0 if the pair never occurs (its `biasid` may also contain 0). Parents are `components{1}(i).parent`; the model's own
+/// `pa` or `parent`, if present, must agree. `len` and `obj` are ignored. Only models with one component can be read.
 ///
 /// # Errors
 ///
-/// [`MatError`], naming the field by its MATLAB path. The numbers themselves are judged by
+/// [`MatError`], naming the field by its MATLAB path. The numbers themselves are checked by
 /// [`Model::new`].
 pub fn parse(file: &[u8]) -> Result<ModelSpec, MatError> {
     let variables = formats::mat5::variables(file)?;
@@ -74,16 +73,16 @@ pub fn parse(file: &[u8]) -> Result<ModelSpec, MatError> {
     })
 }
 
-/// Most indices that a field may hold.
+/// Maximum number of indices in a field.
 const MAX_IDS: usize = Model::MAX_TYPES * Model::MAX_TYPES;
 
-/// A value and the path that led to it.
+/// A value and its path in the file.
 struct At<'v, 'a> {
     field: String,
     value: &'v Value<'a>,
 }
 
-/// An array of structs and the path that led to it.
+/// An array of structs and its path in the file.
 struct Elements<'v, 'a> {
     field: String,
     structs: &'v Structs<'a>,
@@ -133,7 +132,7 @@ impl<'v, 'a> At<'v, 'a> {
         }
     }
 
-    /// All numbers, of which there must be `N`.
+    /// Returns all numbers of the value; there must be exactly `N`.
     fn row<const N: usize>(&self) -> Result<[f64; N], MatError> {
         let numbers = self.numbers_up_to(N)?;
         <[f64; N]>::try_from(numbers.values()).map_err(|_values| self.size(vec![1, N]))
@@ -152,7 +151,7 @@ impl<'v, 'a> At<'v, 'a> {
         values.into_iter().map(|value| self.as_id(value)).collect()
     }
 
-    /// A table of indices, by rows.
+    /// Returns a table of indices, by rows.
     fn table(&self, rows: usize, cols: usize) -> Result<Vec<Vec<usize>>, MatError> {
         if *self.numbers()?.sizes() != [rows, cols] {
             return Err(self.size(vec![rows, cols]));
@@ -357,7 +356,7 @@ fn parents_agree(model: &Elements<'_, '_>, parts: &[ReleasedPart]) -> Result<(),
     Ok(())
 }
 
-/// Checks `maxsize`, where there is one, against the filters.
+/// Checks `maxsize`, if present, against the filters.
 fn largest_agrees(model: &Elements<'_, '_>, filters: &[Filter]) -> Result<(), MatError> {
     let Some(at) = model.find(0, "maxsize") else {
         return Ok(());

@@ -1,11 +1,11 @@
-//! Parallax's own model file: a checked header and the model behind it, bit for bit.
+//! Parallax's own model file: a header with a checksum, followed by the model, bit for bit.
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 0..8 | `PLXMODEL` |
 //! | 8..12 | version, u32, little-endian: 1 |
 //! | 12..20 | length of the payload, u64, little-endian |
-//! | 20..28 | FNV-1a (64 bit) of the payload, little-endian; it tells every change within one byte |
+//! | 20..28 | FNV-1a (64 bit) of the payload, little-endian; it detects every change within one byte |
 //! | 28.. | payload: bincode 2, standard configuration (little-endian, variable-length integers) |
 
 use formats::checksum::{Envelope, EnvelopeError};
@@ -13,7 +13,7 @@ use formats::checksum::{Envelope, EnvelopeError};
 use super::payload;
 use crate::{Model, ModelSpec};
 
-/// How Parallax's own model file begins.
+/// The first bytes of Parallax's own model file.
 pub const MAGIC: [u8; 8] = *b"PLXMODEL";
 
 const ENVELOPE: Envelope = Envelope {
@@ -21,19 +21,19 @@ const ENVELOPE: Envelope = Envelope {
     version: 1,
 };
 
-/// Why bytes are not a model file of Parallax, or none could be made.
+/// Reason why bytes are not a Parallax model file, or a file could not be encoded.
 #[derive(Debug, thiserror::Error)]
 pub enum OwnError {
-    /// Another kind or version of file, or a damaged one.
+    /// The file is of another kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The payload is no model, though its checksum is right.
+    /// The payload is not a model, although its checksum is right.
     #[error("the payload is not a model")]
     Payload(#[source] Box<bincode::error::DecodeError>),
-    /// Something follows the model in the payload.
+    /// The payload contains bytes after the model.
     #[error("the payload has {left} bytes after the end of the model")]
     Left {
-        /// Bytes that follow.
+        /// Number of bytes after the model.
         left: usize,
     },
     /// The model is too large for the format.
@@ -41,22 +41,22 @@ pub enum OwnError {
     Encode(#[source] Box<bincode::error::EncodeError>),
 }
 
-/// Makes the bytes of a model file; [`decode`] gives the same model, every number bit for bit.
+/// Encodes a model file; [`decode`] returns the same model, bit for bit.
 ///
 /// # Errors
 ///
-/// [`OwnError::Encode`], for a model beyond the format's limit of 192 MiB.
+/// [`OwnError::Encode`] for a model beyond the format's limit of 192 MiB.
 pub fn encode(model: &Model) -> Result<Vec<u8>, OwnError> {
     let payload =
         payload::write(model.spec()).map_err(|error| OwnError::Encode(Box::new(error)))?;
     Ok(ENVELOPE.seal(&payload))
 }
 
-/// Reads the bytes of a model file. What the model says is judged by [`Model::new`].
+/// Decodes a model file. The content of the model is checked by [`Model::new`].
 ///
 /// # Errors
 ///
-/// [`OwnError`]; truncated bytes and bytes with a changed one are always refused.
+/// [`OwnError`]; truncated files and files with a changed byte are always refused.
 pub fn decode(bytes: &[u8]) -> Result<ModelSpec, OwnError> {
     let payload = ENVELOPE.open(bytes)?;
     let (spec, n_read) =

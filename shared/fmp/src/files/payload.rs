@@ -6,19 +6,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Edge, Filter, ModelSpec, PartSpec, Spring, Springs};
 
-/// Most bytes of a payload: more than the largest model that is accepted.
+/// Maximum size of a payload in bytes; larger than the largest accepted model.
 const MAX_BYTES: usize = 192 << 20;
 
 const fn configuration() -> Configuration<LittleEndian, Varint, Limit<MAX_BYTES>> {
     config::standard().with_limit::<MAX_BYTES>()
 }
 
-/// Makes the payload of a model.
+/// Encodes the payload of a model.
 pub(super) fn write(spec: &ModelSpec) -> Result<Vec<u8>, EncodeError> {
     bincode::serde::encode_to_vec(ModelRecord::from(spec), configuration())
 }
 
-/// Reads a payload: the model and how many bytes it took.
+/// Decodes a payload; returns the model and the number of bytes read.
 pub(super) fn read(payload: &[u8]) -> Result<(ModelSpec, usize), DecodeError> {
     let (record, n_bytes): (ModelRecord, _) =
         bincode::serde::decode_from_slice(payload, configuration())?;

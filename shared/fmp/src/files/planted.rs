@@ -1,4 +1,4 @@
-//! Small models for tests, in which all numbers differ.
+//! Small models for tests; all their numbers differ.
 
 pub(crate) mod mat;
 mod text;
@@ -7,7 +7,7 @@ pub(crate) use text::as_text;
 
 use crate::{Edge, Filter, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
 
-/// A root and two arms that mirror each other, two types each, filters of 2x2 cells.
+/// Returns a model with a root and two arms that mirror each other, two types each, filters of 2x2 cells.
 pub(crate) fn three_parts() -> ModelSpec {
     let part = |part_idx: usize| PartSpec {
         name: format!("part {}", part_idx + 1),
@@ -26,7 +26,7 @@ pub(crate) fn three_parts() -> ModelSpec {
     }
 }
 
-/// The same tree, with springs per pair of types as in release 1.4; one pair never occurs.
+/// Returns the same tree with springs per pair of types, as in release 1.4; one pair never occurs.
 pub(crate) fn per_pair() -> ModelSpec {
     let mut spec = three_parts();
     for (part_idx, part) in spec.parts.iter_mut().enumerate() {
@@ -44,7 +44,7 @@ pub(crate) fn per_pair() -> ModelSpec {
     spec
 }
 
-/// The published models' 26 parts, one type each.
+/// Returns the published models' 26 parts, one type each.
 pub(crate) fn published_tree() -> ModelSpec {
     let mut spec = three_parts();
     spec.filters.truncate(1);

@@ -1,10 +1,10 @@
-//! Common basis of the released models' formats: everything is named by 1-based indices.
+//! Common basis of the released models' formats, which refer to everything by 1-based indices.
 
 use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
 
 use crate::{Edge, Filter, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
 
-/// A released model, as it lies in the file; nothing is known to hold yet.
+/// A released model as stored in the file, before any check.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Released {
     /// All biases; [`ReleasedPart::bias_ids`] assigns them to parts.
@@ -17,39 +17,39 @@ pub(super) struct Released {
     pub(super) parts: Vec<ReleasedPart>,
     /// Levels per octave.
     pub(super) interval: usize,
-    /// Side of a cell, pixels.
+    /// Side of a cell, in pixels.
     pub(super) cell_px: usize,
-    /// Lowest score that training asked for.
+    /// Minimum score requested by training.
     pub(super) threshold: f64,
 }
 
-/// One part, its belongings named by 1-based indices.
+/// One part, which refers to its filters, biases and springs by 1-based indices.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ReleasedPart {
     /// The parent; 0 for the root.
     pub(super) parent: usize,
     /// One filter per type.
     pub(super) filter_ids: Vec<usize>,
-    /// `[parent type][child type]`, 0 where the pair never occurs; the root uses `[0][0]` only.
+    /// Biases as `[parent type][child type]`, 0 if the pair never occurs; the root uses `[0][0]` only.
     pub(super) bias_ids: Vec<Vec<usize>>,
-    /// The springs; not looked at for the root.
+    /// The springs; ignored for the root.
     pub(super) spring_ids: SpringIds,
 }
 
-/// Which springs a part hangs on.
+/// The springs between a part and its parent.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum SpringIds {
     /// One per type of the child.
     PerChildType(Vec<usize>),
-    /// `[parent type][child type]`, 0 where the pair never occurs.
+    /// One per pair, `[parent type][child type]`, 0 if the pair never occurs.
     PerTypePair(Vec<Vec<usize>>),
 }
 
 impl Released {
-    /// Replaces every index by what it names.
+    /// Replaces every index by the item it refers to.
     ///
     /// A tree of 26 parts with the published models' parents gets their part names and their mirror
-    /// permutation; any other gets `part 1`, `part 2`, ... and no mirror.
+    /// permutation; any other tree gets `part 1`, `part 2`, ... and no mirror.
     pub(super) fn into_spec(self) -> Result<ModelSpec, ModelError> {
         let names_known = self.parts.len() == N_PARTS
             && self
@@ -126,7 +126,7 @@ impl Released {
     }
 }
 
-/// The 0-based index that `id` stands for, if there is such a thing.
+/// Converts the 1-based `id` to a 0-based index, if the item exists.
 fn index(part: usize, what: &'static str, id: usize, count: usize) -> Result<usize, ModelError> {
     id.checked_sub(1).filter(|&idx| idx < count).ok_or(ModelError::Missing {
         part: part + 1,
@@ -136,9 +136,9 @@ fn index(part: usize, what: &'static str, id: usize, count: usize) -> Result<usi
     })
 }
 
-/// A filter from its values as the files hold them: row fastest, channel slowest.
+/// Creates a filter from its values in the order of the files: row fastest, channel slowest.
 ///
-/// * `values`: `rows x cols x N_CHANNELS` of them.
+/// * `values`: `rows x cols x N_CHANNELS` values.
 pub(super) fn filter_from_planes(rows: usize, cols: usize, values: &[f64]) -> Filter {
     let mut weights = Vec::with_capacity(values.len());
     for row in 0..rows {

@@ -1,63 +1,63 @@
-//! A model in a few numbers, for `parallax-lab model show`.
+//! A summary of a model, for `parallax-lab model show`.
 
 use crate::{Model, Spring, Springs};
 
 /// Structure of a model, without its weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSummary {
-    /// Where the model comes from.
+    /// Description of the model's origin.
     pub name: String,
     /// The parts, root first.
     pub parts: Vec<PartSummary>,
     /// Number of filters.
     pub n_filters: usize,
-    /// The different `[rows, cols]` of the filters, ascending, cells.
+    /// The different `[rows, cols]` of the filters, in cells, in ascending order.
     pub filter_sizes: Vec<[usize; 2]>,
     /// Number of pairs of types that have a bias.
     pub n_biases: usize,
-    /// Smallest and largest bias of a pair of types; `None` if there is none.
+    /// Minimum and maximum bias of a pair of types; `None` if there is none.
     pub bias_range: Option<[f64; 2]>,
     /// Number of springs.
     pub n_springs: usize,
-    /// True if springs belong to pairs of types rather than to the child's type.
+    /// True if there is one spring per pair of types, false if per type of the child.
     pub springs_per_pair: bool,
     /// Ranges of the springs; `None` if there is none.
     pub springs: Option<SpringRanges>,
     /// Score of every root placement.
     pub root_bias: f64,
-    /// Score above which training found its positives.
+    /// Minimum score of the positives in training.
     pub threshold: f64,
-    /// Score above which detection reports.
+    /// Minimum score reported by detection.
     pub detection_threshold: f64,
     /// Levels per octave of the pyramid.
     pub interval: usize,
-    /// Side of a feature cell, pixels.
+    /// Side of a feature cell, in pixels.
     pub cell_px: usize,
-    /// True if the model knows which parts are each other's mirror image.
+    /// True if the model contains the mirror image of every part.
     pub has_mirror: bool,
 }
 
 /// One part in a [`ModelSummary`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartSummary {
-    /// Its name.
+    /// Name of the part.
     pub name: String,
-    /// Index of its parent, from 0; `None` for the root.
+    /// Index of the parent, counted from 0; `None` for the root.
     pub parent: Option<usize>,
-    /// Number of its types.
+    /// Number of types of the part.
     pub n_types: usize,
 }
 
-/// Smallest and largest numbers of all springs of a model.
+/// Minimum and maximum values over all springs of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpringRanges {
     /// Weights of `[d_x^2, d_x, d_y^2, d_y]`.
     pub w: [[f64; 2]; 4],
-    /// Anchor `[x, y]`, cells, from 0.
+    /// Anchor `[x, y]`, in cells, counted from 0.
     pub anchor: [[i32; 2]; 2],
 }
 
-/// Sums a model up.
+/// Summarises a model.
 pub fn describe(model: &Model) -> ModelSummary {
     let spec = model.spec();
     let edges: Vec<_> = spec.parts.iter().filter_map(|part| part.edge.as_ref()).collect();

@@ -12,17 +12,16 @@ use crate::{Filter, Model, ModelSpec, N_CHANNELS, Spring};
 
 /// Reads the authors' text format.
 ///
-/// Key words and arrays in a fixed order, separated by white space; an array is `rows cols planes`
-/// and then its values, row fastest, plane slowest. Indices count from 1. Deformations are
-/// `dx^2 dx dy^2 dy`, anchors `x y octave`. The start offsets `*_i` and `obj` belong to the training
-/// and are read over; `len` and `obj` may be absent.
+/// The format consists of keywords and arrays in a fixed order, separated by white space. An array is `rows cols planes` and then its
+/// values, row fastest, plane slowest. Indices count from 1. Deformations are `dx^2 dx dy^2 dy`, anchors `x y octave`. The start offsets
+/// `*_i` and `obj` belong to the training and are skipped; `len` and `obj` may be absent.
 ///
-/// The tree of the published models gets its part names and its mirror. Nothing is allocated on a
-/// count's word: the memory used is in proportion to the text.
+/// The tree of the published models gets its part names and its mirror. Memory is never allocated from a count
+/// alone: the memory used is proportional to the size of the text.
 ///
 /// # Errors
 ///
-/// [`TextError`]. The numbers themselves are judged by [`Model::new`].
+/// [`TextError`]. The numbers themselves are checked by [`Model::new`].
 pub fn parse(text: &str) -> Result<ModelSpec, TextError> {
     let mut it = Tokens::new(text);
     let n_parts = count(&mut it, "partsNbr", 1, Model::MAX_PARTS)?;
@@ -71,9 +70,9 @@ pub fn parse(text: &str) -> Result<ModelSpec, TextError> {
 
 const MAX_FILTERS: usize = Model::MAX_PARTS * Model::MAX_TYPES;
 const MAX_SPRINGS: usize = MAX_FILTERS * Model::MAX_TYPES;
-/// [`Model::new`] knows the true range of the settings.
+/// Maximum value of a setting; [`Model::new`] checks the exact range.
 const MAX_SETTING: usize = 1 << 16;
-/// `dx^2 dx dy^2 dy`.
+/// Number of weights of a spring, `dx^2 dx dy^2 dy`.
 const SPRING_WEIGHTS: usize = 4;
 const INDEX: &str = "a whole number from 0";
 const REAL: &str = "a number";
@@ -260,7 +259,7 @@ fn components(
         .collect())
 }
 
-/// Reads `maxsize`, which must be the largest height and width of the filters.
+/// Reads `maxsize`, which must equal the largest height and width of the filters.
 fn largest_filter(it: &mut Tokens<'_>, filters: &[Filter]) -> Result<(), TextError> {
     let place = it.place();
     let maxsize = ids(it, "maxsize", [1, 2, 1])?;

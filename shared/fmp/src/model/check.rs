@@ -3,7 +3,7 @@
 use super::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 use crate::N_CHANNELS;
 
-/// Checks everything that the rest of the crate assumes.
+/// Checks all assumptions of the rest of the crate.
 pub(super) fn check(spec: &ModelSpec) -> Result<(), ModelError> {
     if spec.parts.is_empty() {
         return Err(ModelError::NoParts);
@@ -158,7 +158,7 @@ fn check_filter(whose: impl Fn() -> String + Copy, filter: &Filter) -> Result<()
     filter.weights.iter().try_for_each(|&weight| number("weight", whose, weight))
 }
 
-/// Checks that `mirror` exchanges parts in pairs and leaves the tree as it is.
+/// Checks that `mirror` exchanges parts in pairs and preserves the tree.
 fn check_mirror(parts: &[PartSpec], mirror: &[usize]) -> Result<(), ModelError> {
     size(
         "mirror",
@@ -251,9 +251,9 @@ mod tests {
     use super::*;
     use crate::files::planted;
 
-    /// One change to a good model.
+    /// One change to a valid model.
     type Change = fn(&mut ModelSpec);
-    /// One number put into a good model.
+    /// Sets one number of a valid model.
     type ChangeTo = fn(&mut ModelSpec, f64);
 
     /// Makes one change to a valid model and returns the error.
@@ -475,19 +475,19 @@ mod tests {
     fn the_mirror_exchanges_parts_in_pairs_and_keeps_the_tree() {
         assert_eq!(
             outcome(|model| model.mirror = Some(vec![1, 2, 0])),
-            "part 1 mirrors part 2, but not the other way round or not on the same tree"
+            "part 1 mirrors part 2, but part 2 does not mirror it, or the tree differs"
         );
         assert_eq!(
             outcome(|model| model.mirror = Some(vec![2, 1, 0])),
-            "part 1 mirrors part 3, but not the other way round or not on the same tree"
+            "part 1 mirrors part 3, but part 3 does not mirror it, or the tree differs"
         );
         assert_eq!(outcome(|model| model.mirror = Some(vec![0, 1, 2])), "fine");
-        // Three arms in a ring: the tree stays, but nothing is exchanged in pairs.
+        // Three arms in a ring: the tree is preserved, but parts are not exchanged in pairs.
         let ring = outcome(|model| {
             model.parts.push(model.parts[2].clone());
             model.mirror = Some(vec![0, 2, 3, 1]);
         });
-        let expected = "part 2 mirrors part 3, but not the other way round or not on the same tree";
+        let expected = "part 2 mirrors part 3, but part 3 does not mirror it, or the tree differs";
         assert_eq!(ring, expected);
     }
 }

@@ -5,14 +5,14 @@ use super::{ExtraTerms, Solver};
 use crate::{Bound, Bounds, Responses, Spring, Springs};
 
 impl Bound {
-    /// For a level on which the messages have been computed without terms.
+    /// Bound of a level on which the messages have been computed without terms.
     ///
     /// * `edges`: see [`Solver::most_of_edges`].
     pub(super) fn of(sweep: &Sweep<'_>, edges: f64) -> Self {
         Self::of_own(sweep.highest(), sweep.own() + edges)
     }
 
-    /// For a level of which the sum of the largest own scores and of the edges is known.
+    /// Bound of a level with a known sum of the largest own scores and of the edges.
     fn of_own(best: f32, size: f64) -> Self {
         Self {
             best,
@@ -22,11 +22,11 @@ impl Bound {
 }
 
 impl Solver {
-    /// The bounds of the offered levels: one solution without extra terms.
+    /// Computes the bounds of the offered levels with one solution without extra terms.
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn bounds(&self, evidence: &Responses<'_>) -> Bounds {
         let edges = self.most_of_edges();
         let found = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
@@ -35,14 +35,14 @@ impl Solver {
         Bounds::of_some(evidence.layout().levels.len(), found)
     }
 
-    /// The bound of a level whose messages were computed elsewhere, without terms; the bits of [`Self::bounds`].
+    /// Returns the bound of a level whose messages were computed elsewhere without terms; bit-identical to [`Self::bounds`].
     ///
     /// * `best`: score of the best root, with the root bias.
     /// * `largest`: largest own score of every part.
     pub fn bound_of(&self, best: f32, largest: &[f32]) -> Bound {
         let mut begun = vec![false; largest.len()];
         let mut own = 0.0;
-        // In the order in which a sweep meets the parts.
+        // In the order in which a sweep visits the parts.
         for part in (0..largest.len()).rev() {
             let edge = self.model.spec().parts[part].edge.as_ref();
             for part in [Some(part), edge.map(|edge| edge.parent)].into_iter().flatten() {
@@ -54,7 +54,7 @@ impl Solver {
         Bound::of_own(best, own + self.most_of_edges())
     }
 
-    /// The maximum that springs and biases can add to a score.
+    /// Returns the maximum that springs and biases can add to a score.
     pub(super) fn most_of_edges(&self) -> f64 {
         let parts = self.model.spec().parts.iter();
         let of_edge = parts.filter_map(|part| part.edge.as_ref()).map(|edge| {
@@ -72,7 +72,7 @@ impl Solver {
         of_edge.sum::<f64>() + self.model.spec().root_bias.abs()
     }
 
-    /// Upper bound of what the terms can add to a pose, and the sum of the bounds' absolute values.
+    /// Returns the upper bound of the terms' contribution to a pose, and the sum of the absolute values of the bounds.
     pub(super) fn max_gain(&self, extra: &dyn ExtraTerms) -> (f64, f64) {
         let gains = (0..self.model.n_parts()).map(|part| f64::from(extra.max_gain(part)));
         gains.fold((0.0, 0.0), |sums, it| (sums.0 + it, sums.1 + it.abs()))

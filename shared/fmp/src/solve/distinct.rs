@@ -8,26 +8,26 @@ use crate::{Bound, Bounds, Pose, Responses};
 const BATCH: usize = 16;
 
 impl Solver {
-    /// The best `n` poses that are distinct; the first one is [`Self::best`].
+    /// Returns the best `n` poses that are distinct; the first one is [`Self::best`].
     ///
-    /// Greedy, best first, over the local maxima of the root's scores on every level: a pose is kept
-    /// if it is far enough from all that were kept before it.
+    /// The search is greedy, best first, over the local maxima of the root's scores on every level. A pose is kept
+    /// if it is far enough from all poses kept before it.
     ///
-    /// * `min_separation`: least mean distance between the part centres of two poses, in units of
+    /// * `min_separation`: minimum mean distance between the part centres of two poses, in units of
     ///   the mean side of the boxes of both.
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn distinct(&self, evidence: &Responses<'_>, n: usize, min_separation: f64) -> Vec<Pose> {
         self.distinct_and_bounds(evidence, n, min_separation).0
     }
 
-    /// [`Self::distinct`] and [`Self::bounds`] in one pass.
+    /// Computes [`Self::distinct`] and [`Self::bounds`] in one pass.
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn distinct_and_bounds(
         &self,
         evidence: &Responses<'_>,
@@ -47,7 +47,7 @@ impl Solver {
         )
     }
 
-    /// The best `n` of these roots whose poses are far enough from each other.
+    /// Returns the best `n` of these roots whose poses are far enough from each other.
     fn greedy(
         &self,
         evidence: &Responses<'_>,
@@ -89,7 +89,7 @@ impl Solver {
     }
 }
 
-/// Roots with no better neighbour among the eight around them, and no equal one before them.
+/// Roots with no better neighbour among the eight around them, and no equal neighbour before them.
 fn peaks(roots: &[Root]) -> Vec<Root> {
     let Some(last) = roots.last() else {
         return Vec::new();

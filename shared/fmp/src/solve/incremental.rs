@@ -11,40 +11,40 @@ use crate::bounds::Upper;
 use crate::pool::{in_pool, lock};
 use crate::{Bounds, Pose, Responses};
 
-/// Limit of the score planes that are kept between solutions, bytes.
+/// Maximum size of the score planes that are kept between solutions, in bytes.
 const MAX_KEPT_BYTES: usize = 64 << 20;
 
 /// Incremental solver: solves one view's evidence repeatedly, as the other views' terms change.
 ///
 /// The results are bit-identical to those of [`Solver::best`], with less work. Levels that cannot
-/// hold the best pose are skipped ([`Bounds`], [`ExtraTerms::max_gain`]). On the others a term is
-/// never taken to be worse than what already rules a pose out, which keeps the windows of the
-/// transforms small. And the scores of subtrees are kept whose terms have not changed since the
+/// contain the best pose are skipped ([`Bounds`], [`ExtraTerms::max_gain`]). On the other levels, a term is
+/// limited to the value at which it already rules a pose out, which keeps the windows of the
+/// transforms small. Finally, the scores of subtrees are kept if their terms have not changed since the
 /// last solution ([`ExtraTerms::key`]).
 ///
-/// Keeps up to 64 MiB of score planes, those of the most promising levels, and returns them to the
-/// solver when it is dropped.
+/// The solver keeps up to 64 MiB of score planes, those of the most promising levels. It returns them to the
+/// [`Solver`] when it is dropped.
 #[derive(Debug)]
 pub struct IncrementalSolver<'a> {
     solver: &'a Solver,
     evidence: &'a Responses<'a>,
     own_bounds: Option<Bounds>,
-    /// By level: the planes of the last solution.
+    /// The planes of the last solution for every level.
     kept: Vec<Mutex<Option<Workspace>>>,
-    /// By level: whether its planes are to be kept.
+    /// For every level, true if its planes must be kept.
     keep: Vec<bool>,
-    /// The levels to be solved with their upper bounds, best first.
+    /// The levels to solve with their upper bounds, best first.
     order: Vec<(Upper, u16)>,
     /// Score of the best guess.
     lowest: f32,
 }
 
 impl Solver {
-    /// Starts to solve `evidence` repeatedly.
+    /// Prepares to solve `evidence` repeatedly.
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn incremental<'a>(&'a self, evidence: &'a Responses<'a>) -> IncrementalSolver<'a> {
         self.check(evidence);
         let n_levels = evidence.layout().levels.len();
@@ -61,9 +61,9 @@ impl Solver {
 }
 
 impl IncrementalSolver<'_> {
-    /// The best pose over the offered levels; see [`Solver::best`].
+    /// Returns the best pose over the offered levels; see [`Solver::best`].
     ///
-    /// Without [`Responses::with_bounds`] the first call computes them.
+    /// Without [`Responses::with_bounds`], the first call computes the bounds.
     ///
     /// * `guesses`: poses that may be nearly as good as the best, such as the last result. They
     ///   only save work: levels that cannot reach the best guess are skipped, and its level is
@@ -102,7 +102,7 @@ impl IncrementalSolver<'_> {
             }
         };
         if in_pool() {
-            // In order, by any idle thread: the earlier a good pose is found, the more levels are
+            // Idle threads take the levels in order: the earlier a good pose is found, the more levels are
             // skipped.
             let next = AtomicUsize::new(0);
             let threads = 0..rayon::current_num_threads().min(self.order.len());
@@ -117,7 +117,7 @@ impl IncrementalSolver<'_> {
         search.finish(&put_back)
     }
 
-    /// Number of levels that the bounds could not rule out at the start of the last solution.
+    /// Returns the number of levels that the bounds could not rule out at the start of the last solution.
     pub fn n_levels(&self) -> usize {
         self.order.len()
     }

@@ -1,29 +1,29 @@
-//! Counters of the incremental solver: how much of the full work it does.
+//! Counters of the incremental solver, which show its share of the full work.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Sums over all solutions of all [`IncrementalSolver`](crate::IncrementalSolver)s of a solver.
 ///
-/// An entry is one value of a max-sum message: of one part for one cell of its parent. With several
-/// threads the counters depend on timing; the results do not.
+/// An entry is one value of a max-sum message: that of one part for one cell of its parent. With several
+/// threads, the counters depend on timing; the results do not.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SolveStatistics {
     /// Number of solutions.
     pub solutions: u64,
-    /// Levels that were offered.
+    /// Number of offered levels.
     pub levels_offered: u64,
-    /// Levels that bounds could not rule out.
+    /// Number of levels that bounds could not rule out.
     pub levels_solved: u64,
-    /// Message entries on all offered levels.
+    /// Number of message entries on all offered levels.
     pub entries_offered: u64,
-    /// Message entries on the levels that bounds could not rule out.
+    /// Number of message entries on the levels that bounds could not rule out.
     pub entries_solved: u64,
-    /// Message entries that were computed, because they could not be kept from the solution before.
+    /// Number of message entries that were computed because they could not be kept from the previous solution.
     pub entries_computed: u64,
 }
 
 impl SolveStatistics {
-    /// The difference from earlier counters.
+    /// Returns the difference from earlier counters.
     #[must_use]
     pub fn since(&self, before: &Self) -> Self {
         Self {
@@ -37,7 +37,7 @@ impl SolveStatistics {
     }
 }
 
-/// [`SolveStatistics`] with atomic counters.
+/// Like [`SolveStatistics`], with atomic counters.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     solutions: AtomicU64,
@@ -49,14 +49,14 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Counts a solution about to begin.
+    /// Counts a solution that is about to begin.
     pub(super) fn offered(&self, levels: usize, entries: usize) {
         add(&self.solutions, 1);
         add(&self.levels_offered, levels);
         add(&self.entries_offered, entries);
     }
 
-    /// Counts a level.
+    /// Counts a level that was solved.
     pub(super) fn solved(&self, entries: usize, computed: usize) {
         add(&self.levels_solved, 1);
         add(&self.entries_solved, entries);

@@ -3,31 +3,31 @@
 use super::{CandidateSettings, Root, Solver};
 use crate::{Layout, Model, Pose, Responses};
 
-/// Most candidates that suppression looks at, as in the reference programs.
+/// Maximum number of candidates considered by suppression, as in the reference programs.
 const MOST: usize = 1000;
 
 impl Solver {
-    /// Every pose whose root scores at least the threshold, less those that overlap a better one.
+    /// Every pose whose root scores at least the threshold, without those that overlap a better pose.
     ///
-    /// The reference programs' rule: of the 1000 best, a candidate is dropped when it overlaps a
-    /// picked one by more than `overlap`, where the overlap of two candidates is the largest share
-    /// of the picked one's box that the other's covers, over all parts and over the rectangles
-    /// around all parts. Best first; ties as in [`Self::best`].
+    /// This is the reference programs' rule: of the 1000 best candidates, a candidate is dropped if it overlaps a picked one by more than
+    /// `overlap`. The overlap of two candidates is the largest share of a box of the picked candidate that the same box of the other
+    /// covers. It is taken over all parts and the rectangle around all parts. The result is sorted best first; ties are resolved as in
+    /// [`Self::best`].
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn candidates(&self, evidence: &Responses<'_>, settings: &CandidateSettings) -> Vec<Pose> {
         let poses = self.above(evidence, settings.threshold, MOST).into_iter();
         suppress(&self.model, evidence.layout(), poses, settings)
     }
 
-    /// Every pose whose root scores at least `threshold`, but at most the `max` best; best first,
-    /// ties as in [`Self::best`]. Most are neighbours of others: see [`Self::candidates`].
+    /// Every pose whose root scores at least `threshold`, but at most the `max` best, sorted best first;
+    /// ties are resolved as in [`Self::best`]. Most are neighbours of others: see [`Self::candidates`].
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's.
+    /// If the evidence belongs to another model.
     pub fn above(&self, evidence: &Responses<'_>, threshold: f32, max: usize) -> Vec<Pose> {
         let roots = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
             let roots = sweep.roots();
@@ -62,7 +62,7 @@ impl Root {
     }
 }
 
-/// Boxes `[x1, y1, x2, y2]` of all parts, then the rectangle around them.
+/// Boxes `[x1, y1, x2, y2]` of all parts, then the rectangle around all parts.
 type Boxes = Vec<[f64; 4]>;
 
 fn suppress(
@@ -91,7 +91,7 @@ fn boxes(model: &Model, layout: &Layout, pose: &Pose) -> Boxes {
     all
 }
 
-/// Largest share of a picked box that the other covers.
+/// Returns the largest share of a picked box that the other box covers.
 fn overlap(picked: &Boxes, other: &Boxes) -> f64 {
     let share = |(a, b): (&[f64; 4], &[f64; 4])| {
         let side = |low: f64, high: f64| (high - low + 1.0).max(0.0);

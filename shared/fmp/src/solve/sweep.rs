@@ -13,19 +13,19 @@ pub(super) struct Workspace {
     /// One plane per part and type, part by part, with the messages of the children added, and the
     /// margin after the last one.
     planes: ScoreBuffer,
-    /// One per plane.
+    /// Score ranges of the planes.
     ranges: Vec<ScoreRange>,
     /// The level of the planes, if they may be reused.
     level: Option<u16>,
-    /// The slack under which they were computed.
+    /// The slack under which the planes were computed.
     slack: f64,
     /// The keys of every part's terms.
     keys: Vec<Option<u64>>,
-    /// True for a part whose planes can be kept: all terms of its subtree are unchanged.
+    /// True for a part whose planes can be kept because all terms of its subtree are unchanged.
     stays: Vec<bool>,
     /// True for a part whose own score has been written.
     begun: Vec<bool>,
-    /// Sum over the parts of the largest own score of each.
+    /// Sum of the largest own scores of all parts.
     own: f64,
     /// Number of message entries that the last sweep computed.
     n_computed: usize,
@@ -39,7 +39,7 @@ pub(super) struct Workspace {
 pub(super) struct Sweep<'a> {
     solver: &'a Solver,
     level: u16,
-    /// The cells of the level that are searched; rows and columns count from its corner.
+    /// The searched cells of the level; rows and columns are counted from its corner.
     window: Window,
     grid: Grid,
     workspace: &'a Workspace,
@@ -87,11 +87,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same, searching only for poses that lose less than `slack` against the bound of the
+    /// Limits the problem to poses that lose less than `slack` against the bound of the
     /// level; other poses may get a score that is too low.
     ///
-    /// No term then has to be as low as it is: a pose with one term that loses more than `slack` is
-    /// still ruled out if that term is taken to lose just `slack`. Smaller differences of scores
+    /// Terms can then be raised to a floor: a pose with one term that loses more than `slack` is
+    /// still ruled out if that term loses just `slack`. Smaller differences of scores
     /// make the windows of the transforms smaller.
     pub(super) fn with_slack(self, slack: f64) -> Self {
         Self { slack, ..self }
@@ -103,7 +103,7 @@ impl<'a> Problem<'a> {
         &self.maps[filter * area..][..area]
     }
 
-    /// The part's position term at all cells of the window, if it has one.
+    /// Returns the part's position term at all cells of the window, if it has one.
     fn position_term<'b>(&self, part: usize, buffer: &'b mut [f32]) -> Option<&'b [f32]> {
         let extra = self.extra?;
         buffer.fill(0.0);
@@ -124,7 +124,7 @@ impl<'a> Problem<'a> {
         has_one.then_some(buffer)
     }
 
-    /// The part's position term at one placement, if it has one.
+    /// Returns the part's position term at one placement, if it has one.
     fn term_at(&self, part: usize, at: Placement) -> Option<f32> {
         let level = usize::from(self.level);
         let cols = self.evidence.layout().levels[level].cols;
@@ -134,8 +134,8 @@ impl<'a> Problem<'a> {
         has_one.then_some(term[0])
     }
 
-    /// The worst position term that a part of a pose that loses less than `slack` may have, if any
-    /// is too bad.
+    /// Returns the minimum position term of a part in a pose that loses less than `slack`, if some terms
+    /// are lower.
     fn worst_term(&self, part: usize, slack: f64) -> Option<f32> {
         let extra = self.extra?;
         let types = 0..self.solver.model.n_types(part);
@@ -146,7 +146,7 @@ impl<'a> Problem<'a> {
         worst.is_finite().then_some(worst)
     }
 
-    /// Number of message entries of a full sweep.
+    /// Returns the number of message entries of a full sweep.
     pub(super) fn n_entries(&self) -> usize {
         (self.solver.model.n_parts() - 1) * self.n_cells()
     }
@@ -155,7 +155,7 @@ impl<'a> Problem<'a> {
         self.grid.rows * self.grid.cols
     }
 
-    /// Memory that the planes of the level need, bytes.
+    /// Memory needed by the planes of the level, in bytes.
     pub(super) fn bytes(&self) -> usize {
         let n_planes = self.solver.first_planes[self.solver.model.n_parts()];
         (self.grid.len(n_planes) + self.grid.margin()) * size_of::<f32>()
@@ -163,7 +163,7 @@ impl<'a> Problem<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    /// Computes all messages, except those that the workspace still holds.
+    /// Computes all messages, except those that the workspace still contains.
     pub(super) fn run(problem: &Problem<'a>, workspace: &'a mut Workspace) -> Self {
         let (solver, grid) = (problem.solver, problem.grid);
         solver.n_sweeps.fetch_add(1, Ordering::Relaxed);
@@ -208,30 +208,30 @@ impl<'a> Sweep<'a> {
         self.level
     }
 
-    /// Number of message entries that were computed.
+    /// Returns the number of message entries that were computed.
     pub(super) fn n_computed(&self) -> usize {
         self.workspace.n_computed
     }
 
-    /// The score of the best root of the level.
+    /// Returns the score of the best root of the level.
     pub(super) fn highest(&self) -> f32 {
         let ranges = &self.workspace.ranges[self.solver.planes(0)];
         let most = ranges.iter().map(|range| range.max + self.solver.root_bias());
         most.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Sum over the parts of the largest own score of each, if all are new.
+    /// Returns the sum of the largest own scores of all parts, if all are new.
     pub(super) fn own(&self) -> f64 {
         self.workspace.own
     }
 
-    /// The best root of the level: first cell in row-major order, then first type.
+    /// Returns the best root of the level; ties go to the first cell in row-major order, then to the first type.
     pub(super) fn best_root(&self) -> Option<Root> {
         let better = |a: Root, b: Root| if b.score > a.score { b } else { a };
         self.roots().reduce(better).filter(|root| root.score > f32::NEG_INFINITY)
     }
 
-    /// The best type of the root at every cell of the window, in row-major order.
+    /// Returns the best type of the root at every cell of the window, in row-major order.
     pub(super) fn roots(&self) -> impl Iterator<Item = Root> {
         let bias = self.solver.root_bias();
         let planes = self.planes(0);
@@ -252,7 +252,7 @@ impl<'a> Sweep<'a> {
         })
     }
 
-    /// The best tree with the given root.
+    /// Returns the best tree with the given root.
     pub(super) fn backtrack(&self, root: Root) -> Option<Pose> {
         let model = &*self.solver.model;
         let mut parts = Vec::with_capacity(model.n_parts());
@@ -280,7 +280,7 @@ impl<'a> Sweep<'a> {
         })
     }
 
-    /// The part's planes and the margin after them.
+    /// Returns the part's planes and the margin after them.
     fn planes(&self, part: usize) -> &[f32] {
         let planes = self.solver.planes(part);
         let [first, end] = [planes.start, planes.end].map(|plane| self.grid.len(plane));
@@ -289,7 +289,7 @@ impl<'a> Sweep<'a> {
 }
 
 impl Workspace {
-    /// Memory held by the planes, bytes.
+    /// Memory held by the planes, in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.planes.bytes()
     }
@@ -332,7 +332,7 @@ impl Workspace {
         self.begun.extend_from_slice(&self.stays);
     }
 
-    /// Writes the part's own score, unless that has been done on this level.
+    /// Writes the part's own score, unless it has already been written on this level.
     fn begin(&mut self, problem: &Problem<'_>, part: usize) {
         if std::mem::replace(&mut self.begun[part], true) {
             return;
@@ -359,7 +359,7 @@ impl Workspace {
     }
 }
 
-/// See [`Solver::score`].
+/// Computes the score of a given pose; see [`Solver::score`].
 pub(super) fn score(problem: &Problem<'_>, pose: &Pose, scores: &mut Vec<f32>) -> f32 {
     let (solver, grid) = (problem.solver, problem.grid);
     let model = &*solver.model;

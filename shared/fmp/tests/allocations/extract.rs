@@ -1,4 +1,4 @@
-//! The extractor, on one thread and in a pool.
+//! Allocations of the extractor, on one thread and in a pool.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::allocations;
 
 const SIZE: [usize; 2] = [90, 110];
 
-/// Thirty filters of two sizes on one part, ten levels per octave.
+/// Returns a model with thirty filters of two sizes on one part, ten levels per octave.
 fn model() -> Arc<Model> {
     let filter = |side: usize| Filter {
         rows: side,
@@ -35,7 +35,7 @@ fn model() -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// Allocations and reallocations of frames that come after the first.
+/// Returns the number of allocations and reallocations of the frames after the first.
 fn of_frames(n_frames: usize) -> usize {
     let model = model();
     let layout = Layout::new(&model, SIZE[0], SIZE[1]).unwrap();
@@ -58,10 +58,10 @@ fn of_frames(n_frames: usize) -> usize {
     allocations(|| frames[1..].iter().for_each(|frame| respond(frame)))
 }
 
-/// On one thread, and in a pool.
+/// Checks the extractor on one thread and in a pool.
 pub(crate) fn takes_no_memory() {
     assert_eq!(of_frames(3), 0, "on one thread");
-    // One pool, until the end: a thread that ends takes memory for what it leaves to others, and is counted.
+    // The pool lives until the end: a thread that ends allocates memory for the data it leaves to others, which would be counted.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3);
     let pool = pool.build().unwrap();
     assert_eq!(pool.install(|| of_frames(3)), 0, "in a pool");

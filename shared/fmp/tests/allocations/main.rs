@@ -1,6 +1,6 @@
 //! From the second frame on, only the results allocate memory, on any thread.
 //!
-//! A program without the test harness, because the harness's own thread allocates and the counter
+//! This test runs without the test harness, because the harness's own thread allocates and the counter
 //! covers all threads: those of a pool do most of the work.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -34,6 +34,6 @@ fn main() {
     assert!(allocations(elsewhere) > 0, "and on all threads");
     solve::takes_memory_for_the_answer_only();
     solve::takes_memory_for_the_answer_only_again();
-    // Last, since threads of a pool may still be ending when it is gone.
+    // This check runs last, since threads of a pool may still be ending after the pool is gone.
     extract::takes_no_memory();
 }

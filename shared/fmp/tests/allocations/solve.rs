@@ -1,4 +1,4 @@
-//! The solver takes no memory from frame to frame but for its answers.
+//! Checks that the solver allocates no memory from frame to frame except for its results.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ pub(crate) fn takes_memory_for_the_answer_only() {
     }
 }
 
-/// Terms that take no memory.
+/// Terms that allocate no memory.
 struct Unmoved;
 
 impl fmp::ExtraTerms for Unmoved {
@@ -46,7 +46,7 @@ impl fmp::ExtraTerms for Unmoved {
     }
 
     fn key(&self, part: usize) -> Option<u64> {
-        // The first parts may always be others.
+        // The terms of the first parts may change at any time.
         (part > 3).then_some(1)
     }
 }

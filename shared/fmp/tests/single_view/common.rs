@@ -1,4 +1,4 @@
-//! Small models and made-up evidence.
+//! Small models and synthetic evidence.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use fmp::{
     Springs,
 };
 
-/// Numbers that look random and depend on the seed only.
+/// Pseudorandom numbers that depend only on the seed.
 pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
@@ -26,7 +26,7 @@ impl Noise {
     }
 }
 
-/// A tree of `n_parts` with up to three types each, springs per child type or per pair.
+/// Returns a tree of `n_parts` parts with up to three types each, and springs per child type or per pair.
 pub(crate) fn tree(noise: &mut Noise, n_parts: usize) -> Arc<Model> {
     let mut parts: Vec<PartSpec> = Vec::new();
     let mut filters = Vec::new();
@@ -111,7 +111,7 @@ fn edge(noise: &mut Noise, parent: usize, n_parent: usize, n_types: usize) -> Ed
     }
 }
 
-/// Made-up responses on levels of the given sizes `[rows, cols]`.
+/// Synthetic responses on levels of the given sizes `[rows, cols]`.
 pub(crate) struct Evidence {
     pub(crate) layout: Layout,
     pub(crate) values: Vec<f32>,

@@ -1,4 +1,4 @@
-//! Models made from artificial images: the whole path from pixels to the pose.
+//! Tests with models made from synthetic images, from pixels to the pose.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ fn picture([width, height]: [usize; 2], [x0, y0]: [usize; 2]) -> Vec<u8> {
     data
 }
 
-/// Cells of the figure that the four parts' filters are cut from, and the filters' sizes.
+/// Cells of the figure from which the four parts' filters are cut, and the filters' sizes.
 const CUTS: [([usize; 2], [usize; 2]); 4] = [
     ([4, 2], [4, 4]),
     ([6, 7], [4, 4]),
@@ -34,7 +34,7 @@ const CUTS: [([usize; 2], [usize; 2]); 4] = [
     ([7, 11], [4, 2]),
 ];
 
-/// A model whose filters are cut out of the figure where it lies in `picture`.
+/// Returns a model whose filters are cut out of the figure in the given picture.
 fn planted(size: [usize; 2], at: [usize; 2], data: &[u8]) -> Arc<Model> {
     let filter = |[_, [rows, cols]]: [[usize; 2]; 2], weights| Filter {
         rows,
@@ -186,8 +186,8 @@ fn extractor_and_solver_give_the_result_of_the_reference() {
         (best.level, &best.parts)
     );
     assert!((f64::from(found.pose.score) - best.score).abs() < 1e-4);
-    // Plain sums are as exact as single precision is. Tiles round more, in proportion to the
-    // largest responses: 1.3e-5 of them was measured here.
+    // Plain sums are as exact as single precision allows. Tiles round more, in proportion to the
+    // largest responses: 1.3e-5 of the largest response was measured here.
     let mut plain = vec![f32::NAN; found.layout.n_responses()];
     Extractor::direct(Arc::clone(&model)).responses(image, &found.layout, &mut plain);
     let largest = plain.iter().fold(0.0_f32, |largest, it| largest.max(it.abs()));

@@ -11,7 +11,7 @@ use crate::other_view::OtherViews;
 
 const SIZES: [[usize; 2]; 5] = [[9, 20], [17, 7], [4, 35], [6, 6], [1, 1]];
 
-/// Sequences of terms made from few seeds, so that terms stay the same or return.
+/// Sequences of terms made from few seeds, so that terms often stay the same or return.
 fn times(n_parts: usize) -> impl Strategy<Value = Vec<(OtherViews, Guess)>> {
     let scale = prop_oneof![Just(0.0_f32), Just(0.25), Just(1.0), Just(1000.0)];
     let gain = prop_oneof![Just(-1.0_f32), Just(0.0), Just(0.125)];
@@ -40,7 +40,7 @@ fn times(n_parts: usize) -> impl Strategy<Value = Vec<(OtherViews, Guess)>> {
 enum Guess {
     None,
     Last,
-    /// On a level that is not offered.
+    /// A pose on a level that is not offered.
     Elsewhere,
 }
 
@@ -61,7 +61,7 @@ proptest! {
         let mut evidence = Evidence::new(&mut noise, &model, &SIZES);
         evidence.values.iter_mut().for_each(|value| *value += offset);
         evidence.levels.truncate(n_levels);
-        // Every level is a little worse than the one before it: some can be left out.
+        // Every level is a little worse than the one before it, so some levels can be skipped.
         for level in 0..SIZES.len() {
             let maps = evidence.layout.map_range(level, 0).start..evidence.layout.n_responses();
             evidence.values[maps].iter_mut().for_each(|value| *value -= 0.25);
@@ -91,7 +91,7 @@ proptest! {
 }
 
 proptest! {
-    /// The best pose loses on one part as much as a pose may lose.
+    /// The best pose loses the maximum allowed amount on one part.
     #[test]
     fn a_term_may_lose_all_of_the_slack(
         seed in any::<u64>(),
@@ -137,7 +137,7 @@ impl ExtraTerms for OnOnePart {
 }
 
 proptest! {
-    /// Bounds come from another process, and may be wrong.
+    /// The bounds come from another process, and may be wrong.
     #[test]
     fn wrong_bounds_do_not_panic(
         seed in any::<u64>(),
@@ -156,7 +156,7 @@ proptest! {
         for (terms, _) in &times {
             last = incremental.best(terms, last.as_ref());
             if let Some(pose) = &last {
-                // Panics if the pose does not lie on its level.
+                // Panics if a part of the pose is not on its level.
                 solver.score(&view, pose, Some(terms));
             }
         }
@@ -183,7 +183,7 @@ impl ExtraTerms for Everywhere {
     }
 }
 
-/// Solves the evidence at all times, with and without shortcuts.
+/// Solves the evidence with all terms in turn, with and without shortcuts.
 fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews, Guess)]) {
     let view = evidence.view();
     let bounds = solver.bounds(&view);
@@ -208,7 +208,7 @@ fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews
     }
 }
 
-/// A pose and the bits of its score.
+/// Returns a pose and the bits of its score.
 fn bits(pose: Option<&Pose>) -> Option<(u32, Pose)> {
     pose.map(|pose| (pose.score.to_bits(), pose.clone()))
 }

@@ -1,10 +1,10 @@
-//! Made-up terms of other views.
+//! Synthetic terms of other views.
 
 use fmp::ExtraTerms;
 
 use crate::common::Noise;
 
-/// Made-up terms of another view: every second part has a position term.
+/// Synthetic terms of another view: every second part has a position term.
 pub(crate) struct OtherView(pub(crate) u64);
 
 impl ExtraTerms for OtherView {
@@ -31,18 +31,18 @@ impl ExtraTerms for OtherView {
 #[derive(Debug)]
 pub(crate) struct OtherViews {
     pub(crate) seeds: Vec<u64>,
-    /// Added to every position term, none of which is larger.
+    /// Value added to every position term; no term exceeds it.
     pub(crate) gain: f32,
-    /// Multiplies all terms.
+    /// Factor by which all terms are multiplied.
     pub(crate) scale: f32,
-    /// True if the gain is given.
+    /// True if the gain is reported.
     pub(crate) known: bool,
 }
 
 impl ExtraTerms for OtherViews {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let mut terms = vec![0.0; score.len()];
-        // In `OtherView` even parts have a term under even seeds.
+        // In `OtherView`, even parts have a term under even seeds.
         let other = OtherView(2 * self.seeds[part]);
         let has_one = other.add_position(2 * part, level, first, &mut terms);
         for (score, term) in score.iter_mut().zip(terms) {
@@ -64,7 +64,7 @@ impl ExtraTerms for OtherViews {
     }
 
     fn key(&self, part: usize) -> Option<u64> {
-        // Some parts never say what they depend on.
+        // Some parts never report a key.
         let key = self.seeds[part] ^ (u64::from(self.gain.to_bits()) << 32);
         (!self.seeds[part].is_multiple_of(5)).then_some(key)
     }

@@ -1,4 +1,4 @@
-//! Searching a part of the pyramid gives what searching all of it gives, there.
+//! Searching a part of the pyramid gives the same results there as searching the whole pyramid.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use crate::common::{Evidence, Noise, tree};
 use crate::other_view::{OtherView, OtherViews};
 
-/// Three filters of several sizes on one part.
+/// Returns a model with three filters of several sizes on one part.
 fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
     let mut filter = |rows: usize, cols: usize| Filter {
         rows,
@@ -37,7 +37,7 @@ fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// A range of at least one of `n`, from two shares.
+/// Returns a range of at least one of `n` items, from two shares.
 fn cut(n: usize, shares: [f64; 2]) -> Range<usize> {
     let at = shares.map(|share| (share * n as f64) as usize);
     at[0].min(at[1])..at[0].max(at[1]) + 1
@@ -51,7 +51,7 @@ fn shares() -> impl Strategy<Value = Shares> {
     [two(), two(), two()]
 }
 
-/// A scope from shares of the levels, the columns and the rows.
+/// Returns a scope from shares of the levels, the columns and the rows.
 fn scope(layout: &Layout, [levels, x, y]: Shares) -> Scope {
     let levels = cut(layout.levels.len(), levels);
     let [x, y] = [(x, 0), (y, 1)].map(|(shares, axis)| {
@@ -66,7 +66,7 @@ fn scope(layout: &Layout, [levels, x, y]: Shares) -> Scope {
     .unwrap()
 }
 
-/// The responses of a scope, and those of the whole on its cells.
+/// Returns the responses of a scope, and those of the whole image on the same cells.
 fn both(
     extractor: &Extractor,
     (image, layout): (Rgb8View<'_>, &Layout),
@@ -90,10 +90,10 @@ fn both(
     [got, want]
 }
 
-/// How far apart a response of the scope and of the whole can be, one for every response.
+/// Returns the maximum difference between the response of the scope and that of the whole image, for every response.
 ///
-/// The bound of [`FilterBank::correlate`] for both, with the largest values that features can have:
-/// four clipped entries, half of their sum; eighteen, weighed as texture; 1.
+/// It is the bound of [`FilterBank::correlate`] for both, with the largest possible values of features:
+/// four clipped entries, half of their sum; eighteen, weighted as texture; 1.
 fn bounds(model: &Model, layout: &Layout, scope: &Scope) -> Vec<f64> {
     let filters = &model.spec().filters;
     let templates: Vec<_> = filters
@@ -128,7 +128,7 @@ fn bounds(model: &Model, layout: &Layout, scope: &Scope) -> Vec<f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Plain sums of the same features are the same bits, so these are the same features.
+    /// Plain sums of equal features are bit-identical, so equal sums show that the features are equal.
     #[test]
     fn a_scope_has_the_features_of_the_whole_image(
         size in [90..230_usize, 90..200_usize],
@@ -145,7 +145,7 @@ proptest! {
         let scope = scope(&layout, shares);
         let [got, want] = both(&Extractor::direct(Arc::clone(&model)), (image, &layout), &scope);
         prop_assert!(got == want, "{:?}", scope);
-        // Tiles begin elsewhere, so they round elsewhere.
+        // Tiles begin elsewhere, so they round differently.
         let [got, want] = both(&Extractor::new(Arc::clone(&model)), (image, &layout), &scope);
         let bounds = bounds(&model, &layout, &scope);
         for ((got, want), bound) in got.iter().zip(&want).zip(bounds) {
@@ -197,7 +197,7 @@ proptest! {
         }
     }
 
-    /// All that lies outside can as well be impossible.
+    /// A scope gives the same result as impossible scores on all cells outside it.
     #[test]
     fn the_solver_finds_the_best_pose_among_the_cells_that_have_values(
         seed in 0..1_u64 << 32,
@@ -245,7 +245,7 @@ proptest! {
             let seeds = (0..n_parts as u64).map(|i| seed ^ (i * round / 2)).collect();
             let others = OtherViews { seeds, gain: 0.5, scale: 0.3, known: true };
             let want = solver.best(&evidence.view(), Some(&others));
-            // A guess may lie where nothing has a value now.
+            // A guess may be at cells that have no value now.
             prop_assert_eq!(&incremental.best(&others, guess.as_ref()), &want);
             guess = guess.map(|mut guess| {
                 guess.parts[0].x = 0;

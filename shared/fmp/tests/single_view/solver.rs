@@ -1,4 +1,4 @@
-//! The solver against every pose that there is, on trees small enough to try them all.
+//! Compares the solver with an exhaustive search, on trees small enough to try every pose.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::common::{Evidence, Noise, tree};
 use crate::other_view::OtherView;
 
-/// Every pose on a level.
+/// Returns all poses on a level.
 fn all_poses(model: &Model, level: u16, [rows, cols]: [usize; 2]) -> Vec<Pose> {
     let mut all = vec![Vec::new()];
     for part in 0..model.n_parts() {
@@ -246,7 +246,7 @@ fn the_sweep_counter_counts_every_solved_level() {
     seen.push(solver.n_sweeps());
     assert_eq!(seen, [0, 2, 4]);
     let evidence = evidence.with_bounds(&bounds);
-    // Without a guess at least one level has to be solved.
+    // Without a guess, at least one level has to be solved.
     solver.incremental(&evidence).best(&OtherView(7), None);
     assert!(solver.n_sweeps() > 4);
 }

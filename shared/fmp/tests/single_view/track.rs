@@ -1,4 +1,4 @@
-//! Where the next pose is searched.
+//! Tests of where the next frame is searched.
 
 use fmp::{FrameTime, Layout, Model, Placement, Pose, Scope, TrackSettings, Tracker};
 
@@ -34,7 +34,7 @@ impl Scene {
         }
     }
 
-    /// Returns true if a frame is searched in full, given the score that is found then.
+    /// Returns true if a frame is searched in full, given the score that is found in it.
     fn is_full(&mut self, at: impl Into<FrameTime>, score: Option<f32>) -> bool {
         let (at, whole) = (at.into(), Scope::whole(&self.layout));
         let mut scope = self.tracker.scope(&self.layout, at);
@@ -47,7 +47,7 @@ impl Scene {
         scope == whole
     }
 
-    /// Which of ten frames are searched in full at a frame rate, all as good as the first.
+    /// Returns the frames, out of ten at a frame rate, that are searched in full if all scores equal the first.
     fn full_at(rate_hz: f64) -> Vec<u64> {
         let mut scene = Self::new(Some(TrackSettings {
             full_every: 1000,
@@ -61,7 +61,7 @@ impl Scene {
     }
 }
 
-/// Parts in columns 10 to 20 and rows 15 to 16 of level 4.
+/// Returns a pose with parts in columns 10 to 20 and rows 15 to 16 of level 4.
 fn pose(score: f32) -> Pose {
     let at = |x: u16, y: u16| Placement { x, y, mixture: 0 };
     Pose {
@@ -93,7 +93,7 @@ fn a_frame_without_a_pose_is_searched_in_full_and_so_is_the_next() {
     assert_eq!(full, [true, false, true, true, false]);
 }
 
-/// At one frame a second the person can be elsewhere in the next frame.
+/// At one frame per second, the person can be elsewhere in the next frame.
 #[test]
 fn at_low_rates_every_frame_is_searched_in_full_and_at_others_twice_a_second() {
     assert_eq!(Scene::full_at(1.0), (0..10).collect::<Vec<_>>());
@@ -119,7 +119,7 @@ fn the_search_margin_grows_with_the_time_since_the_last_pose() {
     let of = (&*scene.model, &scene.layout);
     scene.tracker.update(of, (first, &whole), Some(&pose));
     let [x1, _, x2, _] = pose.bounding_box(&scene.model, &scene.layout);
-    // Half a box's side at least, and a side more for every half of a second.
+    // At least half a side of the box, and one more side for every half second.
     for (seconds, share) in [(0.01, 0.5), (0.2, 0.5), (0.25, 0.5)] {
         let scope = scene.tracker.scope(&scene.layout, at(seconds));
         let begin = (x1 - share * (x2 - x1)).floor().max(0.0);
@@ -146,7 +146,7 @@ fn a_frame_after_a_gap_or_out_of_order_is_searched_in_full() {
 #[test]
 fn a_fallen_score_makes_the_same_frame_be_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
-    // Little by little counts as well; what the full search finds is the new measure.
+    // A gradual drop counts as well; the result of the full search is the new reference.
     let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];
     let full: Vec<bool> = (0..)
         .zip(scores)

@@ -1,4 +1,4 @@
-//! Every angle: its name, its joints, its formula.
+//! Definitions of all angles: names, joints, formulas.
 
 use core::fmt;
 
@@ -11,38 +11,37 @@ use crate::role::{Role, Side};
 /// An angle of a body. The axes of pelvis and thorax are x forwards, y upwards, z to the right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Angle {
-    /// Angle of the trunk (middle of the hips to the neck) from the vertical, forwards, in the direction that the hips face.
+    /// Forward angle of the trunk (midpoint of the hips to the neck) from the vertical, in the direction that the hips face.
     TrunkForwards,
-    /// The same to the person's right.
+    /// Angle of the trunk from the vertical towards the person's right.
     TrunkSideways,
-    /// Turn of the line of the shoulders about the trunk from that of the hips, positive to the left (right shoulder forwards).
+    /// Rotation of the shoulder line about the trunk relative to the hip line, positive to the left (right shoulder forwards).
     TrunkRotation,
-    /// Angle of the trunk from the plane perpendicular to the line of the hips: bent towards the right.
+    /// Angle of the trunk from the plane perpendicular to the hip line; positive if bent towards the right.
     TrunkBend,
-    /// Turn of the thigh about the line of the hips, forwards.
+    /// Forward rotation of the thigh about the hip line.
     HipFlexion(Side),
-    /// Angle of the thigh from the plane of flexion, outwards.
+    /// Outward angle of the thigh from the plane of flexion.
     HipAbduction(Side),
-    /// Turn about the thigh of the axis about which the knee bends, inwards.
+    /// Inward rotation of the knee's bending axis about the thigh.
     HipRotation(Side),
-    /// Between thigh and lower leg, 0 straight.
+    /// Angle between thigh and lower leg, 0 if straight.
     KneeFlexion(Side),
-    /// Angle of the foot (heel to toe) up from the perpendicular of the lower leg.
+    /// Upward angle of the foot (heel to toe) from the perpendicular of the lower leg.
     AnkleDorsiflexion(Side),
-    /// Between the upper arm and the trunk's downwards direction.
+    /// Angle between the upper arm and the trunk's downward direction.
     ShoulderElevation(Side),
     /// Plane of elevation: 0 sideways (abduction), 90 forwards (flexion).
     ShoulderPlane(Side),
-    /// Turn about the upper arm of the axis about which the elbow bends, inwards, from where the first two rotations put it: 0
-    /// for an arm that is held out sideways with the forearm forwards. For hanging arms the plane of elevation is not defined,
-    /// nor is this.
+    /// Inward rotation of the elbow's bending axis about the upper arm, relative to its position after the first two rotations. It is 0 for
+    /// an arm held out sideways with the forearm forwards. For hanging arms, neither the plane of elevation nor this angle is defined.
     ShoulderRotation(Side),
-    /// Between upper arm and forearm, 0 straight.
+    /// Angle between upper arm and forearm, 0 if straight.
     ElbowFlexion(Side),
 }
 
 impl Angle {
-    /// Every angle, in the order of files.
+    /// Returns all angles, in the order used in files.
     pub fn all() -> Vec<Self> {
         let trunk = [
             Self::TrunkForwards,
@@ -66,12 +65,12 @@ impl Angle {
         trunk.into_iter().chain(SIDES.into_iter().flat_map(of_side)).collect()
     }
 
-    /// Returns true if the angle is one with the vertical.
+    /// Returns true if the angle is measured from the vertical.
     pub fn needs_up(self) -> bool {
         matches!(self, Self::TrunkForwards | Self::TrunkSideways)
     }
 
-    /// The joints that it is between, in the order that `degrees` takes them.
+    /// Returns the joints that define the angle, in the order expected by `degrees`.
     pub fn roles(self) -> Vec<Role> {
         use Role::{Ankle, BigToe, Elbow, Heel, Hip, Knee, Neck, Shoulder, Wrist};
         use Side::{Left, Right};
@@ -95,7 +94,7 @@ impl Angle {
         }
     }
 
-    /// The angle, degrees; `None` where the points do not define it.
+    /// Returns the angle, in degrees; `None` if the points do not define it.
     ///
     /// * `points`: in the order of [`Self::roles`].
     pub(super) fn degrees(self, points: &[Vector3<f64>], up: &UnitVector3<f64>) -> Option<f64> {
@@ -151,7 +150,7 @@ impl Angle {
     }
 }
 
-/// 1 on the right, where z points outwards; -1 on the left.
+/// 1 on the right side, where z points outwards; -1 on the left side.
 fn outwards(side: Side) -> f64 {
     match side {
         Side::Right => 1.0,
@@ -159,12 +158,12 @@ fn outwards(side: Side) -> f64 {
     }
 }
 
-/// Returns true if two components are long enough to have a direction.
+/// Returns true if a vector with these two components is long enough to have a direction.
 fn is_told(a: f64, b: f64) -> bool {
     a.hypot(b) > LEAST_TILT
 }
 
-/// The line of the hips to the right, and the trunk.
+/// Returns the hip line towards the right, and the trunk.
 ///
 /// * `points`: right hip, left hip, neck, ...
 fn pelvis(points: &[Vector3<f64>]) -> Option<[Vector3<f64>; 2]> {
@@ -173,7 +172,7 @@ fn pelvis(points: &[Vector3<f64>]) -> Option<[Vector3<f64>; 2]> {
     Some([right, trunk])
 }
 
-/// The direction of the thigh in the axes of the pelvis, whose line of the hips is kept.
+/// Returns the direction of the thigh in the axes of the pelvis, in which the hip line is kept.
 fn thigh(side: Side, points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let [right, trunk] = pelvis(points)?;
     let hip = if side == Side::Right {
@@ -185,20 +184,20 @@ fn thigh(side: Side, points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     Some(axes_right(&right, &trunk)?.tr_mul(&thigh))
 }
 
-/// Joint coordinates of Grood & Suntay as in Wu et al. 2002: the third rotation, about the thigh.
+/// Returns the third rotation, about the thigh, in the joint coordinates of Grood & Suntay as in Wu et al. 2002.
 ///
-/// The knee bends about an axis from left to right that is perpendicular to thigh and lower leg; epicondyles are not known.
+/// The knee's bending axis points from left to right and is perpendicular to thigh and lower leg; the epicondyles are not known.
 fn hip_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
     let [right, trunk] = pelvis(points)?;
     let axes = axes_right(&right, &trunk)?;
     let thigh = thigh(side, points)?;
     let shank = axes.tr_mul(&direction(&points[3], &points[4])?);
-    // A bent knee points the lower leg backwards: the axis that it turns about points to the right on both sides.
+    // In a bent knee, the lower leg points backwards, so the bending axis points to the right on both sides.
     let hinge = shank.cross(&thigh).try_normalize(LEAST_BEND)?;
-    // After flexion and abduction alone the axis is here: perpendicular to the thigh, in the plane of the thigh and z.
+    // Bending axis after flexion and abduction alone: perpendicular to the thigh, in the plane of the thigh and z.
     let neutral = (Vector3::z() - thigh * thigh.z).try_normalize(LEAST_TILT)?;
     let turn = thigh.dot(&neutral.cross(&hinge)).atan2(neutral.dot(&hinge));
-    // A positive turn about the thigh, which points downwards, takes the right end of the axis backwards: outwards on the right.
+    // The thigh points downwards, so a positive rotation about it moves the right end of the axis backwards: outwards on the right side.
     Some((-outwards(side) * turn).to_degrees())
 }
 
@@ -210,7 +209,7 @@ fn trunk_rotation(points: &[Vector3<f64>]) -> Option<f64> {
     is_told(line.x, line.z).then(|| line.x.atan2(line.z).to_degrees())
 }
 
-/// The direction of the upper arm in the axes of the thorax, z outwards; and those axes with the sign of z.
+/// Returns the direction of the upper arm in the axes of the thorax with z outwards, and these axes with the sign of z.
 ///
 /// * `points`: right hip, left hip, neck, right shoulder, left shoulder, elbow, ...
 fn arm(side: Side, points: &[Vector3<f64>]) -> Option<(Vector3<f64>, nalgebra::Matrix3<f64>)> {
@@ -227,7 +226,7 @@ fn arm(side: Side, points: &[Vector3<f64>]) -> Option<(Vector3<f64>, nalgebra::M
     Some((arm, axes))
 }
 
-/// The third rotation of Y-X-Y as in Wu et al. 2005, with the axis about which the elbow bends in place of the epicondyles.
+/// Returns the third rotation of Y-X-Y as in Wu et al. 2005, with the elbow's bending axis instead of the epicondyles.
 fn shoulder_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
     let (arm, axes) = arm(side, points)?;
     if !is_told(arm.x, arm.z) {
@@ -235,19 +234,19 @@ fn shoulder_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
     }
     let mut forearm = axes.tr_mul(&direction(&points[5], &points[6])?);
     forearm.z *= outwards(side);
-    // Mirrored, the left is as the right. A hanging arm bends forwards about an axis that points outwards.
+    // After mirroring, the left arm equals the right one. A hanging arm bends forwards about an axis that points outwards.
     let hinge = arm.cross(&forearm).try_normalize(LEAST_BEND)?;
-    // The arm is elevated about x for abduction (plane 0), about -z for flexion (plane 90); without a third rotation the axis of the
-    // elbow stays perpendicular to that.
+    // The arm is elevated about x for abduction (plane 0), and about -z for flexion (plane 90). Without a third rotation, the elbow's
+    // bending axis stays perpendicular to this axis.
     let (sin, cos) = arm.x.atan2(arm.z).sin_cos();
     let neutral = arm.cross(&Vector3::new(cos, 0.0, -sin));
     let turn = arm.dot(&neutral.cross(&hinge)).atan2(neutral.dot(&hinge));
-    // The third rotation is about the arm upwards.
+    // The third rotation is about the arm, upwards.
     Some(-turn.to_degrees())
 }
 
 impl fmt::Display for Angle {
-    /// Its name in files, as `right knee flexion`.
+    /// Writes the name used in files, for example `right knee flexion`.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (side, name) = match self {
             Self::TrunkForwards => return out.write_str("trunk lean forwards"),

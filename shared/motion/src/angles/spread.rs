@@ -7,15 +7,15 @@ use super::Unknown;
 /// A position and its covariance.
 pub(super) type Place = (Vector3<f64>, Option<Matrix3<f64>>);
 
-/// The standard deviation of `angle` of joints that err independently; `None` if a covariance is not known.
+/// Returns the standard deviation of `angle` for joints with independent errors; `None` if a covariance is unknown.
 ///
-/// Second-order divided differences (Nørgaard, Poulsen & Ravn 2000): the angle is computed at the square root of three
-/// standard deviations to both sides along every axis of every covariance. Unlike derivatives these see that an angle bends,
-/// as that of a nearly straight knee; unlike the unscented transform the steps do not grow with the number of joints.
+/// The method is second-order divided differences (Nørgaard, Poulsen & Ravn 2000): the angle is computed at the square root of three
+/// standard deviations to both sides along every axis of every covariance. Unlike derivatives, these differences respond to the curvature
+/// of an angle, such as that of a nearly straight knee. Unlike in the unscented transform, the steps do not grow with the number of joints.
 ///
 /// # Errors
 ///
-/// [`Unknown::Uncertain`] if the angle is not defined as close by as the joints are uncertain.
+/// [`Unknown::Uncertain`] if the angle is undefined within the uncertainty of the joints.
 pub(super) fn sd(
     centre: f64,
     places: &[Place],
@@ -47,7 +47,7 @@ pub(super) fn sd(
     Ok(Some(variance.sqrt()))
 }
 
-/// A difference of angles the short way round, degrees.
+/// Wraps a difference of angles to the shorter direction, in degrees.
 fn turned(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }

@@ -1,4 +1,4 @@
-//! Files of a run, as people over time.
+//! Reads the files of a run as people over time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader};
@@ -12,34 +12,34 @@ use nalgebra::UnitVector3;
 use runfiles::{FrameLine, JointLine, Line as _, PersonLine};
 use serde_json::Value;
 
-/// A run.
+/// A finished run.
 #[derive(Debug)]
 pub struct Run {
-    /// The instants, seconds, ascending.
+    /// The instants, in seconds, in ascending order.
     pub times: Vec<f64>,
-    /// The number of the frame of every instant.
+    /// The frame number of every instant.
     pub frames: Vec<u64>,
-    /// The people, by ascending identity; all over the same instants.
+    /// The people, by ascending id; all over the same instants.
     pub people: Vec<Person>,
-    /// Part that is missing at the end of the file, in words.
+    /// Description of the part that is missing at the end of the file.
     pub cut: Option<String>,
 }
 
 /// A person of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Identities within the run, ascending: more than one if no frame had two people and the followed person had
-    /// several, one after the other.
+    /// Ids within the run, in ascending order. There are several if no frame had two people and the followed person had
+    /// several ids, one after the other.
     pub ids: Vec<u64>,
-    /// Identity at every instant; where the person is not there, the one before.
+    /// Id at every instant; the previous id at instants without the person.
     pub id_at: Vec<u64>,
     /// The measured joints.
     pub recorded: Recorded,
-    /// The joints before this are joints, the others extra keypoints.
+    /// Number of joints; the entries after these are extra keypoints.
     pub n_joints: usize,
 }
 
-/// A person on the way into a [`Person`].
+/// A [`Person`] while the lines are read.
 #[derive(Debug, Default)]
 struct Gathered {
     ids: BTreeSet<u64>,
@@ -50,7 +50,7 @@ struct Gathered {
 }
 
 impl Gathered {
-    /// Adds a line.
+    /// Adds the person of a line.
     fn add(&mut self, at: usize, person: &PersonLine) {
         let before = self.id_at.last().copied();
         self.id_at.resize(at, before.unwrap_or(person.id));
@@ -84,10 +84,10 @@ impl Gathered {
     }
 }
 
-/// Lines of `pose3d.jsonl`, one after the other.
+/// Reads the lines of `pose3d.jsonl`, one after the other.
 ///
-/// * `each`: gets every line and its number, from 0.
-/// * Returns what is missing at the end: a last line that is not whole.
+/// * `each`: called with every line and its number, counted from 0.
+/// * Returns a description of the missing part at the end, if the last line is incomplete.
 ///
 /// # Errors
 ///
@@ -136,7 +136,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
     let hint = if part.exists() {
         "the run has not ended: its files are still called *.part"
     } else {
-        "give the folder that `output` of the deployment names"
+        "give the folder that is `output` in the deployment"
     };
     in_file(path, error).with_hint(hint)
 }
@@ -149,7 +149,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     let mut people: BTreeMap<u64, Gathered> = BTreeMap::new();
-    // Whoever is followed: where never two people are there, it is one person, who gets another identity after a gap or a jump.
+    // If there are never two people at once, all ids are one person, who gets another id after a gap or a jump.
     let (mut one, mut is_one) = (Gathered::default(), true);
     let path = folder.join(FrameLine::FILE);
     let cut = read_lines(folder, |nth, line| {
@@ -157,17 +157,17 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
         let time_s = time_s.ok_or_else(|| {
             let what = format!("{}: line {} has no time", path.display(), nth + 1);
             Failure::new(ExitKind::Input, what)
-                .with_hint("--rate-hz says how many frames there are per second")
+                .with_hint("set the frames per second with --rate-hz")
         })?;
         if let Some(&before_s) = times.last()
             && time_s <= before_s
         {
             let what = format!(
-                "{}: line {} is at {time_s} s, not after {before_s} s of the line before it",
+                "{}: line {} is at {time_s} s, which is not after {before_s} s of the previous line",
                 path.display(),
                 nth + 1
             );
-            let hint = "lines must be in the order of their times; --rate-hz takes the times from the numbers of the frames";
+            let hint = "lines must be in the order of their times; with --rate-hz, the times follow from the frame numbers";
             return Err(Failure::new(ExitKind::Input, what).with_hint(hint));
         }
         for (nth, person) in line.people.iter().enumerate() {
@@ -183,7 +183,7 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
         Ok(())
     })?;
     if frames.is_empty() {
-        let what = format!("{} has no line", path.display());
+        let what = format!("{} has no lines", path.display());
         return Err(Failure::new(ExitKind::Input, what));
     }
     let people: Vec<Gathered> = match is_one {
@@ -200,7 +200,7 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     })
 }
 
-/// Adds the joints of a line; those that it does not name have not been measured.
+/// Adds the joints of a line; joints that the line does not contain were not measured.
 fn add<'a>(
     joints: &mut Vec<Joint>,
     at: usize,
@@ -222,14 +222,14 @@ fn add<'a>(
     }
 }
 
-/// Returns the deployment's description of itself in the folder of a run, if it can be read.
+/// Returns the deployment that is stored in the folder of a run, if it can be read.
 fn deployment_of(folder: &Path) -> Option<Value> {
     let text = files::read_text(&folder.join("deployment.json"), files::SETTINGS).ok()?;
     let value: Value = serde_json::from_str(&text).ok()?;
     value.get("deployment").cloned()
 }
 
-/// Against gravity in the world of a run: from its deployment, else from its calibration if that is still there.
+/// Returns the direction against gravity in the world of a run: from its deployment, otherwise from its calibration if that still exists.
 pub(crate) fn up(folder: &Path) -> Option<UnitVector3<f64>> {
     let deployment = deployment_of(folder)?;
     if let Ok(up) = serde_json::from_value::<[f64; 3]>(deployment.get("up")?.clone()) {

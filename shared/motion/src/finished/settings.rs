@@ -1,13 +1,13 @@
-//! How a finished run is smoothed.
+//! Settings for smoothing a finished run.
 
-/// How a finished run is smoothed.
+/// Settings for smoothing a finished run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// The method.
+    /// The smoothing method.
     pub method: Method,
-    /// Cutoff of [`Method::Butterworth`], Hz.
+    /// Cutoff of [`Method::Butterworth`], in Hz.
     pub cutoff_hz: f64,
-    /// The longest time between two measurements of a joint that is filled, seconds.
+    /// Maximum time between two measurements of a joint that is filled, in seconds.
     pub fill_s: f64,
     /// True if [`Method::Rts`] keeps the lengths of the limbs' bones constant over the run.
     pub constant_bones: bool,
@@ -24,25 +24,25 @@ impl Default for Settings {
     }
 }
 
-/// How a finished run is smoothed.
+/// Method for smoothing a finished run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// With everything before and after, on the measured covariances.
+    /// Uses everything before and after, with the measured covariances.
     #[default]
     Rts,
-    /// By a zero-phase low-pass filter.
+    /// Uses a zero-phase low-pass filter.
     Butterworth,
-    /// By causal filters on the measured covariances.
+    /// Uses causal filters with the measured covariances.
     Kalman,
-    /// Not at all.
+    /// Does not smooth.
     None,
 }
 
 impl Method {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 4] = [Self::Rts, Self::Butterworth, Self::Kalman, Self::None];
 
-    /// Its word on the command line.
+    /// Returns the name used on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rts => "rts",

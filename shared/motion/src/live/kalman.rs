@@ -1,7 +1,7 @@
-//! Several Kalman filters of different restlessness side by side, weighted by how well each has predicted lately.
+//! Several Kalman filters with different jerk densities side by side, weighted by the quality of their recent predictions.
 //!
-//! The static multiple-model estimator (Bar-Shalom, Li & Kirubarajan 2001, section 11.6.2) with a memory: what was seen
-//! long ago counts less, so that the weights follow a person who begins to run.
+//! This is the static multiple-model estimator (Bar-Shalom, Li & Kirubarajan 2001, section 11.6.2) with a limited memory. Old
+//! measurements count less, so the weights adapt to a person who begins to run.
 
 use core::f64::consts::PI;
 
@@ -12,22 +12,22 @@ use crate::noise::Prior;
 use crate::rts::{FREEDOM, GATE, weight};
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
 
-/// Filters, and of which jerk density the calmest and the next are, common logarithms beyond what is expected of the joint:
-/// most people run a hundred times more restlessly than they stand.
+/// Number of filters. The next constants are the jerk density of the calmest filter and the step to the next one, as common logarithms
+/// relative to the joint's expectation. Most people are a hundred times more restless running than standing.
 const N_MODELS: usize = 6;
 const CALMEST: f64 = -1.0;
 const APART: f64 = 1.0;
-/// While nothing is measured, accelerations go over, seconds.
+/// Time constant with which accelerations decay while nothing is measured, in seconds.
 const CALM_S: f64 = 0.1;
-/// For how long what was seen counts, seconds.
+/// Time for which measurements count in the weights, in seconds.
 const MEMORY_S: f64 = 2.0;
-/// A joint that was not measured for longer begins anew, seconds.
+/// Maximum time without a measurement before a joint starts anew, in seconds.
 const FORGET_S: f64 = 1.0;
-/// Scales of covariances that are believed.
+/// Minimum and maximum plausible scale of covariances.
 const SCALES: [f64; 2] = [1e-2, 1e2];
-/// This many measurements in a row that contradict what was expected are right, and it is not.
+/// After this many successive measurements that contradict the prediction, the measurements are trusted instead of the prediction.
 const MOST_REJECTED: u32 = 5;
-/// Frequency of the movement whose delay is said, Hz.
+/// Frequency of the movement for which the delay is reported, in Hz.
 const DELAY_HZ: f64 = 1.0;
 
 /// The filters of one joint.
@@ -42,11 +42,11 @@ pub(super) struct Models {
 
 #[derive(Debug, Clone, Copy)]
 struct Model {
-    /// Jerk density over the scale of the covariances, m²/s⁵.
+    /// Jerk density divided by the scale of the covariances, in m²/s⁵.
     ratio: f64,
     belief: Belief,
     scale: f64,
-    /// Discounted logarithm of the likelihood.
+    /// Discounted log-likelihood.
     score: f64,
 }
 
@@ -61,7 +61,7 @@ impl Models {
         }
     }
 
-    /// * Returns the position, predicted where nothing was measured; and the delay of movement at 1 Hz, seconds.
+    /// * Returns the position, predicted if nothing was measured, and the delay of movement at 1 Hz, in seconds.
     pub(super) fn step(
         &mut self,
         time_s: f64,
@@ -120,7 +120,7 @@ impl Models {
         )
     }
 
-    /// Begins at a measurement.
+    /// Starts anew from a measurement.
     fn begin(&mut self, measured: Option<(Vector3<f64>, Matrix3<f64>)>) -> Smoothed {
         let Some((position, covariance)) = measured else {
             return Err(Absent::Gap);
@@ -148,7 +148,7 @@ impl Models {
 impl Model {
     /// Uses a measurement.
     ///
-    /// * Returns the gain of position, velocity and acceleration, the mean of the axes.
+    /// * Returns the gain of position, velocity and acceleration, averaged over the axes.
     fn update(
         &mut self,
         position: &Vector3<f64>,
@@ -179,7 +179,7 @@ impl Model {
     }
 }
 
-/// The share of every filter.
+/// Returns the weight of every filter; the weights sum to 1.
 fn shares(models: &[Model; N_MODELS]) -> [f64; N_MODELS] {
     let best = models.iter().map(|model| model.score).fold(f64::NEG_INFINITY, f64::max);
     let odds = models.each_ref().map(|model| (model.score - best).exp());
@@ -187,7 +187,7 @@ fn shares(models: &[Model; N_MODELS]) -> [f64; N_MODELS] {
     odds.map(|odd| odd / sum)
 }
 
-/// Returns the estimate of all filters together; `None` if that is not a number.
+/// Returns the combined estimate of all filters; `None` if it is not a number.
 fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
     let shares = shares(models);
     let mut position = Vector3::zeros();
@@ -207,7 +207,7 @@ fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
     })
 }
 
-/// Amount by which a filter with this gain delays movement at [`DELAY_HZ`], seconds: its phase there. Negative where it
+/// Delay of movement at [`DELAY_HZ`] by a filter with this gain, in seconds, computed from its phase. Negative if the filter
 /// runs ahead.
 fn delay_s(gain: Vector3<f64>, dt: f64) -> f64 {
     let transition = Matrix3::new(1.0, dt, 0.5 * dt * dt, 0.0, 1.0, dt, 0.0, 0.0, 1.0);

@@ -1,14 +1,14 @@
-//! The smoother on tracks whose truth is known.
+//! Tests of the smoother on tracks whose truth is known.
 
 use super::*;
 use crate::{Joint, Measured, Recorded, Role, Settings, Side, Sides, State};
 
-/// A standard normal number, nearly: of 12 uniform ones.
+/// Returns an approximately standard normal number: the sum of 12 uniform ones.
 fn normal(random: &mut fastrand::Rng) -> f64 {
     (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
 }
 
-/// A wrist that swings, 20 cm at 1 Hz, in metres.
+/// Returns a swinging wrist, 20 cm at 1 Hz, in metres.
 fn swing(time: f64) -> Vector3<f64> {
     let turn = core::f64::consts::TAU * time;
     Vector3::new(
@@ -190,7 +190,7 @@ fn somebody_else_begins_anew() {
 #[test]
 fn bones_that_are_asked_for_are_constant() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 5.0);
-    // A forearm: an elbow below the wrist, with errors of its own.
+    // The elbow of the forearm is below the wrist, with its own errors.
     let mut elbow = recorded.joints[0].clone();
     elbow.name = "right elbow".to_owned();
     elbow.role = Some(Role::Elbow(Side::Right));
@@ -247,7 +247,7 @@ fn numbers_that_are_none_and_irregular_times_come_through() {
             _ => {}
         }
     }
-    // The truth is at the times that were said before.
+    // The truth is at the original times.
     for (at, it) in recorded.times.iter_mut().enumerate() {
         *it += if at % 2 == 0 { 0.004 } else { 0.0 };
     }

@@ -6,9 +6,9 @@ use crate::{Compatibility, TypeTables};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// Co-occurrences of part types of pairs of views.
+/// Co-occurrences of part types in pairs of views.
 ///
-/// Row-major matrix of every part `i` of the first view, `[type in first view][type in second view]`, where the part of the
+/// There is one row-major matrix `[type in first view][type in second view]` for every part `i` of the first view. The part of the
 /// second view is the one that shows the same limb.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,12 +35,12 @@ pub enum Appearance {
 pub struct Shape {
     /// Number of types of every part.
     pub n_types: Vec<usize>,
-    /// The part on the other side of every part; the parts themselves if the model has no sides.
+    /// For every part, the part on the other side; the parts themselves if the model has no sides.
     pub mirror: Vec<usize>,
 }
 
 impl Shape {
-    /// The part of the second view that shows what `part` of the first shows.
+    /// Returns the part of the second view that shows the same limb as `part` of the first view.
     pub(crate) fn partner(&self, part: usize, exchanged: bool) -> usize {
         if exchanged { self.mirror[part] } else { part }
     }
@@ -55,7 +55,7 @@ impl Shape {
 }
 
 impl Counts {
-    /// Nothing counted yet.
+    /// Creates empty counts.
     pub fn new(shape: &Shape) -> Self {
         let empty = |exchanged| {
             let sizes = shape.sizes(exchanged);
@@ -69,11 +69,11 @@ impl Counts {
 
     /// Counts one part of one pair of views.
     ///
-    /// * `types`: of the part in the first view, and of its partner in the second.
+    /// * `types`: types of the part in the first view, and of its partner in the second.
     ///
     /// # Panics
     ///
-    /// If the part or one of the types is not of the shape it was made with.
+    /// If the part or one of the types is out of range for the shape.
     pub fn add(&mut self, shape: &Shape, part: usize, types: [usize; 2], exchanged: bool) {
         let n = shape.n_types[shape.partner(part, exchanged)];
         let cells = &mut self.of_mut(exchanged)[part];
@@ -81,7 +81,7 @@ impl Counts {
         *cell = cell.saturating_add(1);
     }
 
-    /// Number of co-occurrences, all parts.
+    /// Returns the number of co-occurrences over all parts.
     pub fn total(&self) -> u64 {
         let both = self.same.iter().chain(&self.exchanged).flatten();
         both.map(|count| u64::from(*count)).sum()
@@ -111,12 +111,12 @@ impl Counts {
         }
     }
 
-    /// `p(type in first view, type in second view)` of every part.
+    /// Returns `p(type in first view, type in second view)` for every part.
     ///
-    /// The counts plus `weight` observations of independent types, so that rare pairs of types and rare
+    /// The counts are extended by `weight` observations of independent types, so that rare pairs of types and rare
     /// angles carry little information.
     ///
-    /// * `marginals`: how frequent every type of every part is; see [`marginals`].
+    /// * `marginals`: frequency of every type of every part; see [`marginals`].
     pub fn joint(
         &self,
         shape: &Shape,
@@ -137,7 +137,7 @@ impl Counts {
         sizes.map(matrix).collect()
     }
 
-    /// The tables of a pair of views.
+    /// Returns the tables of a pair of views.
     pub fn tables(
         &self,
         shape: &Shape,
@@ -175,7 +175,7 @@ fn lift(joint: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The frequency of every type of every part over all counts, with one extra observation of each type.
+/// Returns the frequency of every type of every part over all counts, with one extra observation of each type.
 pub fn marginals(shape: &Shape, all: &[&Counts]) -> Vec<Vec<f64>> {
     let mut sums: Vec<Vec<f64>> = shape.n_types.iter().map(|&n| vec![1.0; n]).collect();
     for counts in all {

@@ -10,11 +10,11 @@ use crate::learned::counts::{Appearance, Counts, Shape, marginals};
 
 /// The format name of a consistency file.
 const FORMAT: &str = "parallax-consistency";
-/// The version that is written, and the only one that is read.
+/// The version that is written, and the only version that can be read.
 const VERSION: u32 = 1;
-/// Most bins of half the circle.
+/// Maximum number of bins of half the circle.
 const MAX_BINS: usize = 180;
-/// The expected size of tables.
+/// The expected size of tables, for error messages.
 const SIZED: &str = "a matrix of counts for every part, as large as its types";
 
 /// The consistency parameters of one model.
@@ -35,35 +35,35 @@ const SIZED: &str = "a matrix of counts for every part, as large as its types";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Learned {
-    /// `parallax-consistency`.
+    /// The format name, `parallax-consistency`.
     pub format: String,
-    /// 1.
+    /// The format version, 1.
     pub version: u32,
-    /// The model that it belongs to.
+    /// The model to which the file belongs.
     pub model: ModelOf,
     /// The amount of training data.
     pub learned: LearnedFrom,
     /// Weights of the terms.
     pub weights: Weights,
-    /// Thresholds of the expected error, one per part, tenths of the person's size.
+    /// Thresholds of the expected error, one per part, in tenths of the person's size.
     pub tau_tenths: Vec<f32>,
     /// Observations of independent types that are added to every table.
     pub smoothing: f64,
-    /// By angle.
+    /// Tables by angle.
     pub ring: Vec<Counts>,
-    /// By name.
+    /// Tables by rig name.
     pub rigs: Vec<NamedRig>,
-    /// From parts to joints.
+    /// Maps from parts to joints.
     pub joints: Vec<JointWeights>,
 }
 
-/// The model that types are of.
+/// The model to which the types belong.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelOf {
     /// Fingerprint of the model file.
     pub fingerprint: String,
-    /// Its parts and types.
+    /// Parts and types of the model.
     pub shape: Shape,
 }
 
@@ -71,11 +71,11 @@ pub struct ModelOf {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LearnedFrom {
-    /// Instants.
+    /// Number of instants.
     pub instants: u64,
-    /// Pictures of them.
+    /// Number of pictures of these instants.
     pub views: u64,
-    /// Instants that the weights were chosen on.
+    /// Number of held-out instants on which the weights were chosen.
     pub held_out: u64,
 }
 
@@ -94,7 +94,7 @@ pub struct Weights {
 }
 
 impl Default for Weights {
-    /// Those of `crate::Settings`.
+    /// Returns the weights of `crate::Settings`.
     fn default() -> Self {
         let settings = crate::Settings::default();
         let cap = settings.max_distance_cells;
@@ -111,9 +111,9 @@ impl Default for Weights {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NamedRig {
-    /// Its name.
+    /// Name of the rig.
     pub name: String,
-    /// Its pairs.
+    /// Pairs of cameras of the rig.
     pub pairs: Vec<NamedPair>,
 }
 
@@ -121,9 +121,9 @@ pub struct NamedRig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NamedPair {
-    /// The two cameras.
+    /// Names of the two cameras.
     pub cameras: [String; 2],
-    /// Their counts.
+    /// Counts of the pair.
     pub counts: Counts,
 }
 
@@ -133,40 +133,38 @@ pub struct NamedPair {
 pub struct JointWeights {
     /// Name of the set.
     pub set: String,
-    /// A row for each joint, a number for each part.
+    /// One row for each joint, with one number for each part.
     pub weights: Vec<Vec<f64>>,
 }
 
-/// Why a text is not a consistency file.
+/// Reason why a text is not a consistency file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// It is not JSON of this layout.
+    /// The text is not JSON of this layout.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
-    /// It is something else, or of another version.
+    /// The text has another format or another version.
     #[error("`{format}` version {version}, expected `{FORMAT}` version {VERSION}")]
     Version {
-        /// Its format name.
+        /// Format name in the text.
         format: String,
-        /// Its version.
+        /// Version in the text.
         version: u32,
     },
     /// A value is out of range, or of the wrong size.
     #[error("`{field}` is not {expected}")]
     Value {
-        /// Where.
+        /// Name of the field.
         field: String,
         /// The expected value.
         expected: &'static str,
     },
-    /// It was learned for another model.
-    #[error(
-        "it was learned for a model whose parts have {got:?} types; this one's have {expected:?}"
-    )]
+    /// The file was learned for another model.
+    #[error("it was learned for a model with {got:?} types per part; this model has {expected:?}")]
     Model {
-        /// Types of every part in the file.
+        /// Number of types of every part in the file.
         got: Vec<usize>,
-        /// In the model.
+        /// Number of types of every part in the model.
         expected: Vec<usize>,
     },
 }
@@ -194,7 +192,7 @@ impl Learned {
     ///
     /// # Errors
     ///
-    /// [`FileError::Json`], for numbers that JSON does not have.
+    /// [`FileError::Json`] for numbers that JSON cannot represent.
     pub fn write(&self) -> Result<String, FileError> {
         Ok(serde_json::to_string(self)? + "\n")
     }
@@ -204,7 +202,7 @@ impl Learned {
         (FORMAT.to_owned(), VERSION)
     }
 
-    /// Checks that it belongs to a model.
+    /// Checks that the file belongs to a model.
     ///
     /// # Errors
     ///
@@ -219,7 +217,7 @@ impl Learned {
         })
     }
 
-    /// Tables for any pair of cameras.
+    /// Returns the tables for any pair of cameras.
     pub fn by_angle(&self, appearance: Appearance) -> AngleTables {
         let marginals = self.marginals();
         let tables = |counts: &Counts| {
@@ -229,7 +227,7 @@ impl Learned {
         AngleTables::new(half, &self.model.shape.mirror)
     }
 
-    /// Tables of the cameras of a rig that was learned by name: pairs of indices, the smaller one first.
+    /// Returns the tables of the cameras of a rig that was learned by name, as pairs of camera indices, the smaller index first.
     ///
     /// * Returns `None` if no rig of that name was learned.
     pub fn of_rig(
@@ -253,7 +251,7 @@ impl Learned {
         Some(rig.pairs.iter().filter_map(pair).collect())
     }
 
-    /// The map from parts to the joints of a set, if one was learned.
+    /// Returns the map from parts to the joints of a set, if one was learned.
     pub fn joint_map(&self, set: &JointSet) -> Option<Arc<JointMap>> {
         let found = self.joints.iter().find(|joint| joint.set == set.name)?;
         JointMap::new(found.weights.clone()).map(Arc::new)

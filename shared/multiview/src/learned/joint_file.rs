@@ -1,4 +1,4 @@
-//! The file beside a model that says where joints lie among its parts.
+//! The file beside a model that defines where joints are relative to its parts.
 
 use std::sync::Arc;
 
@@ -9,35 +9,35 @@ use crate::learned::local::own;
 
 /// The format name of a file of joints.
 const FORMAT: &str = "parallax-joints";
-/// The version that is written, and the only one that is read.
+/// The version that is written, and the only version that can be read.
 const VERSION: u32 = 1;
-/// Largest size of a weight.
+/// Maximum absolute value of a weight.
 const MOST: f64 = 10.0;
-/// How far the sum of a row may be from 1.
+/// Maximum difference of the sum of a row from 1.
 const SUM_TOLERANCE: f64 = 1e-6;
 
-/// Where the joints of `skeleton::PARSE14` lie among the parts of one model.
+/// Positions of the joints of `skeleton::PARSE14` relative to the parts of one model.
 ///
-/// As a file it is one object of JSON; all fields must be there, others are refused.
+/// The file is a single JSON object; all fields are required, and others are refused.
 ///
 /// | field | what |
 /// |---|---|
 /// | `format`, `version` | `"parallax-joints"`, 1 |
-/// | `model` | 16 hexadecimal digits: FNV-1a of the model file that it was learned with |
+/// | `model` | 16 hexadecimal digits: FNV-1a of the model file with which it was learned |
 /// | `joints` | the joints: `name`, in the order of `parse14`, and `weights`, one per part of the model, which sum to 1 |
-/// | `learned` | how it was learned: `reach` and `ridge`, and of every data set (`sets`) its `name`, its `people`, those `found`, and the mean error before and after (`error_before`, `error_after`): percent of the person's size, at most 10 each, of people left out in turn |
+/// | `learned` | how it was learned: `reach` and `ridge`, and for every data set (`sets`) its `name`, its `people`, those `found`, and the mean error before and after (`error_before`, `error_after`): percent of the person's size, at most 10 each, of people left out in turn |
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointFile {
-    /// `parallax-joints`.
+    /// The format name, `parallax-joints`.
     pub format: String,
-    /// 1.
+    /// The format version, 1.
     pub version: u32,
     /// Fingerprint of the model file.
     pub model: String,
-    /// The joints.
+    /// Weights of every joint.
     pub joints: Vec<JointRow>,
-    /// How they were learned.
+    /// Settings and results of the learning.
     pub learned: JointsLearned,
 }
 
@@ -45,58 +45,58 @@ pub struct JointFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointRow {
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
-    /// One number for each part.
+    /// Weights, one for each part.
     pub weights: Vec<f64>,
 }
 
-/// How joints were learned.
+/// Settings and results of the learning of joints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointsLearned {
-    /// Bones between a joint's own part and the farthest one that determines where it lies.
+    /// Maximum number of bones between a joint's own part and a part that determines its position.
     pub reach: usize,
-    /// Cost of weights.
+    /// Cost of a weight on other parts than the joint's own.
     pub ridge: f64,
-    /// The data sets.
+    /// The data sets from which the joints were learned.
     pub sets: Vec<LearnedSet>,
 }
 
-/// A data set that joints were learned from.
+/// A data set from which joints were learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LearnedSet {
-    /// Its name.
+    /// Name of the data set.
     pub name: String,
-    /// People.
+    /// Number of people.
     pub people: u64,
-    /// Those of them who were found.
+    /// Number of people who were found.
     pub found: u64,
     /// Mean error of the parts themselves.
     pub error_before: f64,
-    /// Mean error of the joints, of people that they were not learned from.
+    /// Mean error of the joints on people who were left out of the learning.
     pub error_after: f64,
 }
 
-/// Why a text is not a file of joints.
+/// Reason why a text is not a file of joints.
 #[derive(Debug, thiserror::Error)]
 pub enum JointFileError {
-    /// It is not JSON of this layout.
+    /// The text is not JSON of this layout.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
-    /// It is something else, or of another version.
+    /// The text has another format or another version.
     #[error("`{format}` version {version}, expected `{FORMAT}` version {VERSION}")]
     Version {
-        /// Its format name.
+        /// Format name in the text.
         format: String,
-        /// Its version.
+        /// Version in the text.
         version: u32,
     },
     /// A value is out of range, or of the wrong size.
     #[error("`{field}` is not {expected}")]
     Value {
-        /// Where.
+        /// Name of the field.
         field: String,
         /// The expected value.
         expected: String,
@@ -104,7 +104,7 @@ pub enum JointFileError {
 }
 
 impl JointFile {
-    /// A file of the rows that [`Local::learn`](crate::learned::Local::learn) gave.
+    /// Creates a file from the rows returned by [`Local::learn`](crate::learned::Local::learn).
     ///
     /// * `model`: fingerprint of the model file.
     pub fn new(model: String, rows: Vec<Vec<f64>>, learned: JointsLearned) -> Self {
@@ -141,11 +141,11 @@ impl JointFile {
         Ok(read)
     }
 
-    /// Writes the text that [`Self::parse`] reads: a joint a line.
+    /// Writes the text that [`Self::parse`] reads, with one joint per line.
     ///
     /// # Errors
     ///
-    /// [`JointFileError::Json`], for numbers that JSON does not have.
+    /// [`JointFileError::Json`] for numbers that JSON cannot represent.
     pub fn write(&self) -> Result<String, JointFileError> {
         let joints: Result<Vec<_>, _> = self.joints.iter().map(serde_json::to_string).collect();
         Ok(format!(
@@ -156,7 +156,7 @@ impl JointFile {
         ))
     }
 
-    /// The map from the 26 parts to the joints of a set, all of which are made of those of `skeleton::PARSE14`.
+    /// Returns the map from the 26 parts to the joints of a set. All joints of the set must be made of joints of `skeleton::PARSE14`.
     ///
     /// * Returns `None` for a set with a part that is not a joint there.
     pub fn map(&self, set: &JointSet) -> Option<Arc<JointMap>> {

@@ -1,4 +1,4 @@
-//! Tests of learning from made-up people, and of files with errors.
+//! Tests of learning from synthetic people, and of files with errors.
 
 use proptest::prelude::*;
 use skeleton::{HUMANEVA20, JointSet, MIRROR, N_PARTS, PARSE14, UMPM15};
@@ -11,10 +11,10 @@ const SETTINGS: Local = Local {
     reach: 2,
     ridge: 1e-4,
 };
-/// Share of the way from the hip part to the knee part's far side by which a marked knee lies beyond it.
+/// Distance of an annotated knee beyond its part, as a share of the distance between the thigh part and the knee part.
 const BEYOND: f64 = 0.25;
 
-/// Somebody in a pose of their own, whose knees lie beyond their parts, away from the thigh.
+/// Returns a person in a random pose whose knees are beyond their parts, away from the thigh.
 fn person(random: &mut fastrand::Rng, noise_px: f64) -> Marked {
     let mut noise = |most: f64| most * (2.0 * random.f64() - 1.0);
     let upright = |part: usize| -> [f64; 2] {
@@ -62,7 +62,7 @@ fn people(seed: u64, n: usize, noise_px: f64) -> Vec<Marked> {
     (0..n).map(|_| person(&mut random, noise_px)).collect()
 }
 
-/// Parts of every fifth person lie anywhere.
+/// Moves the parts of every fifth person to random places.
 fn with_wrong_ones(mut people: Vec<Marked>) -> Vec<Marked> {
     let mut random = fastrand::Rng::with_seed(7);
     for person in people.iter_mut().step_by(5) {
@@ -77,7 +77,7 @@ fn learn(people: &[Marked]) -> Vec<Vec<f64>> {
     SETTINGS.learn(&[people.iter().collect()])
 }
 
-/// The weights of the knee's own part and of the thigh.
+/// Returns the weights of the knee's own part and of the thigh.
 fn knee(rows: &[Vec<f64>]) -> [f64; 2] {
     [rows[1][11], rows[1][10]]
 }
@@ -219,7 +219,7 @@ fn a_wrong_file_is_refused_with_the_field() {
     for (words, change) in cases {
         let mut it = file();
         change(&mut it);
-        // Format and version are written as they must be.
+        // Format and version are written correctly.
         let text = it.write().unwrap();
         let text = text.replace("parallax-joints", &it.format);
         let text = text.replace("\"version\":1", &format!("\"version\":{}", it.version));

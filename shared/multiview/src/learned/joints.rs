@@ -8,22 +8,22 @@ use crate::learned::JointWeights;
 /// One person in one picture: the detected parts, named by the side of the body, and a true joint.
 #[derive(Debug, Clone, Copy)]
 pub struct JointSample<'a> {
-    /// Centres of the 26 parts, pixels.
+    /// Centres of the 26 parts, in pixels.
     pub centres: &'a [[f64; 2]],
-    /// The true joint, pixels.
+    /// The true joint, in pixels.
     pub joint: [f64; 2],
-    /// The parts whose mean it is by default (`skeleton::Joint::parts`).
+    /// The parts whose mean is the joint by default (`skeleton::Joint::parts`).
     pub parts: &'static [usize],
-    /// Size of the person, pixels.
+    /// Size of the person, in pixels.
     pub size: f64,
 }
 
 /// Ridge regression for every known joint.
 ///
-/// A joint is the mean of its own parts, plus a weighted sum of all parts relative to it. So the map is
+/// A joint is the mean of its own parts, plus a weighted sum of the offsets of all parts from that mean. So the map is
 /// invariant to translation, rotation and scale. The weights minimise the squared error in units of the
-/// person's size plus `ridge` per sample times their squares, so that rare joints stay close to the default.
-/// Every person counts as its mirror image too.
+/// person's size, plus `ridge` per sample times the squared weights, so that rare joints stay close to the default.
+/// The mirror image of every person is added as well.
 #[derive(Debug, Clone, Default)]
 pub struct JointFit {
     joints: Vec<Normal>,
@@ -82,7 +82,7 @@ impl JointFit {
         }
     }
 
-    /// The map for a set, with rows for all its joints; joints without samples keep their default.
+    /// Returns the map for a set, with rows for all its joints; joints without samples keep their default.
     pub fn solve(&self, set: &JointSet, ridge: f64) -> JointWeights {
         let rows = set.joints.iter().map(|joint| self.row(joint.parts, ridge));
         JointWeights {
@@ -93,7 +93,7 @@ impl JointFit {
 
     fn row(&self, parts: &[usize], ridge: f64) -> Vec<f64> {
         let Some(joint) = self.joints.iter().find(|joint| joint.parts == parts) else {
-            // The mean of joints that may have samples of their own.
+            // The joint is the mean of joints that may have samples of their own.
             let n = parts.len() as f64;
             return match parts {
                 [part] => unit(*part),
@@ -112,7 +112,7 @@ impl JointFit {
         row.map(|(weight, own)| rounded(weight + left * own)).collect()
     }
 
-    /// Mean squared error of another fit's maps on the samples of this one, in units of the person's size;
+    /// Returns the mean squared error of another fit's maps on the samples of this one, in units of the person's size;
     /// `None` without samples.
     pub fn error_of(&self, other: &Self, ridge: f64) -> Option<f64> {
         let n: f64 = self.joints.iter().map(|joint| joint.n).sum();
@@ -142,7 +142,7 @@ impl Normal {
         Some(factors.solve(&self.targets))
     }
 
-    /// Sum of squared errors.
+    /// Returns the sum of squared errors.
     fn error(&self, weights: &DVector<f64>) -> f64 {
         let quadratic = weights.dot(&(&self.products * weights));
         (self.squares - 2.0 * weights.dot(&self.targets) + quadratic).max(0.0)
@@ -166,7 +166,7 @@ fn rounded(weight: f64) -> f64 {
     (weight * 1e6).round() / 1e6
 }
 
-/// The parts of the joint on the other side.
+/// Returns the parts of the joint on the other side.
 fn mirror_of(parts: &[usize]) -> Option<&'static [usize]> {
     let mut mirrored: Vec<usize> = parts.iter().map(|&part| MIRROR[part]).collect();
     mirrored.sort_unstable();

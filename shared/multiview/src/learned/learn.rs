@@ -12,11 +12,11 @@ use crate::learned::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights
 /// Settings of the learning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Bins of half the circle.
+    /// Number of bins of half the circle.
     pub n_bins: usize,
-    /// Error up to which the type of a part counts, its parent's too; tenths of the person's size.
+    /// Maximum error at which the type of a part counts, also for its parent; in tenths of the person's size.
     pub max_error: f32,
-    /// Mean error of a person up to which it is used for the joint map, the same unit.
+    /// Maximum mean error of a person who is used for the joint map, in tenths of the person's size.
     pub max_mean_error: f32,
     /// Observations of independent types added to every table.
     pub smoothing: f64,
@@ -38,15 +38,15 @@ impl Default for Settings {
 pub struct ViewObservation {
     /// Type of every part.
     pub types: Vec<u8>,
-    /// Centres of all parts, pixels; parts as the model names them.
+    /// Centres of all parts, in pixels; parts are named as by the model.
     pub centres: Vec<[f64; 2]>,
-    /// Error of every part, tenths of the person's size.
+    /// Error of every part, in tenths of the person's size.
     pub errors: Vec<f32>,
     /// True if left and right are exchanged according to the ground truth: the person is seen from behind.
     pub exchanged: bool,
-    /// Size of the person, pixels.
+    /// Size of the person, in pixels.
     pub size: f64,
-    /// The true joints of the joint set, pixels; `None` where one is not known.
+    /// The true joints of the joint set, in pixels; `None` for an unknown joint.
     pub joints: Vec<Option<[f64; 2]>>,
 }
 
@@ -55,24 +55,24 @@ pub struct ViewObservation {
 pub struct Pair<'a> {
     /// Observations of the two views.
     pub views: [&'a ViewObservation; 2],
-    /// The angle from the first to the second as seen from the person (`crate::angle_between`), radians.
+    /// The angle from the first to the second view as seen from the person (`crate::angle_between`), in radians.
     pub angle: Option<f64>,
     /// Names of the two cameras, if their pair is also learned by name.
     pub cameras: Option<[&'a str; 2]>,
 }
 
-/// Why nothing was learned.
+/// Reason why nothing was learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LearnError {
     /// No view was close enough to the truth.
     #[error("none of {views} views is near the truth, so nothing can be learned from them")]
     Nothing {
-        /// Views seen.
+        /// Number of views seen.
         views: u64,
     },
 }
 
-/// Learns from one instant after the other; their order only affects rounding in the joints.
+/// Learns from one instant after the other; the order of instants only affects rounding in the joints.
 #[derive(Debug, Clone)]
 pub struct Learner {
     settings: Settings,
@@ -86,7 +86,7 @@ pub struct Learner {
 }
 
 impl Learner {
-    /// A learner without data.
+    /// Creates a learner without data.
     pub fn new(shape: Shape, settings: Settings) -> Self {
         Self {
             ring: vec![Counts::new(&shape); settings.n_bins.max(1)],
@@ -101,7 +101,7 @@ impl Learner {
 
     /// Adds one view.
     ///
-    /// * `set`: of its joints.
+    /// * `set`: joint set of the view.
     pub fn add_view(&mut self, view: &ViewObservation, set: &'static JointSet) {
         self.from.views += 1;
         for (all, error) in self.errors.iter_mut().zip(&view.errors) {
@@ -163,7 +163,7 @@ impl Learner {
         self.named[at].counts.add(&self.shape, part, types, exchanged);
     }
 
-    /// A type counts if its part and the parent, to which it is relative, are right.
+    /// Returns a type counts if its part and the parent part, to which the type is relative, are right.
     fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
         let right = |part: usize| {
@@ -177,12 +177,12 @@ impl Learner {
         self.from.instants += 1;
     }
 
-    /// The regression of the joints.
+    /// Returns the regression of the joints.
     pub fn joints(&self) -> &JointFit {
         &self.joints
     }
 
-    /// Mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
+    /// Returns the mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
     /// b) / (p(a) p(b))`; above 0 if the tables are informative.
     pub fn lift_on(&self, other: &Self) -> Option<f64> {
         let marginals =
@@ -205,7 +205,7 @@ impl Learner {
         (n > 0.0).then(|| sum / n)
     }
 
-    /// The learned parameters.
+    /// Returns the learned parameters.
     ///
     /// * `rig`: the rig of the pairs of cameras that were learned by name.
     ///
@@ -250,9 +250,9 @@ impl Learner {
     }
 }
 
-/// The median; of an even number of values the lower one.
+/// Returns the median; the lower one for an even number of values.
 fn median(values: &[f32]) -> f32 {
     let median = Sorted::new(values).lower_median();
-    // Four digits are more than pictures tell.
+    // More than four digits would exceed the precision of the pictures.
     median.map_or(0.0, |median| (median * 1e4).round() / 1e4)
 }

@@ -1,40 +1,40 @@
-//! Where a joint lies among the parts around it, learned from marked people, some of whom are badly found.
+//! Learns the positions of joints relative to the parts around them from annotated people, some of whom are badly found.
 
 use nalgebra::{DMatrix, DVector};
 use skeleton::{MIRROR, N_PARTS, PARENT, PARSE14};
 
-/// Joints of `skeleton::PARSE14`.
+/// Number of joints in `skeleton::PARSE14`.
 const N_JOINTS: usize = 14;
-/// Parts of shoulders and hips: the other one also shows where one lies.
+/// Parts of shoulders and hips; for each of these, the opposite part is used as well.
 const ACROSS_TRUNK: [usize; 4] = [2, 9, 14, 21];
-/// An error counts at most this much, as a share of the person's size: beyond, the joint was not found at all.
+/// Maximum error that counts, as a share of the person's size; a joint beyond it was not found at all.
 const LIMIT: f64 = 0.1;
-/// Most rounds of reweighting, and the change of weights at which there are no more.
+/// Maximum number of rounds of reweighting, and the change of weights at which the rounds end.
 const MOST_ROUNDS: usize = 50;
 const SETTLED: f64 = 1e-9;
-/// Shares that people are dealt into for choosing the settings.
+/// Number of groups of people for the cross-validation of the settings.
 const FOLDS: usize = 5;
 
-/// A person with found parts and marked joints.
+/// A person with found parts and annotated joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
-    /// Centres of the 26 parts, pixels.
+    /// Centres of the 26 parts, in pixels.
     pub centres: [[f64; 2]; N_PARTS],
-    /// The joints of `skeleton::PARSE14`, pixels, left and right as seen.
+    /// The joints of `skeleton::PARSE14`, in pixels; left and right as seen in the picture.
     pub joints: [[f64; 2]; N_JOINTS],
 }
 
-/// How joints are learned.
+/// Settings for learning joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Local {
-    /// Parts up to this many bones away from the joint's own part determine where it lies.
+    /// Maximum number of bones between the joint's own part and a part that determines its position.
     pub reach: usize,
-    /// How much a weight off a joint's own part costs: squared, per person, in units of the person's size.
+    /// Cost of a weight on other parts than the joint's own: squared, per person, in units of the person's size.
     pub ridge: f64,
 }
 
 impl Local {
-    /// Returns the settings that are tried, the plainest first.
+    /// Returns the settings to try, the simplest first.
     pub fn tried() -> Vec<Self> {
         let with = |reach| [1e-2, 1e-3, 1e-4].map(|ridge| Self { reach, ridge });
         [1, 2, 4].into_iter().flat_map(with).collect()
@@ -42,10 +42,10 @@ impl Local {
 
     /// Learns a row of weights, one per part, for every joint of `skeleton::PARSE14`; rows sum to 1.
     ///
-    /// A joint is its own part plus a weighted sum of those around it relative to it, so that the map is the same for
-    /// people who are moved, turned or larger. Every data set counts the same, as what one collection calls a joint
-    /// another does not; every person counts as its mirror image too, so that the map is symmetric. Errors beyond a
-    /// tenth of a person's size count nothing (Tukey's biweight): there the limb was not found.
+    /// A joint is its own part plus a weighted sum of the offsets of the parts around it. So the map does not change if
+    /// people are moved, rotated or scaled. Every data set has the same weight, because data sets define joints
+    /// differently. The mirror image of every person is added as well, so the map is symmetric. Errors beyond a
+    /// tenth of a person's size are ignored (Tukey's biweight): there, the limb was not found.
     pub fn learn(self, sets: &[Vec<&Marked>]) -> Vec<Vec<f64>> {
         let mut rows = vec![Vec::new(); N_JOINTS];
         for joint in 0..N_JOINTS {
@@ -56,7 +56,7 @@ impl Local {
             let row = self.row(joint, sets);
             let mirrored: Vec<f64> = MIRROR.iter().map(|&mirror| row[mirror]).collect();
             if MIRROR[own] == own {
-                // Symmetric but for rounding.
+                // The row is symmetric apart from rounding.
                 let both = row.iter().zip(&mirrored);
                 rows[joint] = rounded(own, both.map(|(a, b)| f64::midpoint(*a, *b)));
             } else {
@@ -67,7 +67,7 @@ impl Local {
         rows
     }
 
-    /// The weights of one joint.
+    /// Returns the weights of one joint.
     fn row(self, joint: usize, sets: &[Vec<&Marked>]) -> Vec<f64> {
         let own = own(joint);
         let around = around(own, self.reach);
@@ -109,9 +109,10 @@ impl Local {
     }
 }
 
-/// Mean distance of joints from their marks, percent of the person's size, each at most 10; `None` of nobody.
+/// Returns the mean distance of joints from their annotations, in percent of the person's size, each at most 10; `None` if there are no
+/// people.
 ///
-/// * `rows`: as of [`Local::learn`]; the parts themselves without them.
+/// * `rows`: result of [`Local::learn`]; if `None`, the parts themselves are used.
 pub fn mean_error(rows: Option<&[Vec<f64>]>, people: &[&Marked]) -> Option<f64> {
     let of_person = |person: &&Marked| {
         let size = size(&person.joints);
@@ -127,16 +128,16 @@ pub fn mean_error(rows: Option<&[Vec<f64>]>, people: &[&Marked]) -> Option<f64> 
     (!people.is_empty()).then(|| people.iter().map(of_person).sum::<f64>() / people.len() as f64)
 }
 
-/// One of [`Local::tried`] and the errors of every data set on people that it was not learned from.
+/// One of [`Local::tried`], with its errors on every data set for people who were left out of the learning.
 pub type Tried = (Local, Vec<f64>);
 
-/// Tries settings on people that are left out in turn, every fifth of each data set.
+/// Tries all settings with cross-validation: every fifth person of each data set is left out in turn.
 pub fn try_all(sets: &[Vec<Marked>]) -> Vec<Tried> {
     let tried = Local::tried().into_iter();
     tried.map(|tried| (tried, left_out(tried, sets))).collect()
 }
 
-/// The settings of the least error, every data set counting the same; of equal ones the first.
+/// Returns the settings with the smallest error, with the same weight for every data set; the first ones in a tie.
 pub fn best(tried: &[Tried]) -> Option<&Tried> {
     let mean = |tried: &&Tried| tried.1.iter().sum::<f64>();
     tried.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)))
@@ -162,7 +163,7 @@ fn left_out(settings: Local, sets: &[Vec<Marked>]) -> Vec<f64> {
     sums.iter().map(|(sum, n)| sum / f64::max(*n, 1.0)).collect()
 }
 
-/// A joint of one person, everything relative to its own part, in units of the person's size.
+/// A joint of one person. Everything is relative to its own part, in units of the person's size.
 struct Sample {
     around: [DVector<f64>; 2],
     joint: [f64; 2],
@@ -170,7 +171,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// How much it counts: Tukey's biweight of its distance.
+    /// Returns the weight of the sample: Tukey's biweight of its distance.
     fn trust(&self, weights: &DVector<f64>) -> f64 {
         let [x, y] = [0, 1].map(|axis| self.joint[axis] - self.around[axis].dot(weights));
         let square = (x * x + y * y) / (LIMIT * LIMIT);
@@ -221,18 +222,19 @@ fn read(row: &[f64], person: &Marked) -> [f64; 2] {
     })
 }
 
-/// The part that a joint of `skeleton::PARSE14` is by default.
+/// Returns the part that represents a joint of `skeleton::PARSE14` by default.
 pub(crate) fn own(joint: usize) -> usize {
     PARSE14.joints[joint].parts[0]
 }
 
-/// The joint of `skeleton::PARSE14` on the other side.
+/// Returns the same joint of `skeleton::PARSE14` on the other side.
 fn mirror_of(joint: usize) -> usize {
     let other = MIRROR[own(joint)];
     (0..N_JOINTS).find(|i| own(*i) == other).unwrap_or(joint)
 }
 
-/// The parts up to `reach` bones away from a part, without it, ascending; for shoulders and hips also the one across.
+/// Returns the parts up to `reach` bones away from a part, without the part itself, in ascending order; for shoulders and hips also the
+/// opposite part.
 fn around(own: usize, reach: usize) -> Vec<usize> {
     let mut near = [false; N_PARTS];
     near[own] = true;
@@ -251,7 +253,7 @@ fn around(own: usize, reach: usize) -> Vec<usize> {
     (0..N_PARTS).filter(|&i| near[i] && i != own).collect()
 }
 
-/// The longer side of the box around the joints plus a pixel, as for PCK.
+/// Returns the longer side of the box around the joints plus a pixel, as in PCK.
 fn size(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
         let values = || joints.iter().map(move |joint| joint[axis]);
@@ -260,7 +262,7 @@ fn size(joints: &[[f64; 2]]) -> f64 {
     side(0).max(side(1)) + 1.0
 }
 
-/// Weights with six decimals that sum to 1: the joint's own part takes the rest.
+/// Weights with six decimals that sum to 1; the joint's own part takes the remainder.
 fn rounded(own: usize, row: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut millionths: Vec<i64> = row.map(|row| (row * 1e6).round() as i64).collect();
     let sum: i64 = millionths.iter().sum();

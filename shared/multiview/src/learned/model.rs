@@ -5,7 +5,7 @@ use fmp::Model;
 use crate::learned::Shape;
 
 impl Shape {
-    /// The number of types of every part of a model, and the parts on the other side.
+    /// Returns the number of types of every part of a model, and the parts on the other side.
     pub fn of(model: &Model) -> Self {
         let parts = 0..model.n_parts();
         let mirror = model.spec().mirror.clone();

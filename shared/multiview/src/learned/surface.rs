@@ -4,16 +4,16 @@ use serde::Serialize;
 
 use crate::learned::Weights;
 
-/// The grid of values.
+/// The grid of weights to try.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Weights of the geometric term.
     pub alphas: Vec<f64>,
-    /// Caps on its distances, cells; `None`: no cap.
+    /// Caps on the distances of the geometric term, in cells; `None` means no cap.
     pub caps: Vec<Option<f64>>,
-    /// Weights of the appearance term: of the paper's joint probabilities.
+    /// Weights of the appearance term with the paper's joint probabilities.
     pub joint_betas: Vec<f64>,
-    /// The same for the lift.
+    /// Weights of the appearance term with the lift.
     pub lift_betas: Vec<f64>,
 }
 
@@ -31,11 +31,11 @@ impl Default for Grid {
 /// The result of one choice of weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
-    /// The weights.
+    /// The weights that gave this result.
     pub weights: Weights,
-    /// Area under the curve of PCP3D over its threshold from 0 to 1, percent: what is maximised.
+    /// The criterion to maximise: area under the curve of PCP3D over its threshold from 0 to 1, in percent.
     pub area: f64,
-    /// PCP3D at 0.5, percent.
+    /// PCP3D at 0.5, in percent.
     pub pcp3d: f64,
     /// Mean number of single-view solutions until a pair converged.
     pub iterations: f64,
@@ -54,8 +54,8 @@ pub struct Tally {
 impl Tally {
     /// Counts one frame.
     ///
-    /// * `segments`: errors of the segments as shares of their length; `None` where one was not found.
-    /// * `iterations`: of every pair.
+    /// * `segments`: errors of the segments as shares of their length; `None` for a segment that was not found.
+    /// * `iterations`: number of iterations of every pair.
     pub fn add(&mut self, segments: &[Option<f64>], iterations: &[u32]) {
         for error in segments {
             self.n += 1;
@@ -67,7 +67,7 @@ impl Tally {
         self.iterations += iterations.iter().map(|iteration| u64::from(*iteration)).sum::<u64>();
     }
 
-    /// All frames together.
+    /// Returns the result over all frames.
     pub fn point(&self, weights: Weights) -> Point {
         let n = self.n.max(1) as f64;
         Point {
@@ -79,13 +79,13 @@ impl Tally {
     }
 }
 
-/// The best of some points; among equals the first.
+/// Returns the best of the points; the first one in a tie.
 pub fn best(points: &[Point]) -> Option<&Point> {
     points.iter().reduce(|best, it| if it.area > best.area { it } else { best })
 }
 
 impl Grid {
-    /// The first search: the geometric term alone.
+    /// Returns the first search: the geometric term alone.
     pub fn geometry(&self) -> Vec<Weights> {
         let of_cap = |cap: &Option<f64>| {
             let alphas = self.alphas.iter();
@@ -95,7 +95,7 @@ impl Grid {
         self.caps.iter().flat_map(of_cap).collect()
     }
 
-    /// The second search: the appearance term with the best geometric weights and their neighbours.
+    /// Returns the second search: the appearance term with the best geometric weights and their neighbours.
     pub fn appearance(&self, best: &Weights) -> Vec<Weights> {
         let at = self.alphas.iter().position(|alpha| *alpha == best.alpha);
         let at = at.unwrap_or_default();

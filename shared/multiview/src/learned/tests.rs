@@ -14,7 +14,7 @@ fn shape() -> Shape {
     }
 }
 
-/// A person whose parts have type `types(part)` and an error of `error` tenths.
+/// Returns a person whose parts have type `types(part)` and an error of `error` tenths.
 fn observation(types: impl Fn(usize) -> u8, error: f32, exchanged: bool) -> ViewObservation {
     ViewObservation {
         types: (0..N_PARTS).map(types).collect(),
@@ -50,7 +50,7 @@ fn add_views(learner: &mut Learner, views: [&ViewObservation; 2], degrees: f64, 
     }
 }
 
-/// The paper's table of the pair at an angle: part, types in the first and the second view.
+/// Returns the paper's table of the pair at an angle: part, types in the first and the second view.
 fn at(of: &Learned, degrees: f64, part: usize, types: [usize; 2]) -> f64 {
     let tables = of.by_angle(Appearance::Joint);
     let tables = tables.at(degrees.to_radians()).unwrap();
@@ -93,7 +93,7 @@ fn views_from_behind_have_tables_of_their_own() {
     let learned = learned(&learner);
     let joint = learned.by_angle(Appearance::Joint);
     let joint = joint.at(PI * 0.98).unwrap();
-    // Part 5 of the front is part 17 of the back.
+    // Part 5 of the front view is part 17 of the back view.
     assert!(joint.exchanged.as_ref().unwrap().value(5, 1, 2) > 0.8);
     let lift = learned.by_angle(Appearance::Lift);
     let same = &lift.at(PI * 0.98).unwrap().joint;
@@ -111,7 +111,7 @@ fn views_far_from_the_truth_count_for_tau_but_not_for_types() {
     add_views(&mut learner, [&bad, &good], 50.0, 3);
     let learned = learned(&learner);
     assert_eq!(learned.rigs[0].pairs[0].counts.total(), 2 * N_PARTS as u64);
-    // 7 good views and 3 bad ones.
+    // There are 7 good views and 3 bad ones.
     assert_eq!(learned.tau_tenths, vec![0.1; N_PARTS]);
 }
 
@@ -209,7 +209,7 @@ fn the_file_survives_a_round_trip_bit_for_bit() {
     assert_eq!(Learned::parse(&text).unwrap(), example);
 }
 
-/// The error for the example with one change.
+/// Returns the error for the example with one change.
 fn error_of(change: impl Fn(&mut serde_json::Value)) -> String {
     let mut value = serde_json::to_value(example()).unwrap();
     change(&mut value);
@@ -289,11 +289,7 @@ fn a_file_of_another_model_is_refused() {
         ..shape()
     };
     let error = example().check_model(&other).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .starts_with("it was learned for a model whose parts have [3, 3,")
-    );
+    assert!(error.to_string().starts_with("it was learned for a model with [3, 3,"));
     example().check_model(&shape()).unwrap();
 }
 

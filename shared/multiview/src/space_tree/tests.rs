@@ -1,4 +1,4 @@
-//! People solved in space over maps whose truth is known.
+//! People solved in space from maps with a known truth.
 
 use geometry::{Camera, Intrinsics, Lens};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -9,7 +9,7 @@ use crate::solve_person;
 use crate::space_view::{JointEvidence, LIMBS, SpaceView};
 use crate::{SeenPerson, same_person};
 
-/// A man who stands with one arm raised, metres; joints of `skeleton::PARSE14`, z up.
+/// A man who stands with one arm raised, in metres; joints of `skeleton::PARSE14`, z up.
 const STANDING: [[f64; 3]; N] = [
     [0.02, -0.12, 0.08],
     [0.04, -0.11, 0.49],
@@ -52,7 +52,7 @@ fn camera(degrees: f64) -> Camera {
     }
 }
 
-/// A view whose map of a joint is one bump; joints that are `None` are seen nowhere.
+/// A view whose map of a joint is a single bump; the view does not see joints that are `None`.
 struct Bumps {
     at: [Option<[f64; 2]>; N],
     maxima: Vec<Vec<([f64; 2], f32)>>,
@@ -119,7 +119,7 @@ fn solved_by<E: JointEvidence>(
     solve_person(&views, settings).unwrap().pose
 }
 
-/// The largest error, metres.
+/// Returns the largest error, in metres.
 fn worst(found: &SpacePose) -> f64 {
     let errors = found.joints.iter().zip(STANDING);
     errors
@@ -163,7 +163,7 @@ fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() 
     assert!(worst(&solved(&cameras, &bumps)) < 0.03);
     bumps[0].at[6] = None;
     bumps[0].maxima[6].clear();
-    // The elbow is seen by nobody; the wrist hangs on nothing.
+    // No view sees the elbow, so the wrist is not connected to the body.
     for view in &mut bumps {
         view.at[7] = None;
         view.maxima[7].clear();
@@ -216,7 +216,7 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
         });
         let views: Vec<SpaceView<'_>> = views.collect();
         let mut found = solve_person(&views, &settings).unwrap().pose;
-        // The names are those of the first view.
+        // The names in the result follow the first view.
         if exchanged & 1 == 1 {
             for [right, left] in LIMBS.into_iter().flatten() {
                 found.joints.swap(right, left);
@@ -233,7 +233,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
         as_seen: true,
         ..SpaceSettings::default()
     };
-    // Flat and symmetric, so that facing x and facing y look alike from here but for the names.
+    // The body is flat and symmetric: facing x and facing y look alike from here except for the names.
     let mut flat = STANDING.map(|[_, y, z]| [0.0, y, z]);
     for [right, left] in LIMBS.into_iter().flatten() {
         flat[right] = [0.0, -flat[left][1], flat[left][2]];
@@ -241,7 +241,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
     let cameras = [45.0, 135.0, 225.0, 315.0].map(camera);
     let bumps = cameras.each_ref().map(|camera| {
         let mut seen = Bumps::of_joints(camera, &flat);
-        // The side on the left of the picture is called the right one.
+        // The side on the left of the picture is named right.
         for [right, left] in LIMBS.into_iter().flatten() {
             if seen.at[right].unwrap()[0] > seen.at[left].unwrap()[0] {
                 seen.at.swap(right, left);
@@ -333,7 +333,7 @@ fn whoever_is_the_same_person_in_most_views_is_chosen() {
     assert_eq!(same_person(&[], false), []);
 }
 
-/// A view whose network cannot tell the ankles from each other, nor the knees, and sees the left leg better in the maps of both.
+/// A view whose network cannot distinguish the two ankles, nor the two knees, and sees the left leg better in both maps.
 struct EitherLeg(Bumps);
 
 impl EitherLeg {
@@ -386,7 +386,7 @@ fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
 
 #[test]
 fn legs_that_are_together_stay_together() {
-    // What both maps show is in one place only: there is no other leg to find.
+    // Both maps show one place only, so there is no other leg to find.
     let cameras = RING.map(camera);
     let mut bumps = cameras.each_ref().map(Bumps::new);
     for view in &mut bumps {

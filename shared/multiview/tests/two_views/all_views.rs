@@ -11,7 +11,7 @@ use crate::oracle;
 use crate::paper::{ROUNDING, SIZES, TINY, all_poses};
 use crate::planted::{Scene, settings};
 
-/// The parameters of a problem, besides its seed.
+/// The parameters of a problem, without its seed.
 #[derive(Debug, Clone)]
 struct Start {
     candidates: Vec<usize>,
@@ -49,7 +49,7 @@ fn fuse(scene: &Scene, settings: &Settings, start: &Start) -> AllViewsEstimate {
     estimate_all_views(&scene.solver, settings, &input, &evidence, from)
 }
 
-/// The energy of given poses, computed independently.
+/// Returns the energy of given poses, computed independently.
 fn energy(scene: &Scene, settings: &Settings, start: &Start, poses: &[Pose]) -> f64 {
     let n = poses.len();
     let own: f64 = (0..n).map(|view| oracle::own(scene, view, &poses[view])).sum();

@@ -26,7 +26,7 @@ pub(crate) fn own(scene: &Scene, view: usize, pose: &Pose) -> f64 {
     f64::from(scene.solver.score(&evidence, pose, None))
 }
 
-/// The last two sums of eq. 3.
+/// Returns the last two sums of eq. 3.
 pub(crate) fn between(
     scene: &Scene,
     settings: &Settings,
@@ -65,7 +65,7 @@ fn is_usable(scene: &Scene, settings: &Settings, view: usize, part: usize) -> bo
     }
 }
 
-/// Eq. 4: squared distances to the lines of each other, in the cells of either view.
+/// Eq. 4: the squared distance of each point from the other's line, in the cells of its own view.
 fn distance2(
     scene: &Scene,
     settings: &Settings,
@@ -92,7 +92,7 @@ fn distance2(
     of_side(0) + of_side(1)
 }
 
-/// The released program's score of `poses[target]`, with the other pose fixed.
+/// Returns the released program's score of `poses[target]`, with the other pose fixed.
 pub(crate) fn released(
     scene: &Scene,
     settings: &Settings,
@@ -124,7 +124,7 @@ pub(crate) fn released(
 
 /// Returns true if a part of the support is on: it is good enough, or both are bad but it is clearly better.
 ///
-/// * `parts`: of the support and of the target.
+/// * `parts`: indices of the part in the support and in the target.
 fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usize; 2]) -> bool {
     let views = [support, 1 - support];
     let [here, there] = [0, 1].map(|side| is_usable(scene, settings, views[side], parts[side]));
@@ -132,7 +132,7 @@ fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usi
     here || (!there && sigma(0) < sigma(1) - settings.rescue_px[parts[0]])
 }
 
-/// Heat of the line of a support at `pixel` (counted from 1), at a part of the target.
+/// Returns the heat of the line of a support at `pixel` (counted from 1), at a part of the target.
 fn heat(scene: &Scene, target: usize, pose: &Pose, part: usize, pixel: [f64; 2]) -> f64 {
     let [here, there] = [target, 1 - target].map(|view| scene.views[view].plan.camera());
     let fundamental = epipolar::fundamental(there, here);

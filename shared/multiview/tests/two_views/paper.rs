@@ -13,9 +13,9 @@ use crate::planted::{
 };
 
 pub(crate) const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
-/// Small enough to try every pose; in the second, only types can change.
+/// Pyramids small enough to try every pose; in the second one, only types can change.
 pub(crate) const TINY: [&[[usize; 2]]; 2] = [&[[3, 4], [2, 2]], &[[1, 1]]];
-/// Single-view scores are sums in single precision.
+/// Tolerance for single-view scores, which are sums in single precision.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
 fn starts() -> impl Strategy<Value = PairStart> {
@@ -57,7 +57,7 @@ pub(crate) fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
 }
 
 proptest! {
-    /// Bounds come from another process.
+    /// The bounds come from another process.
     #[test]
     fn correct_bounds_change_nothing_and_wrong_bounds_do_not_panic(
         seed in any::<u64>(),
@@ -184,7 +184,7 @@ proptest! {
         (switch, sees) in prop::sample::select(vec![
             (SwitchBy::Support, 1.0),
             (SwitchBy::Worse, 1.0),
-            // Neither is usable, and one is worse than the other.
+            // Neither view is usable, and one is worse than the other.
             (SwitchBy::Worse, 8.5),
         ]),
         start in starts(),
@@ -290,7 +290,7 @@ proptest! {
     }
 }
 
-/// The best value of the terms alone: each part of `view` is optimised independently, the other
+/// Returns the best value of the terms alone: each part of `view` is optimised independently, the other
 /// view is fixed.
 fn all_placements(scene: &Scene, settings: &Settings, view: usize, poses: &[Pose; 2]) -> f64 {
     let level = &scene.views[view].plan.layout().levels[0];
@@ -405,7 +405,7 @@ fn thresholds_of_a_prediction_are_used_where_the_settings_have_none() {
     assert_eq!(found.active, [true, true, false]);
 }
 
-/// The view that is the first support.
+/// Returns which view is the first support.
 fn first_support(sigma_px: [Option<[f32; N_PARTS]>; 2], seed: u64) -> (usize, usize) {
     let mut scene = Scene::new(seed, 2, &SIZES);
     for (view, sigma) in scene.views.iter_mut().zip(sigma_px) {

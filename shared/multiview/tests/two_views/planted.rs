@@ -1,4 +1,4 @@
-//! Small artificial scenes: a root with two arms that mirror each other, seen by cameras on a
+//! Small synthetic scenes: a root with two arms that mirror each other, seen by cameras on a
 //! circle.
 
 use std::sync::Arc;
@@ -16,14 +16,14 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 pub(crate) const N_PARTS: usize = 3;
 pub(crate) const N_TYPES: usize = 2;
-/// The arms exchange sides.
+/// Mirror image of the parts: the arms exchange sides.
 pub(crate) const MIRROR: [usize; N_PARTS] = [0, 2, 1];
 
 /// A deterministic generator of pseudorandom numbers.
 pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
-    /// A number in 0..1.
+    /// Returns a number in 0..1.
     pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -40,7 +40,7 @@ impl Noise {
     }
 }
 
-/// A model with two equal sides.
+/// Returns a model with two equal sides.
 pub(crate) fn model(noise: &mut Noise) -> Arc<Model> {
     let mut spring = || Spring {
         w: [
@@ -82,7 +82,7 @@ pub(crate) fn model(noise: &mut Noise) -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// A pyramid with levels of `sizes` `[rows, cols]`; the first has cells of `cell_px`, and each next
+/// Returns a pyramid with levels of `sizes` `[rows, cols]`; the first has cells of `cell_px`, and each next
 /// level is twice as coarse.
 pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
     let [rows, cols] = sizes[0];
@@ -108,11 +108,11 @@ pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
     }
 }
 
-/// A camera 4 m from the origin, looking at it, for images of `[width, height]`.
+/// Returns a camera 4 m from the origin, looking at it, for images of `[width, height]`.
 pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensModel) -> Camera {
     let eye = Point3::new(4.0 * bearing.cos(), 4.0 * bearing.sin(), height);
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-    // `look_at_rh` is x right, y up, z backward; half a turn about x gives OpenCV's axes.
+    // `look_at_rh` has x right, y up, z backward; a rotation by 180 degrees about x gives OpenCV's axes.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     let [width, rows] = size.map(|size| size as f64);
     Camera {
@@ -129,7 +129,7 @@ pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensMode
     }
 }
 
-/// No distortion, a mild one, a fisheye, and one without solution in the corners.
+/// Lenses with no distortion, a mild distortion, a fisheye, and a lens without a solution in the corners.
 pub(crate) fn lenses() -> [LensModel; 4] {
     let radial = |k1: f64, k2: f64| LensModel::BrownConrady {
         k: [k1, k2, 0.0, 0.0, 0.0, 0.0],
@@ -202,7 +202,7 @@ impl View {
     }
 }
 
-/// The pose with the two sides of the model exchanged.
+/// Returns the pose with the two sides of the model exchanged.
 pub(crate) fn mirrored(pose: &Pose) -> Pose {
     Pose {
         parts: MIRROR.map(|part| pose.parts[part]).to_vec(),
@@ -218,7 +218,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// A scene of random evidence on levels of `sizes`.
+    /// Returns a scene of random evidence on levels of `sizes`.
     pub(crate) fn new(seed: u64, n_views: usize, sizes: &[[usize; 2]]) -> Self {
         let noise = &mut Noise(seed);
         let model = model(noise);
@@ -265,7 +265,7 @@ impl Scene {
         self.fuse_evidence(settings, views, start, evidence.each_ref())
     }
 
-    /// As [`Self::fuse`], on given evidence of these views.
+    /// Like [`Self::fuse`], with the given evidence of these views.
     pub(crate) fn fuse_evidence(
         &self,
         settings: &Settings,
@@ -302,7 +302,7 @@ pub(crate) const FROM_BEST: PairStart = PairStart {
     exchanged: false,
 };
 
-/// A random pose on a random level, with its own score.
+/// Returns a random pose on a random level, with its own score.
 fn pose(noise: &mut Noise, solver: &Solver, view: &View) -> Pose {
     let level = noise.pick(&view.levels);
     let level_layout = &view.plan.layout().levels[usize::from(level)];

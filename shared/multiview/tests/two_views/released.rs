@@ -20,7 +20,7 @@ fn parts(pose: &Pose) -> (u16, &[fmp::Placement]) {
     (pose.level, &pose.parts)
 }
 
-/// Returns true if the last poses of both views are those of four iterations before, but not of two.
+/// Returns true if the last poses of both views equal those of four iterations before, but not of two.
 fn cycles(estimate: &PairEstimate) -> bool {
     let [.., a, b, c, d, e, f] = &estimate.iterations[..] else {
         return false;
@@ -68,7 +68,7 @@ fn a_part_that_is_off_in_the_support_adds_nothing_to_the_target() {
         };
         let found = scene.fuse(&settings, [0, 1], FROM_BEST);
         assert_eq!(found.active, [blind != 0; N_PARTS]);
-        // The view with the blind support gets the same result as alone.
+        // The view with the blind support gets the same result as it does alone.
         let alone = &scene.views[1 - blind].candidates[0];
         assert_eq!(parts(&found.poses[1 - blind]), parts(alone));
         // The blind view has a support, unless no line meets its image.
@@ -127,7 +127,7 @@ proptest! {
     }
 }
 
-/// The switches of the first view for given expected errors of every part in the two views.
+/// Returns the switches of the first view for given expected errors of every part in the two views.
 fn switch_of_first(sigma_px: [f32; 2]) -> bool {
     let mut scene = Scene::new(7, 2, &SIZES);
     for (view, sigma) in scene.views.iter_mut().zip(sigma_px) {

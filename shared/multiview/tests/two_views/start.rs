@@ -22,7 +22,7 @@ fn ranked(scene: &Scene, settings: &Settings) -> Vec<multiview::Start> {
     rank_starts(settings, &inputs, &tables)
 }
 
-/// Sum of eq. 3 over all pairs.
+/// Returns the sum of eq. 3 over all pairs.
 fn energy(scene: &Scene, settings: &Settings, candidates: &[usize], exchanged: &[bool]) -> f64 {
     let n = candidates.len();
     let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));

@@ -1,4 +1,4 @@
-//! A person with a nose and toes before cameras on a circle.
+//! A person with a nose and toes in front of cameras on a circle.
 
 use geometry::TriangulateError;
 use multiview::FusedPose;
@@ -13,7 +13,7 @@ const N_VIEWS: usize = 4;
 const NAMES: [&str; 3] = ["nose", "left big toe", "right big toe"];
 const SIGMA_PX: f64 = 2.0;
 
-/// The 14 joints, metres; the person faces along x.
+/// The 14 joints, in metres; the person faces along x.
 const JOINTS: [[f64; 3]; 14] = [
     [0.1, -0.12, 0.08],
     [0.05, -0.11, 0.5],
@@ -32,11 +32,11 @@ const JOINTS: [[f64; 3]; 14] = [
 ];
 const EXTRAS: [[f64; 3]; 3] = [[0.1, 0.0, 1.62], [0.1, 0.13, 0.02], [0.3, -0.13, 0.02]];
 
-/// Sightings of all views, and the step.
+/// The sightings of all views, and the step.
 struct Scene {
     step: ExtrasStep,
     skeleton: Skeleton,
-    /// The people that each view sees.
+    /// The people seen by each view.
     seen: Vec<Vec<Sighting>>,
 }
 
@@ -67,7 +67,7 @@ impl Scene {
         scene
     }
 
-    /// The joints of the person, moved, in a view.
+    /// Returns the joints of the displaced person in a view.
     fn joints(&self, view: usize, by: [f64; 3]) -> [[f64; 2]; 14] {
         JOINTS.map(|joint| self.project(view, joint, by))
     }
@@ -123,7 +123,7 @@ fn skeleton() -> Skeleton {
     }
 }
 
-/// Checks that every extra keypoint lies where it is.
+/// Checks that every extra keypoint is at its true position.
 fn check(found: &[Result<Triangulated, NoJoint>]) {
     assert_eq!(found.len(), NAMES.len());
     for ((name, it), truth) in NAMES.iter().zip(found).zip(EXTRAS) {
@@ -170,7 +170,7 @@ fn the_candidate_that_is_the_person_counts() {
         scene.seen[view].insert(0, other);
     }
     check(&scene.run());
-    // A view that shows the other one alone has no part.
+    // A view that shows only the other person does not contribute.
     scene.seen[3].pop();
     let found = scene.run();
     check(&found);
@@ -180,7 +180,7 @@ fn the_candidate_that_is_the_person_counts() {
 #[test]
 fn a_candidate_without_its_keypoints_is_no_other_one() {
     let mut scene = Scene::new();
-    // There was no room for those of the person.
+    // There was no room for the extra keypoints of the person.
     let by = [0.3, -1.2, 0.0];
     let other = scene.sighting(0, by);
     scene.seen[0].insert(0, other);

@@ -1,4 +1,4 @@
-//! Planted people before cameras on a circle.
+//! Simulated people in front of cameras on a circle.
 
 use geometry::{Intrinsics, Lens, LensModel};
 use nalgebra::Isometry3;
@@ -12,7 +12,7 @@ pub(crate) fn camera(view: usize) -> Camera {
     let bearing = 1.2 * view as f64;
     let eye = Point3::new(5.0 * bearing.cos(), 5.0 * bearing.sin(), 1.5);
     let upright = Isometry3::look_at_rh(&eye, &Point3::new(0.0, 0.0, 1.0), &Vector3::z());
-    // `look_at_rh` is x right, y up, z backward: half a turn about x makes it OpenCV's.
+    // `look_at_rh` has x right, y up, z backward: a rotation by 180 degrees about x gives OpenCV's axes.
     let opencv = Isometry3::rotation(Vector3::x() * core::f64::consts::PI);
     Camera {
         name: format!("camera {view}"),
@@ -28,7 +28,7 @@ pub(crate) fn camera(view: usize) -> Camera {
     }
 }
 
-/// Returns a view's sighting of a person who stands at a place.
+/// Returns a view's sighting of a person at a place.
 fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> FoundBody {
     let line = [1.75, 1.5, 0.95, 0.5, 0.08].map(|z| Point3::new(x, y, z));
     let points_px = line.map(|line| <[f64; 2]>::from(camera.project(&line).unwrap()));
@@ -40,7 +40,7 @@ fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> FoundBody {
     }
 }
 
-/// The sightings of people in all views, in an order that differs from view to view.
+/// Returns the sightings of people in all views, in an order that differs from view to view.
 fn seen(cameras: &[Camera], people: &[([f64; 2], f64)]) -> Vec<Vec<FoundBody>> {
     let of_view = |(view, camera): (usize, &Camera)| {
         let mut all: Vec<FoundBody> = people
@@ -127,11 +127,11 @@ fn something_that_is_no_body_in_space_is_nobody() {
 fn the_others_of_a_view_are_left_out_but_never_all() {
     let cameras = cameras(3);
     let mut found = found(&cameras, &[([0.0, 0.0], 1.0), ([1.2, 0.5], 0.8)]);
-    // In view v the person number p is candidate (p - v) mod 2.
+    // In view v, person p is candidate (p - v) mod 2.
     assert_eq!(found.others(Some(0)), [0b10, 0b01, 0b10]);
     assert_eq!(found.others(Some(1)), [0b01, 0b10, 0b01]);
     assert_eq!(found.others(None), [0, 0, 0], "nothing would be left");
-    // The first is hidden in the last view: the other one is all that it has.
+    // The first person is hidden in the last view, which shows only the other one.
     found.views[2].remove(0);
     found.people[0].candidates[2] = None;
     found.people[1].candidates[2] = Some(0);

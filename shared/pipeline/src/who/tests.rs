@@ -1,4 +1,4 @@
-//! People who stand before cameras on a circle.
+//! People who stand in front of cameras on a circle.
 
 use nalgebra::Point3;
 
@@ -8,7 +8,7 @@ use crate::people::tests::camera;
 const RATE_HZ: f64 = 30.0;
 const N_VIEWS: usize = 4;
 
-/// The 14 joints of a person who stands at the origin, metres.
+/// The 14 joints of a person who stands at the origin, in metres.
 const JOINTS: [[f64; 3]; 14] = [
     [0.1, -0.12, 0.08],
     [0.05, -0.11, 0.5],
@@ -57,7 +57,7 @@ fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<Sightings>> {
     (0..N_VIEWS).map(view).collect()
 }
 
-/// The people of every frame.
+/// Returns the people of every frame.
 fn run(follow: Follow, frames: &[&[([f64; 2], f32)]]) -> Vec<FramePeople> {
     let settings = WhoSettings {
         follow,

@@ -1,12 +1,12 @@
-//! Allocations of the steps of `fuse` and `triangulate` for a frame, once their buffers are there.
+//! Allocations of the steps of `fuse` and `triangulate` for a frame, after their buffers exist.
 //!
-//! The goal is nothing; it is not reached. Nothing as large as a response map is allocated: a frame of four times the
-//! cells takes no more than a small one. What is left are the answers themselves (the poses of every solution, the
-//! joints) and short lists of a frame, one entry per view, part, candidate or level; in `triangulate` once for each of
-//! the eight assumptions about facing of four views. The limits are what was counted, rounded up; they fall when a
-//! list goes, and hold with the checks that a build for tests has.
+//! The goal of no allocations is not reached. But nothing as large as a response map is allocated: a frame with four times the
+//! cells allocates no more than a small one. The remaining allocations are the results (the poses of every solution, the
+//! joints) and short lists per frame with one entry per view, part, candidate or level. In `triangulate`, each list occurs once for
+//! each of the eight assumptions about facing of four views. The limits are the measured counts, rounded up. They should be lowered when a
+//! list is removed. They apply to test builds, with their additional checks.
 //!
-//! A program without the harness, whose own threads allocate too; everything runs on one thread.
+//! This test runs without the test harness, whose threads allocate too; everything runs on one thread.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod scene;
@@ -22,10 +22,10 @@ use scene::Scene;
 #[global_allocator]
 static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Views of the rig; pairs are the six of them.
+/// Number of views of the rig; they form six pairs.
 const N_VIEWS: usize = 4;
 
-/// Limit of `fuse`, for each single-view solution.
+/// Limit of `fuse` for each single-view solution.
 const MOST_OF_SOLUTION: Count = Count {
     allocations: 13,
     bytes: 5_500,
@@ -37,7 +37,7 @@ const MOST_OF_SKELETON: Count = Count {
     bytes: 250_000,
 };
 
-/// Number of allocations and reallocations of a call, and of their bytes.
+/// Number and total size of the allocations and reallocations of a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Count {
     allocations: usize,
@@ -64,7 +64,7 @@ fn count<T>(call: impl FnOnce() -> T) -> (T, Count) {
     (answer, count)
 }
 
-/// Counts a frame of pairs: in `fuse` for each of its single-view solutions, and in `triangulate`.
+/// Counts the allocations for a frame of pairs: in `fuse` per single-view solution, and in `triangulate`.
 fn of_frame(rows: usize, combine: Combine) -> [Count; 2] {
     let scene = Scene::new(rows, N_VIEWS);
     let settings = multiview::Settings::default();
@@ -82,7 +82,7 @@ fn of_frame(rows: usize, combine: Combine) -> [Count; 2] {
     let mut skeleton = SkeletonStep::new(scene.plans.clone(), None, settings);
     let evidence = scene.evidence();
     let mut last = None;
-    // The first frames make the buffers.
+    // The first frames create the buffers.
     for _ in 0..3 {
         let start = fuse.start(&scene.answers, &Others::default());
         let (pairs, of_pairs) = count(|| {

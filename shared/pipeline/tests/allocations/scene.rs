@@ -1,4 +1,4 @@
-//! A made-up frame: 26 parts, random evidence, cameras on a circle.
+//! A synthetic frame: 26 parts, random evidence, cameras on a circle.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
 const N_TYPES: usize = 2;
 const N_LEVELS: usize = 3;
 
-/// Views of one frame, and what each of them found alone.
+/// The views of one frame, and their single-view findings.
 pub(crate) struct Scene {
     pub(crate) model: Arc<Model>,
     pub(crate) plans: Vec<Arc<ViewPlan>>,
@@ -26,7 +26,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// * `rows`: cells of the finest level, in either direction.
+    /// * `rows`: number of cells of the finest level in each direction.
     pub(crate) fn new(rows: usize, n_views: usize) -> Self {
         let model = model();
         let layout = Arc::new(layout(rows));
@@ -133,7 +133,7 @@ fn camera(view: usize, size: [usize; 2]) -> Camera {
     let bearing = 1.3 * view as f64;
     let eye = Point3::new(4.0 * bearing.cos(), 4.0 * bearing.sin(), 1.0);
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-    // `look_at_rh` is x right, y up, z backward: half a turn about x makes it OpenCV's.
+    // `look_at_rh` has x right, y up, z backward: a rotation by 180 degrees about x gives OpenCV's axes.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     let [width, height] = size.map(|size| size as f64);
     Camera {

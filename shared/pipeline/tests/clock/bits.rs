@@ -1,12 +1,12 @@
-//! Without skews a result is what it was, to the bit.
+//! Without skews, results are bit-identical to those without instants.
 
 use pipeline::{BodySettings, Skeleton, SkeletonSettings, SkeletonStep, ViewResult};
 
 use crate::planted::Scene;
 
-/// The skeletons of a few frames in which views find one candidate after the other.
+/// Returns the skeletons of a few frames in which views find one candidate after the other.
 ///
-/// * `instants`: whether the step is told when frames are.
+/// * `instants`: true to pass the instants of the frames to the step.
 fn skeletons(scene: &Scene, instants: bool, skews_s: [f64; 3]) -> Vec<Skeleton> {
     let settings = SkeletonSettings {
         body: BodySettings::NONE,
@@ -30,7 +30,7 @@ fn skeletons(scene: &Scene, instants: bool, skews_s: [f64; 3]) -> Vec<Skeleton> 
     (0..4).map(frame).collect()
 }
 
-/// Every digit of the joints; not a number is equal to itself.
+/// Returns all digits of the joints as text, because NaN is not equal to itself.
 fn digits(skeletons: &[Skeleton]) -> Vec<String> {
     skeletons.iter().map(|skeleton| format!("{skeleton:?}")).collect()
 }

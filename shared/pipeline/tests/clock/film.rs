@@ -1,4 +1,4 @@
-//! People who move, as cameras with noise and clocks of their own see their joints.
+//! Moving people, and their joints as seen by cameras with noise and with clocks of their own.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -8,22 +8,22 @@ use nalgebra::{Point2, Point3, Vector2};
 use scene::{Action, RigChoice, Scene, Settings};
 use skeleton::PARSE14;
 
-/// Number of joints.
+/// Number of joints in `skeleton::PARSE14`.
 pub(crate) const N: usize = PARSE14.joints.len();
 /// Frames per second.
 pub(crate) const RATE_HZ: f64 = 30.0;
 
-/// A person before a rig.
+/// A person in front of a rig.
 pub(crate) struct Film {
     scene: Arc<Scene>,
     cameras: Vec<Camera>,
-    /// Standard deviation of a joint in a picture along each axis, pixels.
+    /// Standard deviation of a joint in a picture along each axis, in pixels.
     pub(crate) noise_px: f64,
     random: Random,
 }
 
 impl Film {
-    /// * `seed`: of the person, the motion and the noise.
+    /// * `seed`: seed of the person, the motion and the noise.
     pub(crate) fn new(rig: &str, action: Action, seed: u64) -> Self {
         let rig = RigChoice::parse(rig).expect("a rig");
         let cameras = rig.rig().expect("a rig").cameras().to_vec();
@@ -35,7 +35,7 @@ impl Film {
         }
     }
 
-    /// Begins other noise.
+    /// Restarts the noise with another seed.
     pub(crate) fn reseed(&mut self, seed: u64) {
         self.random = Random::new(seed);
     }
@@ -44,12 +44,12 @@ impl Film {
         &self.cameras
     }
 
-    /// Where the joints are at a time.
+    /// True positions of the joints at a time.
     pub(crate) fn truth(&self, seconds: f64) -> [Point3<f64>; N] {
         self.scene.joints(seconds).map(Point3::from)
     }
 
-    /// The noise of a picture.
+    /// Draws the noise of a picture.
     pub(crate) fn noise(&mut self) -> [Vector2<f64>; N] {
         let mut one = || self.random.normal() * self.noise_px;
         core::array::from_fn(|_| Vector2::new(one(), one()))
@@ -69,10 +69,10 @@ impl Film {
     }
 }
 
-/// Scenes that were made: whether the rig is a ring, the action, the seed.
+/// Cached scenes, by whether the rig is a ring, the action and the seed.
 type Made = BTreeMap<(bool, &'static str, u64), Arc<Scene>>;
 
-/// Makes a scene, which takes a while, once. All rings stand around the same place.
+/// Returns a scene from the cache, since creating one takes a while. All rings are around the same place.
 fn scene_of(rig: RigChoice, action: Action, seed: u64) -> Arc<Scene> {
     static MADE: Mutex<Made> = Mutex::new(Made::new());
     let is_ring = matches!(rig, RigChoice::Ring { .. });
@@ -89,7 +89,7 @@ fn scene_of(rig: RigChoice, action: Action, seed: u64) -> Arc<Scene> {
     Arc::clone(scene)
 }
 
-/// Random numbers that are the same in every run.
+/// Pseudorandom numbers that are the same in every run.
 struct Random(u64);
 
 impl Random {
@@ -102,7 +102,7 @@ impl Random {
         random
     }
 
-    /// Between 0 and 1.
+    /// Draws from the uniform distribution between 0 and 1.
     fn unit(&mut self) -> f64 {
         self.0 = self
             .0

@@ -1,5 +1,6 @@
-//! Pictures that were not taken when their frame says: what is done about those whose time is known, and how a camera whose times
-//! are wrong is found. People of the crate `scene` move before planted cameras; views see their joints exactly, but for noise.
+//! Tests for pictures that were not taken at the instant of their frame. They cover corrections for known times, and the detection of a
+//! camera whose times are wrong. People of the crate `scene` move in front of simulated cameras; the views see their joints exactly, apart
+//! from noise.
 
 #![expect(clippy::expect_used, reason = "a test fails by panicking")]
 #![expect(

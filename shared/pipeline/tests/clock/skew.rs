@@ -1,4 +1,4 @@
-//! Cameras that take their pictures up to half a period from the instants of the frames: what is done about it, measured.
+//! Measures the corrections for cameras that take their pictures up to half a period from the instants of the frames.
 
 use geometry::skew::{Tracks, Velocity, moved, widened_px};
 use geometry::{Observation, Settings, longer_side, triangulate};
@@ -10,19 +10,19 @@ use crate::film::{Film, N, RATE_HZ};
 /// How the skews of the cameras are taken into account.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum By {
-    /// Not.
+    /// The skews are ignored.
     Nothing,
-    /// Each point is trusted less, by its speed times the skew.
+    /// The deviation of each point grows by its speed times the skew.
     Widening,
     /// Each point is moved to the instant by its own velocity.
     Moving,
-    /// And trusted less where that makes it worse: what a run does.
+    /// Each point is moved, and its deviation grows by the error of the move: what a run does.
     Both,
 }
 
-/// Mean distance of the joints from the truth at the instants of the frames, millimetres.
+/// Returns the mean distance of the joints from the truth at the instants of the frames, in millimetres.
 ///
-/// * `skews_ms`: of the cameras, from the first on, again and again.
+/// * `skews_ms`: skews of the cameras from the first on, repeated cyclically.
 fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
     let cameras = film.cameras().to_vec();
     let skews_s: Vec<f64> =
@@ -64,7 +64,7 @@ fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
     1e3 * sum / n
 }
 
-/// Where a point was, and its deviation.
+/// Returns the position of a point as used, and its deviation.
 fn used(
     (at, sigma_px): (Point2<f64>, f64),
     velocity: Option<Velocity>,
@@ -81,7 +81,7 @@ fn used(
     }
 }
 
-/// The errors of three people: without skews, and with them, by nothing, widening, moving and both.
+/// Returns the errors for three people: without skews, then with skews and no correction, widening, moving and both.
 fn measured(rig: &str, action: Action, skews_ms: &[f64]) -> [f64; 5] {
     let mut sums = [0.0; 5];
     for seed in 1..=3 {

@@ -1,4 +1,4 @@
-//! Cameras whose pictures were taken at other times than they say.
+//! Cameras whose pictures were taken at other times than their timestamps say.
 
 use geometry::{Camera, RigWatch, Step, StepWatch};
 use nalgebra::{Isometry3, Vector3};
@@ -6,11 +6,11 @@ use scene::Action;
 
 use crate::film::{Film, RATE_HZ};
 
-/// The offsets that are found in a number of frames.
+/// Returns the offsets found after a number of frames.
 ///
-/// * `late_ms`: how much later than they say the pictures of every camera are taken, at a frame.
-/// * `skews_ms`: how much later than the instants they say that they are taken.
-/// * `calibrated`: the cameras as the watch has them.
+/// * `late_ms`: delay of every camera's pictures behind their timestamps at a frame, in milliseconds.
+/// * `skews_ms`: delay of the timestamps behind the instants, in milliseconds.
+/// * `calibrated`: the cameras as known to the watch.
 fn watch(
     film: &mut Film,
     n_frames: u32,
@@ -68,7 +68,7 @@ fn nothing_is_found_where_all_are_in_step() {
         let cameras = film.cameras().to_vec();
         for seed in 0..20 {
             film.reseed(seed);
-            // What their times say is no offset.
+            // Skews that the timestamps report are not offsets.
             let watch = watch(
                 &mut film,
                 400,
@@ -151,7 +151,7 @@ fn a_late_camera_may_look_moved_and_is_then_known_to_be_late() {
 fn a_camera_that_drifts_is_named_once_it_is_out_of_step() {
     let mut film = Film::new("ring:4", Action::Walking, 1);
     let cameras = film.cameras().to_vec();
-    // 1 ms a second: thirty times what clocks do.
+    // 1 ms per second: thirty times the drift of real clocks.
     let drift = |view: usize, frame: u32| {
         if view == 3 {
             f64::from(frame) / RATE_HZ

@@ -1,10 +1,10 @@
-//! The joint limits of a healthy adult, degrees.
+//! The joint limits of a healthy adult, in degrees.
 
 use super::N_BONES;
 
-/// Smallest and largest flexion, abduction and twist of every bone.
+/// Minimum and maximum flexion, abduction and twist of every bone.
 ///
-/// Rounded from the normal ranges of the American Academy of Orthopaedic Surgeons; the spine's are
+/// The values are rounded from the normal ranges of the American Academy of Orthopaedic Surgeons; the ranges of the spine are
 /// divided between two bones.
 pub(crate) const LIMITS: [[[f64; 2]; 3]; N_BONES] = [
     [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]],

@@ -1,4 +1,4 @@
-//! Bone lengths, sides and the directions of rotation.
+//! Tests of bone lengths, sides and directions of rotation.
 
 use proptest::prelude::*;
 

@@ -1,13 +1,13 @@
-//! A closed surface of triangles where a lattice of distances changes its sign.
+//! Creates a closed surface of triangles where a lattice of distances changes its sign.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::shape::Grid;
 
-/// Surface nets (Gibson 1998): one point in every cell that the surface intersects, at the mean of the intersections
-/// with the cell's edges; two triangles for every edge of the lattice that it intersects.
+/// Surface nets (Gibson 1998): there is one point in every cell that the surface intersects, at the mean of its intersections
+/// with the cell's edges, and two triangles for every edge of the lattice that the surface intersects.
 ///
-/// The border of the lattice must lie outside. Triangles are anticlockwise seen from outside.
+/// The border of the lattice must lie outside the body. Triangles are anticlockwise as seen from outside.
 pub(super) fn surface(grid: &Grid) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
     const NONE: u32 = u32::MAX;
     let mut at_cell = vec![NONE; grid.values.len()];
@@ -50,7 +50,7 @@ pub(super) fn surface(grid: &Grid) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// The four cells around an edge of the lattice, anticlockwise seen against its direction.
+/// Returns the four cells around an edge of the lattice, anticlockwise as seen against the direction of the edge.
 fn around(at: [usize; 3], axis: usize) -> [[usize; 3]; 4] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     [[1, 1], [0, 1], [0, 0], [1, 0]].map(|[du, dv]| {
@@ -61,7 +61,7 @@ fn around(at: [usize; 3], axis: usize) -> [[usize; 3]; 4] {
     })
 }
 
-/// The mean of the places where the surface cuts the edges of a cell.
+/// Returns the mean of the points where the surface intersects the edges of a cell.
 fn cut(grid: &Grid, cell: [usize; 3]) -> Option<Point3<f32>> {
     let corner = |bits: usize| core::array::from_fn(|axis| cell[axis] + (bits >> axis & 1));
     let values: [f32; 8] = core::array::from_fn(|i| grid.values[grid.index(corner(i))]);

@@ -8,16 +8,16 @@ use crate::body::{FOOT, FOREARM, SHIN, THIGH, UPPER_ARM};
 
 /// Parameters of a gait.
 struct Gait {
-    /// Strides (two steps) a second, and metres a stride in heights of the person.
+    /// Strides (two steps) per second, and length of a stride in heights of the person.
     hertz: f64,
     stride: f64,
-    /// Degrees: middle and swing of the hips, how far knees fold in swing and give in stance.
+    /// Centre and swing of the hips, and fold of the knees in swing and in stance, in degrees.
     hip: [f64; 2],
     knee: [f64; 2],
     arm: f64,
     elbow: f64,
     lean: f64,
-    /// How high the body flies between steps, metres.
+    /// Height of the flight between steps, in metres.
     flight: f64,
 }
 
@@ -51,14 +51,14 @@ pub(super) fn jogging(actor: &Actor, seconds: f64) -> Stance {
     gait_stance(actor, &gait, seconds)
 }
 
-/// A bump around a phase of the stride, 1 at its top.
+/// Returns a bump around a phase of the stride, with height 1.
 fn bump(phase: f64, at: f64, width: f64) -> f64 {
     let off = (phase - at + 0.5).rem_euclid(1.0) - 0.5;
     (-0.5 * (off / width).powi(2)).exp()
 }
 
-/// Joint angles over the stride as bumps and waves after the curves of Winter, *Biomechanics and Motor
-/// Control of Human Movement*, by eye.
+/// Returns the stance at a time. Joint angles over the stride are bumps and waves fitted by eye to the curves of Winter, *Biomechanics and
+/// Motor Control of Human Movement*.
 fn gait_stance(actor: &Actor, gait: &Gait, seconds: f64) -> Stance {
     let style = actor.subject.style;
     let mut stage = actor.random.fork("way");
@@ -69,7 +69,7 @@ fn gait_stance(actor: &Actor, gait: &Gait, seconds: f64) -> Stance {
     let stride = stage.unit() + gait.hertz * seconds;
     let mut stance = Stance::standing(&actor.subject).trunk(gait.lean, 0.0, 0.0);
     for side in 0..2 {
-        // The right leg is half a stride behind; an arm goes with the other leg.
+        // The right leg is half a stride behind; each arm moves with the opposite leg.
         let phase = (stride + 0.5 * side as f64).rem_euclid(1.0);
         let wave = (TAU * phase + 0.25).cos();
         stance.angles[THIGH[side]][0] = gait.hip[0] + gait.hip[1] * wave;
@@ -86,7 +86,7 @@ fn gait_stance(actor: &Actor, gait: &Gait, seconds: f64) -> Stance {
     let wave = (TAU * stride).cos();
     stance = stance.trunk(0.0, 1.5 * (TAU * stride).sin(), 5.0 * wave);
     stance.spin = -4.0 * wave;
-    // Lean and look towards the centre of the path.
+    // The person leans and looks towards the centre of the path.
     stance.roll = -2.0 * direction;
     stance = stance.look(2.0, 6.0 * direction + 5.0 * (0.37 * seconds).sin());
     stance.heading = actor.heading + turned + direction * TAU / 4.0;

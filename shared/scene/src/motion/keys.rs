@@ -1,4 +1,4 @@
-//! Actions made of key poses at regular beats, chosen at random where the action allows it.
+//! Actions that consist of key poses at regular beats; key poses are random where the action allows it.
 
 use super::stance::Stance;
 use super::{Action, Actor, Motion};
@@ -18,7 +18,7 @@ fn beat_seconds(action: Action) -> f64 {
     }
 }
 
-/// The stance between the two key poses of a time.
+/// Returns the stance at a time, between two key poses.
 pub(super) fn stance(actor: &Actor, action: Action, seconds: f64) -> Stance {
     let beats = seconds * actor.subject.style.tempo / beat_seconds(action);
     let nth = beats.floor();
@@ -40,7 +40,7 @@ pub(super) fn stance(actor: &Actor, action: Action, seconds: f64) -> Stance {
     it
 }
 
-/// The n-th key pose.
+/// Returns the n-th key pose.
 fn key(actor: &Actor, action: Action, nth: i64) -> Stance {
     let mut random = actor.random.fork("keys").nth(nth as u64);
     let it = Stance::standing(&actor.subject);
@@ -203,7 +203,7 @@ fn grab(it: Stance, phase: i64, random: &mut Random) -> Stance {
     }
 }
 
-/// The way of leaning, one for a whole performance because the furniture does not move.
+/// Returns the way of leaning. It stays the same for a whole performance because the furniture does not move.
 fn leaning_variant(actor: &Actor) -> u64 {
     actor.random.fork("lean").bits() % 3
 }
@@ -280,7 +280,7 @@ fn lying(it: Stance, actor: &Actor, random: &mut Random) -> Stance {
 const WOOD: Material = Material::Wood([150, 108, 66]);
 const STEEL: Material = Material::Plain([70, 72, 78]);
 
-/// The furniture that the action needs.
+/// Returns the furniture that the action needs.
 pub(super) fn furniture(motion: &Motion, action: Action) -> Vec<Block> {
     let actor = &motion.actor;
     let placed = |stance: Stance| {
@@ -336,14 +336,14 @@ pub(super) fn furniture(motion: &Motion, action: Action) -> Vec<Block> {
     }
 }
 
-/// A frame of reference on the floor, to place furniture in.
+/// A frame of reference on the floor for placing furniture.
 struct Placement {
     at: [f64; 2],
     heading: f64,
 }
 
 impl Placement {
-    /// A block with its centre at a distance forward, to the left and up.
+    /// Creates a block whose centre is at given distances forward, to the left and up.
     fn block(&self, centre: [f64; 3], half: [f64; 3], material: Material) -> Block {
         let (sin, cos) = self.heading.sin_cos();
         let [forward, left, up] = centre;

@@ -1,30 +1,30 @@
-//! A pose before joint limits and the floor are applied: joint angles, and how the body stands in the room.
+//! A pose before joint limits and the floor are applied: joint angles, and the position of the body in the room.
 
 use crate::body::{
     ABDOMEN, Angles, CHEST, FOOT, FOREARM, HAND, HEAD, N_BONES, NECK, SHIN, THIGH, UPPER_ARM,
 };
 use crate::subject::Subject;
 
-/// Angles in degrees as in [`Angles`], before joint limits and the floor are applied.
+/// A pose with angles in degrees as in [`Angles`], before joint limits and the floor are applied.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stance {
     pub(super) angles: Angles,
     /// Direction that the person faces, radians from x to y.
     pub(super) heading: f64,
-    /// The pelvis nods forward, tips to the right, and turns about the person's own axis, degrees.
+    /// Rotations of the pelvis in degrees: forward, to the right, and about the person's own axis.
     pub(super) pitch: f64,
     pub(super) roll: f64,
     pub(super) spin: f64,
-    /// Where the middle of the feet (or of the hips) is, metres.
+    /// Position of the middle of the feet (or of the hips), in metres.
     pub(super) place: [f64; 2],
-    /// True if `place` is that of the feet.
+    /// True if `place` is the position of the feet.
     pub(super) planted: bool,
-    /// Height of the lowest point above the floor, metres.
+    /// Height of the lowest point above the floor, in metres.
     pub(super) lift: f64,
 }
 
 impl Stance {
-    /// Standing, in the style of the subject.
+    /// Returns a person who stands in the style of the subject.
     pub(super) fn standing(subject: &Subject) -> Self {
         let style = subject.style;
         let mut stance = Self {
@@ -70,7 +70,7 @@ impl Stance {
         self.leg(0, hip, knee).leg(1, hip, knee)
     }
 
-    /// Bends the trunk forward, to the right, and turns it left.
+    /// Bends the trunk forward and to the right, and turns it left.
     pub(super) fn trunk(mut self, bend: f64, aside: f64, turn: f64) -> Self {
         self.angles[ABDOMEN][0] += 0.6 * bend;
         self.angles[CHEST][0] += 0.4 * bend;
@@ -81,7 +81,7 @@ impl Stance {
         self
     }
 
-    /// Turns the face: down and left.
+    /// Turns the face down and left.
     pub(super) fn look(mut self, down: f64, left: f64) -> Self {
         self.angles[NECK][0] += 0.5 * down;
         self.angles[HEAD][0] += 0.5 * down;
@@ -100,7 +100,7 @@ impl Stance {
         self
     }
 
-    /// Turns the ankles so that the soles lie flat.
+    /// Rotates the ankles so that the soles are flat.
     pub(super) fn flat(mut self) -> Self {
         for side in 0..2 {
             let knee = self.angles[SHIN[side]][0];
@@ -109,7 +109,7 @@ impl Stance {
         self
     }
 
-    /// Between this stance and another; the place and the heading are this one's.
+    /// Interpolates between this stance and another; the place and the heading remain those of this stance.
     pub(super) fn towards(&self, other: &Self, share: f64) -> Self {
         let mix = |a: f64, b: f64| a + (b - a) * share;
         let angles = core::array::from_fn(|bone| {

@@ -1,4 +1,4 @@
-//! Joint limits, bone lengths, the floor and the sides are kept.
+//! Tests that joint limits, bone lengths, the floor and the sides are respected.
 
 use proptest::prelude::*;
 
@@ -44,7 +44,7 @@ proptest! {
         }
     }
 
-    /// From the points alone: knees and elbows fold one way only.
+    /// Checked from the points alone: knees and elbows fold in one direction only.
     #[test]
     fn knees_and_elbows_never_bend_backwards(
         number in 0_u64..200, action in action(), seed in 0_u64..1000, seconds in 0.0..60.0,
@@ -82,7 +82,7 @@ proptest! {
         let motion = acting(number, action, seed);
         let joints = |at: f64| motion.bones.joints(&motion.bones.frames(&motion.pose(at)));
         for (a, b) in joints(seconds).iter().zip(joints(seconds + 1e-3)) {
-            // 14 m/s, the hand of a boxer.
+            // 14 m/s is the speed of a boxer's hand.
             prop_assert!((a - b).norm() < 0.014, "{}", (a - b).norm());
         }
     }

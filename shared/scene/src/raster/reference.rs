@@ -1,11 +1,11 @@
-//! The readable reference: rays through the samples, intersected with every triangle.
+//! The readable reference: rays through the samples are intersected with every triangle.
 
 use geometry::Camera;
 use nalgebra::{Point2, Point3, Vector3};
 
 use super::{Corner, NOTHING, Samples};
 
-/// The nearest triangle that a ray meets from its front, and the depth of the intersection.
+/// Returns the nearest triangle that a ray hits from its front, and the depth of the intersection.
 pub(super) fn nearest_triangle(
     camera: &Camera,
     points: &[Point3<f64>],
@@ -41,12 +41,12 @@ mod tests {
     use crate::rigs;
     use crate::subject::Subject;
 
-    /// A whole person through a lens with distortion.
+    /// Tests a whole person through a lens with distortion.
     #[test]
     fn the_z_buffer_agrees_with_ray_casting() {
         let rig = rigs::humaneva().unwrap();
         let mut camera = rig.cameras()[0].clone();
-        // Much smaller, so that every sample can be checked: 64 x 48.
+        // The picture is much smaller, 64 x 48, so that every sample can be checked.
         let intrinsics = &mut camera.intrinsics;
         for value in [
             &mut intrinsics.fx,
@@ -86,7 +86,7 @@ mod tests {
                 match (ray, found) {
                     (Some((_, ray)), Some(found)) => {
                         n_seen += 1;
-                        // A sample on a silhouette may get another triangle.
+                        // A sample on a silhouette may get a different triangle.
                         n_edge += usize::from((ray - found).abs() > 2e-3);
                     }
                     (None, None) => {}

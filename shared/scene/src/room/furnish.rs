@@ -1,4 +1,4 @@
-//! Random rooms.
+//! Creates random rooms.
 
 use nalgebra::{Point3, Vector3};
 
@@ -36,7 +36,7 @@ const BODIES: [Material; 7] = [
     Material::Plain([64, 100, 66]),
 ];
 
-/// Only the action's own furniture stands nearer to the middle, metres.
+/// Radius around the middle that contains only the action's own furniture, in metres.
 const CLEAR_RADIUS: f32 = 1.75;
 
 pub(super) fn room(random: Random, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Room {
@@ -191,7 +191,7 @@ fn chair([x, y]: [f32; 2], yaw: f32, material: Material) -> Vec<Block> {
     ]
 }
 
-/// Returns true if a block is off the stage, and neither at nor in front of a camera.
+/// Returns true if a block is outside the stage, and neither at nor in front of a camera.
 fn is_free(block: &Block, cameras: &[Point3<f32>]) -> bool {
     let [x, y, _] = block.centre;
     let reach = block.half[0].hypot(block.half[1]);
@@ -211,7 +211,7 @@ fn is_free(block: &Block, cameras: &[Point3<f32>]) -> bool {
     })
 }
 
-/// Returns true if two blocks are so near that they may touch.
+/// Returns true if two blocks are so close that they may touch.
 fn touch(a: &Block, b: &Block) -> bool {
     let reach = |block: &Block| block.half[0].hypot(block.half[1]);
     (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1]) < reach(a) + reach(b)

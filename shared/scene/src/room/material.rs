@@ -5,13 +5,13 @@ use nalgebra::Vector3;
 use crate::colour::{Linear, srgb};
 use crate::random::{Random, noise};
 
-/// A material and its colour, sRGB of 0 to 255.
+/// A material and its colour, in sRGB from 0 to 255.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Material {
     Plain([u8; 3]),
     /// Boards along x.
     Wood([u8; 3]),
-    /// Squares of two shades; their width in metres.
+    /// Squares of two shades, with their width in metres.
     Tiles([u8; 3], f32),
     Carpet([u8; 3]),
     Bricks([u8; 3]),
@@ -31,7 +31,7 @@ fn chequered(u: f32, v: f32) -> f32 {
 }
 
 impl Material {
-    /// The colour at a place: metres in the object's own frame, or -1 to 1 across a panel.
+    /// Returns the colour at a place, which is given in metres in the object's own frame, or from -1 to 1 across a panel.
     pub(crate) fn colour(self, at: &Vector3<f32>) -> Linear {
         let grain = |scale: f32, size: f32| 1.0 + size * noise(&(at * scale), 21);
         match self {
@@ -94,7 +94,7 @@ impl Material {
         }
     }
 
-    /// The colour of the frame around a panel of this material.
+    /// Returns the colour of the frame around a panel of this material.
     pub(super) fn frame(self) -> Linear {
         match self {
             Self::Window(_) => srgb([225, 224, 220]),

@@ -1,4 +1,4 @@
-//! Rays end at walls and furniture, and the cameras' views of the stage are free.
+//! Tests that rays end at walls and furniture, and that the cameras' views of the stage are free.
 
 use proptest::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Pictures agree with their ground truth.
+//! Tests that pictures agree with their ground truth.
 
 use std::collections::BTreeSet;
 
@@ -69,7 +69,7 @@ fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
                 (x1 - 3.0..=x2 + 3.0).contains(&x) && (y1 - 3.0..=y2 + 3.0).contains(&y),
                 "{action:?}"
             );
-            // Within 3 pixels of the person.
+            // The joint is within 3 pixels of the person.
             let near =
                 (-3..=3).flat_map(|dy| (-3..=3).map(move |dx| (x as i64 + dx, y as i64 + dy)));
             let on = near.filter(|(x, y)| {
@@ -199,7 +199,7 @@ fn a_camera_is_found_by_name_and_by_number() {
     assert!(error.contains("C1, C2, C3"), "{error}");
 }
 
-/// A scene with others, and the same without.
+/// Returns a scene with the given number of other people.
 fn crowd(others: u64) -> Arc<Scene> {
     let settings = Settings {
         rig: RigChoice::parse("ring:3:6:1.6").unwrap(),
@@ -222,7 +222,7 @@ fn the_truth_and_the_mask_are_the_subjects_alone() {
         let changed = first.iter().zip(&second);
         let changed = changed.filter(|(a, b)| a.abs_diff(**b) > 20).count();
         assert!(changed > 3000, "camera {camera} sees the others: {changed}");
-        // Others may hide the subject, but are not it.
+        // Other people may hide the subject, but are not part of its mask.
         let (mask, mask_among) = (alone.mask(), among.mask());
         let less = mask_among.iter().zip(&mask);
         assert!(less.clone().all(|(among, alone)| among <= alone));

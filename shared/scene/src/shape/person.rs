@@ -1,7 +1,7 @@
 //! The solids of a person: body, hair and the slack of the clothes.
 //!
-//! Sizes in metres are those of a man of 1.75 m, by eye; all are scaled with the height, thicknesses
-//! with the girth.
+//! Sizes in metres apply to a man of 1.75 m and are chosen by eye. All sizes are scaled with the height, and thicknesses
+//! also with the girth.
 
 use super::solid::Solid;
 use crate::body::{
@@ -16,7 +16,7 @@ struct SolidBuilder<'a> {
     pieces: Vec<(usize, Solid)>,
 }
 
-/// All solids, in the frames of their bones.
+/// Returns all solids, in the frames of their bones.
 pub(super) fn pieces(subject: &Subject, bones: &Bones) -> Vec<(usize, Solid)> {
     let mut builder = SolidBuilder {
         subject,
@@ -36,7 +36,7 @@ pub(super) fn pieces(subject: &Subject, bones: &Bones) -> Vec<(usize, Solid)> {
 }
 
 impl SolidBuilder<'_> {
-    /// An ellipsoid; centre and radii in metres of the mean person.
+    /// Adds an ellipsoid; centre and radii are in metres for the mean person.
     fn ellipsoid(&mut self, bone: usize, centre: [f32; 3], radii: [f32; 3], slack: f32) {
         let s = self.scale;
         let solid = Solid::ellipsoid(
@@ -46,7 +46,7 @@ impl SolidBuilder<'_> {
         self.pieces.push((bone, solid.thicker(slack)));
     }
 
-    /// A cone between points in metres, radii in those of the mean person.
+    /// Adds a cone between points in metres; the radii apply to the mean person.
     fn cone(&mut self, bone: usize, ends: [[f32; 3]; 2], radii: [f32; 2], slack: f32) {
         let r = radii.map(|radius| radius * self.scale);
         let solid = Solid::cone(ends[0], ends[1], r).thicker(slack);
@@ -122,7 +122,7 @@ impl SolidBuilder<'_> {
         }
     }
 
-    /// Slack of a sleeve or leg at a share of the limb.
+    /// Slack of a sleeve or trouser leg at a share of the limb.
     fn cover(share: f32, until: f32, slack: f32) -> f32 {
         if share < until { slack } else { 0.0 }
     }

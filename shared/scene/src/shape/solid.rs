@@ -1,8 +1,8 @@
-//! Two kinds of smooth solids, and how far a point is from them.
+//! Two kinds of smooth solids, and the distance of a point from them.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// A solid.
+/// A smooth solid.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Solid {
     /// The convex hull of two balls.
@@ -32,7 +32,7 @@ impl Solid {
         }
     }
 
-    /// Larger by a distance in all directions.
+    /// Returns the solid enlarged by a distance in all directions.
     pub(super) fn thicker(self, by: f32) -> Self {
         match self {
             Self::Cone { ends, radii } => Self::Cone {
@@ -59,7 +59,7 @@ impl Solid {
         }
     }
 
-    /// A box around it.
+    /// Returns a box that contains the solid.
     pub(super) fn bounds(&self) -> [Vector3<f32>; 2] {
         match self {
             Self::Cone {
@@ -80,7 +80,7 @@ impl Solid {
         }
     }
 
-    /// Returns true if a point is certainly farther than `limit`, by a bounding ball.
+    /// Returns true if a point is certainly farther away than `limit`, judged by a bounding ball.
     pub(super) fn is_far(&self, at: &Point3<f32>, limit: f32) -> bool {
         let (centre, radius) = match self {
             Self::Cone {
@@ -95,7 +95,7 @@ impl Solid {
         (at - centre).norm_squared() > (radius + limit).powi(2)
     }
 
-    /// Signed distance, exact for cones (Quilez, "round cone"), of first order for ellipsoids.
+    /// Signed distance; exact for cones (Quilez, "round cone"), first-order for ellipsoids.
     pub(super) fn distance(&self, at: &Point3<f32>) -> f32 {
         match self {
             Self::Cone {
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Brute force: a cone is the union of the balls between its ends (to the step's error).
+        /// Compares with brute force: a cone is the union of the balls between its ends (up to the error of the step).
         #[test]
         fn a_cone_is_the_union_of_balls(
             x in -1.0_f32..1.0, y in -1.0_f32..1.0, z in -1.0_f32..2.0,

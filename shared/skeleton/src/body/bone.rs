@@ -23,16 +23,16 @@ pub(crate) const L_WRIST: usize = 11;
 pub(crate) const NECK: usize = 12;
 pub(crate) const HEAD: usize = 13;
 
-/// The distance between a joint and another, or the middle of two.
+/// The distance between two joints, or between the midpoint of two joints and a third.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bone {
-    /// Name.
+    /// Name of the bone.
     pub name: &'static str,
     /// Kind of the bone.
     pub kind: Kind,
-    /// It begins in the middle of these two joints; the same joint twice for all but the trunk.
+    /// Start of the bone: the midpoint of these two joints; both are the same joint except for the trunk.
     pub from: [usize; 2],
-    /// The joint that it ends in.
+    /// The joint at the end of the bone.
     pub to: usize,
 }
 
@@ -45,7 +45,7 @@ const fn bone(name: &'static str, kind: Kind, from: [usize; 2], to: usize) -> Bo
     }
 }
 
-/// The bones.
+/// All bones, in a fixed order.
 pub const BONES: [Bone; N_BONES] = [
     bone("right lower leg", Kind::LowerLeg, [R_KNEE; 2], R_ANKLE),
     bone("right upper leg", Kind::UpperLeg, [R_HIP; 2], R_KNEE),
@@ -78,41 +78,41 @@ pub const BONES: [Bone; N_BONES] = [
     bone("head", Kind::Head, [NECK; 2], HEAD),
 ];
 
-/// Bones of the right side and the same of the left.
+/// Pairs of bones: each bone of the right side with the same bone of the left side.
 pub(crate) const SIDES: [[usize; 2]; 5] = [[0, 4], [1, 3], [5, 8], [6, 7], [9, 10]];
 
 impl Bone {
-    /// From its beginning to its end, metres in the world; `None` if a joint is missing.
+    /// Returns the vector from the start of the bone to its end, in metres in the world; `None` if a joint is missing.
     pub(crate) fn vector(&self, joints: &Joints) -> Option<Vector3<f64>> {
         let [a, b] = self.from;
         let from = nalgebra::center(&joints[a]?, &joints[b]?);
         Some(joints[self.to]? - from)
     }
 
-    /// Its length, metres; `None` if a joint is missing.
+    /// Returns the length of the bone, in metres; `None` if a joint is missing.
     pub fn length(&self, joints: &Joints) -> Option<f64> {
         self.vector(joints).map(|vector| vector.norm())
     }
 
-    /// Bit `i` is set if joint `i` is an end of it.
+    /// Bit mask of the bone's joints: bit `i` is set if joint `i` is an end.
     pub(crate) const fn mask(&self) -> u32 {
         1 << self.from[0] | 1 << self.from[1] | 1 << self.to
     }
 }
 
-/// The lengths of all bones, metres; `None` where a joint is missing.
+/// Returns the lengths of all bones, in metres; `None` if a joint is missing.
 pub(crate) fn lengths(joints: &Joints) -> [Option<f64>; N_BONES] {
     core::array::from_fn(|i| BONES[i].length(joints))
 }
 
-/// Joints that cannot be worked with become missing ones.
+/// Replaces unusable joints by missing ones.
 pub(crate) fn clean(joints: &Joints) -> Joints {
     const FARTHEST: f64 = 1e6;
     let is_near = |point: &Point3<f64>| point.iter().all(|x| x.abs() < FARTHEST);
     joints.map(|joint| joint.filter(is_near))
 }
 
-/// The joints of a mask, ascending.
+/// Returns the joints of a mask, in ascending order.
 pub(crate) fn joints_of(mut mask: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let joint = mask.trailing_zeros();

@@ -1,4 +1,4 @@
-//! Check that a skeleton can be a person, and search for the joints that cannot belong to one.
+//! Checks whether a skeleton can be a person, and finds the joints that cannot belong to it.
 
 use crate::body::bone::{self, BONES, SIDES, clean, joints_of};
 use crate::body::lengths::{Learned, Lengths};
@@ -8,38 +8,44 @@ use crate::body::stature::{MIN_BONES, STATURES, Stature, of_lengths};
 use crate::body::verdict::{Reason, Verdict};
 use crate::body::{Covariances, Joints, N_BONES, N_JOINTS};
 
-/// A bone is impossible if its length is this many standard deviations from the expected one.
+/// A bone is impossible if its length differs from the expected length by more than this many standard deviations.
 ///
-/// Our own choice. With a standard deviation of at least [`MEASUREMENT_SD`], 17.5 cm are always allowed: for a man of
-/// 1.75 m a lower arm of 7 to 44 cm, an upper leg of 23 to 63 cm.
+/// Our own choice. The standard deviation is at least [`MEASUREMENT_SD`], so 17.5 cm are always allowed. For a man of
+/// 1.75 m, a lower arm may measure 7 to 44 cm, and an upper leg 23 to 63 cm.
 pub const LIMIT: f64 = 3.5;
 
-/// How much longer one side is than the other, as a share of the length: standard deviation, our own choice.
+/// Standard deviation of the difference between the two sides, as a share of the length; our own choice.
 const SIDES_DIFFER: f64 = 0.02;
 
-/// How differently a person's stature is found from frame to frame, as a share: standard deviation, our own choice. Not
-/// what the frame says of itself: the bones of a wrong skeleton disagree, and would excuse it.
+/// Standard deviation of a person's estimated stature between frames, as a share; our own choice. The uncertainty
+/// computed from a single frame is not used: the bones of a wrong skeleton disagree, which would make it acceptable.
 const STATURE_SPREAD: f64 = 0.08;
 
-/// Standard deviation of a reach, as a share of it: people and places, our own choice.
+/// Standard deviation of a reach, as a share of it, for people and joint places; our own choice.
 const REACH_SPREAD: f64 = 0.06;
 
-/// A single bone counts at most this many standard deviations in [`Verdict::deviation`].
+/// Maximum contribution of a single bone to [`Verdict::deviation`], in standard deviations.
 const MOST: f64 = 10.0;
 
 /// Judges a skeleton.
 ///
-/// A skeleton is not that of a person if it has fewer than [`MIN_BONES`] bones, a stature beyond [`STATURES`] or more than
-/// 28 % from that of the learned lengths, or if more than half of its bones are impossible. Otherwise an impossible
-/// bone loses its worst joint: the one that also spoils other bones, else the one farther from the trunk, else the one
-/// with the larger covariance; and so on until what is left is possible. Impossible are
+/// A skeleton is not a person's if
 ///
-/// * a bone whose length is more than [`LIMIT`] standard deviations from what the stature lets expect, or the
+/// * it has fewer than [`MIN_BONES`] bones,
+/// * its stature is outside [`STATURES`], or more than 28 % from that of the learned lengths, or
+/// * more than half of its bones are impossible.
+///
+/// Otherwise, every impossible bone loses its worst joint, until the rest is possible. The worst joint is the one that also makes other
+/// bones impossible. In a tie, it is the one farther from the trunk, and then the one with the larger covariance.
+///
+/// These are impossible:
+///
+/// * a bone whose length is more than [`LIMIT`] standard deviations from the length expected for the stature, or from the
 ///   learned length;
 /// * the bones of the two sides, if one is more than [`LIMIT`] standard deviations longer than the other;
-/// * two joints that hang together by missing joints only, if they are farther apart than the bones between them reach.
+/// * two joints connected only through missing joints, if they are farther apart than the bones between them reach.
 ///
-/// * `lengths`: the person's own, where they are known.
+/// * `lengths`: the person's own bone lengths, if known.
 pub fn check(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengths>) -> Verdict {
     let mut joints = clean(joints);
     let whole = Judgement::new(&joints, lengths);
@@ -79,11 +85,11 @@ pub fn check(joints: &Joints, covariances: &Covariances, lengths: Option<&Length
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Expected {
     pub(crate) metres: f64,
-    /// Standard deviation, metres.
+    /// Standard deviation of the length, in metres.
     pub(crate) spread: f64,
 }
 
-/// The length of a kind of bone, learned or else of people with this stature.
+/// Returns the expected length of a kind of bone: the learned length if there is one, otherwise that of people of this stature.
 pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> Expected {
     let proportion = kind.proportion();
     if let Some(Learned { metres, sd }) = lengths.and_then(|length| length.of_kind(kind)) {
@@ -97,14 +103,14 @@ pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> E
     }
 }
 
-/// The bones of a skeleton against what is expected of them.
+/// The bones of a skeleton compared with their expected lengths.
 struct Judgement<'a> {
     stature: Option<Stature>,
     lengths: [Option<f64>; N_BONES],
-    /// Deviation of every bone's length from the expected one, standard deviations.
+    /// Deviation of every bone's length from the expected length, in standard deviations.
     z: [Option<f64>; N_BONES],
     learned: Option<&'a Lengths>,
-    /// The stature that lengths are expected of, metres: one that people have.
+    /// Stature from which the expected lengths are derived, in metres; limited to those of people.
     expected_of: f64,
 }
 
@@ -138,7 +144,7 @@ impl<'a> Judgement<'a> {
         (self.z.iter().flatten().map(capped).sum::<f64>() / n as f64).sqrt()
     }
 
-    /// Why it is not a person, whatever its proportions.
+    /// Reason why the skeleton is not a person's, regardless of its proportions.
     fn reason(&self) -> Option<Reason> {
         let Some(stature) = self.stature else {
             return Some(Reason::TooFewBones {
@@ -154,8 +160,8 @@ impl<'a> Judgement<'a> {
         })
     }
 
-    /// The statures that are possible, metres: those of people, about that of the learned lengths of the bones that
-    /// are there.
+    /// Returns the possible statures, in metres: those of people, and near the stature given by the learned lengths of the present
+    /// bones.
     fn statures(&self) -> [f64; 2] {
         let learned = |bone: usize| self.learned.and_then(|learned| learned.bone(bone));
         let lengths =
@@ -167,7 +173,7 @@ impl<'a> Judgement<'a> {
         })
     }
 
-    /// The joint to drop; `None` if all that is there is possible.
+    /// Returns the joint to drop; `None` if all present joints are possible.
     fn worst_joint(&self, joints: &Joints, covariances: &Covariances) -> Option<usize> {
         let mut worst: Option<Conflict> = None;
         let mut spoilt = [0_u32; N_JOINTS];
@@ -192,13 +198,13 @@ impl<'a> Judgement<'a> {
         joints_of(worst?.joints).max_by(order)
     }
 
-    /// Sum of the deviations of a joint's bones.
+    /// Returns the sum of the deviations of a joint's bones.
     fn strain(&self, joint: usize) -> f64 {
         let of_joint = BONES.iter().zip(&self.z).filter(|bone| bone.0.mask() >> joint & 1 == 1);
         of_joint.filter_map(|bone| *bone.1).map(f64::abs).sum()
     }
 
-    /// Calls `found` for everything that is impossible.
+    /// Calls `found` for every conflict.
     fn conflicts(&self, joints: &Joints, mut found: impl FnMut(Conflict)) {
         for (bone, z) in BONES.iter().zip(&self.z) {
             if let Some(z) = z.map(f64::abs).filter(|z| *z > LIMIT) {
@@ -252,12 +258,12 @@ impl<'a> Judgement<'a> {
     }
 }
 
-/// Something impossible.
+/// A combination of joints that is impossible.
 #[derive(Clone, Copy)]
 struct Conflict {
-    /// Bit `i` is set if joint `i` takes part.
+    /// Bit mask of the joints involved: bit `i` is set for joint `i`.
     joints: u32,
-    /// How impossible, standard deviations.
+    /// Size of the conflict, in standard deviations.
     z: f64,
 }
 

@@ -1,35 +1,35 @@
-//! How unlike a person a skeleton is: a number to choose among many by.
+//! A number for how unlike a person a skeleton is, used to choose among many skeletons.
 
 use crate::body::bone::{self, BONES};
 use crate::body::proportion::MEASUREMENT_SD;
 use crate::body::stature::median_of_lengths;
 use crate::body::{Joints, N_BONES};
 
-/// No bone adds more than this many squared standard deviations to [`deviation`], and the stature no more than four times
-/// as many.
+/// Maximum number of squared standard deviations that one bone adds to [`deviation`]; the stature adds at most four times
+/// this number.
 pub const DEVIATION_CAP: f64 = 9.0;
 
-/// Statures that cost nothing, metres: from a child of three years to a man taller than almost all.
+/// Range of statures that cost nothing, in metres: from a three-year-old child to a man taller than almost all others.
 const USUAL: [f64; 2] = [0.95, 2.0];
-/// Standard deviation beyond them, metres.
+/// Standard deviation outside this range, in metres.
 const UNUSUAL_SD: f64 = 0.05;
 const UNUSUAL_CAP: f64 = 4.0 * DEVIATION_CAP;
 
-/// How unlike a person a skeleton is: squared standard deviations, summed over the 14 bones and the stature.
+/// Returns how unlike a person a skeleton is: squared standard deviations, summed over the 14 bones and the stature.
 ///
-/// For every bone the squared deviation of the logarithm of its length from what the stature lets expect, at most
-/// [`DEVIATION_CAP`]; the stature is the one that the bones agree on best, and costs nothing between 0.95 and 2.0 m. A
-/// missing bone counts 1, as much as an ordinary one, so that skeletons with different joints missing can be compared.
+/// Every bone adds the squared deviation of the logarithm of its length from that expected for the stature, at most
+/// [`DEVIATION_CAP`]. The stature is the one on which the bones agree best, and costs nothing between 0.95 and 2.0 m. A
+/// missing bone counts 1, as much as an ordinary bone, so skeletons with different missing joints can be compared.
 ///
-/// * Returns a number without unit, 0 to 18 times the cap: up to 14 is ordinary. Half of it is a robust
-///   negative log-likelihood. The largest number if there are too few bones for a stature.
+/// * Returns a number without a unit, from 0 to 18 times the cap; up to 14 is ordinary. Half of it is a robust
+///   negative log-likelihood. Returns the largest number if there are too few bones for a stature.
 pub fn deviation(joints: &Joints) -> f64 {
     let lengths = bone::lengths(&bone::clean(joints));
     let Some(stature) = median_of_lengths(&lengths) else {
         return DEVIATION_CAP * N_BONES as f64 + UNUSUAL_CAP;
     };
     let unusual = (stature - stature.clamp(USUAL[0], USUAL[1])) / UNUSUAL_SD;
-    // Near 0 all bones have lost their length; the smallest person has a stature to compare with.
+    // Near 0, all expected lengths vanish; this minimum keeps a stature to compare with.
     let stature = stature.max(0.1);
     let mut sum = (unusual * unusual).min(UNUSUAL_CAP);
     for (bone, length) in BONES.iter().zip(&lengths) {

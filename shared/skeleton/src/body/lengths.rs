@@ -1,32 +1,32 @@
-//! The lengths of one person's own bones, learned over a run.
+//! Bone lengths of one person, learned over a run.
 
 use crate::body::bone::{self, BONES};
 use crate::body::proportion::Kind;
 use crate::body::verdict::Verdict;
 use crate::body::{Joints, N_BONES};
 
-/// Number of frames whose lengths are kept, the last ones.
+/// Number of most recent frames whose lengths are kept.
 pub const MAX_FRAMES: usize = 240;
 
 /// Number of frames after which a length counts as learned.
 pub const MIN_FRAMES: usize = 30;
 
-/// Frames that err alike, and so count as one: half a second at 30 frames a second, our own choice.
+/// Number of successive frames with correlated errors, which count as one: half a second at 30 frames per second; our own choice.
 const ALIKE: f64 = 15.0;
 
-/// A length that was learned.
+/// A learned length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Learned {
-    /// The length, metres: a median.
+    /// The length, in metres; a median over frames.
     pub metres: f64,
-    /// Standard deviation of that median, metres: of single frames (from the median absolute deviation) over the
-    /// square root of their number, [`MAX_FRAMES`] of them counting as 16.
+    /// Standard deviation of that median, in metres. It is the deviation of single frames (from the median absolute deviation) divided by
+    /// the square root of their effective number; [`MAX_FRAMES`] frames count as 16.
     pub sd: f64,
 }
 
-/// Bone lengths of one person, learned over a run; left and right bones share theirs.
+/// Bone lengths of one person, learned over a run; the left and right bones of a kind share one length.
 ///
-/// Holds the lengths of the last [`MAX_FRAMES`] good frames of every kind of bone. The same frames in the same
+/// Stores the lengths from the last [`MAX_FRAMES`] good frames for every kind of bone. The same frames in the same
 /// order give the same lengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lengths {
@@ -36,7 +36,7 @@ pub struct Lengths {
 }
 
 impl Default for Lengths {
-    /// Nothing is known.
+    /// Creates an empty store.
     fn default() -> Self {
         let empty = || Vec::with_capacity(MAX_FRAMES);
         Self {
@@ -48,17 +48,17 @@ impl Default for Lengths {
 }
 
 impl Lengths {
-    /// Forgets the person.
+    /// Forgets all learned lengths.
     pub fn reset(&mut self) {
         self.frames.iter_mut().for_each(Vec::clear);
         self.next = [0; Kind::ALL.len()];
         self.learned = [None; Kind::ALL.len()];
     }
 
-    /// Adds a frame: the bones whose joints the verdict keeps; nothing of a skeleton that is not that of a person.
+    /// Adds a frame: the bones whose joints the verdict keeps. A skeleton that is not a person's adds nothing.
     ///
-    /// * `joints`: as they were triangulated; not refined, or the lengths confirm themselves.
-    /// * `verdict`: of [`check`](crate::body::check) on these joints.
+    /// * `joints`: the joints as triangulated, not as refined; otherwise the lengths would confirm themselves.
+    /// * `verdict`: result of [`check`](crate::body::check) for these joints.
     pub fn add(&mut self, joints: &Joints, verdict: &Verdict) {
         if verdict.nobody.is_some() {
             return;
@@ -75,14 +75,14 @@ impl Lengths {
         }
     }
 
-    /// The length of a bone, once it was in [`MIN_FRAMES`] frames.
+    /// Returns the length of a bone after it was seen in at least [`MIN_FRAMES`] frames.
     ///
-    /// * `bone`: its index in [`BONES`]; `None` beyond.
+    /// * `bone`: index in [`BONES`]; `None` is returned if it is out of range.
     pub fn bone(&self, bone: usize) -> Option<Learned> {
         self.of_kind(BONES.get(bone)?.kind)
     }
 
-    /// The number of bones, of the 14, whose length is known.
+    /// Returns the number of bones, out of 14, whose length is known.
     pub fn n_learned(&self) -> usize {
         (0..N_BONES).filter(|bone| self.bone(*bone).is_some()).count()
     }
@@ -120,7 +120,7 @@ fn learn(frames: &[f64]) -> Learned {
     Learned { metres, sd }
 }
 
-/// The upper median; the order of the values is lost.
+/// Returns the upper median; reorders the values.
 fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1

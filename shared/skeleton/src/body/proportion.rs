@@ -1,18 +1,18 @@
-//! How long bones are, as shares of the stature, and how much that differs among people.
+//! Bone lengths as shares of the stature, and their spread among people.
 
-/// Standard deviation of the measured length of a bone about its true length, metres.
+/// Standard deviation of the measured length of a bone from its true length, in metres.
 ///
-/// Our own choice: the pipeline's joints are 5 to 15 cm off, mostly together with their neighbours and across the bone.
+/// Our own choice: the pipeline's joints are off by 5 to 15 cm, mostly together with their neighbours and across the bone.
 pub const MEASUREMENT_SD: f64 = 0.05;
 
-/// The statures for which [`Proportion::child`] and [`Proportion::adult`] hold, metres; between them the shares
-/// change linearly with the stature, beyond them not at all.
+/// The statures to which [`Proportion::child`] and [`Proportion::adult`] apply, in metres. Between them, the shares
+/// change linearly with the stature; outside them, they are constant.
 ///
 /// 0.95 m is about the median at three years (WHO Child Growth Standards 2006: girls 95.1 cm, boys 96.1 cm). 1.65 m is
-/// between the mean women (1.629 m) and men (1.756 m) of ANSUR II, our choice of where growth has ended.
+/// between the mean women (1.629 m) and men (1.756 m) of ANSUR II; it is our choice for the end of growth.
 pub const CHILD_AND_ADULT: [f64; 2] = [0.95, 1.65];
 
-/// Kind of a bone; left and right are of one kind.
+/// Kind of a bone; left and right bones have the same kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Shoulder to elbow.
@@ -23,7 +23,7 @@ pub enum Kind {
     UpperLeg,
     /// Knee to ankle.
     LowerLeg,
-    /// Middle of the hips to the base of the neck.
+    /// Midpoint of the hips to the base of the neck.
     Trunk,
     /// Shoulder to shoulder.
     ShoulderWidth,
@@ -40,36 +40,36 @@ pub enum Kind {
 pub struct Proportion {
     /// Mean share of adults.
     pub adult: f64,
-    /// Mean share of a child of three years.
+    /// Mean share of a three-year-old child.
     pub child: f64,
     /// Standard deviation among people, as a share of the length.
     pub people: f64,
-    /// How differently detectors and data sets place the joints, as a share of the length.
+    /// Differences between detectors and data sets in placing the joints, as a share of the length.
     pub place: f64,
-    /// How much the distance changes with the posture, as a share of the length.
+    /// Variation of the distance with the posture, as a share of the length.
     pub posture: f64,
 }
 
 impl Proportion {
-    /// Standard deviation of the length about what the stature lets expect, as a share of the length: people,
-    /// places and postures together.
+    /// Returns the standard deviation of the length from that expected for the stature, as a share of the length; combines people,
+    /// places and postures.
     pub fn spread(&self) -> f64 {
         self.variance().sqrt()
     }
 
-    /// The square of [`spread`](Self::spread).
+    /// Returns the square of [`spread`](Self::spread).
     pub(crate) fn variance(&self) -> f64 {
         self.people * self.people + self.place * self.place + self.posture * self.posture
     }
 
-    /// Length at a stature, metres.
+    /// Returns the length at a stature, in metres.
     pub fn length(&self, stature: f64) -> f64 {
         let [child, adult] = CHILD_AND_ADULT;
         let share = self.child + self.slope() * (stature.clamp(child, adult) - child);
         share * stature
     }
 
-    /// Derivative of [`length`](Self::length) by the stature.
+    /// Returns the derivative of [`length`](Self::length) with respect to the stature.
     pub(crate) fn length_by_stature(&self, stature: f64) -> f64 {
         let [child, adult] = CHILD_AND_ADULT;
         if stature < child {
@@ -81,7 +81,7 @@ impl Proportion {
         }
     }
 
-    /// The stature at which a bone has this length, metres: the inverse of [`length`](Self::length).
+    /// Returns the stature at which a bone has this length, metres: the inverse of [`length`](Self::length).
     pub fn stature(&self, length: f64) -> f64 {
         let [child, adult] = CHILD_AND_ADULT;
         if length <= self.child * child {
@@ -103,7 +103,7 @@ impl Proportion {
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 9] = [
         Self::UpperArm,
         Self::LowerArm,
@@ -116,39 +116,39 @@ impl Kind {
         Self::Head,
     ];
 
-    /// Its place in [`ALL`](Self::ALL).
+    /// Returns the index of the kind in [`ALL`](Self::ALL).
     pub(crate) const fn index(self) -> usize {
         self as usize
     }
 
-    /// Its length as a share of the stature.
+    /// Returns the length of this kind of bone as a share of the stature.
     ///
     /// Sources, by their short names:
     ///
     /// * *D&C*: Drillis & Contini (1966), Body segment parameters, as in figure 4.1 of Winter, *Biomechanics and Motor
     ///   Control of Human Movement*: between joints.
     /// * *ANSUR II*: Gordon et al. (2014), 2012 Anthropometric Survey of U.S. Army Personnel, Natick/TR-15/007: 4082
-    ///   men, 1986 women, between landmarks on the skin. `people` is the standard deviation of the share over its mean,
-    ///   of the shares of single people in its public data: upper arm 0.1909 ± 0.0062, forearm 0.1511 ± 0.0067, thigh
+    ///   men, 1986 women, between landmarks on the skin. `people` is the standard deviation of the share divided by its mean,
+    ///   over the shares of the individuals in its public data: upper arm 0.1909 ± 0.0062, forearm 0.1511 ± 0.0067, thigh
     ///   0.2476 ± 0.0113, shank 0.2267 ± 0.0088, trunk 0.3052 ± 0.0154, biacromial breadth 0.2328 ± 0.0114, hip breadth
-    ///   0.2036 ± 0.0167. Of the head there is none; it has the spread of the trunk.
+    ///   0.2036 ± 0.0167. There is no value for the head; it uses the spread of the trunk.
     ///
     /// | kind | adult |
     /// |---|---|
     /// | upper and lower arm, upper and lower leg | D&C: 0.186, 0.146, 0.245, 0.246 |
     /// | trunk | D&C: shoulders at 0.818 of the stature, hips at 0.530; the base of the neck 0.012 higher (our choice) |
-    /// | head | what is left to 1 above hips and trunk: 0.170 |
+    /// | head | the remainder to 1 above hips and trunk: 0.170 |
     /// | shoulder width | ANSUR II: 0.2328, less 0.01 on either side to the centre of the joint (our choice) |
     /// | hip width | centres 72 % of the iliac spines' distance apart (Bell, Pedersen & Brand 1990), of some 24 cm: 0.100 |
     /// | shoulder to neck | half the width, and 0.02 higher: 0.110 |
     ///
-    /// The children's column is our own, made to add up to 1 from ankle (0.045 above the floor) to vertex: a head of
-    /// about a fifth of the stature, where adults have 0.13 (D&C), and a neck; sitting height about 0.57 of the stature
-    /// at three years, 0.52 for adults (Fredriks et al. 2005), which leaves legs shorter by a ninth; arms shorter by a
+    /// The shares of children are our own. They add up to 1 from ankle (0.045 above the floor) to vertex. The head is
+    /// about a fifth of the stature, where adults have 0.13 (D&C), plus a neck. The sitting height is about 0.57 of the stature
+    /// at three years and 0.52 for adults (Fredriks et al. 2005), so the legs are shorter by a ninth. The arms are shorter by a
     /// twentieth.
     ///
-    /// `place` and `posture` are our own. Data sets mean different points by hips, neck and top of the head most of all;
-    /// backs bend, heads nod and shoulders are shrugged, while limbs keep their lengths but for the skin under markers.
+    /// `place` and `posture` are our own. Data sets differ most in the points they call hips, neck and top of the head.
+    /// Backs bend, heads nod and shoulders shrug, whereas limbs keep their lengths except for the skin under markers.
     pub const fn proportion(self) -> Proportion {
         let [adult, child, people, place, posture] = match self {
             Self::UpperArm => [0.186, 0.178, 0.032, 0.045, 0.02],

@@ -1,4 +1,4 @@
-//! How far apart two joints can be when what lies between them is missing.
+//! Maximum distance of two joints if the joints between them are missing.
 
 use crate::body::bone::{
     BONES, L_ELBOW, L_HIP, L_KNEE, L_SHOULDER, NECK, R_ELBOW, R_HIP, R_KNEE, R_SHOULDER, joints_of,
@@ -6,7 +6,7 @@ use crate::body::bone::{
 use crate::body::proportion::Kind;
 use crate::body::{Joints, N_JOINTS};
 
-/// The next joint towards the neck, and the kinds of bone between; a hip has half the width of the hips besides.
+/// The next joint towards the neck, and the kind of bone between them; a hip also has half the width of the hips.
 const TOWARDS_NECK: [Option<(usize, Kind)>; N_JOINTS] = [
     Some((R_KNEE, Kind::LowerLeg)),
     Some((R_HIP, Kind::UpperLeg)),
@@ -24,12 +24,12 @@ const TOWARDS_NECK: [Option<(usize, Kind)>; N_JOINTS] = [
     Some((NECK, Kind::Head)),
 ];
 
-/// How far from the trunk a joint is: 0 for the neck, 3 for the ends.
+/// Rank of a joint by its distance from the trunk: 0 for the neck, 3 for the ends.
 pub(crate) const RANK: [u32; N_JOINTS] = [3, 2, 1, 1, 2, 3, 3, 2, 1, 1, 2, 3, 0, 3];
 
-/// Sum of the lengths of the bones from one joint to another, metres.
+/// Returns the sum of the lengths of the bones from one joint to another, in metres.
 ///
-/// * `length`: of a kind of bone, metres.
+/// * `length`: returns the length of a kind of bone, in metres.
 pub(crate) fn between(a: usize, b: usize, length: impl Fn(Kind) -> f64) -> f64 {
     let mut ends = [a, b];
     let mut sum = 0.0;
@@ -38,7 +38,7 @@ pub(crate) fn between(a: usize, b: usize, length: impl Fn(Kind) -> f64) -> f64 {
         if is_hip(ends[0]) && is_hip(ends[1]) {
             return sum + length(Kind::HipWidth);
         }
-        // The end that is farther from the neck moves; of a leg and an arm both in the end.
+        // The end that is farther from the neck moves; between a leg and an arm, both move in the end.
         let far = usize::from(RANK[ends[1]] > RANK[ends[0]]);
         let Some((next, kind)) = TOWARDS_NECK[ends[far]] else {
             return sum;
@@ -52,7 +52,7 @@ pub(crate) fn between(a: usize, b: usize, length: impl Fn(Kind) -> f64) -> f64 {
     sum
 }
 
-/// Which of the joints hang together by bones that are there: bit `j` of entry `i`.
+/// For each joint `i`, the joints connected to it by present bones: bit `j` of entry `i`.
 pub(crate) fn pieces(joints: &Joints) -> [u32; N_JOINTS] {
     let mut pieces: [u32; N_JOINTS] = core::array::from_fn(|joint| 1 << joint);
     for bone in BONES.iter().filter(|bone| bone.length(joints).is_some()) {

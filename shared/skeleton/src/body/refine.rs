@@ -1,4 +1,4 @@
-//! Where the joints are, if bones keep their lengths: a soft prior in triangulation.
+//! Moves joints so that bones keep their lengths: a soft prior in triangulation.
 
 mod rows;
 
@@ -11,47 +11,46 @@ use crate::body::{Covariances, Joints, N_JOINTS};
 
 use rows::{Linear, N_ROWS, Row, State};
 
-/// Standard deviation of a joint without a covariance, metres, in every direction: our own choice.
+/// Standard deviation of a joint without a covariance in every direction, in metres; our own choice.
 const UNKNOWN_SD: f64 = 0.05;
-/// Added to every covariance, square metres: 1 mm.
+/// Minimum variance, added to every covariance, in square metres: 1 mm squared.
 const LEAST_VARIANCE: f64 = 1e-6;
-/// Variance of the stature about what the bones say at first, square metres: so wide that it does not matter.
+/// Variance of the stature around its initial value from the bones, in square metres; so wide that it has no effect.
 const STATURE_VARIANCE: f64 = 0.25;
-/// The stature of a skeleton that does not show it, metres.
+/// Stature assumed for a skeleton whose stature is unknown, in metres.
 const ANY_STATURE: f64 = 1.65;
-/// A bone that is off by more than this many standard deviations, those of its joints included, loses its pull.
+/// A bone that is off by more than this many standard deviations, including those of its joints, loses its pull.
 const LOSS: f64 = 3.5;
 const MAX_ITERATIONS: usize = 10;
-/// The iteration ends where no joint moves by more, metres.
+/// The iteration ends if no joint moves by more than this, in metres.
 const STILL: f64 = 1e-4;
 
-/// A skeleton with a prior.
+/// A skeleton refined with the prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refined {
-    /// The joints, metres in the world; missing where they were.
+    /// The joints, in metres in the world; missing joints stay missing.
     pub joints: Joints,
-    /// Their covariances, square metres: no direction is less certain than before. `None` where a joint is missing.
+    /// Covariances of the joints, in square metres; no direction is less certain than before. `None` for a missing joint.
     pub covariances: Covariances,
-    /// Iterations done; 0 if the joints are as they were given.
+    /// Number of iterations; 0 if the joints are unchanged.
     pub iterations: usize,
 }
 
-/// Moves joints to where bones have the lengths that are expected, as far as the joints are uncertain.
+/// Moves joints so that bones get their expected lengths, in proportion to the uncertainty of the joints.
 ///
-/// Minimises the squared Mahalanobis distances of the joints from where they were triangulated, plus, for every
-/// bone, `ρ(((|a - b| - expected) / spread)²)`. Expected is the learned length, its spread what is left uncertain of
-/// it and what postures change, at least 1.5 cm. Where nothing was learned, it is the share of the stature with the
-/// spread of people, and the stature is found along with the joints. The bones of the two sides are equal within 1.5 cm.
-/// The loss `ρ(s) = s / (1 + s / c²)` lets go of a bone that neither its spread nor the covariances of its joints
-/// explain, so that it does not drag its neighbours.
+/// Minimises the squared Mahalanobis distances of the joints from their triangulated positions. Adds, for every bone, `ρ(((|a - b| -
+/// expected) / spread)²)`. The expected length is the learned length. Its spread covers the remaining uncertainty and the effect of
+/// posture, at least 1.5 cm. If nothing was learned, the expected length is the bone's share of the stature, with the spread of people; the
+/// stature is then estimated along with the joints. The bones of the two sides are equal within 1.5 cm. The loss `ρ(s) = s / (1 + s / c²)`
+/// releases a bone that neither its spread nor the covariances of its joints explain, so that it does not drag its neighbours.
 ///
-/// Gauss & Newton with step halving. The normal equations are solved in the space of the bones, 19 rows for up to 42
-/// coordinates. The covariances of the result are blocks of the inverse of the normal matrix, and as good as those
-/// given: with covariances that promise too much, little moves.
+/// The method is Gauss-Newton with step halving. The normal equations are solved in the space of the bones, with 19 rows for up to 42
+/// coordinates. The covariances of the result are blocks of the inverse of the normal matrix. They are only as good as the
+/// given covariances; if those are too small, little moves.
 ///
-/// * `covariances`: a joint without a positive definite one is taken as known to 5 cm.
-/// * Returns the joints as they are, with the covariances as they were used, if there is no bone or numbers get
-///   out of hand.
+/// * `covariances`: a joint without a positive definite covariance is assumed to be known to 5 cm.
+/// * Returns the joints unchanged, with the covariances that were used, if there is no bone or the numbers
+///   diverge.
 pub fn refine(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengths>) -> Refined {
     let joints = clean(joints);
     let problem = Problem::new(&joints, covariances, lengths);
@@ -80,10 +79,10 @@ pub fn refine(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengt
 
 type Normal = Cholesky<f64, Const<N_ROWS>>;
 
-/// The rows about a state, in the space of the bones.
+/// The rows linearised at a state, in the space of the bones.
 struct About {
     linear: [Option<Linear>; N_ROWS],
-    /// Covariance times derivatives: how the joints follow a row.
+    /// Covariance times derivatives: how the joints respond to a row.
     follow: [[Vector3<f64>; N_JOINTS]; N_ROWS],
     /// Factorisation of `J C Jᵀ + variances`.
     normal: Normal,
@@ -96,7 +95,7 @@ struct Problem {
     /// The inverses of the covariances.
     weights: [Matrix3<f64>; N_JOINTS],
     rows: [Option<Row>; N_ROWS],
-    /// Beyond this square of a residual a row loses its pull, square metres.
+    /// Squared residual above which a row loses its pull, in square metres.
     losses: [f64; N_ROWS],
 }
 
@@ -133,7 +132,7 @@ impl Problem {
         }
     }
 
-    /// Returns the cost that is minimised.
+    /// Returns the cost to be minimised.
     fn cost(&self, state: &State) -> f64 {
         let off = (state.stature - self.measured.stature).powi(2) / STATURE_VARIANCE;
         let joints = state.joints.iter().zip(&self.measured.joints);
@@ -150,7 +149,7 @@ impl Problem {
         off + joints.sum::<f64>() + rows.sum::<f64>()
     }
 
-    /// The normal equations about a state; `None` if they cannot be solved.
+    /// Returns the normal equations at a state; `None` if they cannot be solved.
     fn about(&self, state: &State) -> Option<About> {
         let rows = self.rows.map(|row| row.map(|row| row.linear(state)));
         let follow = rows.map(|row| {
@@ -187,7 +186,7 @@ impl Problem {
         })
     }
 
-    /// Where the linear problem about a state has its minimum.
+    /// Returns the minimum of the problem linearised at a state.
     fn target(&self, state: &State) -> Option<State> {
         let about = self.about(state)?;
         let mut gaps = SVector::<f64, N_ROWS>::zeros();
@@ -248,7 +247,7 @@ impl Problem {
     }
 }
 
-/// A covariance that can be worked with, and its inverse.
+/// Returns a usable covariance and its inverse.
 fn usable(given: Option<Matrix3<f64>>) -> [Matrix3<f64>; 2] {
     let inverse = |matrix3: &Matrix3<f64>| {
         let inverse = matrix3.cholesky()?.inverse();

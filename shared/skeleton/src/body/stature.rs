@@ -1,39 +1,39 @@
-//! How tall a person is, from the bones that are there.
+//! Estimates a person's stature from the present bones.
 
 use crate::body::Joints;
 use crate::body::bone::{self, BONES, N_BONES};
 use crate::body::proportion::{Kind, MEASUREMENT_SD};
 
-/// The statures that a person can have, metres.
+/// Minimum and maximum stature of a person, in metres.
 ///
-/// Our own choice: below, a child of one or two years, which hardly stands (WHO Child Growth Standards 2006: at
-/// two years the median is about 0.86 m); above, men taller than all but a handful alive (ANSUR II: men
+/// Our own choice. Below the minimum is a child of one or two years, who can hardly stand (WHO Child Growth Standards 2006: the
+/// median at two years is about 0.86 m). Above the maximum are men taller than all but a handful alive (ANSUR II: men
 /// 1.756 ± 0.069 m, women 1.629 ± 0.064 m).
 pub const STATURES: [f64; 2] = [0.80, 2.30];
 
-/// The least number of bones that say anything about a person.
+/// Minimum number of bones for any statement about a person.
 pub const MIN_BONES: usize = 4;
 
 /// A standing height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stature {
-    /// The height, metres.
+    /// The height, in metres.
     pub metres: f64,
-    /// Its standard deviation, metres.
+    /// Standard deviation of the height, in metres.
     pub sd: f64,
 }
 
-/// Standing height of the person with these joints, in whatever posture; `None` if there are fewer than [`MIN_BONES`]
+/// Returns the standing height of a person from the joints, in any posture; `None` if there are fewer than [`MIN_BONES`]
 /// bones.
 ///
-/// The median of what every bone says, weighted by how well it can tell: one limb that is wrong changes little. The
-/// uncertainty is that of a weighted median of independent bones, or of the disagreement that is seen, whichever is
+/// The height is the median of the estimates from single bones, weighted by their precision, so one wrong limb has little effect. The
+/// uncertainty is that of a weighted median of independent bones or that of the observed disagreement, whichever is
 /// larger.
 pub fn stature(joints: &Joints) -> Option<Stature> {
     of_lengths(&bone::lengths(&bone::clean(joints)))
 }
 
-/// The same, from the lengths of the bones, metres.
+/// Like [`stature`], but from the lengths of the bones, in metres.
 pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
     let mut sorted = Votes::new(lengths)?;
     let metres = sorted.median();
@@ -43,18 +43,19 @@ pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
         vote[0] = (vote[0] - metres).abs();
     }
     sorted.sort();
-    // A sample's deviation from its median absolute one, and that of a median from the sample's, both normal.
+    // The first factor converts a median absolute deviation to a standard deviation, the second one converts to that of a median; both
+    // assume a normal distribution.
     let seen = 1.4826 * sorted.median() / n.sqrt();
     let sd = 1.2533 * (model * metres).max(seen);
     Some(Stature { metres, sd })
 }
 
-/// The median alone: what is needed many times a frame.
+/// Only the median, which is needed many times per frame.
 pub(crate) fn median_of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<f64> {
     Votes::new(lengths).map(|votes| votes.median())
 }
 
-/// Statures that the bones vote for, ascending, each with its weight: the inverse of its relative deviation.
+/// Statures suggested by the bones, in ascending order. The weight of each is the inverse of its relative deviation.
 struct Votes {
     votes: [[f64; 2]; N_BONES],
     n: usize,
@@ -91,7 +92,7 @@ impl Votes {
         self.votes_mut().sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     }
 
-    /// The value at half of the weight, linear between the middles of the weights.
+    /// Returns the value at half of the total weight, interpolated linearly between the centres of the weights.
     fn median(&self) -> f64 {
         let half = 0.5 * self.votes().iter().map(|vote| vote[1]).sum::<f64>();
         let [mut last, mut at_last] = [self.votes[0][0], 0.0];
@@ -109,7 +110,7 @@ impl Votes {
     }
 }
 
-/// How well a kind of bone tells the stature: the inverse of its relative deviation, for a person of 1.7 m.
+/// Returns the weight of a kind of bone in the stature: the inverse of its relative deviation, for a person of 1.7 m.
 fn weight(kind: Kind) -> f64 {
     let it = kind.proportion();
     let measured = MEASUREMENT_SD / (it.adult * 1.7);

@@ -1,4 +1,4 @@
-//! People for the tests: bodies in postures, noise, and what is learned of them.
+//! People for the tests: bodies in postures, noise, and learned lengths.
 
 use nalgebra::{Point3, Vector3};
 
@@ -6,12 +6,12 @@ use crate::body::{Covariances, Joints, Kind, Lengths, MIN_FRAMES, N_JOINTS, chec
 
 pub(crate) const NO_COVARIANCES: Covariances = [None; N_JOINTS];
 
-/// The mean body of a stature, standing: facing +x, left at +y, z up.
+/// Returns the mean body of a stature, standing: facing +x, left at +y, z up.
 pub(crate) fn standing(stature: f64) -> Joints {
     posed(stature, [[0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]], 0.0)
 }
 
-/// In the middle of a step.
+/// Returns a person in the middle of a step.
 pub(crate) fn walking(stature: f64) -> Joints {
     posed(
         stature,
@@ -20,7 +20,7 @@ pub(crate) fn walking(stature: f64) -> Joints {
     )
 }
 
-/// On a chair, hands on the knees.
+/// Returns a person on a chair, hands on the knees.
 pub(crate) fn sitting(stature: f64) -> Joints {
     posed(
         stature,
@@ -29,7 +29,7 @@ pub(crate) fn sitting(stature: f64) -> Joints {
     )
 }
 
-/// Bent over, the arms hanging.
+/// Returns a person bent over, with hanging arms.
 pub(crate) fn bent(stature: f64) -> Joints {
     posed(
         stature,
@@ -38,7 +38,7 @@ pub(crate) fn bent(stature: f64) -> Joints {
     )
 }
 
-/// The arms up in the air.
+/// Returns a person with raised arms.
 pub(crate) fn reaching(stature: f64) -> Joints {
     posed(
         stature,
@@ -49,7 +49,8 @@ pub(crate) fn reaching(stature: f64) -> Joints {
 
 pub(crate) const POSTURES: [fn(f64) -> Joints; 5] = [standing, walking, sitting, bent, reaching];
 
-/// * the angles: of hips, knees, shoulders and elbows, right and left, forwards (knees back), and of the trunk, radians.
+/// * `angles`: angles of hips, knees, shoulders and elbows, right and left, forwards (knees back); `lean`: angle of the trunk; all in
+///   radians.
 fn posed(stature: f64, angles: [[f64; 2]; 4], lean: f64) -> Joints {
     let [hips, knees, shoulders, elbows] = angles;
     let of = |kind: Kind| kind.proportion().length(stature);
@@ -83,7 +84,7 @@ fn posed(stature: f64, angles: [[f64; 2]; 4], lean: f64) -> Joints {
     joints
 }
 
-/// Normal noise, standard deviation along x and across, metres.
+/// Adds normal noise with standard deviations along x and across x, in metres.
 pub(crate) fn noisy(
     joints: &Joints,
     depth: f64,
@@ -101,7 +102,7 @@ pub(crate) fn noisy(
     })
 }
 
-/// Shows frames of a person until all its bones are learned.
+/// Adds frames of a person until all bones are learned.
 pub(crate) fn learn(lengths: &mut Lengths, joints: &Joints) {
     let verdict = check(joints, &NO_COVARIANCES, None);
     assert_eq!(verdict.nobody, None);
@@ -110,12 +111,12 @@ pub(crate) fn learn(lengths: &mut Lengths, joints: &Joints) {
     }
 }
 
-/// The joints of a person whose left and right are exchanged.
+/// Returns the joints of a person with left and right exchanged.
 pub(crate) fn mirrored<T: Copy>(joints: &[T; N_JOINTS]) -> [T; N_JOINTS] {
     [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13].map(|joint| joints[joint])
 }
 
-/// Mean distance of joints, metres.
+/// Returns the mean distance of joints, in metres.
 pub(crate) fn error(a: &Joints, b: &Joints) -> f64 {
     let pairs = a.iter().zip(b).filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()));
     let (sum, n) = pairs.fold((0.0, 0.0), |(sum, n), it| (sum + it, n + 1.0));

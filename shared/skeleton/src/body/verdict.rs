@@ -1,4 +1,4 @@
-//! Judgement of a skeleton, and the reason why it is not a person.
+//! The verdict on a skeleton, and the reason if it is not a person's.
 
 use core::fmt;
 
@@ -6,28 +6,28 @@ use crate::body::bone::clean;
 use crate::body::stature::Stature;
 use crate::body::{Joints, N_JOINTS};
 
-/// Why a skeleton is not that of a person.
+/// Reason why a skeleton is not a person's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
-    /// There is too little of it.
+    /// Too few bones are known.
     TooFewBones {
-        /// Bones whose joints are there and possible.
+        /// Number of bones whose joints are present and possible.
         bones: usize,
-        /// Bones needed.
+        /// Minimum number of such bones.
         needed: usize,
     },
-    /// Nobody is that tall, or that small; or the person with the learned lengths is not.
+    /// The stature is impossible for any person, or for the person with the learned lengths.
     Stature {
-        /// The stature that its bones agree on, metres.
+        /// The stature on which the bones agree, in metres.
         metres: f64,
-        /// The statures that are possible, metres.
+        /// Minimum and maximum possible stature, in metres.
         limits: [f64; 2],
     },
-    /// More than half of its bones have lengths that no person of its stature has.
+    /// More than half of the bones have lengths that no person of this stature has.
     Impossible {
-        /// Impossible bones.
+        /// Number of impossible bones.
         impossible: usize,
-        /// All bones whose joints are there.
+        /// Number of bones whose joints are present.
         bones: usize,
     },
 }
@@ -42,7 +42,7 @@ impl fmt::Display for Reason {
                 let [low, high] = limits;
                 write!(
                     f,
-                    "it would be {metres:.2} m tall; {low:.2} to {high:.2} m are possible"
+                    "the person would be {metres:.2} m tall; {low:.2} to {high:.2} m are possible"
                 )
             }
             Self::Impossible { impossible, bones } => {
@@ -52,22 +52,22 @@ impl fmt::Display for Reason {
     }
 }
 
-/// Judgement of a skeleton.
+/// The verdict on a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// The standing height, from the joints that are kept; from all if it is not a person. `None` with too few bones.
+    /// The standing height, from the kept joints, or from all joints if the skeleton is not a person's. `None` if there are too few bones.
     pub stature: Option<Stature>,
-    /// Root mean square of the deviations of the bones' lengths from the expected ones, in standard deviations: 0 to 1
-    /// is ordinary. Of the joints that are kept; of all if it is not a person; 0 without bones.
+    /// Root mean square deviation of the bone lengths from the expected lengths, in standard deviations; 0 to 1
+    /// is ordinary. Computed from the kept joints, or from all joints if the skeleton is not a person's; 0 without bones.
     pub deviation: f64,
-    /// The joints that must not be reported: those of impossible bones. A missing joint is not dropped.
+    /// The joints of impossible bones, which must not be reported. A missing joint is not dropped.
     pub dropped: [bool; N_JOINTS],
-    /// Why it is not a person; then no joint is to be reported.
+    /// Reason why the skeleton is not a person's; if set, no joint must be reported.
     pub nobody: Option<Reason>,
 }
 
 impl Verdict {
-    /// The joints that may be reported.
+    /// Returns the joints that may be reported.
     #[must_use]
     pub fn keep(&self, joints: &Joints) -> Joints {
         let joints = clean(joints);

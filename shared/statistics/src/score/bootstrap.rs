@@ -12,7 +12,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// From the values of a frame.
+    /// Creates the share from the values of a frame.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let add = |share: Self, value: f64| Self {
             sum: share.sum + value,
@@ -21,7 +21,7 @@ impl Share {
         values.into_iter().fold(Self::default(), add)
     }
 
-    /// Mean over all frames, each weighted by its number of values; `None` without a value.
+    /// Returns the mean over all frames, each weighted by its number of values; `None` if there are no values.
     pub fn mean(frames: &[Self]) -> Option<f64> {
         let sum: f64 = frames.iter().map(|frame| frame.sum).sum();
         let n: f64 = frames.iter().map(|frame| frame.n).sum();
@@ -29,16 +29,16 @@ impl Share {
     }
 }
 
-/// How frames are resampled.
+/// Settings for resampling frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
     /// Number of resamples.
     pub n_resamples: usize,
-    /// The same seed gives the same interval.
+    /// Seed of the random numbers; the same seed gives the same interval.
     pub seed: u64,
-    /// Share of the resamples that lie inside, 0..1.
+    /// Share of the resamples inside the interval, 0..1.
     pub confidence: f64,
-    /// Consecutive frames that are drawn together. Neighbouring frames are correlated: drawing them one by
+    /// Number of consecutive frames that are drawn together. Neighbouring frames are correlated, so drawing them one by
     /// one gives intervals that are too narrow.
     pub block: usize,
 }
@@ -55,10 +55,10 @@ impl Default for Bootstrap {
 }
 
 impl Bootstrap {
-    /// The percentile interval of the mean over frames (Efron 1979), in circular blocks
-    /// (Politis & Romano 1992) where `block` is more than 1.
+    /// Returns the percentile interval of the mean over frames (Efron 1979), in circular blocks
+    /// (Politis & Romano 1992) if `block` is more than 1.
     ///
-    /// * Returns the lower and the upper end; `None` without a value.
+    /// * Returns the lower and the upper end; `None` if there are no values.
     pub fn interval(&self, frames: &[Share]) -> Option<[f64; 2]> {
         Share::mean(frames)?;
         let mut random = fastrand::Rng::with_seed(self.seed);
@@ -84,10 +84,10 @@ impl Bootstrap {
         self.percentiles(means)
     }
 
-    /// The percentile interval of any number that is computed from the values of all frames. Frames are drawn one by one,
-    /// whatever `block` is.
+    /// Returns the percentile interval of any number that is computed from the values of all frames. Frames are always drawn one by one,
+    /// regardless of `block`.
     ///
-    /// * `of`: the number; `None` where the values give none: such a resample is skipped.
+    /// * `of`: computes the number; if it returns `None`, the resample is skipped.
     /// * Returns the lower and the upper end; `None` if no resample gives a number.
     pub fn interval_of<T: Copy>(
         &self,

@@ -1,10 +1,10 @@
 //! The paper's histogram of improvements and deteriorations between two versions.
 
-/// Histogram of differences of errors, `before - after`: positive ones are improvements.
+/// Histogram of differences of errors, `before - after`; positive differences are improvements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changes {
     width: f64,
-    /// Counts of `[edge, edge + width)`; the outermost include everything beyond.
+    /// Counts of `[edge, edge + width)`; the outermost bins include everything beyond.
     bins: Vec<usize>,
     improved: usize,
     deteriorated: usize,
@@ -13,11 +13,11 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// An empty histogram.
+    /// Creates an empty histogram.
     ///
-    /// * `reach`: the histogram goes from `-reach` to `reach`, in the unit of the errors.
+    /// * `reach`: the histogram ranges from `-reach` to `reach`, in the unit of the errors.
     /// * `n_bins`: number of bins, at least 2.
-    /// * `same`: differences that are at most this large count as no change.
+    /// * `same`: maximum difference that counts as no change.
     pub fn new(reach: f64, n_bins: usize, same: f64) -> Self {
         let n_bins = n_bins.max(2);
         Self {
@@ -44,7 +44,7 @@ impl Changes {
         self.bins[bin.clamp(0.0, last as f64) as usize] += 1;
     }
 
-    /// The bins from the worst to the best: lower edge and count.
+    /// Returns the bins from the worst to the best, each as lower edge and count.
     pub fn bins(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
         let middle = self.bins.len() as f64 / 2.0;
         let edge = move |value: usize| (value as f64 - middle) * self.width;
@@ -52,17 +52,17 @@ impl Changes {
         counts.map(move |(bin, &count)| (edge(bin), count))
     }
 
-    /// Number of improvements.
+    /// Returns the number of improvements.
     pub fn improved(&self) -> usize {
         self.improved
     }
 
-    /// Number of deteriorations.
+    /// Returns the number of deteriorations.
     pub fn deteriorated(&self) -> usize {
         self.deteriorated
     }
 
-    /// Number of all counted differences.
+    /// Returns the number of all counted differences.
     pub fn total(&self) -> usize {
         self.total
     }

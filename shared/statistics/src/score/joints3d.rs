@@ -5,9 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 use crate::score::Point;
 use crate::score::pcp3d::distance;
 
-/// Distance of every joint from the truth, in their unit.
+/// Returns the distance of every joint from the truth, in the unit of the joints.
 ///
-/// * Returns `None` where the truth is not known; infinity where the joint was not found.
+/// * Returns `None` if the truth is not known; infinity if the joint was not found.
 pub fn joint_errors(found: &[Option<Point>], truth: &[Option<Point>]) -> Vec<Option<f64>> {
     let error = |(found, truth): (&Option<Point>, &Option<Point>)| {
         let truth = (*truth)?;
@@ -16,13 +16,13 @@ pub fn joint_errors(found: &[Option<Point>], truth: &[Option<Point>]) -> Vec<Opt
     found.iter().zip(truth).map(error).collect()
 }
 
-/// The found joints after the best alignment by rotation, translation and scale.
+/// Returns the found joints after the best alignment by rotation, translation and scale.
 ///
-/// Minimises the sum of squared distances over all rotations (no mirroring), translations and scales
-/// (Umeyama 1991), over the joints that both have; what remains is the error of the pose regardless of
-/// position and size. The mean of these distances is the Procrustes form of the MPJPE.
+/// The alignment minimises the sum of squared distances over all rotations (no mirroring), translations and scales
+/// (Umeyama 1991), using the joints that are both found and known. The remaining distances are the error of the pose regardless of
+/// position and size. Their mean is the Procrustes form of the MPJPE.
 ///
-/// * Returns `None` if fewer than three joints are in both, or those found lie in one place.
+/// * Returns `None` if fewer than three joints are both found and known, or the found joints are all at one place.
 pub fn aligned(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<Vec<Option<Point>>> {
     let both: Vec<(Vector3<f64>, Vector3<f64>)> = found
         .iter()

@@ -1,19 +1,19 @@
 //! Mean offsets of found joints along and across their bones, in shares of the person's height.
 //!
-//! PCP and PCK count what is near enough; they do not say whether a joint lies on the same side of its mark every time.
-//! A bone points from the trunk outwards to the joint at its end. *Along* is positive beyond the mark, seen from the
-//! trunk: a knee that is found too high on the thigh has a negative one. *Across* is positive away from the body where the
+//! PCP and PCK count joints that are close enough; they do not show whether a joint is always on the same side of its mark.
+//! A bone points outwards from the trunk to the joint at its end. *Along* is positive beyond the mark, seen from the
+//! trunk: a knee that is found too high on the thigh has a negative value. *Across* is positive away from the body if the
 //! limb hangs down: to the left in the picture for right limbs, to the right for left ones.
 
 use crate::score::{Bootstrap, Share};
 
-/// Joints of `skeleton::PARSE14`.
+/// Number of joints in `skeleton::PARSE14`.
 const N_JOINTS: usize = 14;
 
-/// A joint farther than this share of the person's size from its mark was not found at all, and has no offset.
+/// Maximum distance of a found joint from its mark, as a share of the person's size; a joint beyond it has no offset.
 pub const FOUND_WITHIN: f64 = 0.2;
 
-/// Where the bone of every joint begins: the mean of these joints.
+/// Start of the bone of every joint: the mean of these joints.
 const BONES: [&[usize]; N_JOINTS] = [
     &[1],
     &[2],
@@ -31,7 +31,7 @@ const BONES: [&[usize]; N_JOINTS] = [
     &[12],
 ];
 
-/// The joints of every row: both sides.
+/// The joints of every row, of both sides.
 const ROWS: [(&str, &[usize]); 8] = [
     ("head", &[13]),
     ("neck", &[12]),
@@ -43,25 +43,25 @@ const ROWS: [(&str, &[usize]); 8] = [
     ("ankle", &[0, 5]),
 ];
 
-/// The offsets of a joint, of both sides together, percent of the person's height.
+/// The offsets of a joint, for both sides together, in percent of the person's height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
-    /// The joint.
+    /// Name of the joint.
     pub joint: &'static str,
-    /// How many were found.
+    /// Number of joints found.
     pub n_found: usize,
-    /// How many there are.
+    /// Number of joints in total.
     pub n: usize,
     /// Mean along and across the bone.
     pub mean: [f64; 2],
-    /// Their intervals, by resampling people.
+    /// Confidence intervals of the means, by resampling people.
     pub interval: [[f64; 2]; 2],
 }
 
-/// The mean offset of every joint.
+/// Returns the mean offset of every joint.
 ///
-/// * `people`: what was found and what is true, of every person; the joints of `skeleton::PARSE14`.
-/// * Returns a row a joint; none for joints of which nothing was found.
+/// * `people`: found and true joints of every person, those of `skeleton::PARSE14`.
+/// * Returns one row per joint; joints that were never found have no row.
 pub fn offsets<'a>(
     people: impl IntoIterator<Item = (Option<&'a [[f64; 2]; N_JOINTS]>, &'a [[f64; 2]; N_JOINTS])>,
     bootstrap: &Bootstrap,
@@ -92,7 +92,7 @@ pub fn offsets<'a>(
     ROWS.iter().filter_map(row).collect()
 }
 
-/// The offsets of one person, along and across; none of joints that were not found.
+/// Returns the offsets of one person, along and across; `None` for joints that were not found.
 fn of_person(
     found: &[[f64; 2]; N_JOINTS],
     truth: &[[f64; 2]; N_JOINTS],
@@ -106,7 +106,7 @@ fn of_person(
         let is_bone = is_found[joint] && length > 0.0 && height > 0.0;
         is_bone.then(|| {
             let [u, v] = [0, 1].map(|axis| found[joint][axis] - truth[joint][axis]);
-            // The first three and 6 to 8 are of the right side.
+            // The joints 0 to 2 and 6 to 8 belong to the right side.
             let out = if matches!(joint, 0..=2 | 6..=8) {
                 1.0
             } else {
@@ -118,7 +118,8 @@ fn of_person(
     })
 }
 
-/// Height of a person who would stand, in the unit of the joints: top of the head to neck to hips, and the longer leg.
+/// Returns the standing height of a person, in the unit of the joints: from the top of the head over the neck to the hips, plus the longer
+/// leg.
 pub fn height<const D: usize>(joints: &[[f64; D]; N_JOINTS]) -> f64 {
     let distance = |a: [f64; D], b: [f64; D]| {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
@@ -139,7 +140,7 @@ fn middle<const D: usize>(joints: &[[f64; D]; N_JOINTS], of: &[usize]) -> [f64; 
 mod tests {
     use super::*;
 
-    /// Somebody who stands with hanging arms, 100 px from the neck to the ankles and 20 above.
+    /// Returns a person who stands with hanging arms, 100 px from the neck to the ankles and 20 px above the neck.
     fn person() -> [[f64; 2]; N_JOINTS] {
         [
             [40.0, 120.0],

@@ -1,7 +1,7 @@
 //! Percentage of correct keypoints in one image.
 
-/// The reported groups of joints, with the joints (of `skeleton::PARSE14`) that are averaged: both sides, and
-/// the neck with the top of the head, as Yang & Ramanan's released `eval_pck` does.
+/// The reported groups of joints, with the joints (of `skeleton::PARSE14`) that are averaged. A group combines both sides, or
+/// the neck with the top of the head, as in Yang & Ramanan's released `eval_pck`.
 pub const PCK_GROUPS: [(&str, [usize; 2]); 7] = [
     ("head", [12, 13]),
     ("shoulder", [8, 9]),
@@ -12,13 +12,13 @@ pub const PCK_GROUPS: [(&str, [usize; 2]); 7] = [
     ("ankle", [0, 5]),
 ];
 
-/// Which joints are found: no farther from the truth than `share` of the person's size.
+/// Returns which joints are found: those at most `share` of the person's size from the truth.
 ///
-/// The size is the longer side of the rectangle around the true joints plus 1 px, as both of the pixels
-/// at its ends belong to it (Yang & Ramanan 2013, section 6.2, and their released code). They use a `share` of 0.1 for
-/// PARSE and 0.2 for BUFFY. A joint that is NaN in `found` is not found.
+/// The size is the longer side of the rectangle around the true joints plus 1 px, since the pixels at both ends belong to it (Yang &
+/// Ramanan 2013, section 6.2, and their released code). They use a `share` of 0.1 for PARSE and 0.2 for BUFFY. A joint that is NaN in
+/// `found` is not found.
 ///
-/// * `found`, `truth`: the same joints, pixels.
+/// * `found`, `truth`: the same joints, in pixels.
 pub fn joints_found<const N: usize>(
     found: &[[f64; 2]; N],
     truth: &[[f64; 2]; N],
@@ -32,14 +32,14 @@ pub fn joints_found<const N: usize>(
     std::array::from_fn(|i| (found[i][0] - truth[i][0]).hypot(found[i][1] - truth[i][1]) <= limit)
 }
 
-/// The best detection of the annotated person, on an image where others may be detected too.
+/// Returns the best detection of the annotated person on an image where others may be detected as well.
 ///
-/// It is the one of the highest score among those whose box covers more than `share` of the true box:
-/// the released evaluation uses a `share` of 0.3 for PCK, on detections before non-maximum suppression.
+/// It is the detection with the highest score among those whose box covers more than `share` of the true box.
+/// The released evaluation uses a `share` of 0.3 for PCK, on detections before non-maximum suppression.
 ///
-/// * `detections`: score and box `[x1, y1, x2, y2]` around all parts, pixels.
-/// * `truth`: the true box, pixels.
-/// * Returns its index; `None` if no detection covers enough.
+/// * `detections`: score and box `[x1, y1, x2, y2]` around all parts, in pixels.
+/// * `truth`: the true box, in pixels.
+/// * Returns the index of the detection; `None` if no detection covers enough.
 pub fn best_covering(detections: &[(f64, [f64; 4])], truth: [f64; 4], share: f64) -> Option<usize> {
     let area =
         |bounds: [f64; 4]| (bounds[2] - bounds[0]).max(0.0) * (bounds[3] - bounds[1]).max(0.0);

@@ -1,12 +1,12 @@
 //! Percentage of correctly detected parts in one image.
 
-/// A stick: the mean of some joints at either end.
+/// A stick: its name, and the joints whose means are its two ends.
 type Stick = (&'static str, &'static [usize], &'static [usize]);
 
-/// The ten sticks of the PARSE evaluation, ends in `skeleton::PARSE14` order.
+/// The ten sticks of the PARSE evaluation, with ends in `skeleton::PARSE14` order.
 ///
-/// Torso from the middle of the shoulders to the middle of the hips, limbs from joint to joint, head
-/// from neck to head top.
+/// The torso goes from the midpoint of the shoulders to the midpoint of the hips, limbs from joint to joint, and the head
+/// from the neck to the top of the head.
 pub const PARSE_STICKS: [Stick; 10] = [
     ("torso", &[8, 9], &[2, 3]),
     ("right upper leg", &[2], &[1]),
@@ -20,26 +20,26 @@ pub const PARSE_STICKS: [Stick; 10] = [
     ("head", &[12], &[13]),
 ];
 
-/// How the two ends of a stick are judged.
+/// Rule for judging the two ends of a stick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PcpRule {
-    /// Either end lies within half the stick's true length.
+    /// Each end must be within half the stick's true length.
     BothEnds,
-    /// The mean of the two distances does.
+    /// The mean of the two distances must be within half the stick's true length.
     MeanOfEnds,
 }
 
-/// Correct sticks out of those judged.
+/// Number of correct sticks and of judged sticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Pcp {
-    /// Sticks found.
+    /// Number of sticks found.
     pub correct: usize,
-    /// Sticks judged.
+    /// Number of sticks judged.
     pub total: usize,
 }
 
 impl Pcp {
-    /// Percentage, 0 if nothing was judged.
+    /// Returns the percentage of correct sticks; 0 if nothing was judged.
     pub fn percent(&self) -> f64 {
         if self.total == 0 {
             return 0.0;
@@ -47,7 +47,7 @@ impl Pcp {
         100.0 * self.correct as f64 / self.total as f64
     }
 
-    /// Counts one more.
+    /// Counts one more stick.
     pub fn count(&mut self, is_correct: bool) {
         self.correct += usize::from(is_correct);
         self.total += 1;
@@ -62,7 +62,7 @@ impl Pcp {
 
 /// Judges the ten sticks of one image, with half of the true length as the limit.
 ///
-/// * `found`, `truth`: the 14 joints of `skeleton::PARSE14`, pixels.
+/// * `found`, `truth`: the 14 joints of `skeleton::PARSE14`, in pixels.
 pub fn pcp(found: &[[f64; 2]; 14], truth: &[[f64; 2]; 14], rule: PcpRule) -> Pcp {
     let sticks = sticks_found(found, truth, rule);
     Pcp {
@@ -71,9 +71,9 @@ pub fn pcp(found: &[[f64; 2]; 14], truth: &[[f64; 2]; 14], rule: PcpRule) -> Pcp
     }
 }
 
-/// Which of [`PARSE_STICKS`] are found, with half of the true length as the limit.
+/// Returns which of [`PARSE_STICKS`] are found, with half of the true length as the limit.
 ///
-/// * `found`, `truth`: the 14 joints of `skeleton::PARSE14`, pixels.
+/// * `found`, `truth`: the 14 joints of `skeleton::PARSE14`, in pixels.
 pub fn sticks_found(
     found: &[[f64; 2]; 14],
     truth: &[[f64; 2]; 14],

@@ -4,10 +4,10 @@ use skeleton::JointSet;
 
 use crate::score::Point;
 
-/// A segment of the body: the mean of some joints at either end.
+/// A segment of the body between two ends, each the mean of some joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Segment {
-    /// Name, as the paper's tables have it.
+    /// Name, as in the paper's tables.
     pub name: &'static str,
     /// Joints whose mean is the start.
     pub from: &'static [usize],
@@ -17,7 +17,7 @@ pub struct Segment {
 
 /// The names of the segments that the paper judges, in the order of its tables.
 ///
-/// The text does not say which they are. The overall value that its comparison on subject 1 prints
+/// The text does not list the segments. The overall value in its comparison on subject 1
 /// (87.24) is the mean over these twelve rows of the same table, so shoulders and hips count too.
 pub const SEGMENT_NAMES: [&str; 12] = [
     "Head",
@@ -34,7 +34,7 @@ pub const SEGMENT_NAMES: [&str; 12] = [
     "L-L Leg",
 ];
 
-/// Ends of the segments: neck, head, shoulders, elbows, wrists, middle of the hips, hips, knees, ankles;
+/// Ends of the segments: neck, head, shoulders, elbows, wrists, midpoint of the hips, hips, knees, ankles;
 /// the right side before the left.
 type Ends = [&'static [usize]; 15];
 
@@ -92,9 +92,9 @@ const HUMANEVA20: Ends = [
     &[13],
 ];
 
-/// The twelve segments between the joints of a set; `None` for a set that is not known here.
+/// Returns the twelve segments between the joints of a set; `None` for an unknown set.
 ///
-/// If a set has one point twice (the elbow as the end of both arm segments), its two joints are averaged.
+/// If a set contains one point twice (such as the elbow as the end of both arm segments), its two joints are averaged.
 pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
     let ends = match set.name {
         "parse14" => PARSE14,
@@ -141,17 +141,17 @@ pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
     Some(std::array::from_fn(segment))
 }
 
-/// The error of every segment: the mean error of its two ends over its true length.
+/// Returns the error of every segment: the mean error of its two ends divided by its true length.
 ///
-/// A segment is correct at a threshold `gamma` if this is at most `gamma` (eq. 13), 0.5 by convention.
+/// A segment is correct at a threshold `gamma` if the error is at most `gamma` (eq. 13), 0.5 by convention.
 ///
-/// * `found`, `truth`: the same joints, in one unit and world; `None` where there is none.
-/// * Returns `None` for a segment whose truth is not known, or has no length; infinity for one that was
+/// * `found`, `truth`: the same joints, in the same unit and world; `None` for a missing joint.
+/// * Returns `None` for a segment whose truth is not known, or has no length; infinity for a segment that was
 ///   not found.
 ///
 /// # Panics
 ///
-/// If a segment names a joint that one of the two lacks.
+/// If a segment refers to a joint that is not in `found` or `truth`.
 pub fn segment_errors(
     segments: &[Segment],
     found: &[Option<Point>],
@@ -173,7 +173,7 @@ pub fn segment_errors(
     segments.iter().map(of_segment).collect()
 }
 
-/// Mean of some joints; `None` if one is missing.
+/// Returns the mean of some joints; `None` if one is missing.
 fn mean(joints: &[Option<Point>], of: &[usize]) -> Option<Point> {
     let mut sum = [0.0; 3];
     for &joint in of {

@@ -1,10 +1,10 @@
 //! Rank statistics: area under the ROC, and rank correlation.
 
-/// Area under the receiver operating characteristic: the chance that a sample of the class scores above
-/// one that is not of it, ties counting half (Mann and Whitney).
+/// Returns the area under the receiver operating characteristic: the probability that a sample of the class scores above
+/// a sample that is not of the class, with ties counting half (Mann and Whitney).
 ///
-/// * `samples`: score, and whether it is of the class.
-/// * Returns `None` unless there are both kinds, or if a score is NaN.
+/// * `samples`: score, and whether the sample is of the class.
+/// * Returns `None` if one kind of sample is missing, or if a score is NaN.
 pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
     let scores: Vec<f64> = samples.iter().map(|sample| sample.0).collect();
     let ranks = ranks(&scores)?;
@@ -14,9 +14,9 @@ pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
     (n > 0.0 && others > 0.0).then(|| (sum - n * (n + 1.0) / 2.0) / (n * others))
 }
 
-/// Spearman's rank correlation of two numbers, ties with the mean of their ranks.
+/// Spearman's rank correlation of two numbers; ties get the mean of their ranks.
 ///
-/// * Returns `None` for fewer than two pairs, if either number is constant, or one is NaN.
+/// * Returns `None` for fewer than two pairs, if either number is constant, or if one is NaN.
 pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let [first, second] = [
         pairs.iter().map(|pair| pair.0).collect::<Vec<f64>>(),
@@ -32,7 +32,7 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     (scale > 0.0).then(|| product(&first, &second) / scale)
 }
 
-/// Ranks from 1, equal numbers with the mean of theirs; `None` if one is NaN.
+/// Ranks counted from 1; equal numbers get the mean of their ranks. `None` if one is NaN.
 fn ranks(values: &[f64]) -> Option<Vec<f64>> {
     if values.iter().any(|value| value.is_nan()) {
         return None;

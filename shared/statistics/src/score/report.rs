@@ -19,8 +19,8 @@ pub struct Report {
 
 /// Judges a list of images.
 ///
-/// * `images`: the detection (`None` if there is none: all joints count as wrong) and the truth, 14
-///   joints in the order of `skeleton::PARSE14` each, pixels.
+/// * `images`: the detection (if `None`, all joints count as wrong) and the truth, each with 14
+///   joints in the order of `skeleton::PARSE14`, in pixels.
 pub fn evaluate<'a>(
     images: impl IntoIterator<Item = (Option<&'a [[f64; 2]; 14]>, &'a [[f64; 2]; 14])>,
 ) -> Report {
@@ -49,22 +49,22 @@ impl Report {
         }
     }
 
-    /// Images judged.
+    /// Returns the number of judged images.
     pub fn n_images(&self) -> usize {
         self.n_images
     }
 
-    /// Images on which nothing was found.
+    /// Returns the number of images on which nothing was found.
     pub fn n_missed(&self) -> usize {
         self.n_missed
     }
 
-    /// All sticks together.
+    /// Returns the result over all sticks.
     pub fn pcp(&self, rule: PcpRule) -> Pcp {
         sum(self.sticks(rule).iter().copied())
     }
 
-    /// Each of [`PARSE_STICKS`].
+    /// Returns the result of each of [`PARSE_STICKS`].
     pub fn sticks(&self, rule: PcpRule) -> &[Pcp; PARSE_STICKS.len()] {
         match rule {
             PcpRule::MeanOfEnds => &self.sticks[0],
@@ -72,7 +72,7 @@ impl Report {
         }
     }
 
-    /// Sticks of both sides in one column each, as they are published, with their names.
+    /// Returns the results with the sticks of both sides combined in one column each, as in publications, with their names.
     pub fn limbs(&self, rule: PcpRule) -> [(&'static str, Pcp); COLUMNS.len()] {
         COLUMNS.map(|(name, sticks)| {
             let sticks = sticks.iter().map(|&stick| self.sticks(rule)[stick]);
@@ -80,7 +80,7 @@ impl Report {
         })
     }
 
-    /// All joints together, which is the mean over [`PCK_GROUPS`].
+    /// Returns the result over all joints, which is the mean over [`PCK_GROUPS`].
     ///
     /// * `share`: index into [`PCK_SHARES`].
     ///
@@ -91,7 +91,7 @@ impl Report {
         sum(self.joints[share].iter().copied())
     }
 
-    /// Each of [`PCK_GROUPS`].
+    /// Returns the result of each of [`PCK_GROUPS`].
     ///
     /// * `share`: index into [`PCK_SHARES`].
     ///
@@ -113,7 +113,7 @@ fn sum(counts: impl IntoIterator<Item = Pcp>) -> Pcp {
     total
 }
 
-/// Sticks of both sides in one column, as they are published.
+/// Columns of the published tables: the sticks of both sides are combined.
 const COLUMNS: [(&str, &[usize]); 6] = [
     ("torso", &[0]),
     ("u.leg", &[1, 2]),
@@ -124,7 +124,7 @@ const COLUMNS: [(&str, &[usize]); 6] = [
 ];
 
 impl fmt::Display for Report {
-    /// A table of percentages, a line for each rule and each share.
+    /// Writes a table of percentages, with one line for each rule and each share.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (n_images, n_missed) = (self.n_images, self.n_missed);
         write!(out, "{n_images} images, nothing found on {n_missed}")?;

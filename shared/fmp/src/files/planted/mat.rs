@@ -4,7 +4,7 @@ use testkit::mat::{Mat, number, row};
 
 use crate::{ModelSpec, N_CHANNELS, PartSpec, Springs};
 
-/// The `model` struct: release 1.4 (springs per pair, 0 where one never occurs) or 1.3.
+/// Returns the `model` struct of release 1.4 (springs per pair, 0 if a pair never occurs) or 1.3.
 pub(crate) fn model(spec: &ModelSpec) -> Mat {
     let (mut biases, mut springs) = (vec![spec.root_bias], Vec::new());
     let components = spec
@@ -47,7 +47,7 @@ pub(crate) fn model(spec: &ModelSpec) -> Mat {
     Mat::Structs(names, values)
 }
 
-/// `biasid`, `filterid`, `defid`, `parent` of a part.
+/// Returns `biasid`, `filterid`, `defid` and `parent` of a part.
 fn component(part: &PartSpec, biases: &mut Vec<f64>, springs: &mut Vec<Mat>) -> [Mat; 4] {
     let filter_ids = part
         .filter_of_type

@@ -2,7 +2,7 @@
 
 use crate::{Filter, ModelSpec, N_CHANNELS, Spring, Springs};
 
-/// The text of a model whose parts have equally many types and springs per child type.
+/// Returns the text of a model whose parts have equally many types and springs per child type.
 pub(crate) fn as_text(spec: &ModelSpec) -> String {
     let owned = Owned::new(spec);
     let (n_biases, n_filters) = (owned.biases.len(), spec.filters.len());
@@ -32,7 +32,7 @@ pub(crate) fn as_text(spec: &ModelSpec) -> String {
     .concat()
 }
 
-/// Entries that the parts of a model own, and their indices.
+/// Entries owned by the parts of a model, and their indices.
 struct Owned {
     biases: Vec<f64>,
     bias_ids: Vec<usize>,

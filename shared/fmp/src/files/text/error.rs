@@ -1,4 +1,4 @@
-//! Why a text was rejected as a model, and where.
+//! The error for a text that was rejected as a model, with its position.
 
 use std::fmt;
 
@@ -7,9 +7,9 @@ use crate::ModelError;
 /// The position of a token in a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextPosition {
-    /// Line, from 1.
+    /// Line, counted from 1.
     pub line: usize,
-    /// Token of the file, from 1.
+    /// Token of the file, counted from 1.
     pub token: usize,
 }
 
@@ -19,17 +19,17 @@ impl fmt::Display for TextPosition {
     }
 }
 
-/// Why a text was rejected as a model.
+/// Reason why a text was rejected as a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TextError {
-    /// Another token where a keyword is expected.
+    /// A keyword is expected, but another token was found.
     #[error("{place}: expected `{field}`, got `{got}`")]
     Keyword {
-        /// The key word.
+        /// The expected keyword.
         field: &'static str,
-        /// Where.
+        /// Position in the text.
         place: TextPosition,
-        /// Text in the file.
+        /// Text found in the file.
         got: String,
     },
     /// The text ends too early.
@@ -37,7 +37,7 @@ pub enum TextError {
     Ended {
         /// The field that was being read.
         field: &'static str,
-        /// Where.
+        /// Position in the text.
         place: TextPosition,
     },
     /// A number cannot be read.
@@ -45,11 +45,11 @@ pub enum TextError {
     Number {
         /// The field that was being read.
         field: &'static str,
-        /// Where.
+        /// Position in the text.
         place: TextPosition,
-        /// Which numbers would do.
+        /// Description of the expected numbers.
         kind: &'static str,
-        /// Text in the file.
+        /// Text found in the file.
         got: String,
     },
     /// Two places of the file contradict each other.
@@ -57,47 +57,47 @@ pub enum TextError {
     Disagrees {
         /// The field that was being read.
         field: &'static str,
-        /// Where.
+        /// Position in the text.
         place: TextPosition,
-        /// Which number of the field.
+        /// Name of the number in the field.
         what: &'static str,
-        /// The number.
+        /// The number found.
         got: usize,
-        /// The number according to other fields.
+        /// The number required by other fields.
         expected: usize,
     },
-    /// A count is beyond what a model may have.
+    /// A count exceeds the limits of a model.
     #[error("{place}: `{field}` is {got}, expected {min} to {max}")]
     Limit {
         /// The field that was being read.
         field: &'static str,
-        /// Where.
+        /// Position in the text.
         place: TextPosition,
-        /// The count.
+        /// Value of the count.
         got: usize,
-        /// Least accepted.
+        /// Minimum accepted value.
         min: usize,
-        /// Most accepted.
+        /// Maximum accepted value.
         max: usize,
     },
     /// A part is anchored at another level than its parent.
     #[error(
-        "{place}: `defs_anchor` puts spring {spring} {got} octaves from its parent, expected 0"
+        "{place}: `defs_anchor` puts spring {spring} at {got} octaves from its parent, expected 0"
     )]
     OtherLevel {
-        /// Where the array begins.
+        /// Start of the array in the text.
         place: TextPosition,
-        /// 1-based spring.
+        /// The spring in question, counted from 1.
         spring: usize,
         /// The anchor's third component.
         got: i32,
     },
-    /// Something follows the last field.
+    /// There is text after the last field.
     #[error("{place}: expected the end of the file, got `{got}`")]
     Trailing {
-        /// Where.
+        /// Position in the text.
         place: TextPosition,
-        /// Text in the file.
+        /// Text found in the file.
         got: String,
     },
     /// An index is out of range.

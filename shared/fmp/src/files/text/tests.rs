@@ -165,7 +165,7 @@ fn refuses_parts_at_another_level_than_their_parent() {
     let line = text[start..].lines().next().unwrap();
     let octave = line.trim_end().strip_suffix("0 0").unwrap().to_owned() + "1 0 ";
     let expected =
-        "line 12 (token 863): `defs_anchor` puts spring 3 1 octaves from its parent, expected 0";
+        "line 12 (token 863): `defs_anchor` puts spring 3 at 1 octaves from its parent, expected 0";
     assert_eq!(outcome(&text.replace(line, &octave)), expected);
 }
 

@@ -21,12 +21,12 @@ impl<'a> Tokens<'a> {
         tokens
     }
 
-    /// The position of the next token.
+    /// Returns the position of the next token.
     pub(super) fn place(&self) -> TextPosition {
         self.place
     }
 
-    /// The next token, without consuming it.
+    /// Returns the next token, without consuming it.
     pub(super) fn peek(&self) -> Option<&'a str> {
         self.rest.split_whitespace().next()
     }
@@ -54,7 +54,7 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// The next token as a number; `kind` describes the expected numbers.
+    /// Returns the next token as a number; `kind` describes the expected numbers.
     pub(super) fn number<T: FromStr>(
         &mut self,
         field: &'static str,
@@ -78,13 +78,13 @@ impl<'a> Tokens<'a> {
         Ok(value)
     }
 
-    /// Upper bound of the number of remaining tokens: limits what is reserved for a count in the
+    /// Returns the upper bound of the number of remaining tokens; limits the memory reserved for a count in the
     /// file.
     pub(super) fn at_most(&self) -> usize {
         self.rest.len().div_ceil(2)
     }
 
-    /// Consumes `bytes` of the next token, which is all of it, and the following white space.
+    /// Consumes the next token, which has `bytes` bytes, and the following white space.
     fn advance(&mut self, bytes: usize) {
         let behind = &self.rest[bytes..];
         self.rest = behind.trim_start();
@@ -94,7 +94,7 @@ impl<'a> Tokens<'a> {
     }
 }
 
-/// At most 24 characters of a token, for an error.
+/// At most 24 characters of a token, for an error message.
 pub(super) fn shortened(token: &str) -> String {
     token.chars().take(24).collect()
 }

@@ -1,4 +1,4 @@
-//! Expectations of bones, as residuals of joints and stature, with their derivatives.
+//! Expectations for bones, as residuals of joints and stature, with their derivatives.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,22 +10,22 @@ use crate::body::{Joints, N_JOINTS};
 /// One row for every bone, then one for every pair of sides.
 pub(super) const N_ROWS: usize = N_BONES + SIDES.len();
 
-/// Least standard deviation of a bone's length, metres.
+/// Minimum standard deviation of a bone's length, in metres.
 const LEAST_SPREAD: f64 = 0.015;
-/// Standard deviation of the difference between the sides, metres: our own choice.
+/// Standard deviation of the difference between the sides, in metres; our own choice.
 const SIDES_SD: f64 = 0.015;
 
-/// Unknowns of the solution.
+/// The unknowns of the problem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct State {
-    /// Metres in the world; 0 where a joint is missing.
+    /// Positions of the joints, in metres in the world; 0 for a missing joint.
     pub(super) joints: [Vector3<f64>; N_JOINTS],
-    /// Metres.
+    /// Stature, in metres.
     pub(super) stature: f64,
 }
 
 impl State {
-    /// The state at a share of the way to another state.
+    /// Interpolates between this state and another.
     pub(super) fn towards(&self, target: &Self, share: f64) -> Self {
         Self {
             joints: core::array::from_fn(|i| self.joints[i].lerp(&target.joints[i], share)),
@@ -33,7 +33,7 @@ impl State {
         }
     }
 
-    /// How far the joint that differs most is from its other place, metres.
+    /// Returns the largest displacement of a joint between two states, in metres.
     pub(super) fn distance(&self, other: &Self) -> f64 {
         let pairs = self.joints.iter().zip(&other.joints);
         pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
@@ -45,17 +45,17 @@ impl State {
     }
 }
 
-/// One expectation.
+/// One expectation for the solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Row {
     of: Of,
-    /// Variance of the expectation, square metres.
+    /// Variance of the expectation, in square metres.
     pub(super) variance: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Of {
-    /// A bone has the length that was learned.
+    /// A bone has its learned length.
     Learned { bone: usize, metres: f64 },
     /// A bone has its share of the stature.
     Share { bone: usize },
@@ -66,18 +66,18 @@ enum Of {
 /// A residual and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Linear {
-    /// Metres; 0 as expected.
+    /// The residual, in metres; 0 if the expectation is met.
     pub(super) residual: f64,
     pub(super) by_joint: [Vector3<f64>; N_JOINTS],
     pub(super) by_stature: f64,
-    /// Bit `i` is set if it depends on joint `i`.
+    /// Joints on which the residual depends: bit `i` is set for joint `i`.
     pub(super) mask: u32,
 }
 
 impl Row {
-    /// The rows whose joints are there.
+    /// Returns the rows whose joints are present.
     ///
-    /// * `stature`: rough height of the person, metres, which sets the spread among people.
+    /// * `stature`: rough height of the person, in metres, which determines the spread among people.
     pub(super) fn all(
         joints: &Joints,
         stature: f64,
@@ -109,7 +109,7 @@ impl Row {
         })
     }
 
-    /// Metres; 0 as expected.
+    /// Returns the residual, in metres; 0 if the expectation is met.
     pub(super) fn residual(&self, state: &State) -> f64 {
         let length = |bone: usize| state.bone(bone).norm();
         match self.of {
@@ -121,7 +121,7 @@ impl Row {
         }
     }
 
-    /// The residual with its derivatives. A bone without length has no direction, and derivatives of 0.
+    /// Returns the residual with its derivatives. A bone of length 0 has no direction, so its derivatives are 0.
     pub(super) fn linear(&self, state: &State) -> Linear {
         let mut it = Linear {
             residual: self.residual(state),

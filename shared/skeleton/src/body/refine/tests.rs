@@ -8,7 +8,7 @@ fn depth_noise() -> Covariances {
     [Some(Matrix3::from_diagonal(&Vector3::new(25e-4, 1e-4, 1e-4))); N_JOINTS]
 }
 
-/// Mean error of joints before and after, metres, over noisy frames of a person in all postures.
+/// Returns the mean error of joints before and after, metres, over noisy frames of a person in all postures.
 fn errors(body: impl Fn(&Joints) -> Joints, tall: f64, lengths: Option<&Lengths>) -> [f64; 2] {
     let mut random = fastrand::Rng::with_seed(11);
     let mut sum = [0.0; 2];
@@ -24,7 +24,7 @@ fn errors(body: impl Fn(&Joints) -> Joints, tall: f64, lengths: Option<&Lengths>
     sum.map(|sum| sum / (60.0 * POSTURES.len() as f64))
 }
 
-/// Legs longer and arms shorter than the mean, by two standard deviations among people.
+/// Returns a body whose legs are longer and whose arms are shorter than the mean, by two standard deviations among people.
 fn unusual(joints: &Joints) -> Joints {
     let mut it = *joints;
     let stretch = |stretched: &mut Joints, from: usize, to: &[usize], by: f64| {
@@ -158,7 +158,7 @@ fn the_result_is_a_minimum() {
     );
     let mut state = problem.measured;
     state.joints = found.joints.map(|joint| joint.unwrap().coords);
-    // The stature is not in the result: the best one for these joints.
+    // The result does not contain the stature; use the best one for these joints.
     let cost = |state: &State| {
         let of = |mm: i32| State {
             stature: 1.2 + f64::from(mm) / 1000.0,
