@@ -37,7 +37,7 @@ pub struct About {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AboutError {
     /// A key is missing.
-    #[error("the recording does not say its {0}")]
+    #[error("the recording does not state its {0}")]
     Missing(&'static str),
     /// A value is not a number.
     #[error("the recording's {key} is {got:?}")]

@@ -223,7 +223,7 @@ impl Video {
                 n_read: self.n_read,
                 n_expected,
                 message: if message.is_empty() {
-                    format!("the decoder says nothing ({status})")
+                    format!("the decoder gave no message ({status})")
                 } else {
                     message
                 },
