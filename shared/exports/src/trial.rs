@@ -207,7 +207,7 @@ pub enum TrialError {
     Joints(String),
     /// Two frames are too far apart.
     #[error(
-        "frames {first} and {last} lie {slots} frames apart, more than {MAX_SLOTS}: one of the numbers must be wrong"
+        "frames {first} and {last} are {slots} frames apart, more than {MAX_SLOTS}: one of the numbers must be wrong"
     )]
     Range {
         /// Number of the first frame.
