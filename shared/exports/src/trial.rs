@@ -370,7 +370,7 @@ impl Gathering {
     /// Returns a [`TrialError`] on failure.
     pub fn finish(mut self, name: &str, rate_hz: Option<f64>) -> Result<Vec<Trial>, TrialError> {
         let n_lines = self.frames.len();
-        // Of two lines about the same frame, the first one counts.
+        // If two lines are about the same frame, the first one counts.
         self.frames.sort_by_key(|line| line.frame);
         self.frames.dedup_by_key(|line| line.frame);
         let ends = self.frames.first().zip(self.frames.last());

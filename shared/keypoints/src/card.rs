@@ -432,7 +432,7 @@ impl Card {
     }
 }
 
-/// Checks the limits that hold for the input of any network.
+/// Checks the input against the limits that apply to any network.
 pub(crate) fn check_input(input: &Input) -> Result<(), CardError> {
     for (key, side) in [("input.width", input.width), ("input.height", input.height)] {
         let fits = (8..=MAX_SIDE).contains(&side);

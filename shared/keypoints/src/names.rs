@@ -53,7 +53,7 @@ pub const HALPE_26: [&str; 26] = [
     "right heel",
 ];
 
-/// Keypoints of OpenPose.
+/// Keypoints of `OpenPose`.
 pub const BODY_25: [&str; 25] = [
     "nose",
     "neck",

@@ -1,4 +1,4 @@
-//! Where a process spends its time, and what it has lost.
+//! Times and losses of a process.
 
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;

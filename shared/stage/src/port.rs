@@ -135,8 +135,7 @@ impl<R> Port<R> {
 
     /// Returns true if the sender, after a restart, has forgotten frames that others have received. This is the case for a sender that
     /// answers messages of views. By contrast, a process of a view receives the frame again, and a fusion worker holds the messages that
-    /// the
-    /// others wait for.
+    /// the others wait for.
     pub(crate) fn forgets(&self) -> bool {
         self.sender == Sender::All
     }

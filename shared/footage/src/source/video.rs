@@ -462,7 +462,7 @@ mod tests {
             return;
         };
         let mut video = Video::open(&path, &SourceSpec::new("x")).unwrap();
-        // As after the death of this process, the only reader of the pipe is closed.
+        // Closes the only reader of the pipe, as the death of this process would do.
         let other = Command::new("true").stdout(Stdio::piped()).spawn();
         let (mut other, pipe) = (other.unwrap(), &mut video.stdout);
         drop(std::mem::replace(pipe, other.stdout.take().unwrap()));

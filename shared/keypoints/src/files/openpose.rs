@@ -23,8 +23,7 @@ struct File {
 #[derive(Deserialize)]
 struct Person {
     /// Numbers of the keypoints. They are missing or empty if a program keeps the entry of a person that it did not find. Before version
-    /// 1.4,
-    /// `OpenPose` called this key `pose_keypoints`.
+    /// 1.4, `OpenPose` called this key `pose_keypoints`.
     #[serde(alias = "pose_keypoints", alias = "joints", alias = "keypoints")]
     pose_keypoints_2d: Option<Numbers>,
 }
@@ -35,7 +34,7 @@ impl Person {
     }
 }
 
-/// Reads the file of a frame of OpenPose or of mmpose. A keypoint was not found if all its three numbers are 0, or if one of them is not
+/// Reads the file of a frame of `OpenPose` or of mmpose. A keypoint was not found if all its three numbers are 0, or if one of them is not
 /// a number.
 ///
 /// * `names`: names of the keypoints. If `None`, they follow from the number of keypoints ([`NameSet::of_number`]).

@@ -13,9 +13,8 @@ const FARTHEST_PX: f64 = 1e6;
 /// The keypoints of one person, as another program found them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SeenKeypoints {
-    /// Keypoints in the order of the names. Each has a position, pixels of the footage with the centre of the top-left pixel at (0, 0), and
-    /// a
-    /// score from 0 to 1. `None` for a keypoint that was not found, or not labelled.
+    /// Keypoints in the order of the names. Each has a position, pixels of the footage with the centre of the top-left pixel at (0, 0),
+    /// and a score from 0 to 1. `None` for a keypoint that was not found, or not labelled.
     pub keypoints: Vec<Option<Keypoint>>,
 }
 

@@ -20,8 +20,7 @@ pub struct Received {
     /// Says that the message carries a result, or why it has none. Heartbeats always carry a result.
     pub status: Status,
     /// For heartbeats and for pictures of cameras, which are numbered: the epoch of the process, and the number of messages that it has
-    /// sent
-    /// in this epoch.
+    /// sent in this epoch.
     pub life: Option<[u64; 2]>,
     /// For poses of a view: true if evidence was sent with them.
     pub has_evidence: bool,
