@@ -123,7 +123,7 @@ pub enum FootageError {
         rate_hz: f64,
     },
     /// `start` is after the last frame.
-    #[error("first frame {start} lies beyond the {n_frames} frames (counted from 0) of {path}")]
+    #[error("first frame {start} is beyond the {n_frames} frames (counted from 0) of {path}")]
     StartBeyondEnd {
         /// Path as the user wrote it.
         path: String,

@@ -23,15 +23,15 @@ impl Answer {
     pub(crate) fn complaint(self) -> String {
         match self {
             Self::Picture => {
-                "it is the address of a single picture; that of the stream is another one (the manual of the camera has it)"
+                "this is the address of a single picture; the stream has another address (see the manual of the camera)"
                     .to_owned()
             }
             Self::Other(kind) if kind == "text/html" => {
-                "a page came (text/html) in place of pictures: does the camera want somebody to sign in (name and \
-                 password stand in front of the host, with an @ behind), or is it the address of its menu?"
+                "a page came (text/html) instead of pictures: does the camera require a login (write the name and the \
+                 password before the host, followed by @), or is this the address of its menu?"
                     .to_owned()
             }
-            Self::Other(kind) => format!("{kind} came in place of pictures"),
+            Self::Other(kind) => format!("{kind} came instead of pictures"),
         }
     }
 }

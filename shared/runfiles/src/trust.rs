@@ -162,26 +162,26 @@ impl fmt::Display for Doubt {
         match self.kind {
             Kind::Reprojection => write!(
                 f,
-                "joints are {value:.0} % of the person's height from where the views see them (more than {limit:.0} %): see `parallax \
-                 calib check`, and whether the footage is of one moment"
+                "joints are {value:.0} % of the person's height away from the views' own joints (more than {limit:.0} %): run `parallax \
+                 calib check`, and check that all footage is of the same moment"
             ),
             Kind::Limbs => write!(
                 f,
-                "bones change their lengths and views disagree, by {value:.1} cm together (more than {limit:.0} cm): limbs are wrong in some frames, \
+                "bone lengths vary and views disagree, by {value:.1} cm together (more than {limit:.0} cm): limbs are wrong in some frames, \
                  or the cameras do not fit"
             ),
             Kind::Jumps => write!(
                 f,
-                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the one who is followed changes; `person.follow` \
-                 and the space that the cameras see say whom to follow"
+                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the followed person changes; `person.follow` \
+                 and the space that the cameras see decide who is followed"
             ),
             Kind::Implausible => write!(
                 f,
-                "{value:.0} % of what was found is not a body that people have (more than {limit:.0} %): is one person seen whole, in the right size?"
+                "{value:.0} % of the bodies that were found are impossible (more than {limit:.0} %): is one person completely visible, at the right scale?"
             ),
             Kind::Joints => write!(
                 f,
-                "{value:.0} % of the joints are where no body has them (more than {limit:.0} %): is one person seen whole by every camera?"
+                "{value:.0} % of the joints are in impossible positions (more than {limit:.0} %): is one person completely visible to every camera?"
             ),
             Kind::Bones => write!(
                 f,
@@ -227,7 +227,7 @@ mod tests {
                 "by 2.6 cm together",
             ),
             (|trust| trust.jumps = 0.087, "jumps in 8.7 %"),
-            (|trust| trust.implausible = 0.4, "40 % of what was found"),
+            (|trust| trust.implausible = 0.4, "40 % of the bodies that were found"),
             (|trust| trust.joints_implausible = 0.3, "30 % of the joints"),
             (|trust| trust.body_deviation = Some(3.0), "bones are 3.0"),
             (|trust| trust.sides_unsure = 0.5, "unsure in 50 %"),

@@ -124,10 +124,10 @@ impl Fault for GuestError {
     fn hint(&self) -> Option<String> {
         match self {
             Self::Version { .. } | Self::WrongType { .. } => Some(
-                "build this program and the deployment of the same version of Parallax".to_owned(),
+                "build this program and the deployment from the same version of Parallax".to_owned(),
             ),
             Self::Full { .. } => {
-                Some("end one of them; a program that was killed leaves its place".to_owned())
+                Some("end one of them; a program that was killed no longer counts".to_owned())
             }
             _ => None,
         }

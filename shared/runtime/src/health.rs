@@ -99,7 +99,7 @@ impl Health {
                     }
                     Err(error) => {
                         if result_sender.send(Err(error)).is_err() {
-                            tracing::debug!("the start of the heartbeats is not awaited any more");
+                            tracing::debug!("the caller no longer waits for the start of the heartbeats");
                         }
                     }
                 }
@@ -189,7 +189,7 @@ impl Health {
     /// Counts a frame that the processor computed because the GPU was lost. Logs the first one.
     pub fn without_gpu(&self) {
         if self.counts.n_without_gpu.fetch_add(1, Ordering::Relaxed) == 0 {
-            tracing::warn!("the GPU was lost: the processor computes from here on");
+            tracing::warn!("the GPU was lost: the processor computes from now on");
         }
     }
 
@@ -332,7 +332,7 @@ impl Counts {
 }
 
 fn spin() -> ! {
-    tracing::warn!("computing for ever, on purpose");
+    tracing::warn!("looping forever, on purpose");
     loop {
         core::hint::spin_loop();
     }

@@ -153,7 +153,7 @@ impl Mapping<'_> {
         // byte of it.
         let result = unsafe { madvise(address, len, Advice::LinuxPopulateWrite) };
         if let Err(error) = result {
-            tracing::debug!(%error, path = self.path, "pool is not mapped ahead of use");
+            tracing::debug!(%error, path = self.path, "the pool is not mapped before use");
         }
     }
 }

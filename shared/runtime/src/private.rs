@@ -60,7 +60,7 @@ pub enum PrivacyError {
         path: PathBuf,
     },
     /// Other users may replace the entries of the directory.
-    #[error("{path:?} of {owner} may be written by anybody (mode {mode:o})")]
+    #[error("{path:?} of {owner} can be written to by any user (mode {mode:o})")]
     Open {
         /// The directory.
         path: PathBuf,
@@ -95,7 +95,7 @@ impl PrivacyError {
     pub(crate) fn hint(&self) -> Option<String> {
         match self {
             Self::Foreign { path, owner, .. } => Some(format!(
-                "run as {owner}, or have it removed: `sudo rm -r {}`; a deployment and its processes are one user's",
+                "run as {owner}, or have it removed: `sudo rm -r {}`; a deployment and its processes must belong to one user",
                 failure::wording::shell(path.display())
             )),
             Self::Link { path, .. } | Self::NoDirectory { path } => Some(format!(
@@ -103,11 +103,11 @@ impl PrivacyError {
                 failure::wording::shell(path.display())
             )),
             Self::Open { path, .. } => Some(format!(
-                "have it shut: `sudo chmod go-w {}`",
+                "close it to other users: `sudo chmod go-w {}`",
                 failure::wording::shell(path.display())
             )),
             Self::Unmarked { path, .. } => Some(format!(
-                "nothing in it was touched: see what it is, and move or remove {} yourself",
+                "nothing in it was changed: check its content, and move or remove {} yourself",
                 path.display()
             )),
             Self::File { .. } => None,

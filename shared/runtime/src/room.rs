@@ -13,19 +13,19 @@ pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
 /// Remedy if there is no room.
 pub(crate) const ROOM: &str =
-    "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)";
+    "make room in /dev/shm: end other programs that use it, or make it larger (in Docker --shm-size)";
 
 /// If there was no room for a segment, returns a text with the requested size, the free size, and a remedy.
 pub(crate) fn no_room() -> Option<String> {
     let kilobytes = |bytes: u64| bytes.div_ceil(1000);
     Some(match refused()? {
         Refused::NoRoom { wanted_bytes } => format!(
-            "{} KB of shared memory were wanted, {} KB are free in /dev/shm: {ROOM}",
+            "{} KB of shared memory were needed, {} KB are free in /dev/shm: {ROOM}",
             kilobytes(wanted_bytes),
             free_shared_memory().unwrap_or(0) / 1000
         ),
         Refused::TooLarge { wanted_bytes } => format!(
-            "{} KB of shared memory were wanted in one piece, and no file may have more than {} KB: \
+            "{} KB of shared memory were needed in one piece, and no file may have more than {} KB: \
              allow more (`ulimit -f unlimited`)",
             kilobytes(wanted_bytes),
             getrlimit(Resource::Fsize).current.unwrap_or(0) / 1000

@@ -254,7 +254,7 @@ fn a_directory_without_marker_is_named_and_not_changed() {
     };
     assert_eq!(*path, home.join("t"));
     assert_eq!(census(&home), before);
-    assert!(error.hint().unwrap().contains("nothing in it was touched"));
+    assert!(error.hint().unwrap().contains("nothing in it was changed"));
 }
 
 #[test]

@@ -420,7 +420,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ) -> Result<(), Failure> {
         let n_connected = || {
             if let Err(error) = drain() {
-                tracing::debug!(%error, "cannot discard what comes after the end");
+                tracing::debug!(%error, "cannot discard messages after the end");
             }
             let outputs = self.outgoing.iter();
             outputs.map(Outgoing::n_connected).sum()

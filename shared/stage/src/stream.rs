@@ -83,7 +83,7 @@ impl Stage<'_, ()> {
                 })?;
                 intake.processed(&header, now_nanos() - begin);
                 if let Err(error) = place.note(intake.past().numbers()) {
-                    tracing::debug!(%error, "cannot note how far this view has come");
+                    tracing::debug!(%error, "cannot save the progress of this view");
                 }
                 if service.stop().is_requested() {
                     return Ok(());

@@ -68,7 +68,7 @@ impl Denied {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Cores { .. } => {
-                "name cores of this machine that its container, its slice or `taskset` leave to it (`nproc`, `taskset -cp $$`)"
+                "name cores of this machine that the process's container, slice or `taskset` allows (`nproc`, `taskset -cp $$`)"
             }
             Self::RealTime { .. } => {
                 "`ulimit -r 99` (root or /etc/security/limits.conf: rtprio), systemd LimitRTPRIO=99, Docker --cap-add=SYS_NICE, or `setcap cap_sys_nice+ep` on the executable"

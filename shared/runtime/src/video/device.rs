@@ -57,7 +57,7 @@ fn check_kind(path: &Path) -> Result<(), VideoError> {
         FileType::CharacterDevice | FileType::BlockDevice => "it is a device of another kind",
         FileType::Directory => "it is a folder",
         FileType::RegularFile => "it is a file",
-        _ => "it is no device",
+        _ => "it is not a device",
     };
     Err(VideoError::NoCamera {
         path: path.to_owned(),
@@ -216,7 +216,7 @@ mod tests {
         assert!(matches!(absent, VideoError::Open { .. }), "{absent}");
         let other = VideoDevice::open(Path::new("/dev/null")).unwrap_err();
         assert!(
-            other.to_string().contains("/dev/null is no camera"),
+            other.to_string().contains("/dev/null is not a camera"),
             "{other}"
         );
     }

@@ -17,7 +17,7 @@ pub enum VideoError {
         source: io::Error,
     },
     /// The device is of another kind.
-    #[error("{} is no camera: {why}", path.display())]
+    #[error("{} is not a camera: {why}", path.display())]
     NoCamera {
         /// Path of the device.
         path: PathBuf,
