@@ -133,7 +133,7 @@ impl Failure {
     ///
     /// # Errors
     ///
-    /// Fails if `out` fails.
+    /// Fails if `out` cannot be written to.
     pub fn report(&self, out: &mut dyn Write) -> io::Result<()> {
         for (depth, error) in crate::wording::chain(self.source()).enumerate() {
             let label = if depth == 0 { "error" } else { "  cause" };

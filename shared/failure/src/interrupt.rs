@@ -24,7 +24,7 @@ const PERIOD: Duration = Duration::from_millis(50);
 ///
 /// # Panics
 ///
-/// Panics if the work does.
+/// Panics if `work` panics.
 pub fn unless_stopped<T: Send + 'static>(
     stop: &Stop,
     work: impl FnOnce() -> T + Send + 'static,

@@ -180,7 +180,7 @@ impl Source {
     ///
     /// # Errors
     ///
-    /// The same as for [`next_frame`](Self::next_frame).
+    /// Fails in the same cases as [`next_frame`](Self::next_frame).
     ///
     /// # Panics
     ///
@@ -209,7 +209,7 @@ impl Source {
     ///
     /// # Errors
     ///
-    /// The same as for [`next_frame`](Self::next_frame).
+    /// Fails in the same cases as [`next_frame`](Self::next_frame).
     pub fn skip(&mut self, n: u64) -> Result<u64, FootageError> {
         for n_skipped in 0..n {
             let is_there = match &mut self.reader {
@@ -282,7 +282,7 @@ impl Reader {
 ///
 /// # Errors
 ///
-/// The same as for [`Source::open`].
+/// Fails in the same cases as [`Source::open`].
 pub fn stored(spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
     let image = match listing::list(&spec.path)? {
         Listing::Images(paths) => paths.into_iter().next().unwrap_or_default(),

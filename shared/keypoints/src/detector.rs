@@ -284,8 +284,8 @@ impl DetectorCard {
         step
     }
 
-    /// Returns the mean colour of the pixels of the picture that a pixel of the input covers. In a picture that is enlarged, the colour is
-    /// bilinear.
+    /// Returns the mean colour of the pixels of the picture that a pixel of the input covers. If the picture is enlarged, the colour is
+    /// interpolated bilinearly.
     fn cell(&self, rgb: &[u8], size: [usize; 2], (at, step): ([usize; 2], f64)) -> [f32; 3] {
         let span = [0, 1].map(|axis| {
             let begin = (at[axis] as f64 * step) as usize;

@@ -55,7 +55,7 @@ pub struct Metrics {
     pub queue: u32,
     /// Maximum number of frames or results that ever waited, or [`NO_QUEUE`].
     pub longest_queue: u32,
-    /// The view of the process, or [`NO_VIEW`].
+    /// Index of the process's view, or [`NO_VIEW`].
     pub view: u32,
     /// 1 once the process has reached the end of the stream and forwarded it.
     pub finished: u32,
@@ -182,9 +182,9 @@ impl Default for Metrics {
 #[type_name("MetricsRow.v1")]
 #[repr(C)]
 pub struct MetricsRow {
-    /// The span.
+    /// Span that was measured.
     pub span: Span,
-    /// The view, or [`NO_VIEW`].
+    /// Index of the view, or [`NO_VIEW`].
     pub view: u32,
     /// Number of measurements.
     pub count: u64,

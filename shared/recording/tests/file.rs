@@ -401,7 +401,7 @@ fn damage_between_two_chunks_loses_no_later_chunk() {
     let recording = scan(&mut Cursor::new(&whole)).unwrap();
     let entries = recording.tracks["frame/v1/0"].entries.iter();
     let chunks: Vec<usize> = entries.map(|entry| entry.chunk as usize).collect();
-    // Change the length of a chunk's record, and the lengths in it.
+    // Change the length of a chunk's record, or one of the two lengths in it.
     for at in [1, 25, 41] {
         let mut file = whole.clone();
         file[chunks[12] + at..chunks[12] + at + 8].fill(0xff);

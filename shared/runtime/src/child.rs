@@ -49,7 +49,7 @@ impl Child {
     ///
     /// # Errors
     ///
-    /// The same as for [`start`](Self::start). It also fails if the system has no room for the file.
+    /// Fails in the same cases as [`start`](Self::start). It also fails if the system has no room for the file.
     pub fn start_given(executable: &Path, args: &[OsString], given: &[u8]) -> io::Result<Self> {
         let mut file = File::from(memfd_create("given", MemfdFlags::CLOEXEC)?);
         file.write_all(given)?;
@@ -183,7 +183,7 @@ pub fn kill(pid: u32) -> io::Result<()> {
 ///
 /// # Errors
 ///
-/// The same as for [`kill`].
+/// Fails in the same cases as [`kill`].
 pub fn freeze(pid: u32) -> io::Result<()> {
     signal(pid, Signal::STOP)
 }
@@ -194,7 +194,7 @@ pub fn freeze(pid: u32) -> io::Result<()> {
 ///
 /// # Errors
 ///
-/// The same as for [`kill`].
+/// Fails in the same cases as [`kill`].
 pub fn thaw(pid: u32) -> io::Result<()> {
     signal(pid, Signal::CONT)
 }

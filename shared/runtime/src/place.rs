@@ -88,7 +88,7 @@ impl Place {
     ///
     /// # Errors
     ///
-    /// The same as for [`note_bytes`](Self::note_bytes).
+    /// Fails in the same cases as [`note_bytes`](Self::note_bytes).
     pub fn note<const N: usize>(&mut self, numbers: [u64; N]) -> io::Result<()> {
         self.note_bytes(numbers.map(u64::to_le_bytes).as_flattened())
     }

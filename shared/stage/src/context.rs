@@ -103,7 +103,7 @@ impl<'a> Context<'a> {
     ///
     /// # Errors
     ///
-    /// The same as for [`refuse`](Self::refuse).
+    /// Fails in the same cases as [`refuse`](Self::refuse).
     pub fn refuse_end(
         &self,
         name: &'static str,

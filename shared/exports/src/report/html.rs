@@ -89,7 +89,7 @@ pub trait Value {
 
 /// A value in the braces of [`put!`].
 pub struct Put<'a, T: ?Sized>(
-    /// The value.
+    /// Value that is written.
     pub &'a T,
 );
 

@@ -178,7 +178,7 @@ pub fn read_image(path: &Path) -> Result<(Size, Vec<u8>), FootageError> {
 ///
 /// # Errors
 ///
-/// The same as for [`read_image`].
+/// Fails in the same cases as [`read_image`].
 pub fn read_upright(path: &Path) -> Result<(Size, Vec<u8>, Turn), FootageError> {
     let still = Still::open(path, 1, Rotation::Tag)?;
     Ok((still.size, still.rgb, still.tag))
