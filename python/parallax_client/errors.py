@@ -21,7 +21,7 @@ class VersionMismatch(ClientError):
         self.what, self.theirs, self.ours = what, theirs, ours
         super().__init__(
             f"deployment {name!r} sends {what!r} version {theirs}, this package reads version {ours}: "
-            "install the package of the same version of Parallax"
+            "install the package from the same version of Parallax"
         )
 
 

@@ -159,7 +159,7 @@ class Client:
 
     def __init__(self, name, skeletons, poses, pictures, cameras, most, wait):
         if not (skeletons or poses or pictures):
-            raise ClientError("nothing is asked for: neither skeletons nor poses nor pictures")
+            raise ClientError("nothing is requested: neither skeletons nor poses nor pictures")
         self.name, self._wish = name, (skeletons, poses, pictures)
         self._cameras, self._most = cameras, most
         self._changed, self._ready = threading.Condition(), collections.deque()

@@ -176,7 +176,7 @@ class Guest:
         if "IncompatibleTypes" in str(error):
             return ClientError(
                 f"topic {topic!r} of deployment {self.name!r} has another layout than this package knows: "
-                "install the package of the same version of Parallax"
+                "install the package from the same version of Parallax"
             )
         return ClientError(f"cannot read topic {topic!r} of deployment {self.name!r}: {error}")
 

@@ -368,7 +368,7 @@ mod tests {
             start: 10,
             ..path(PATH)
         };
-        assert!(refused(&beyond).contains("lies beyond"));
+        assert!(refused(&beyond).contains("is beyond"));
         assert!(
             refused(&SourceSpec {
                 step: 0,

@@ -370,7 +370,7 @@ impl Supply {
 
 /// Never returns, like a process that is stuck in a computation.
 fn spin() -> ! {
-    tracing::warn!("computing for ever, on purpose");
+    tracing::warn!("looping forever, on purpose");
     loop {
         core::hint::spin_loop();
     }

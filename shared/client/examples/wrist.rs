@@ -1,4 +1,4 @@
-//! Moves a bar by the right wrist of whoever a running deployment sees.
+//! Moves a bar with the right wrist of the person that a running deployment follows.
 //!
 //! `cargo run -p parallax-client --example wrist -- demo "right wrist"`
 #![expect(clippy::print_stdout, reason = "an example shows something")]
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use parallax_client::{Client, ClientError, State, Wish};
 
-/// Half of the room that the bar shows, metres.
+/// Half of the width that the bar shows, metres.
 const REACH_M: f64 = 2.0;
 const WIDTH: usize = 60;
 

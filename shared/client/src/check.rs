@@ -1,4 +1,4 @@
-//! Checks of a message from another process before it is given to a program.
+//! Checks a message from another process before the program receives it.
 
 use messages::{
     FrameHeader, MAX_CANDIDATES, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, SkeletonMessage,
@@ -11,7 +11,7 @@ pub(crate) fn stamp(stamp: &Stamp, running: &Running, view: usize) -> bool {
     stamp.session == running.session && stamp.view as usize == view
 }
 
-/// Returns true if the counts of skeletons are the deployment's, every identity is that of one person, and numbers are finite.
+/// Returns true if the counts of skeletons match the deployment, identities are unique, and all numbers are finite.
 pub(crate) fn skeletons(message: &Skeletons, running: &Running) -> bool {
     let n_people = message.n_people as usize;
     let people = message.listed();
@@ -47,7 +47,7 @@ fn skeleton(person: &SkeletonMessage, running: &Running) -> bool {
     fits && are_finite && are_placed
 }
 
-/// Returns true if the counts of a view's pose fit into it.
+/// Returns true if the counts of a view's pose fit into the message.
 pub(crate) fn pose(message: &ViewPose) -> bool {
     let n_candidates = message.n_candidates as usize;
     let n_keypoints = message.n_keypoints as usize;
@@ -58,7 +58,7 @@ pub(crate) fn pose(message: &ViewPose) -> bool {
         })
 }
 
-/// Returns true if a picture is as large as its header says; one without pixels may be empty.
+/// Returns true if a picture is as large as its header says. A picture without pixels may be empty.
 pub(crate) fn picture(header: &FrameHeader, len: usize) -> bool {
     let [width, height] = [header.width, header.height].map(|side| side as usize);
     let expected = width.checked_mul(height).and_then(|area| area.checked_mul(3));

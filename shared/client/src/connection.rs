@@ -18,21 +18,21 @@ use crate::joiner::Joiner;
 use crate::moment::{Buffers, Picture};
 use crate::wish::Wish;
 
-/// Messages that are taken from one port in one turn, so that a turn ends.
+/// Maximum number of messages that one pass takes from a port, so that the pass ends.
 const MOST_A_TURN: usize = 64;
-/// How long a deployment may take to begin.
+/// Time that a deployment may take to start.
 const STARTING: Duration = Duration::from_secs(5);
 
-/// The ports of one run of a deployment. Its description stays the same, and so does its session.
+/// The ports of one run of a deployment. The description and the session stay the same during the run.
 #[derive(Debug)]
 pub(crate) struct Connection {
     skeletons: Option<GuestPort<Skeletons, ()>>,
     views: Vec<ViewPorts>,
     pub(crate) running: Arc<Running>,
     buffers: Option<Buffers>,
-    /// Messages that could not be of this run, or not be at all.
+    /// Number of messages that belong to another run or are malformed.
     pub(crate) n_refused: u64,
-    // Dropped last: the ports are its.
+    // Dropped last, because it owns the ports.
     guest: Guest,
 }
 
@@ -43,20 +43,20 @@ struct ViewPorts {
     pictures: Option<GuestPort<u8, FrameHeader>>,
 }
 
-/// Outcome of taking the pictures of a turn.
+/// Outcome of taking the pictures in one pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Turn {
-    /// All that was there was taken.
+    /// All available pictures were taken.
     Done,
-    /// A picture waits until another is given back.
+    /// A picture waits until the caller drops another one.
     Held,
 }
 
 impl Connection {
-    /// Joins a deployment. One that is about to start is waited for, until it says what it is and all topics are there.
+    /// Joins a deployment. If it is about to start, waits for its description and all its topics.
     pub(crate) fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         let namespace = Namespace::new(deployment)?;
-        // Where it does not, the guest says why.
+        // If there is no description, `Guest::open` returns the reason.
         wait_for_description(&namespace, STARTING);
         let guest = Guest::open(&namespace)?;
         let text = namespace.description().map_err(|error| unreadable(deployment, error))?;
@@ -82,7 +82,7 @@ impl Connection {
         })
     }
 
-    /// The numbers of the views that were asked for.
+    /// Returns the indices of the requested views.
     pub(crate) fn views(&self) -> impl Iterator<Item = usize> + Clone {
         self.views.iter().map(|view| view.view)
     }
@@ -92,13 +92,13 @@ impl Connection {
         self.guest.is_over()
     }
 
-    /// Takes what is there.
+    /// Takes all messages that are available.
     pub(crate) fn turn(
         &mut self,
         joiner: &mut Joiner<Picture>,
         now: Instant,
     ) -> Result<Turn, ClientError> {
-        // Skeletons are sent last, so all that belongs to one of these is there when the views are looked at.
+        // Skeletons are sent last. When the views are read, all messages that belong to these skeletons are therefore available.
         let skeletons = self.skeletons()?;
         let mut turn = Turn::Done;
         for nth in 0..self.views.len() {
@@ -186,7 +186,7 @@ impl Connection {
             if header.status == Status::END {
                 continue;
             }
-            // One that waits for a skeleton would keep its memory from the sender for too long.
+            // A picture that waits for its skeleton would block the sender's memory for too long.
             let picture = match &self.buffers {
                 Some(buffers) => Picture::copied(&seen, buffers),
                 None => Picture::in_place(seen),
@@ -233,7 +233,7 @@ fn numbers(running: &Running, wish: &Wish) -> Result<Vec<usize>, ClientError> {
     Ok(numbers)
 }
 
-/// Why there is no description: the deployment has ended in the meantime, or its file cannot be read.
+/// Returns the reason why there is no description: the deployment has ended in the meantime, or its file cannot be read.
 fn unreadable(name: &str, source: io::Error) -> GuestError {
     let name = name.to_owned();
     if source.kind() == io::ErrorKind::NotFound {

@@ -1,34 +1,34 @@
-//! Why a deployment cannot be read.
+//! Reasons why a deployment cannot be read.
 
 use std::io;
 
 use runfiles::RunningError;
 use runtime::{GuestError, NamespaceError, ReceiveError};
 
-/// A deployment cannot be read.
+/// Reason why a deployment cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
-    /// The name cannot be that of a deployment.
+    /// The text is not a valid name of a deployment.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
-    /// It does not run (with the names of those that do), has no place for another client, or sends another version.
+    /// The deployment does not run, has no place for another client, or sends another version. The error names the deployments that run.
     #[error(transparent)]
     Guest(#[from] GuestError),
-    /// Its description is missing, damaged, or of another version.
+    /// The description of the deployment is missing, damaged, or of another version.
     #[error(transparent)]
     Description(#[from] RunningError),
-    /// It has no camera of that name.
+    /// The deployment has no camera with the requested name.
     #[error("deployment {deployment:?} has no camera {camera:?}, but {}", .cameras.join(", "))]
     NoCamera {
         /// Name of the deployment.
         deployment: String,
-        /// The camera that was asked for.
+        /// The requested camera.
         camera: String,
-        /// The cameras that it has.
+        /// The cameras of the deployment.
         cameras: Vec<String>,
     },
-    /// Nothing was asked for.
-    #[error("nothing is asked for: neither skeletons nor poses nor pictures")]
+    /// The [`Wish`](crate::Wish) requests nothing.
+    #[error("nothing is requested: neither skeletons nor poses nor pictures")]
     NoWish,
     /// A message cannot be received.
     #[error(transparent)]
@@ -49,7 +49,7 @@ impl ClientError {
         match self {
             Self::Guest(error) => failure::Fault::hint(error),
             Self::Description(_) => Some(
-                "build this program and the deployment of the same version of Parallax".to_owned(),
+                "build this program and the deployment from the same version of Parallax".to_owned(),
             ),
             _ => None,
         }

@@ -1,4 +1,4 @@
-//! Brings together what belongs to one frame. Reads no clock, knows no port.
+//! Collects the parts of every frame. Does not read the clock and does not use ports.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -7,7 +7,7 @@ use messages::{Skeletons, Stamp, ViewPose};
 
 use crate::wish::Wish;
 
-/// Frames that may be waiting for their parts at the same time.
+/// Maximum number of frames that may wait for their parts at the same time.
 const MOST_PENDING: usize = 32;
 
 /// The parts of one frame.
@@ -16,10 +16,10 @@ pub(crate) struct Gathered<P> {
     pub(crate) frame: u64,
     pub(crate) captured_at_nanos: u64,
     pub(crate) skeletons: Option<Box<Skeletons>>,
-    /// One for each view that was asked for.
+    /// Parts of each requested view.
     pub(crate) views: Vec<Parts<P>>,
     pub(crate) is_complete: bool,
-    /// When its first part came.
+    /// Arrival of the frame's first part.
     since: Instant,
 }
 
@@ -45,14 +45,14 @@ pub(crate) struct Joiner<P> {
     wish: Wish,
     n_views: usize,
     pending: BTreeMap<u64, Gathered<P>>,
-    /// No frame before this one is given any more.
+    /// Number of the first frame that may still be given.
     next: u64,
-    /// Parts that came after their frame, and frames that were given up.
+    /// Number of parts that came after their frame, and of frames that were given up.
     pub(crate) n_late: u64,
 }
 
 impl<P> Joiner<P> {
-    /// * `n_views`: how many views are asked for.
+    /// * `n_views`: number of requested views.
     pub(crate) fn new(wish: Wish, n_views: usize) -> Self {
         Self {
             wish,
@@ -83,13 +83,13 @@ impl<P> Joiner<P> {
         }
     }
 
-    /// Gives up all that waits.
+    /// Gives up all frames that wait.
     pub(crate) fn clear(&mut self) {
         self.n_late += self.pending.len() as u64;
         self.pending.clear();
     }
 
-    /// The place of a frame; none if it has passed.
+    /// Returns the place for the parts of a frame; `None` if the frame has passed.
     fn frame(&mut self, stamp: &Stamp, now: Instant) -> Option<&mut Gathered<P>> {
         if stamp.frame < self.next {
             self.n_late += 1;
@@ -112,9 +112,10 @@ impl<P> Joiner<P> {
         Some(gathered)
     }
 
-    /// The frames that wait for nothing more, in order. What is older than one of them never comes.
+    /// Returns the frames that need not wait any longer, in order. Frames before them stop waiting, too; if skeletons are
+    /// requested, those without one are given up.
     ///
-    /// A skeleton is the last that is sent about a frame: it says that the rest is there, or will not be.
+    /// The skeleton is the last message about a frame. When it arrives, all other parts are there or will never come.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<Gathered<P>> {
         let last = self
             .pending
@@ -200,7 +201,7 @@ mod tests {
         joiner.add_skeletons(Box::new(skeletons(4)), now);
         assert_eq!(joiner.take(now).len(), 0, "too late");
         assert_eq!(joiner.n_late, 2);
-        // A view that is missing is said.
+        // The result says that a view is missing.
         joiner.add_pose(1, pose(6), now);
         joiner.add_skeletons(Box::new(skeletons(6)), now);
         let given = joiner.take(now);

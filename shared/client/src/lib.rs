@@ -1,4 +1,4 @@
-//! A read-only door to a running deployment, for programs of one's own.
+//! Read-only access to a running deployment, for your own programs.
 //!
 //! ```no_run
 //! use std::time::Duration;
@@ -20,17 +20,17 @@
 //! }
 //! ```
 //!
-//! [`Client::next`] gives one [`Moment`] for each frame: the people, and if asked for the pose and the picture of every view,
-//! joined by the number of the frame. A thread reads the deployment; what waits for the caller is bounded, and either only the
-//! newest moment or every one is given ([`Wish::every_frame`]).
+//! [`Client::next`] gives one [`Moment`] for each frame. It has the people and, on request, the pose and the picture of every view.
+//! A thread reads the deployment and matches these parts by the number of the frame. It keeps a limited number of moments for the
+//! caller: either only the newest moment, or every moment in order ([`Wish::every_frame`]).
 //!
-//! Nothing can be sent to the deployment: neither this crate nor [`runtime::Guest`], on which it stands, has a way to. The pipeline does not wait for
-//! a client, does not wake it, and does not count it among its receivers. A process of the deployment that is started anew
-//! is heard again without a word; when the deployment ends the client leaves it by itself, and joins the next one of that
-//! name ([`Client::state`]).
+//! A client cannot send anything to the deployment: neither this crate nor [`runtime::Guest`], on which it is based, has a function
+//! for it. The pipeline does not wait for a client, does not wake it, and does not count it among its receivers. If a process of the
+//! deployment restarts, the client receives its messages again without any action. When the deployment ends, the client leaves it, and
+//! joins the next deployment with the same name ([`Client::state`]).
 //!
-//! Every message is checked before it is given: session, counts, sizes, numbers. What is wrong is refused and counted
-//! ([`Client::losses`]).
+//! The client checks every message before the caller receives it: session, counts, sizes and numbers. Invalid messages are refused and
+//! counted ([`Client::losses`]).
 #![forbid(unsafe_code)]
 
 mod check;

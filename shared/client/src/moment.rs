@@ -1,4 +1,4 @@
-//! A moment, as a program receives it: everything about one frame.
+//! Everything about one frame, in the form in which a program receives it.
 
 use std::sync::{Arc, Mutex};
 
@@ -8,35 +8,35 @@ use runtime::Seen;
 
 use crate::lock::lock;
 
-/// Everything about one frame that was asked for and is there.
+/// All requested parts of one frame that are available.
 #[derive(Debug)]
 pub struct Moment {
-    /// Description of the deployment by itself: names of joints and cameras.
+    /// The deployment's description of itself: names of joints and cameras.
     pub running: Arc<Running>,
     /// Number of the frame, the same in all views.
     pub frame: u64,
-    /// When it was captured, nanoseconds of `CLOCK_MONOTONIC`.
+    /// Time at which the frame was captured, nanoseconds of `CLOCK_MONOTONIC`.
     pub captured_at_nanos: u64,
-    /// The people, if skeletons were asked for: there may be a reason in their place ([`Skeletons::status`]).
+    /// The people, if skeletons were requested. If there are none, [`Skeletons::status`] has the reason.
     pub skeletons: Option<Skeletons>,
-    /// The views that were asked for, in the order of the deployment.
+    /// The requested views, in the order of the deployment.
     pub views: Vec<ViewMoment>,
-    /// True if everything that was asked for is there.
+    /// True if all requested parts are there.
     pub is_complete: bool,
-    /// Frames between this moment and the one given before that were not given: skipped by the pipeline, lost with a process, or
-    /// passed over because newer ones were there. 0 for the first of a run.
+    /// Number of frames between the previous moment and this one that were not given. The pipeline skipped them, they were
+    /// lost with a process, or newer ones replaced them. 0 for the first moment of a run.
     pub n_missed: u64,
 }
 
 /// Parts of a moment that belong to one view.
 #[derive(Debug)]
 pub struct ViewMoment {
-    /// Number of the view.
+    /// Index of the view.
     pub view: usize,
-    /// Poses that the view found alone: the message, which holds positions in cells of the pyramid. Positions in pixels after
+    /// Poses from this view alone. The message has positions in cells of the pyramid. Positions in pixels after
     /// fusion are in [`Skeleton::centres_px`].
     pub pose: Option<Box<ViewPose>>,
-    /// Its picture.
+    /// Picture of the view.
     pub picture: Option<Picture>,
 }
 
@@ -54,27 +54,27 @@ pub struct Skeleton<'a> {
     running: &'a Running,
 }
 
-/// One joint, and where it is or why it is nowhere.
+/// One joint, with its position or the reason why it has none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joint<'a> {
-    /// Its name.
+    /// Name of the joint.
     pub name: &'a str,
-    /// Where it is; or why there is no place.
+    /// Position of the joint, or the reason why it has none.
     pub found: Result<Place, Status>,
 }
 
-/// Where a joint is.
+/// Position of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// In the world frame of the calibration, metres.
+    /// Position in the world frame of the calibration, metres.
     pub in_world: [f64; 3],
     /// Covariance `[xx, xy, xz, yy, yz, zz]`, square metres.
     pub covariance: [f64; 6],
-    /// Standard deviation along one axis, the mean over the three: `sqrt((xx + yy + zz) / 3)`, metres.
+    /// Standard deviation along one axis, averaged over the three axes: `sqrt((xx + yy + zz) / 3)`, metres.
     pub deviation_m: f64,
-    /// Root mean square distance from what the views saw, pixels.
+    /// Root mean square distance of the reprojections from the observations of the views, pixels.
     pub reprojection_px: f64,
-    /// Number of views that it was located with.
+    /// Number of views from which the joint was located.
     pub n_views: u32,
 }
 
@@ -83,17 +83,17 @@ impl Skeletons {
         Self { message, running }
     }
 
-    /// The message as it was sent.
+    /// Returns the message as it was sent.
     pub fn message(&self) -> &messages::Skeletons {
         &self.message
     }
 
-    /// [`Status::OK`] if anybody has a skeleton, or why nobody has.
+    /// Returns [`Status::OK`] if any person has a skeleton, otherwise the reason why not.
     pub fn status(&self) -> Status {
         self.message.status
     }
 
-    /// The people, the followed person first.
+    /// Iterates over the people, the followed person first.
     pub fn people(&self) -> impl Iterator<Item = Skeleton<'_>> {
         let people = self.message.listed().iter();
         people.map(|message| Skeleton {
@@ -102,47 +102,47 @@ impl Skeletons {
         })
     }
 
-    /// The followed person; `None` if there is nobody.
+    /// Returns the followed person; `None` if there is no person.
     pub fn followed(&self) -> Option<Skeleton<'_>> {
         self.people().next()
     }
 }
 
 impl<'a> Skeleton<'a> {
-    /// The part of the message that is about the person.
+    /// Returns the person's part of the message.
     pub fn message(self) -> &'a SkeletonMessage {
         self.message
     }
 
-    /// Identity within the run, from 1.
+    /// Returns the person's identity within the run, counted from 1.
     pub fn id(self) -> u64 {
         self.message.id
     }
 
-    /// [`Status::OK`] if there is a skeleton, or why there is none.
+    /// Returns [`Status::OK`] if there is a skeleton, otherwise the reason why not.
     pub fn status(self) -> Status {
         self.message.status
     }
 
-    /// The joints, in the order of the deployment.
+    /// Iterates over the joints, in the order of the deployment.
     pub fn joints(self) -> impl Iterator<Item = Joint<'a>> {
         let names = self.running.joints.iter();
         names.zip(self.message.listed_joints()).map(named)
     }
 
-    /// The joint of that name; `None` if the deployment has no such joint.
+    /// Returns the joint with a name; `None` if the deployment has no such joint.
     pub fn joint(self, name: &str) -> Option<Joint<'a>> {
         self.joints().find(|joint| joint.name == name)
     }
 
-    /// Iterates over the keypoints that networks name beside the joints.
+    /// Iterates over the extra keypoints of networks, which are not joints.
     pub fn keypoints(self) -> impl Iterator<Item = Joint<'a>> {
         let names = self.running.keypoints.iter();
         names.zip(self.message.listed_keypoints()).map(named)
     }
 
-    /// The centres of the parts in the frame of a view after fusion, `[column, row]` in pixels; empty where the view has no part in
-    /// the skeleton.
+    /// Returns the centres of the parts in the frame of a view after fusion, `[column, row]` in pixels. Empty if the view did not
+    /// contribute to the skeleton.
     pub fn centres_px(self, view: usize) -> &'a [[f64; 2]] {
         let view = self.message.views.get(view);
         let seen = view.filter(|view| view.status == Status::OK);
@@ -171,8 +171,8 @@ fn named<'a>((name, joint): (&'a String, &Joint3d)) -> Joint<'a> {
 
 /// The picture of one view.
 ///
-/// Without skeletons it lies where its sender wrote it, and no pixel is copied. Joined with a skeleton, which comes later, it is a
-/// copy, in memory that is used again: its sender cannot spare the memory for so long.
+/// Without skeletons, the pixels stay in the memory of the sender and are not copied. With skeletons, the picture has to wait for the
+/// skeleton, and the sender cannot spare its memory for so long. The picture is therefore a copy, in memory that is reused.
 #[derive(Debug)]
 pub struct Picture {
     pixels: Pixels,
@@ -188,7 +188,7 @@ enum Pixels {
     },
 }
 
-/// Memory of pictures that were dropped, for those to come.
+/// Memory of dropped pictures, reused for later ones.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Buffers(Arc<Mutex<Vec<Vec<u8>>>>);
 
@@ -212,7 +212,7 @@ impl Picture {
         }
     }
 
-    /// The pixels, RGB, row major; empty if there is no picture ([`Self::status`]).
+    /// Returns the pixels, RGB, row major; empty if there is no picture ([`Self::status`]).
     pub fn pixels(&self) -> &[u8] {
         if self.status() != Status::OK {
             return &[];
@@ -223,18 +223,18 @@ impl Picture {
         }
     }
 
-    /// Width and height, pixels; 0 if there is no picture.
+    /// Returns the width and height, pixels; 0 if there is no picture.
     pub fn size(&self) -> [u32; 2] {
         let header = self.header();
         [header.width, header.height]
     }
 
-    /// [`Status::OK`], or what is wrong with the camera.
+    /// Returns [`Status::OK`], or the fault of the camera.
     pub fn status(&self) -> Status {
         self.header().status
     }
 
-    /// The header as it was sent.
+    /// Returns the header as it was sent.
     pub fn header(&self) -> &FrameHeader {
         match &self.pixels {
             Pixels::InPlace(seen) => seen.header(),
@@ -242,7 +242,7 @@ impl Picture {
         }
     }
 
-    /// Returns true if the pixels lie where the sender wrote them.
+    /// Returns true if the pixels are in the memory of the sender.
     pub fn is_in_place(&self) -> bool {
         matches!(self.pixels, Pixels::InPlace(_))
     }
@@ -257,12 +257,12 @@ impl Drop for Picture {
 }
 
 impl Moment {
-    /// The followed person; `None` if there is nobody, or skeletons were not asked for.
+    /// Returns the followed person; `None` if there is no person, or skeletons were not requested.
     pub fn followed(&self) -> Option<Skeleton<'_>> {
         self.skeletons.as_ref()?.followed()
     }
 
-    /// Returns true if any picture of the moment lies where its sender wrote it.
+    /// Returns true if any picture of the moment is in the memory of its sender.
     pub(crate) fn is_in_place(&self) -> bool {
         let mut pictures = self.views.iter().filter_map(|view| view.picture.as_ref());
         pictures.any(Picture::is_in_place)

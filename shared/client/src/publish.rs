@@ -1,7 +1,7 @@
-//! Sends the skeletons of a running deployment as datagrams, for programs that can do neither with Rust nor with Python.
+//! Sends the skeletons of a running deployment as datagrams, for programs that can use neither Rust nor Python.
 //!
-//! A program beside the deployment, which reads it as any other does (`client`): no process of the pipeline waits for it, and
-//! what the receiver does not take is lost and counted. [`json_datagram`] and [`osc_datagrams`] are pure.
+//! The publisher is a separate program, which reads the deployment as any client does. No process of the pipeline waits for it.
+//! Datagrams that the receiver does not take are lost and counted. [`json_datagram`] and [`osc_datagrams`] are pure functions.
 
 mod beside;
 mod frame;
@@ -17,5 +17,5 @@ pub use osc::osc_datagrams;
 pub use send::{Counts, run};
 pub use target::{Form, Target, TargetError};
 
-/// The largest datagram, bytes: one that crosses any network in one piece.
+/// Maximum size of a datagram, bytes. A datagram of this size crosses any network in one piece.
 pub const MOST_BYTES: usize = 1400;

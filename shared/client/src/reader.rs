@@ -1,4 +1,4 @@
-//! The thread that reads a deployment, and what it hands to the caller.
+//! The thread that reads a deployment and passes moments to the caller.
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -15,16 +15,16 @@ use crate::lock::lock;
 use crate::moment::{Moment, Picture, Skeletons, ViewMoment};
 use crate::wish::Wish;
 
-/// Pause between two looks at the ports: no sender wakes a client.
+/// Pause between two checks of the ports, because no sender wakes a client.
 const PAUSE: Duration = Duration::from_millis(1);
-/// How often the reader looks whether the deployment still runs. It has a second to leave.
+/// Interval at which the reader checks that the deployment still runs. The reader has a second to leave.
 const CHECK: Duration = Duration::from_millis(100);
 /// Pause between two attempts to join a deployment that does not run.
 const RETRY: Duration = Duration::from_millis(200);
 
 /// Reads a deployment.
 ///
-/// Dropping it leaves the deployment.
+/// Dropping the client leaves the deployment.
 #[derive(Debug)]
 pub struct Client {
     shared: Arc<Shared>,
@@ -33,24 +33,24 @@ pub struct Client {
     last: Option<(u64, u64)>,
 }
 
-/// Connection to the deployment.
+/// State of the connection to the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// It runs, and is read.
+    /// The deployment runs, and the client reads it.
     Connected,
-    /// It does not run; the client joins it when it does.
+    /// The deployment does not run. The client joins it when it starts.
     Waiting,
 }
 
-/// Counts of what was not given to the caller.
+/// Counts of messages and moments that were not given to the caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Losses {
     /// Messages of another run, or with impossible counts or numbers.
     pub refused: u64,
-    /// Parts that came after their frame, and frames without a skeleton where one was asked for.
+    /// Parts that came after their frame, and frames whose requested skeleton did not come.
     pub late: u64,
-    /// Moments that were passed over, because newer ones came before the caller asked, or the deployment ended and had to have its
-    /// pictures back.
+    /// Moments that were dropped because newer ones came before the caller took them. When the deployment ends, moments that
+    /// hold its pictures are dropped as well.
     pub passed_over: u64,
 }
 
@@ -75,7 +75,7 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// [`ClientError`]; if no such deployment runs, it has the names of those that do.
+    /// Returns a [`ClientError`] if the deployment cannot be joined. If it does not run, the error names the deployments that do.
     pub fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         check_wish(wish)?;
         let connection = Connection::open(deployment, wish)?;
@@ -86,7 +86,7 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// [`ClientError`], but not that it does not run.
+    /// Returns a [`ClientError`] if the deployment cannot be joined. That it does not run is not an error.
     pub fn wait_for(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         check_wish(wish)?;
         match Connection::open(deployment, wish) {
@@ -127,12 +127,12 @@ impl Client {
         })
     }
 
-    /// The next moment; none if nothing came in time, or while the deployment does not run.
+    /// Returns the next moment; `None` if none came in time, or while the deployment does not run.
     ///
     /// # Errors
     ///
-    /// The deployment that runs now cannot be read, for example because it is of another version; or a port failed. The client goes
-    /// on trying, so that the caller may ask again.
+    /// Fails if the running deployment cannot be read, for example because it is of another version, or if a port fails. The client
+    /// keeps trying, so the caller may call this function again.
     pub fn next(&mut self, patience: Duration) -> Result<Option<Moment>, ClientError> {
         let inner = lock(&self.shared.inner);
         let is_idle = |inner: &mut Inner| inner.ready.is_empty() && inner.problem.is_none();
@@ -157,7 +157,7 @@ impl Client {
         lock(&self.shared.inner).state
     }
 
-    /// Returns the deployment's description of itself; `None` before the first has run, and that of the last run after it.
+    /// Returns the deployment's description of itself: that of the last run, or `None` before the first run.
     pub fn running(&self) -> Option<Arc<Running>> {
         lock(&self.shared.inner).running.clone()
     }
@@ -174,7 +174,7 @@ impl Drop for Client {
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {
-            // It has said why on standard error.
+            // The panic has already been reported on standard error.
         }
     }
 }
@@ -211,7 +211,7 @@ impl Reader {
         }
     }
 
-    /// Tries to join the deployment. Failures other than that it does not run are returned to the caller.
+    /// Tries to join the deployment. All failures except that it does not run are passed to the caller.
     fn join(&self) -> Option<Connection> {
         match Connection::open(&self.deployment, &self.wish) {
             Ok(connection) => {
@@ -249,7 +249,7 @@ impl Reader {
             {
                 let mut inner = lock(&self.shared.inner);
                 if matches!(turn, Ok(Turn::Held)) && self.wish.newest_wins() && given.is_empty() {
-                    // What waits here keeps the newest from being taken.
+                    // Moments that wait here keep the newest picture from being taken.
                     inner.losses.passed_over += inner.ready.len() as u64;
                     inner.ready.clear();
                     joiner.clear();
@@ -279,7 +279,7 @@ impl Reader {
         }
         let mut inner = lock(&self.shared.inner);
         inner.state = State::Waiting;
-        // Pictures in place would keep the deployment from ending.
+        // The deployment cannot end while pictures in its memory are held.
         let n_ready = inner.ready.len();
         inner.ready.retain(|moment| !moment.is_in_place());
         inner.losses.passed_over += (n_ready - inner.ready.len()) as u64;
@@ -287,7 +287,7 @@ impl Reader {
 }
 
 impl Inner {
-    /// Adds a moment to those that wait, of which there are at most so many.
+    /// Adds a moment to those that wait. Drops the oldest ones if more than `most` would wait.
     fn hand_over(&mut self, moment: Moment, most: usize) {
         while self.ready.len() >= most {
             self.ready.pop_front();

@@ -1,23 +1,23 @@
-//! Wishes of a program: the parts of a deployment's frames that it takes.
+//! Requests of a program: the parts of a deployment's frames that it takes.
 
 use core::time::Duration;
 
-/// Parts of every frame that a client takes, and choice of the frames that it is given.
+/// Parts of every frame that a client takes, and the choice of frames that it receives.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Wish {
     pub(crate) skeletons: bool,
     pub(crate) poses: bool,
     pub(crate) pictures: bool,
-    /// None for all.
+    /// Names of the requested cameras; `None` for all.
     pub(crate) cameras: Option<Vec<String>>,
-    /// How many moments may wait for the caller.
+    /// Maximum number of moments that may wait for the caller.
     pub(crate) waiting: usize,
-    /// How long parts of a frame are waited for, where nothing says that they will not come.
+    /// Longest wait for the parts of a frame, if no message says that they will not come.
     pub(crate) patience: Duration,
 }
 
 impl Wish {
-    /// The skeleton of the newest frame.
+    /// Requests the skeletons of the newest frame.
     #[must_use]
     pub fn skeletons() -> Self {
         Self {
@@ -30,7 +30,7 @@ impl Wish {
         }
     }
 
-    /// The views of the newest frame, without skeleton: add [`Self::with_poses`] or [`Self::with_pictures`].
+    /// Requests the views of the newest frame, without skeletons. Add [`Self::with_poses`] or [`Self::with_pictures`].
     #[must_use]
     pub fn views() -> Self {
         Self {
@@ -39,49 +39,50 @@ impl Wish {
         }
     }
 
-    /// And the pose of every view, as the single views found it.
+    /// Requests also the single-view pose of every view.
     #[must_use]
     pub fn with_poses(mut self) -> Self {
         self.poses = true;
         self
     }
 
-    /// And the picture of every view.
+    /// Requests also the picture of every view.
     ///
-    /// With [`Self::views`] it is where its sender wrote it. A client can hold one picture of a view at a time, so frames that
-    /// come before a [`Moment`](crate::Moment) is dropped are given without theirs; and as long as it is held, the deployment
-    /// cannot be started anew. With [`Self::skeletons`] it is a copy.
+    /// With [`Self::skeletons`], the picture is a copy. With [`Self::views`], it stays in the memory of its sender. A client can then
+    /// hold only one picture of a view at a time: until a [`Moment`](crate::Moment) is dropped, later frames come without their pictures.
+    /// The deployment cannot be restarted while a picture is held.
     #[must_use]
     pub fn with_pictures(mut self) -> Self {
         self.pictures = true;
         self
     }
 
-    /// Only of these cameras; of all without it.
+    /// Restricts the request to these cameras. Without this call, all cameras are read.
     #[must_use]
     pub fn of_cameras(mut self, names: &[&str]) -> Self {
         self.cameras = Some(names.iter().map(|name| (*name).to_owned()).collect());
         self
     }
 
-    /// Every frame in order, instead of the newest.
+    /// Requests every frame in order, instead of the newest frame only.
     ///
-    /// * `most`: how many may wait for the caller, at least 1; where more come, the oldest is dropped and counted.
+    /// * `most`: maximum number of moments that may wait for the caller, at least 1. If more come, the oldest moment is dropped and
+    ///   counted.
     #[must_use]
     pub fn every_frame(mut self, most: usize) -> Self {
         self.waiting = most.max(1);
         self
     }
 
-    /// How long the views of a frame are waited for where no skeleton is asked for, whose arrival says that all is there;
-    /// half a second if it is not set.
+    /// Sets the longest wait for the views of a frame if no skeletons are requested; half a second by default. With skeletons, the
+    /// arrival of the skeleton ends the wait.
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
         self
     }
 
-    /// Returns true if anything of single views is asked for.
+    /// Returns true if poses or pictures of single views are requested.
     pub(crate) fn has_views(&self) -> bool {
         self.poses || self.pictures
     }

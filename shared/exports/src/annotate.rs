@@ -1,4 +1,4 @@
-//! The pose in space drawn on the picture of a view: limbs, and around every joint the ellipse of two standard deviations.
+//! Draws the pose in space on the picture of a view: limbs, and around every joint the ellipse of two standard deviations.
 
 use core::f64::consts::TAU;
 
@@ -6,12 +6,12 @@ use footage::{CENTRE, Canvas, Limb, Side, draw_limbs, line_width};
 
 use crate::{Seen, Trial, ViewCamera};
 
-/// How many standard deviations the ellipses are wide.
+/// Half-axis of the ellipses, in standard deviations.
 pub const DEVIATIONS: f64 = 2.0;
-/// Points of an ellipse.
+/// Number of points of an ellipse.
 const N_POINTS: usize = 40;
 
-/// Draws a frame on the picture of a view: everybody, each with the number of the person if there are several.
+/// Draws a frame on the picture of a view, with all people. If there are several, each has the number of the person.
 pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamera) {
     for trial in trials {
         let at = person(canvas, trial, slot, view);
@@ -33,13 +33,13 @@ pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamer
     canvas.label([2.0, 2.0], text.trim_end(), CENTRE);
 }
 
-/// The trial whose status is that of the frame: of a person who is there, if anybody is.
+/// Returns the trial whose status is that of the frame: a trial with a person in it, if there is one.
 fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
     let is_there = |trial: &&Trial| trial.slots[slot].points.iter().any(Result::is_ok);
     trials.iter().find(is_there).or(trials.first())
 }
 
-/// Draws a person; returns the upper left corner of what the view sees of it.
+/// Draws a person. Returns the upper left corner of the part that the view sees.
 fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) -> Option<[f64; 2]> {
     let seen: Vec<Option<Seen>> = trial
         .points(slot)
@@ -67,7 +67,7 @@ fn ellipse(canvas: &mut Canvas, seen: &Seen, width: f64, side: Side) {
     let Some([xx, xy, yy]) = seen.covariance else {
         return;
     };
-    // One that is larger than the picture tells nothing, and takes long to draw.
+    // An ellipse that is larger than the picture shows nothing, and takes long to draw.
     let size = canvas.size();
     let longest = (size.width + size.height) as f64;
     if (DEVIATIONS * (xx + yy).sqrt()).total_cmp(&longest).is_gt() {
@@ -89,7 +89,7 @@ fn ellipse(canvas: &mut Canvas, seen: &Seen, width: f64, side: Side) {
     canvas.polyline(&points, width, side.colour());
 }
 
-/// The side of the body that a point is of, by its name.
+/// Returns the side of the body of a point, by its name.
 pub(crate) fn side_of(name: &str) -> Side {
     let is = |side: &str, of: char| {
         let own = |part: &str| {

@@ -11,12 +11,12 @@ use crate::tree::{N_NODES, NODES, Posed, Poser, lengths};
 
 /// Centimetres in a metre.
 const CM: f64 = 100.0;
-/// Runs of frames that are listed.
+/// Maximum number of runs of frames that are listed.
 const MAX_LISTED: usize = 5;
 
 /// Writes the tree, and a line for each frame.
 ///
-/// The lengths are medians. A bone that was never seen, with what hangs on it, is left out.
+/// The lengths are medians. A bone that was never seen is left out, with everything that depends on it.
 pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let lengths = lengths(trial);
     let is_there = is_there(&lengths);
@@ -52,7 +52,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     Ok(notes(trial, &lengths, &is_there, &held))
 }
 
-/// Which nodes the file has: those that were seen, and those that turn towards one.
+/// Returns the nodes that the file has: those that were seen, and those that point towards a seen node.
 fn is_there(lengths: &[Option<f64>; N_NODES]) -> [bool; N_NODES] {
     let mut is_there = [true; N_NODES];
     for (index, node) in NODES.iter().enumerate().skip(1) {
@@ -70,7 +70,7 @@ fn children(index: usize, is_there: &[bool; N_NODES]) -> impl Iterator<Item = us
     (0..N_NODES).filter(move |&i| is_there[i] && NODES[i].parent == Some(index))
 }
 
-/// Ends of the tree have no channels.
+/// Returns true if a node has channels. Ends of the tree have none.
 fn has_channels(index: usize, is_there: &[bool; N_NODES]) -> bool {
     is_there[index] && (index == 0 || children(index, is_there).next().is_some())
 }
@@ -110,13 +110,13 @@ fn node(
     writeln!(out, "{tab}}}")
 }
 
-/// The angles of a rotation as `Rz Rx Ry`, radians: `[z, x, y]`.
+/// Returns the angles of a rotation as `Rz Rx Ry`, radians: `[z, x, y]`.
 fn zxy(turn: &UnitQuaternion<f64>) -> [f64; 3] {
     let turn = turn.to_rotation_matrix();
     let m = turn.matrix();
     let x = m[(2, 1)].clamp(-1.0, 1.0).asin();
     if m[(2, 1)].abs() > 1.0 - 1e-12 {
-        // The axes of z and y are one: all of the turn is given to z.
+        // The axes of z and y coincide, so the whole rotation is assigned to z.
         return [m[(1, 0)].atan2(m[(0, 0)]), x, 0.0];
     }
     [
@@ -126,18 +126,18 @@ fn zxy(turn: &UnitQuaternion<f64>) -> [f64; 3] {
     ]
 }
 
-/// The same angles, each as near as whole turns bring it to the last ones, so that programs may interpolate.
+/// Returns the same angles, shifted by whole turns to be as near as possible to the last ones, so that programs may interpolate.
 fn unwrapped(angles: [f64; 3], last: [f64; 3]) -> [f64; 3] {
     let turn = core::f64::consts::TAU;
     core::array::from_fn(|i| angles[i] + ((last[i] - angles[i]) / turn).round() * turn)
 }
 
-/// Frames in which something stays as it was.
+/// Frames in which a bone or the whole body is held.
 #[derive(Debug, Default)]
 struct Held {
-    /// Runs of frames, first and last, in which any bone is held.
+    /// First and last frame of each run in which any bone is held.
     runs: Vec<[usize; 2]>,
-    /// Frames in which the whole body is.
+    /// Number of frames in which the whole body is held.
     n_whole: usize,
     n_frames: usize,
 }

@@ -1,41 +1,42 @@
-//! The table of formats that are one file each.
+//! The table of formats with one file per trial.
 
 use std::io;
 
 use crate::sink::{Notes, Sink};
 use crate::{Trial, bvh, glb, points, tables};
 
-/// Facts of a run that a format needs.
+/// Properties of a run that a format needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Needs {
-    /// How many frames a second there are.
+    /// True if the format needs the frame rate.
     pub rate: bool,
-    /// Which way is up.
+    /// True if the format needs the upward direction.
     pub up: bool,
 }
 
-/// A format of one file.
+/// A format with one file per trial.
 #[derive(Debug, Clone, Copy)]
 pub struct FileFormat {
-    /// Its name in commands.
+    /// Name of the format in commands.
     pub name: &'static str,
-    /// Suffix of its files after the name of the trial.
+    /// Suffix of the format's files, after the name of the trial.
     pub suffix: &'static str,
-    /// Its unit.
+    /// Unit of lengths.
     pub unit: &'static str,
-    /// Its axes.
+    /// Directions of the axes.
     pub axes: &'static str,
     /// Representation of a gap in the format.
     pub gaps: &'static str,
-    /// How it holds uncertainty.
+    /// Representation of uncertainty in the format.
     pub uncertainty: &'static str,
-    /// Facts of a run that it needs.
+    /// Properties of a run that the format needs.
     pub needs: Needs,
     /// Writes a trial.
     ///
     /// # Errors
     ///
-    /// Those of the writer; a trial that the format has no room for, or that has nothing of what it holds.
+    /// Returns errors of the writer. Also fails if the format has no room for the trial, or if the trial has nothing that the format
+    /// can store.
     pub write: fn(&Trial, &mut Sink<'_>) -> io::Result<Notes>,
 }
 
@@ -49,7 +50,7 @@ const NOTHING: Needs = Needs {
     up: false,
 };
 
-/// All of them.
+/// All formats with one file per trial.
 pub const FILES: &[FileFormat] = &[
     FileFormat {
         name: "c3d",

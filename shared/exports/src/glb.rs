@@ -1,9 +1,9 @@
 //! GLB (glTF 2.0, binary): a skinned skeleton with its animation; metres, y up.
 //!
-//! The nodes are those of the tree of this crate; their rotations and places are those that were seen, frame by frame, so that every joint stands where
-//! the run put it and bones have the length that they had. Every bone has a piece of the skin on a node of its own, which is scaled
-//! to nothing where an end of the bone was not seen: glTF interpolates, and would show what nobody saw. Standard deviations and gaps
-//! of all points stand in the extras of the animation.
+//! The nodes are those of the tree of this crate. Their rotations and positions are the measured ones of every frame, so that joints have
+//! the positions of the run and bones have their measured lengths. Every bone has a piece of the skin on a separate node. This node is
+//! scaled to nothing if an end of the bone was not seen, because glTF would otherwise interpolate. Standard deviations and gaps
+//! of all points are in the extras of the animation.
 
 mod mesh;
 mod store;
@@ -22,22 +22,22 @@ use store::Store;
 
 /// Length at rest of a bone that was never seen, metres.
 const UNSEEN_M: f64 = 0.2;
-/// Length up to which a bone is not drawn, metres: matrices divide by it.
+/// Length up to which a bone is not drawn, metres, because matrices divide by the length.
 const SHORTEST_M: f64 = 1e-4;
 /// Size of a keypoint's mark, metres.
 const MARK_M: f64 = 0.02;
 
-/// A piece of the skin, on a node of its own.
+/// A piece of the skin, on a separate node.
 struct Piece {
-    /// For a bone the node where it ends; for a keypoint its index among the points.
+    /// Node where the bone ends, or index of the keypoint among the points.
     of: Of,
     name: String,
-    /// The node that carries it, of the file.
+    /// Node of the file that carries the piece.
     parent: usize,
-    /// Its place at rest, in the frame of that node.
+    /// Pose of the piece at rest, in the frame of its parent node.
     rest: Isometry3<f64>,
     scale: Vector3<f64>,
-    /// Its place at rest, in the scene.
+    /// Pose of the piece at rest, in the scene.
     in_scene: Isometry3<f64>,
 }
 
@@ -47,7 +47,7 @@ enum Of {
     Keypoint(usize),
 }
 
-/// Writes the file; its binary part is put together in memory, about 600 bytes for each frame.
+/// Writes the file. Its binary part is assembled in memory, about 600 bytes for each frame.
 pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let rate_hz = rate(trial)?;
     let lengths = lengths(trial);
@@ -105,7 +105,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     ])
 }
 
-/// Where the nodes of the tree lie at rest: a T-pose, feet at the ground.
+/// Returns the positions of the nodes of the tree at rest: a T-pose with the feet on the ground.
 fn places_at_rest(lengths: &[Option<f64>; N_NODES]) -> [Vector3<f64>; N_NODES] {
     let mut places = [Vector3::zeros(); N_NODES];
     for (index, node) in NODES.iter().enumerate().skip(1) {
@@ -119,7 +119,7 @@ fn places_at_rest(lengths: &[Option<f64>; N_NODES]) -> [Vector3<f64>; N_NODES] {
     places
 }
 
-/// Node 0 of the file is the person; the tree follows.
+/// Returns the index of a node in the file. Node 0 of the file is the person, and the tree follows.
 const fn in_file(node: usize) -> usize {
     node + 1
 }
@@ -182,7 +182,7 @@ fn mesh(pieces: &[Piece]) -> Mesh {
     mesh
 }
 
-/// The skin: all nodes of the tree, then those of the pieces.
+/// Returns the skin: all nodes of the tree, then those of the pieces.
 fn skin(store: &mut Store, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Value {
     let of_tree = rest.iter().map(|place| Matrix4::new_translation(&-place));
     let of_pieces = pieces.iter().map(|piece| {
@@ -202,7 +202,7 @@ fn skin(store: &mut Store, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> 
     })
 }
 
-/// The node that carries the mesh, after all others.
+/// Returns the index of the node that carries the mesh, after all other nodes.
 fn skin_node(pieces: &[Piece]) -> usize {
     in_file(N_NODES + pieces.len())
 }
@@ -249,7 +249,7 @@ fn real4(it: &UnitQuaternion<f64>) -> [f32; 4] {
 
 /// Values that change from frame to frame.
 struct Tracks {
-    /// Turns of every node of the tree.
+    /// Rotations of every node of the tree.
     turns: Vec<Vec<f32>>,
     places: Vec<Vec<f32>>,
     /// Scales of every piece.
@@ -273,7 +273,7 @@ impl Tracks {
         for slot in 0..trial.slots.len() {
             let posed = poser.pose(slot);
             for (index, last) in last.iter_mut().enumerate() {
-                // A quaternion and its negative are one turn; programs interpolate between numbers.
+                // A quaternion and its negative are the same rotation, but programs interpolate between the numbers.
                 let turn = posed.turn[index].quaternion();
                 let is_far = turn.dot(last) < 0.0;
                 *last = if is_far { -turn } else { *turn };
@@ -355,7 +355,7 @@ impl Animation {
     }
 }
 
-/// Standard deviations, metres, in the order of the frames, and gaps, as numbers of first and last frames.
+/// Returns the standard deviations, metres, in the order of the frames, and the gaps as numbers of first and last frames.
 fn extras(trial: &Trial) -> Value {
     let of_point = |(nth, label): (usize, String)| {
         let deviations: Vec<Option<f64>> = (0..trial.slots.len())
@@ -370,7 +370,7 @@ fn extras(trial: &Trial) -> Value {
     json!({ "points": points })
 }
 
-/// The container: a head, the document, the binary part.
+/// Writes the container: a head, the document, the binary part.
 fn chunks(out: &mut Sink<'_>, document: &Value, binary: &[u8]) -> io::Result<()> {
     let mut text = serde_json::to_vec(document)?;
     text.resize(text.len().next_multiple_of(4), b' ');

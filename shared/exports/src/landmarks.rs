@@ -1,11 +1,11 @@
-//! Landmarks of the body by the names of the joints of every set: the same names, whatever the set.
+//! Landmarks of the body, found by the names of the joints. Every set of joints has the same landmarks.
 
 use nalgebra::Point3;
 
 use crate::Trial;
 use crate::naming::LANDMARKS;
 
-/// Which points of a trial are the landmarks.
+/// Points of a trial that are landmarks.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Landmarks {
     points: Vec<(&'static str, Vec<usize>)>,
@@ -21,7 +21,7 @@ impl Landmarks {
         let mut all = Self {
             points: points.into(),
         };
-        // A set without a pelvis has it in the middle of the hips.
+        // If a set has no pelvis, the pelvis is the middle of the hips.
         let hips = ["left hip", "right hip"].map(|name| all.points_of(name).to_vec());
         if all.points_of("pelvis").is_empty() && hips.iter().all(|hip| hip.len() == 1) {
             all.points[0].1 = hips.concat();
@@ -29,13 +29,13 @@ impl Landmarks {
         all
     }
 
-    /// The points whose mean is the landmark; none where there is none.
+    /// Returns the points whose mean is the landmark; empty if the set does not have the landmark.
     pub(crate) fn points_of(&self, landmark: &str) -> &[usize] {
         let found = self.points.iter().find(|point| point.0 == landmark);
         found.map_or(&[], |entry| &entry.1)
     }
 
-    /// Where the landmark is, in the world; none in a gap.
+    /// Returns the position of the landmark in the world; `None` in a gap.
     pub(crate) fn at(&self, trial: &Trial, slot: usize, landmark: &str) -> Option<Point3<f64>> {
         let points = self.points_of(landmark);
         let mut sum = nalgebra::Vector3::zeros();

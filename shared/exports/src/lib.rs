@@ -1,20 +1,20 @@
-//! Results for other programs: a run in the files of other tools, one module for each format, and pages ([`report`]).
+//! Exports a run to the file formats of other programs, with one module for each format, and to pages ([`report`]).
 //!
-//! [`Gathering`] takes the lines of a run one by one, and makes a [`Trial`] of them: every frame in its place on the grid of the
-//! frame rate, gaps included. [`FILES`] is the table of formats that are one file each; two formats have a file for every view and
-//! frame ([`openpose`]) or pictures ([`annotate`]), and are given a [`ViewCamera`].
+//! [`Gathering`] takes the lines of a run one by one and makes a [`Trial`] of them. A trial has every frame in its place on the grid of
+//! the frame rate, including gaps. [`FILES`] is the table of formats with one file per trial. Two formats have a file for every view and
+//! frame ([`openpose`]) or pictures ([`annotate`]), and need a [`ViewCamera`].
 //!
-//! | format | unit | axes | a gap is |
+//! | format | unit | axes | representation of a gap |
 //! |---|---|---|---|
 //! | [`c3d`](FILES) | mm | z up | residual -1 |
 //! | `trc` | m | y up | NaN |
 //! | `glb` | m | y up | a bone that is not there (scale 0) |
-//! | `bvh` | cm | y up | the last rotation, and said: the format knows no gaps |
+//! | `bvh` | cm | y up | the last rotation, and a note: the format has no gaps |
 //! | `csv`, `csv-long` | m | the rig's | empty cells |
 //! | `parquet` (a feature) | m | the rig's | null |
 //! | [`openpose`] | pixels of the footage | x right, y down | `0, 0, 0` |
 //!
-//! Nothing here opens a file. Nothing is smoothed or filled; what a format cannot say is said in its [`Notes`].
+//! This crate opens no file, and does not smooth or fill data. Each format lists in its [`Notes`] what it cannot express.
 #![forbid(unsafe_code)]
 
 pub mod report;

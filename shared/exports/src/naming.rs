@@ -1,6 +1,6 @@
 //! Names of points in the files.
 
-/// A landmark of the body, and the joints of the sets that are it: the first that a set has.
+/// A landmark of the body, and the joints of the sets that represent it. The first joint that a set has is used.
 pub(crate) const LANDMARKS: [(&str, &[&str]); 15] = [
     ("pelvis", &["pelvis", "torsoDistal"]),
     ("neck", &["neck", "thorax", "torsoProximal"]),
@@ -19,7 +19,7 @@ pub(crate) const LANDMARKS: [(&str, &[&str]); 15] = [
     ("right ankle", &["right ankle", "lowerRLegDistal"]),
 ];
 
-/// The landmark of a joint of HumanEva-I's set; any other name as it is.
+/// Returns the landmark of a joint of HumanEva-I's set, or any other name unchanged.
 fn plain_name(joint: &str) -> &str {
     let is_humaneva = joint.contains(|letter: char| letter.is_ascii_uppercase());
     let found = LANDMARKS
@@ -32,15 +32,15 @@ fn plain_name(joint: &str) -> &str {
 /// Names of the points in the files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Naming {
-    /// Those of the run: `right ankle`.
+    /// Names of the run, such as `right ankle`.
     #[default]
     Own,
-    /// Those of OpenSim models with markers for keypoints (Pose2Sim's `HALPE_26`): `RAnkle`, `LBigToe`, `Hip`.
+    /// Names of OpenSim models with markers for keypoints (Pose2Sim's `HALPE_26`), such as `RAnkle`, `LBigToe`, `Hip`.
     OpenSim,
 }
 
 impl Naming {
-    /// The name in the files of a point that the run calls `name`.
+    /// Returns the name in the files of a point that the run calls `name`.
     pub(crate) fn apply(self, name: &str) -> String {
         match self {
             Self::Own => name.to_owned(),
@@ -49,7 +49,7 @@ impl Naming {
     }
 }
 
-/// The side as a letter, then every word with a capital.
+/// Returns the side as a letter, then every word with a capital.
 fn opensim(name: &str) -> String {
     if name == "pelvis" {
         return "Hip".to_owned();
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn opensim_names_are_those_of_the_marker_set() {
-        // Markers_Halpe26.xml of Pose2Sim 0.10; eyes and ears are not in it.
+        // These are the names of Markers_Halpe26.xml of Pose2Sim 0.10, which does not have eyes and ears.
         let due = [
             "Nose",
             "LEye",

@@ -1,8 +1,8 @@
-//! The pose in space as each view sees it, as `OpenPose` writes keypoints: a file for every view and frame, `BODY_25`.
+//! Writes the pose in space as each view sees it, in the keypoint format of `OpenPose`: a file for every view and frame, `BODY_25`.
 //!
-//! The format has a confidence for every keypoint. Here it is the share of the views that the joint was triangulated from; the
-//! standard deviation of the place in the picture stands beside it, under a key that others pass over. What was not found, is
-//! behind the camera, or lies outside of the picture is `0, 0, 0`.
+//! The format has a confidence for every keypoint. Here, it is the share of the views from which the joint was triangulated.
+//! The standard deviation of the position in the picture has a separate key, which other programs ignore. A keypoint that was not found,
+//! is behind the camera, or is outside the picture is `0, 0, 0`.
 
 use keypoints::BODY_25;
 use serde_json::{Value, json};
@@ -13,14 +13,14 @@ use crate::{Seen, Trial, ViewCamera};
 /// Suffix of the file of a frame.
 pub const SUFFIX: &str = "_keypoints.json";
 
-/// The file of a view and a frame; people who were not found are not in it. `person_id` is -1 in a run of one person.
+/// Returns the file of a view and a frame, without people that were not found. `person_id` is -1 in a run of one person.
 pub fn frame(trials: &[Trial], slot: usize, view: &ViewCamera) -> String {
     let id = |trial: &Trial| (trials.len() > 1).then_some(trial.id());
     let people = trials.iter().filter_map(|trial| person(trial, id(trial), slot, view));
     json!({ "version": 1.3, "people": people.collect::<Vec<Value>>() }).to_string()
 }
 
-/// A person; `None` who is not seen.
+/// Returns a person; `None` if the view does not see the person.
 fn person(trial: &Trial, id: Option<u64>, slot: usize, view: &ViewCamera) -> Option<Value> {
     let landmarks = Landmarks::of(trial);
     let (mut numbers, mut deviations) = (Vec::new(), Vec::new());
@@ -51,7 +51,7 @@ fn person(trial: &Trial, id: Option<u64>, slot: usize, view: &ViewCamera) -> Opt
     is_any.then_some(person)
 }
 
-/// A keypoint in the picture, and the share of the views that it is from.
+/// Returns a keypoint in the picture, and the share of the views from which it was triangulated.
 fn keypoint(
     trial: &Trial,
     slot: usize,
@@ -69,7 +69,7 @@ fn keypoint(
     let mut mean = **all.first()?;
     mean.in_world = landmarks.at(trial, slot, name).unwrap_or(mean.in_world);
     if all.len() > 1 {
-        // The errors of its joints are taken as independent.
+        // The errors of the averaged joints are assumed to be independent.
         mean.covariance = core::array::from_fn(|i| {
             all.iter().map(|point| point.covariance[i]).sum::<f64>() / (n * n)
         });
@@ -77,7 +77,7 @@ fn keypoint(
     }
     let share = f64::from(mean.views.count_ones()) / trial.views.len().max(1) as f64;
     let seen = view.see(&mean).filter(|seen| view.holds(seen.at))?;
-    // A joint of no view that is known is found nevertheless; zero would mean that it is not.
+    // A joint whose views are not known was found nevertheless, and a share of zero would mean that it was not.
     Some((seen, share.clamp(0.01, 1.0)))
 }
 
@@ -141,7 +141,7 @@ mod tests {
         let value: Value =
             serde_json::from_str(&frame(core::slice::from_ref(&trial), 1, &view)).unwrap();
         let person = &value["people"][0];
-        // The right ankle.
+        // Keypoint 11 is the right ankle.
         for nth in 33..36 {
             assert_eq!(person["pose_keypoints_2d"][nth], 0.0);
         }

@@ -34,7 +34,7 @@ const SCHEMA: &str = "message pose3d {
     REQUIRED BYTE_ARRAY status (UTF8);
 }";
 
-/// Frames of a group of rows, which is put together in memory.
+/// Number of frames in a group of rows, which is assembled in memory.
 const GROUP: usize = 2000;
 
 pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
@@ -107,7 +107,9 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
     Ok(())
 }
 
-/// * `levels`: 1 where there is a value, 0 where there is none; none for a column without gaps.
+/// Writes a column.
+///
+/// * `levels`: 1 if there is a value, 0 if there is none; `None` for a column without gaps.
 fn column<T: DataType, W: Write + Send>(
     group: &mut SerializedRowGroupWriter<'_, W>,
     values: &[T::T],

@@ -1,4 +1,4 @@
-//! Points over time: C3D and TRC.
+//! Formats of points over time: C3D and TRC.
 
 use std::io;
 
@@ -7,18 +7,18 @@ use formats::c3d::{Heading, Marker};
 use crate::sink::{Notes, Sink};
 use crate::{Point, Trial};
 
-/// Cameras that C3D has room for, for each point.
+/// Maximum number of cameras per point in C3D.
 const C3D_CAMERAS: u32 = 0x7f;
 /// Finest step of C3D's residuals, millimetres.
 const FINEST_MM: f64 = 0.01;
 
-/// The rate; the table of formats says that it is needed, and who calls has seen to it.
+/// Returns the frame rate. The table of formats says that it is needed, and the caller has checked that it is known.
 pub(crate) fn rate(trial: &Trial) -> io::Result<f64> {
     let unknown = || io::Error::new(io::ErrorKind::InvalidInput, "the frame rate is not known");
     trial.rate_hz.ok_or_else(unknown)
 }
 
-/// C3D: millimetres, z up.
+/// Writes C3D: millimetres, z up.
 pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
     let all = (0..trial.slots.len()).flat_map(|slot| trial.points(slot).flatten());
     let deviations = all.filter_map(Point::deviation_m);
@@ -41,7 +41,7 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
     let turn = trial.z_up_from_world();
     let marker = |point: &Point| Marker {
         position: (turn * point.in_world * 1e3).into(),
-        // The format says that a residual of 0 is a point that was not measured.
+        // In this format, a residual of 0 means that the point was not measured.
         residual: if point.is_filled {
             0.0
         } else {
@@ -67,7 +67,7 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
     Ok(notes)
 }
 
-/// TRC: metres, y up, as `pose3d.trc` of a run.
+/// Writes TRC: metres, y up, like `pose3d.trc` of a run.
 pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let labels: Vec<String> = trial
         .labels()

@@ -1,11 +1,11 @@
-//! Pages for people: of a run and of a rig, and what all pages are made with. One look, one way to escape.
+//! HTML pages about runs and rigs, and the parts that all pages share: one style, and one method to escape text.
 //!
-//! Every page is one HTML file that needs nothing but itself: no font, no picture, no style from elsewhere, and no
-//! script but the one of [`run`] that draws the skeleton in space.
+//! Every page is a single HTML file without other resources: no font, no picture, no style from elsewhere. The only
+//! script is that of [`run`], which draws the skeleton in space.
 //!
-//! Markup is a type of its own, which only constants of the program, numbers and escaped text get into. Templates were
-//! considered: most of these pages is SVG made in loops of numbers with a fixed count of digits, which templates do not
-//! shorten, and the page of a model is XML, too, whose empty elements end with a slash; `maud` writes those of HTML only.
+//! Markup is a separate type that accepts only constants of the program, numbers and escaped text. Templates were
+//! considered but not used. Most of these pages is SVG made in loops of numbers with a fixed number of digits, which templates do not
+//! shorten. The page of a model is also XML, whose empty elements end with a slash, and `maud` writes only those of HTML.
 //! Each page has a test with text that would break it.
 
 pub mod html;

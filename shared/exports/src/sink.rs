@@ -1,8 +1,8 @@
-//! Where a format is written, and what it says beside.
+//! Destination of a format, and the notes about it.
 
 use std::io::Write;
 
-/// Where a format is written.
+/// Destination to which a format is written.
 pub type Sink<'a> = dyn Write + Send + 'a;
 
 /// Notes for the user on what a format cannot express.

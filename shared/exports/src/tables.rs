@@ -5,7 +5,7 @@ use std::io;
 use crate::sink::{Notes, Sink};
 use crate::{Point, Trial};
 
-/// The columns of the long table: those of `pose3d.csv`, and the standard deviation.
+/// Columns of the long table: those of `pose3d.csv`, and the standard deviation.
 const LONG: [&str; 17] = [
     "frame",
     "time_s",
@@ -26,7 +26,7 @@ const LONG: [&str; 17] = [
     "status",
 ];
 
-/// A number as short as it can be and still be the same; empty where there is none.
+/// Returns the shortest text that still represents the same number; empty if there is none.
 fn cell(number: Option<f64>) -> String {
     let number = number.filter(|number| number.is_finite());
     number.map_or(String::new(), |number| number.to_string())
@@ -38,7 +38,7 @@ fn place(point: Option<&Point>) -> [String; 4] {
     [axis(0), axis(1), axis(2), deviation]
 }
 
-/// A row for each frame: four columns for each point.
+/// Writes a row for each frame, with four columns for each point.
 pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     let mut head = ["frame", "time_s", "person", "status"].map(str::to_owned).to_vec();
@@ -60,7 +60,7 @@ pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     Ok(Notes::new())
 }
 
-/// A row for each point of each frame.
+/// Writes a row for each point of each frame.
 pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record(LONG)?;
@@ -83,7 +83,7 @@ pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     Ok(Notes::new())
 }
 
-/// Identity of the person; empty where it is not known.
+/// Returns the identity of the person; empty if it is not known.
 fn person(trial: &Trial, slot: usize) -> String {
     let id = trial.id_at(slot);
     id.map_or(String::new(), |id| id.to_string())
@@ -105,7 +105,7 @@ pub(crate) fn state(trial: &Trial, slot: usize, point: usize) -> &str {
     }
 }
 
-/// The views that a point is from.
+/// Returns the views from which a point was triangulated.
 pub(crate) fn views(trial: &Trial, point: &Point) -> String {
     let named = trial.views.iter().enumerate();
     let seen = named.filter(|named| named.0 < 32 && point.views >> named.0 & 1 == 1);

@@ -1,4 +1,4 @@
-//! A person who walks in place, and a camera that looks.
+//! Test data: a person who walks in place, and a camera that sees the person.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use skeleton::PARSE14;
 
 use crate::{Gathering, Trial, ViewCamera};
 
-/// A line of a frame in which every joint was found.
+/// Returns the line of a frame in which every joint was found.
 pub(crate) fn line(frame: u64, rate_hz: Option<f64>) -> FrameLine {
     let time = frame as f64 / 30.0;
     let swing = |phase: f64, side: f64, up: f64, out: f64| {
@@ -66,7 +66,7 @@ pub(crate) fn line(frame: u64, rate_hz: Option<f64>) -> FrameLine {
     }
 }
 
-/// Frames of it at 30 Hz, z up, from frame 10 on.
+/// Returns frames of the person at 30 Hz, z up, from frame 10 on.
 pub(crate) fn walker(n: u64) -> Trial {
     let mut all = Gathering::new(vec!["left".to_owned(), "right".to_owned()]);
     for frame in 10..10 + n {
@@ -77,7 +77,7 @@ pub(crate) fn walker(n: u64) -> Trial {
     trial
 }
 
-/// It sees the whole person.
+/// Returns a camera that sees the whole person.
 pub(crate) fn camera() -> ViewCamera {
     let axes = nalgebra::Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));

@@ -1,9 +1,9 @@
-//! The skeleton as animation programs have it: a tree of nodes with rotations, in a T-pose at rest.
+//! The skeleton in the form that animation programs use: a tree of nodes with rotations, in a T-pose at rest.
 //!
-//! At rest the person stands with arms out, y up, looking along +z, the left hand at +x. Nodes without a landmark of their own lie
-//! where their parent is, and turn so that their child lies where it was seen: so every bone has a rotation of its own, and only the
-//! lengths of bones can differ from what was seen. Joints do not show how a bone turns about its own axis; it turns with
-//! its parent.
+//! At rest, the person stands with arms out, y up, looking along +z, with the left hand at +x. A node without its own landmark has the
+//! position of its parent, and its rotation points its child towards the measured position. Every bone therefore has its own rotation, and
+//! only the lengths of bones can differ from the measured ones. Joints do not show the rotation of a bone about its own axis, so it
+//! follows its parent.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 
@@ -15,11 +15,11 @@ use crate::landmarks::Landmarks;
 pub(crate) struct Node {
     pub(crate) name: &'static str,
     pub(crate) parent: Option<usize>,
-    /// Landmark at which it lies; a node without one lies where its parent is.
+    /// Landmark at the position of the node; a node without one has the position of its parent.
     pub(crate) landmark: Option<&'static str>,
     /// Direction from the parent at rest; zero without a landmark.
     pub(crate) rest: [f64; 3],
-    /// The child that it turns towards.
+    /// Child towards which the node points.
     pub(crate) aim: Option<usize>,
 }
 
@@ -87,7 +87,7 @@ pub(crate) const NODES: [Node; 21] = [
 
 pub(crate) const N_NODES: usize = NODES.len();
 
-/// The node with a landmark that a node hangs on.
+/// Returns the nearest ancestor of a node that has a landmark.
 pub(crate) fn anchor(node: usize) -> Option<usize> {
     let parent = NODES[node].parent?;
     match NODES[parent].landmark {
@@ -99,17 +99,17 @@ pub(crate) fn anchor(node: usize) -> Option<usize> {
 /// The tree in one frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Posed {
-    /// Where the landmarks of the nodes were seen, metres, y up.
+    /// Measured positions of the nodes' landmarks, metres, y up.
     pub(crate) seen: [Option<Point3<f64>>; N_NODES],
-    /// The turn of every node against its parent.
+    /// Rotation of every node relative to its parent.
     pub(crate) turn: [UnitQuaternion<f64>; N_NODES],
-    /// Place of every node in its parent's frame, as seen; where it was not seen, as last time.
+    /// Measured position of every node in its parent's frame; the last one if it was not seen.
     pub(crate) place: [Vector3<f64>; N_NODES],
-    /// True for a node whose turn follows from what was seen in this frame, and for nodes that never turn.
+    /// True for a node whose rotation follows from the measurements of this frame, and for nodes that never rotate.
     pub(crate) is_turn_seen: [bool; N_NODES],
 }
 
-/// Poses the tree frame by frame. What is not seen stays as it was against its parent.
+/// Poses the tree frame by frame. A part that is not seen keeps its pose relative to its parent.
 #[derive(Debug)]
 pub(crate) struct Poser<'a> {
     trial: &'a Trial,
@@ -119,7 +119,9 @@ pub(crate) struct Poser<'a> {
 }
 
 impl<'a> Poser<'a> {
-    /// * `lengths`: of [`lengths`]; where nodes lie before they are seen.
+    /// Creates a poser.
+    ///
+    /// * `lengths`: result of [`lengths`], which gives the positions of nodes before they are seen.
     pub(crate) fn new(trial: &'a Trial, lengths: &[Option<f64>; N_NODES]) -> Self {
         let place = core::array::from_fn(|node| {
             Vector3::from(NODES[node].rest) * lengths[node].unwrap_or(0.0)
@@ -137,7 +139,7 @@ impl<'a> Poser<'a> {
         }
     }
 
-    /// The next frame.
+    /// Poses the tree in the next frame.
     pub(crate) fn pose(&mut self, slot: usize) -> &Posed {
         let posed = &mut self.last;
         posed.seen = seen(self.trial, &self.landmarks, &self.world, slot);
@@ -178,7 +180,7 @@ fn seen(
     })
 }
 
-/// From a node's anchor to its child, both seen.
+/// Returns the direction from a node's anchor to its child, if both were seen.
 fn towards(
     seen: &[Option<Point3<f64>>; N_NODES],
     node: usize,
@@ -191,7 +193,8 @@ fn towards(
     Some(seen[child]? - seen[from]?)
 }
 
-/// How the hips are turned: x from the right hip to the left one, y as near as it can to the neck, or to up where that is not seen.
+/// Returns the orientation of the hips: x from the right hip to the left one, and y as near as possible to the neck. If the neck was not
+/// seen, y is as near as possible to up.
 fn facing(seen: &[Option<Point3<f64>>; N_NODES]) -> Option<UnitQuaternion<f64>> {
     let [left, right] = [seen[14]?, seen[18]?];
     let spine = seen[2].zip(seen[0]).map(|ends| ends.0 - ends.1);
@@ -203,17 +206,17 @@ fn facing(seen: &[Option<Point3<f64>>; N_NODES]) -> Option<UnitQuaternion<f64>> 
     ))
 }
 
-/// The shortest turn from one direction to another.
+/// Returns the shortest rotation from one direction to another.
 fn arc(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(from, to).unwrap_or_else(|| {
-        // Opposite directions have no shortest turn: half a one about an axis across.
+        // Opposite directions have no shortest rotation, so this is half a turn about a perpendicular axis.
         let across = from.cross(&Vector3::z());
         let axis = Unit::try_new(across, 1e-9).unwrap_or_else(Vector3::x_axis);
         UnitQuaternion::from_axis_angle(&axis, core::f64::consts::PI)
     })
 }
 
-/// The length of every node's bone, metres: the median over the frames in which both ends were seen. None where there is no such
+/// Returns the length of every node's bone, metres: the median over the frames in which both ends were seen. `None` if there is no such
 /// frame, or no such bone.
 pub(crate) fn lengths(trial: &Trial) -> [Option<f64>; N_NODES] {
     let landmarks = Landmarks::of(trial);
@@ -268,7 +271,7 @@ mod tests {
                 places[node] = place + turn * posed.place[node];
                 if let Some(seen) = posed.seen[node] {
                     assert!((seen - places[node]).norm() < 1e-9, "{}", NODES[node].name);
-                    // A bone lies along its rest direction, since its parent turns towards it.
+                    // A bone has its rest direction, because its parent points towards it.
                     let length = posed.place[node].norm();
                     let along = Vector3::from(NODES[node].rest) * length;
                     let off = (along - posed.place[node]).norm();

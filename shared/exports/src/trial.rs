@@ -1,4 +1,4 @@
-//! Results of a run, every frame in its place on the grid of the frame rate.
+//! Results of a run, with every frame in its place on the grid of the frame rate.
 
 use std::collections::BTreeSet;
 
@@ -8,153 +8,153 @@ use skeleton::JointSet;
 
 use crate::Naming;
 
-/// Most places on the grid: a day at 50 Hz, and a number of a frame that is not one.
+/// Maximum number of places on the grid. It is more than a day at 50 Hz; a larger number comes from a wrong frame number.
 const MAX_SLOTS: u64 = 5_000_000;
-/// A coordinate beyond this counts as missing, metres.
+/// Limit of coordinates, metres. A larger coordinate counts as missing.
 const MAX_COORDINATE: f64 = 1e6;
 /// States of smoothed points that were not measured.
 const FILLED: [&str; 2] = ["filled", "rejected"];
-/// How far a time may be from the grid, as a share of its spacing.
+/// Maximum distance of a time from the grid, as a share of the grid's spacing.
 const TOLERANCE: f64 = 0.25;
 
 /// A point in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// In the world of the rig, metres.
+    /// Position in the world of the rig, metres.
     pub in_world: Point3<f64>,
-    /// Covariance, square metres: xx, xy, xz, yy, yz, zz; NaN where unknown.
+    /// Covariance, square metres: xx, xy, xz, yy, yz, zz; NaN if unknown.
     pub covariance: [f64; 6],
-    /// Root mean square distance of its reprojections from what the views found, pixels of their frames.
+    /// Root mean square distance of the point's reprojections from the observations of the views, pixels of their frames.
     pub reprojection_px: Option<f64>,
-    /// Bit `v` is set if it was triangulated from view `v` of [`Trial::views`].
+    /// Bit `v` is set if the point was triangulated from view `v` of [`Trial::views`].
     pub views: u32,
-    /// True if it was not measured in this frame: smoothing has filled it in.
+    /// True if the point was not measured in this frame, but filled in by smoothing.
     pub is_filled: bool,
 }
 
 impl Point {
-    /// The covariance as a matrix; none where it is not known.
+    /// Returns the covariance as a matrix; `None` if it is not known.
     pub fn covariance(&self) -> Option<Matrix3<f64>> {
         let [xx, xy, xz, yy, yz, zz] = self.covariance;
         let all = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         all.iter().all(|value| value.is_finite()).then_some(all)
     }
 
-    /// Root mean square distance that it is expected to be off, metres; none where that is not known.
+    /// Returns the expected root mean square error of the position, metres; `None` if it is not known.
     pub fn deviation_m(&self) -> Option<f64> {
         let trace = self.covariance()?.trace();
         (trace >= 0.0).then(|| trace.sqrt())
     }
 }
 
-/// Why a point has no position.
+/// Reason why a point has no position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Gap(pub Box<str>);
 
 /// A place on the grid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Slot {
-    /// Identity of the person whose points these are; `None` where nobody is.
+    /// Identity of the person with these points; `None` if there is no person.
     pub person: Option<u64>,
-    /// `ok`, or why there is no skeleton; empty where the run left no line.
+    /// `ok`, or the reason why there is no skeleton; empty if the run left no line.
     pub status: Box<str>,
-    /// Joints, then extra keypoints; empty where there is no result.
+    /// Joints, then extra keypoints; empty if there is no result.
     pub points: Vec<Result<Point, Gap>>,
 }
 
-/// One person of a run. The trials of a run have the same slots; a person who is not there has no point in a slot.
+/// One person of a run. All trials of a run have the same slots. If the person is not there, the slot has no points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Name of the run in the files.
     pub name: String,
-    /// Identities of the person within the run, ascending: more than one if no frame had two people and the followed
-    /// person had several, one after the other.
+    /// Identities of the person within the run, ascending. There are several if no frame had two people and the followed
+    /// person had several identities, one after the other.
     pub ids: Vec<u64>,
     /// Naming of the points in the files.
     pub naming: Naming,
-    /// The joints.
+    /// Set of joints.
     pub joints: &'static JointSet,
-    /// Names of the points after the joints: what networks name beside them.
+    /// Names of the points after the joints: extra keypoints of networks.
     pub extras: Vec<String>,
-    /// The views, as [`Point::views`] numbers them.
+    /// Names of the views, in the numbering of [`Point::views`].
     pub views: Vec<String>,
-    /// Places per second, where known.
+    /// Places on the grid per second, if known.
     pub rate_hz: Option<f64>,
-    /// Number of the first place's frame in the footage, and how far those of two places are apart.
+    /// Number of the first place's frame in the footage.
     pub first_frame: u64,
-    /// See [`Trial::first_frame`].
+    /// Distance between the frame numbers of two neighbouring places.
     pub frame_step: u64,
-    /// Against gravity, where the rig knows.
+    /// Direction against gravity, if the rig knows it.
     pub up_in_world: Option<UnitVector3<f64>>,
-    /// The frames.
+    /// Frames on the grid.
     pub slots: Vec<Slot>,
-    /// Frames that stand a quarter of the spacing or more from where their time is.
+    /// Number of frames whose place differs from their time by a quarter of the spacing or more.
     pub n_irregular: usize,
-    /// Lines that were about a frame that another line was about, and were left out.
+    /// Number of lines that were left out because an earlier line was about the same frame.
     pub n_repeated: usize,
 }
 
 impl Trial {
-    /// Names of all points: joints, then extra keypoints.
+    /// Iterates over the names of all points: joints, then extra keypoints.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let joints = self.joints.joints.iter().map(|joint| joint.name);
         joints.chain(self.extras.iter().map(String::as_str))
     }
 
-    /// Names of all points in files of text.
+    /// Returns the names of all points in text files.
     pub fn written_names(&self) -> Vec<String> {
         self.names().map(|name| self.naming.apply(name)).collect()
     }
 
-    /// The same with underscores for blanks, as formats of motion capture want.
+    /// Returns the names of all points with underscores for blanks, as formats of motion capture require.
     pub fn labels(&self) -> Vec<String> {
         let names = self.written_names().into_iter();
         names.map(|name| name.replace(' ', "_")).collect()
     }
 
-    /// The lowest identity of the person.
+    /// Returns the lowest identity of the person.
     pub fn id(&self) -> u64 {
         self.ids.first().copied().unwrap_or(0)
     }
 
-    /// Identity of the person at a place; `None` where that is not known.
+    /// Returns the identity of the person at a place; `None` if it is not known.
     pub fn id_at(&self, slot: usize) -> Option<u64> {
         let only = self.ids.first().filter(|_| self.ids.len() == 1);
         self.slots[slot].person.or(only.copied())
     }
 
-    /// How many points a place has.
+    /// Returns the number of points of a place.
     pub fn n_points(&self) -> usize {
         self.joints.joints.len() + self.extras.len()
     }
 
-    /// A point of a place; none in a gap.
+    /// Returns a point of a place; `None` in a gap.
     pub fn point(&self, slot: usize, point: usize) -> Option<&Point> {
         self.slots.get(slot)?.points.get(point)?.as_ref().ok()
     }
 
-    /// All points of a place.
+    /// Iterates over all points of a place.
     pub fn points(&self, slot: usize) -> impl Iterator<Item = Option<&Point>> {
         (0..self.n_points()).map(move |point| self.point(slot, point))
     }
 
-    /// Number of a place's frame in the footage.
+    /// Returns the number of a place's frame in the footage.
     pub fn frame(&self, slot: usize) -> u64 {
         self.first_frame + slot as u64 * self.frame_step
     }
 
-    /// When that frame was taken, seconds after frame 0 of the footage.
+    /// Returns the time at which a place's frame was taken, seconds after frame 0 of the footage.
     pub fn time_s(&self, slot: usize) -> Option<f64> {
         let rate_hz = self.rate_hz?;
         Some(self.frame(slot) as f64 / self.frame_step as f64 / rate_hz)
     }
 
-    /// Numbers of the first and the last frame of every run of frames in which a point has no position.
+    /// Returns the numbers of the first and the last frame of every run of frames in which a point has no position.
     pub fn gaps(&self, point: usize) -> Vec<[u64; 2]> {
         self.runs(|slot| self.point(slot, point).is_none())
     }
 
-    /// The same of frames in which it was filled in by smoothing.
+    /// Returns the numbers of the first and the last frame of every run of frames in which smoothing filled in a point.
     pub fn filled(&self, point: usize) -> Vec<[u64; 2]> {
         self.runs(|slot| self.point(slot, point).is_some_and(|found| found.is_filled))
     }
@@ -171,26 +171,26 @@ impl Trial {
         runs
     }
 
-    /// Places with at least one point.
+    /// Returns the number of places with at least one point.
     pub fn n_with_points(&self) -> usize {
         let has = |slot: &&Slot| slot.points.iter().any(Result::is_ok);
         self.slots.iter().filter(has).count()
     }
 
-    /// The world turned so that z points up; not turned where up is unknown.
+    /// Returns the rotation of the world after which z points up; the identity if up is unknown.
     pub fn z_up_from_world(&self) -> Rotation3<f64> {
         let turn = self.up_in_world.as_ref().map(geometry::z_up_from_world);
         turn.unwrap_or_else(Rotation3::identity)
     }
 
-    /// The world turned so that y points up; not turned where up is unknown.
+    /// Returns the rotation of the world after which y points up; the identity if up is unknown.
     pub fn y_up_from_world(&self) -> Rotation3<f64> {
         let turn = self.up_in_world.as_ref().map(geometry::y_up_from_world);
         turn.unwrap_or_else(Rotation3::identity)
     }
 }
 
-/// The lines of a run are none that can be exported.
+/// Reason why the lines of a run cannot be exported.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TrialError {
     /// There is no line.
@@ -199,30 +199,30 @@ pub enum TrialError {
     /// There is no point in any frame.
     #[error("none of {frames} frames has a joint in space")]
     NoPoint {
-        /// Lines.
+        /// Number of lines.
         frames: usize,
     },
-    /// The joints are those of no set.
+    /// The joints do not belong to a known set.
     #[error("the joints are not those of a known set: {0}")]
     Joints(String),
-    /// Two frames are farther apart than can be.
+    /// Two frames are too far apart.
     #[error(
-        "frames {first} and {last} lie {slots} frames apart, more than {MAX_SLOTS}: one of the numbers must be wrong"
+        "frames {first} and {last} are {slots} frames apart, more than {MAX_SLOTS}: one of the numbers must be wrong"
     )]
     Range {
-        /// The first.
+        /// Number of the first frame.
         first: u64,
-        /// The last.
+        /// Number of the last frame.
         last: u64,
-        /// Places from one to the other.
+        /// Number of places between the two frames.
         slots: u64,
     },
 }
 
-/// Status of a place where others are, but not the person.
+/// Status of a place with other people, but without this person.
 const NOT_THERE: &str = "not there";
 
-/// The lines of a run on their way into a [`Trial`] for each person; one at a time, in any order.
+/// Collects the lines of a run, one at a time and in any order, and makes a [`Trial`] for each person.
 #[derive(Debug, Clone, Default)]
 pub struct Gathering {
     joints: Option<&'static JointSet>,
@@ -231,7 +231,7 @@ pub struct Gathering {
     frames: Vec<Gathered>,
 }
 
-/// A line.
+/// Content of one line.
 #[derive(Debug, Clone)]
 struct Gathered {
     frame: u64,
@@ -242,7 +242,9 @@ struct Gathered {
 }
 
 impl Gathering {
-    /// * `views`: the cameras in the order of the run; others that lines name come after them.
+    /// Starts without lines.
+    ///
+    /// * `views`: the cameras in the order of the run. Other cameras that lines name come after them.
     pub fn new(views: Vec<String>) -> Self {
         Self {
             views,
@@ -250,11 +252,11 @@ impl Gathering {
         }
     }
 
-    /// Takes a line of `pose3d.jsonl` or `pose3d-smooth.jsonl`.
+    /// Adds a line of `pose3d.jsonl` or `pose3d-smooth.jsonl`.
     ///
     /// # Errors
     ///
-    /// [`TrialError::Joints`].
+    /// Returns [`TrialError::Joints`] if the joints belong to no known set.
     pub fn push(&mut self, line: &FrameLine) -> Result<(), TrialError> {
         let mut people = Vec::with_capacity(line.people.len());
         for person in &line.people {
@@ -280,7 +282,7 @@ impl Gathering {
         Ok(())
     }
 
-    /// Finds the set that the joints are of, and notes new extra keypoints.
+    /// Finds the set that the joints belong to, and adds new extra keypoints.
     fn know(&mut self, person: &PersonLine) -> Result<(), TrialError> {
         if self.joints.is_none() && !person.joints.is_empty() {
             let is_named = |set: &&'static JointSet| {
@@ -343,7 +345,7 @@ impl Gathering {
         })
     }
 
-    /// The number of a view.
+    /// Returns the number of a view.
     fn view(&mut self, name: &str) -> u32 {
         let at = self.views.iter().position(|view| view == name);
         let at = at.unwrap_or_else(|| {
@@ -353,22 +355,22 @@ impl Gathering {
         at as u32
     }
 
-    /// Lines so far.
+    /// Returns the number of lines so far.
     pub fn n_lines(&self) -> usize {
         self.frames.len()
     }
 
-    /// The trials, one for each person who has a point in any frame, by ascending identity. Where never two people are in a frame, there is
-    /// one trial: the person who is followed gets another identity after a gap or a jump.
+    /// Returns the trials, one for each person who has a point in any frame, by ascending identity. If no frame has two people, there is
+    /// only one trial, because the followed person gets another identity after a gap or a jump.
     ///
-    /// * `rate_hz`: frames of the footage per second, where no line has a time.
+    /// * `rate_hz`: frames of the footage per second, used if no line has a time.
     ///
     /// # Errors
     ///
-    /// [`TrialError`].
+    /// Returns a [`TrialError`] on failure.
     pub fn finish(mut self, name: &str, rate_hz: Option<f64>) -> Result<Vec<Trial>, TrialError> {
         let n_lines = self.frames.len();
-        // Of two lines about a frame the first one counts.
+        // If two lines are about the same frame, the first one counts.
         self.frames.sort_by_key(|line| line.frame);
         self.frames.dedup_by_key(|line| line.frame);
         let ends = self.frames.first().zip(self.frames.last());
@@ -424,9 +426,9 @@ impl Gathering {
             .collect())
     }
 
-    /// Puts a person in its places.
+    /// Puts the points of a person into the places of the grid.
     ///
-    /// * `is_one`: no frame has two people, so the person who is there is the followed one.
+    /// * `is_one`: true if no frame has two people, so that the person in a frame is the followed one.
     fn trial(&mut self, mut trial: Trial, is_one: bool) -> Trial {
         let n_points = trial.n_points();
         for line in &mut self.frames {
@@ -450,12 +452,13 @@ impl Gathering {
     }
 }
 
-/// The greatest common divisor.
+/// Returns the greatest common divisor.
 fn common(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { common(b, a % b) }
 }
 
-/// Frames of the footage per second, by the first and the last line with a time; to nine digits, since times are rounded.
+/// Returns the frames of the footage per second, from the first and the last line with a time. The result has nine digits, because times
+/// are rounded.
 fn rate(frames: &[Gathered]) -> Option<f64> {
     let mut timed = frames.iter().filter_map(|line| Some((line.frame, line.time_s?)));
     let first = timed.next()?;

@@ -5,14 +5,14 @@ use nalgebra::Matrix2;
 
 use crate::Point;
 
-/// A camera, and what its pictures are of it.
+/// A camera, and the map to its pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewCamera {
     /// Name of the view.
     pub name: String,
-    /// The camera of the calibration, or of frames that were turned and scaled.
+    /// Camera of the calibration, or camera of turned and scaled frames.
     pub camera: Camera,
-    /// From pixels of that camera to those of the pictures: two rows of an affine map.
+    /// Map from pixels of that camera to pixels of the pictures: two rows of an affine map.
     pub picture_from_camera: [[f64; 3]; 2],
     /// Width and height of the pictures, pixels.
     pub size: [u32; 2],
@@ -21,14 +21,14 @@ pub struct ViewCamera {
 /// A point in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
-    /// Pixels; the centre of the top-left pixel is (0, 0).
+    /// Position, pixels; the centre of the top-left pixel is (0, 0).
     pub at: [f64; 2],
-    /// Covariance of it: xx, xy, yy, square pixels; none where it is not known.
+    /// Covariance of the position: xx, xy, yy, square pixels; `None` if it is not known.
     pub covariance: Option<[f64; 3]>,
 }
 
 impl Seen {
-    /// Root mean square distance that it is expected to be off, pixels.
+    /// Returns the expected root mean square error of the position, pixels.
     pub fn deviation_px(&self) -> Option<f64> {
         let [xx, _, yy] = self.covariance?;
         (xx + yy >= 0.0).then(|| (xx + yy).sqrt())
@@ -36,7 +36,7 @@ impl Seen {
 }
 
 impl ViewCamera {
-    /// Where a point is in the pictures of the camera; none behind it. It may lie outside of the picture.
+    /// Returns the position of a point in the pictures of the camera; `None` behind the camera. The position may be outside the picture.
     pub fn see(&self, point: &Point) -> Option<Seen> {
         let (pixel, jacobian) = self.camera.project_with_jacobian(&point.in_world)?;
         let [[a, b, c], [d, e, f]] = self.picture_from_camera;
@@ -49,7 +49,7 @@ impl ViewCamera {
         at.iter().all(|value| value.is_finite()).then_some(Seen { at, covariance })
     }
 
-    /// Returns true if a pixel lies in the picture.
+    /// Returns true if a pixel is inside the picture.
     pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
         let [width, height] = self.size.map(f64::from);
         (-0.5..width - 0.5).contains(&x) && (-0.5..height - 0.5).contains(&y)

@@ -6,25 +6,25 @@ use std::path::Path;
 
 use crate::{ExitKind, Failure, in_file};
 
-/// The lock file in the folder. It is never removed: only the lock on it counts, and the system releases that when
+/// The lock file in the folder. It is never removed: only the lock on it counts, and the system releases the lock when
 /// the process ends.
 const FILE: &str = ".parallax.lock";
 
 /// Exclusive write access to a folder; released when dropped.
 #[derive(Debug)]
 pub struct Claim {
-    /// None if the file system does not support locks; the run goes on without one.
+    /// `None` if the file system does not support locks; the run then continues without a lock.
     _file: Option<File>,
 }
 
 impl Claim {
-    /// Claims a folder; creates it if it does not exist.
+    /// Claims a folder. Creates it if it does not exist.
     ///
-    /// * `owner`: shown in the error message of another process that tries to claim the folder.
+    /// * `owner`: name of this process, shown in the error message of another process that tries to claim the folder.
     ///
     /// # Errors
     ///
-    /// The folder cannot be created or written to, or another process has claimed it; the message names that process.
+    /// Fails if the folder cannot be created or written to, or if another process has claimed it. The message names that process.
     pub fn take(folder: &Path, owner: &str) -> Result<Self, Failure> {
         let opened = files::Folder::create(folder).map_err(|error| in_file(folder, &error))?;
         if let Some(risk) = opened.risk().map_err(|error| in_file(folder, &error))? {
@@ -53,7 +53,7 @@ impl Claim {
 ///
 /// # Errors
 ///
-/// The message names that process.
+/// The message names the process that has claimed the folder.
 pub fn check_claim(folder: &Path) -> Result<(), Failure> {
     let Ok(mut file) = files::open(&folder.join(FILE)) else {
         return Ok(());

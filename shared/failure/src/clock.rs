@@ -1,8 +1,8 @@
-//! The one clock of a deployment.
+//! The clock that all processes of a deployment share.
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// `CLOCK_MONOTONIC` in nanoseconds: the same in all processes of a host, and never set back.
+/// Returns `CLOCK_MONOTONIC` in nanoseconds, which is the same in all processes of a host and is never set back.
 pub fn now_nanos() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64

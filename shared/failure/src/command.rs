@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use crate::{ExitKind, Failure};
 
-/// The hint of a panic.
+/// The hint that is shown after a panic.
 pub const DEFECT: &str = "this is a defect of the program, unless something else has changed its files in /dev/shm: \
     please report it";
 
@@ -24,7 +24,7 @@ pub fn run_command(body: impl FnOnce() -> Result<ExitCode, Failure>) -> ExitCode
     }
 }
 
-/// Logs panics of all threads in one line.
+/// Logs the panics of all threads, each in one line.
 pub fn log_panics() {
     std::panic::set_hook(Box::new(|info| {
         let at = info.location().map(ToString::to_string).unwrap_or_default();

@@ -1,52 +1,52 @@
-//! Where a run shows its progress.
+//! Display of the progress of a run.
 
 use core::fmt::Debug;
 
 use crate::Failure;
 use serde_json::Value;
 
-/// Where a run shows its progress: messages for people, events for programs, and a progress bar if there is one.
+/// Display of a run: messages for users, events for programs, and a progress bar if there is one.
 ///
-/// Called from several threads. An implementation decides what is shown: without a bar, for example, its methods do
-/// nothing.
+/// The methods are called from several threads. An implementation decides what it shows. Without a progress bar, for example,
+/// the methods for the bar do nothing.
 pub trait Console: Debug + Send + Sync {
-    /// Shows a message for people.
+    /// Shows a message to the user.
     fn message(&self, text: &str);
 
-    /// Writes an event for programs, if events were asked for.
+    /// Writes an event for programs, if events were requested.
     ///
     /// # Errors
     ///
-    /// The output cannot be written.
+    /// Fails if the output cannot be written.
     fn event(&self, event: &Value) -> Result<(), Failure>;
 
-    /// Writes a result for people.
+    /// Writes a result for the user.
     ///
     /// # Errors
     ///
-    /// The output cannot be written.
+    /// Fails if the output cannot be written.
     fn result(&self, text: &str) -> Result<(), Failure>;
 
-    /// Returns true if the progress bar shows the steps, so that no messages about them are needed.
+    /// Returns true if the progress bar shows the steps, so that messages about them are not needed.
     fn shows_bar(&self) -> bool;
 
-    /// Begins the bar again, at 0.
+    /// Restarts the bar at 0.
     fn begin(&self, label: &str, details: &str);
 
     /// Shows details beside the bar.
     fn details(&self, text: &str);
 
-    /// Moves the bar.
+    /// Sets the bar to `done` of `of` steps.
     fn set(&self, done: usize, of: usize);
 
-    /// Moves the bar by `n`.
+    /// Moves the bar forward by `n` steps.
     fn advance(&self, n: usize);
 
     /// Removes the bar.
     fn finish(&self);
 }
 
-/// Shows nothing.
+/// A console that shows nothing.
 #[derive(Debug)]
 pub struct Silent;
 

@@ -1,4 +1,4 @@
-//! Failures that end a process: what happened, why, what to try, and the exit status.
+//! Failures that end a process: the error, its cause, a hint for the user, and the exit status.
 
 use core::error::Error;
 use core::fmt;
@@ -14,11 +14,11 @@ use crate::wording::in_words;
 /// | 0 | done |
 /// | 1 | the run failed: a process, the transport or the system gave up |
 /// | 2 | the command line is wrong |
-/// | 3 | a configuration is wrong: an unknown key, a value out of range, settings that contradict |
+/// | 3 | a configuration is wrong: an unknown key, a value out of range, settings that contradict each other |
 /// | 4 | an input is missing, unreadable or malformed: footage, model, table |
-/// | 5 | a calibration cannot be used: not a rotation, another image size, a camera without one |
-/// | 6 | a limit that was asked for was missed |
-/// | 7 | the run ended, but degraded: views, frames or processes were lost on the way |
+/// | 5 | a calibration cannot be used: not a rotation, another image size, a camera without calibration |
+/// | 6 | a requested limit was missed |
+/// | 7 | the run ended, but degraded: views, frames or processes were lost during the run |
 /// | 130 | interrupted |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExitKind {
@@ -36,7 +36,7 @@ pub enum ExitKind {
     Limit,
     /// The run ended, but degraded.
     Degraded,
-    /// Interrupted.
+    /// The run was interrupted.
     Interrupted,
 }
 
@@ -53,7 +53,7 @@ impl ExitKind {
         Self::Interrupted,
     ];
 
-    /// The exit status of the process.
+    /// Returns the exit status of the process.
     pub fn status(self) -> u8 {
         match self {
             Self::Run => 1,
@@ -67,7 +67,7 @@ impl ExitKind {
         }
     }
 
-    /// The kind with an exit status, if there is one.
+    /// Returns the kind with an exit status, if there is one.
     pub fn of_status(status: i32) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| i32::from(kind.status()) == status)
     }
@@ -81,7 +81,7 @@ impl ExitKind {
     }
 }
 
-/// Why a process ends, with its exit status and a hint.
+/// Failure that ends a process, with its exit status and a hint.
 #[derive(Debug)]
 pub struct Failure {
     kind: ExitKind,
@@ -90,7 +90,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// A failure of a kind.
+    /// Creates a failure of a kind.
     ///
     /// * `source`: an error, or a text.
     pub fn new(kind: ExitKind, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
@@ -101,7 +101,7 @@ impl Failure {
         }
     }
 
-    /// Adds what the user may try.
+    /// Adds a hint for the user.
     #[must_use]
     pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
@@ -119,7 +119,7 @@ impl Failure {
         self.with_hint(both)
     }
 
-    /// Its kind.
+    /// Returns the kind of the failure.
     pub fn kind(&self) -> ExitKind {
         self.kind
     }
@@ -129,11 +129,11 @@ impl Failure {
         self.source.as_ref()
     }
 
-    /// Writes `error:`, one line `cause:` for each cause, and `hint:` if there is one.
+    /// Writes `error:`, one line `cause:` for each cause, and `hint:` if there is a hint.
     ///
     /// # Errors
     ///
-    /// Those of `out`.
+    /// Fails if `out` cannot be written to.
     pub fn report(&self, out: &mut dyn Write) -> io::Result<()> {
         for (depth, error) in crate::wording::chain(self.source()).enumerate() {
             let label = if depth == 0 { "error" } else { "  cause" };
@@ -145,7 +145,7 @@ impl Failure {
         out.flush()
     }
 
-    /// Reports to standard error and turns into the exit status.
+    /// Writes the report to standard error and returns the exit status.
     pub fn exit(&self) -> ExitCode {
         if self.report(&mut io::stderr().lock()).is_err() {
             // The failure cannot be reported.
@@ -160,9 +160,9 @@ impl fmt::Display for Failure {
     }
 }
 
-/// An error that knows its exit status, so that `?` turns it into a [`Failure`].
+/// An error with an exit status, so that `?` turns it into a [`Failure`].
 pub trait Fault: Error + Send + Sync + 'static {
-    /// The kind of failure.
+    /// Returns the kind of failure.
     fn kind(&self) -> ExitKind {
         ExitKind::Run
     }
@@ -184,13 +184,13 @@ impl<E: Fault> From<E> for Failure {
     }
 }
 
-/// Gives an error its exit status.
+/// Conversion of an error into a [`Failure`] with an exit status.
 pub trait OrFail<T> {
     /// Turns the error into a [`Failure`] of a kind.
     ///
     /// # Errors
     ///
-    /// The error, if there is one.
+    /// Returns the error as a [`Failure`], if there is one.
     fn or_fail(self, kind: ExitKind) -> Result<T, Failure>;
 }
 
@@ -200,13 +200,13 @@ impl<T, E: Into<Box<dyn Error + Send + Sync>>> OrFail<T> for Result<T, E> {
     }
 }
 
-/// Returns the exit status of a command: success if it found something.
+/// Returns the exit status of a command, which is success if the command found something.
 ///
-/// * `message`: the error message if it found nothing.
+/// * `message`: the error message if the command found nothing.
 ///
 /// # Errors
 ///
-/// Nothing was found: `ExitKind::Degraded` with the message.
+/// Returns `ExitKind::Degraded` with the message if nothing was found.
 pub fn require_results(is_found: bool, message: &str) -> Result<ExitCode, Failure> {
     let failure = || Failure::new(ExitKind::Degraded, message);
     is_found.then_some(ExitCode::SUCCESS).ok_or_else(failure)

@@ -1,5 +1,7 @@
-//! Set-up of every process: files are private to the user, exceeding the limit on the size of a file is an
-//! error instead of a signal, and missing shared memory ends the process with a message.
+//! Set-up of every process.
+//!
+//! Files are private to the user. Exceeding the limit on the size of a file is an error instead of a signal. If shared memory is
+//! missing, the process ends with a message.
 #![expect(
     unsafe_code,
     reason = "signal handlers for memory faults have no safe binding"
@@ -25,17 +27,17 @@ const WRONG_MEMORY: &[u8] = b"error: a process has used memory that is not there
     hint: something else has changed the files of the deployment in /dev/shm while they were in use, \
     or this is a defect of the program: please report it; `parallax clean` removes what is left there\n";
 
-/// Prepares the process. Call it first, from the main thread.
+/// Prepares the process. Call this function first, from the main thread.
 ///
-/// * New files are private to the user (umask 077): results show people.
+/// * New files are private to the user (umask 077), because results show people.
 /// * Exceeding the limit on the size of files (`ulimit -f`) makes writing fail with `EFBIG`, instead of a
 ///   signal that ends the process (SIGXFSZ).
-/// * SIGBUS and SIGSEGV end it with a message and exit status 1. The queues of the transport are in files
-///   that the same user may truncate or corrupt; not all of that can be detected before use.
+/// * SIGBUS and SIGSEGV end the process with a message and exit status 1. The queues of the transport are in files
+///   that the same user may truncate or corrupt, and not every such change can be detected before use.
 ///
 /// # Errors
 ///
-/// A signal handler cannot be installed.
+/// Fails if a signal handler cannot be installed.
 pub fn guard_process() -> io::Result<()> {
     umask(umask(OTHERS) | OTHERS);
     // SAFETY: ignoring a signal has no precondition.
@@ -53,7 +55,7 @@ fn handle(signal: c_int) -> io::Result<()> {
     // SAFETY: all zeros is a value of this structure of numbers, flags and an address.
     let mut action: sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
     action.sa_sigaction = end as *const () as usize;
-    // The stack may have overflowed; the standard library gives every thread an alternative one for
+    // The stack may have overflowed. The standard library gives every thread an alternative stack for
     // handlers.
     action.sa_flags = SA_SIGINFO | SA_ONSTACK;
     // SAFETY: the structure is initialised, and the handler is async-signal-safe.
@@ -65,18 +67,18 @@ fn handle(signal: c_int) -> io::Result<()> {
     }
 }
 
-/// Ends the process from any thread, whatever the others wait for: nothing is dropped.
+/// Ends the process from any thread, without waiting for the other threads and without dropping any value.
 ///
 /// * `text`: written to standard error.
 pub fn end_process(text: &str) {
     write_and_exit(text.as_bytes());
 }
 
-/// Two system calls.
+/// Writes a text to standard error and ends the process, with two system calls.
 fn write_and_exit(text: &[u8]) {
     // SAFETY: standard error stays open for the life of the process.
     let stderr = unsafe { BorrowedFd::borrow_raw(libc::STDERR_FILENO) };
-    // A failure cannot be reported.
+    // If this write fails, the failure cannot be reported.
     rustix::io::write(stderr, text).ok();
     signal_hook::low_level::exit(c_int::from(ExitKind::Run.status()));
 }

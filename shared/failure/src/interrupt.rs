@@ -1,4 +1,4 @@
-//! Work that a signal ends in time, however long it takes between two looks at the flag.
+//! Work that a signal can end in time, even if the work rarely checks the flag.
 
 use core::time::Duration;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -7,24 +7,24 @@ use std::time::Instant;
 
 use crate::{ExitKind, Failure, OrFail as _, Stop};
 
-/// How long the work may take to notice the flag by itself.
+/// Time that the work may take to notice the flag.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Pause between two looks at the flag.
+/// Pause between two checks of the flag.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// Does `work` on a thread of its own and waits for it; a second after the flag is raised the work is
-/// left behind, to end with the process.
+/// Runs `work` on a separate thread and waits for it. If the work does not end within a second after the flag is raised,
+/// it is abandoned and ends with the process.
 ///
-/// * Returns what the work returned; `None` if it was left behind.
+/// Returns the result of the work; `None` if it was abandoned.
 ///
 /// # Errors
 ///
-/// The operating system refuses a thread.
+/// Fails if the operating system refuses a thread.
 ///
 /// # Panics
 ///
-/// If the work does.
+/// Panics if `work` panics.
 pub fn unless_stopped<T: Send + 'static>(
     stop: &Stop,
     work: impl FnOnce() -> T + Send + 'static,
@@ -33,7 +33,7 @@ pub fn unless_stopped<T: Send + 'static>(
     let worker = thread::Builder::new().name("train".to_owned());
     let worker = worker
         .spawn(move || {
-            // Nobody waits any more: nothing is lost.
+            // If sending fails, the caller no longer waits for the result.
             drop(sender.send(work()));
         })
         .or_fail(ExitKind::Run)?;

@@ -1,5 +1,5 @@
-//! Frame of every program's work: exit codes and errors with hints, the stop request, log lines, progress, and the set-up of the
-//! process. No transport.
+//! The base of every program: exit codes, errors with hints, the stop request, log lines, progress, and the set-up of the
+//! process. This crate does not contain the transport.
 
 mod claim;
 mod clock;

@@ -14,10 +14,10 @@ use tracing_subscriber::registry::LookupSpan;
 ///
 /// A second call has no effect.
 ///
-/// * `process`: its name, part of every line.
+/// * `process`: name of the process, part of every line.
 /// * `level`: the least severe events that are logged.
 pub fn init_logging(process: &str, level: Level) {
-    // False if there is a subscriber already.
+    // The result is false if there is a subscriber already.
     let set = tracing_subscriber::fmt()
         .with_max_level(level)
         .with_writer(io::stderr)
@@ -31,14 +31,15 @@ pub fn init_logging(process: &str, level: Level) {
     drop(set);
 }
 
-/// `2026-01-31T12:00:00.000000Z WARN pose-2: message key=value`.
+/// Format of a line: `2026-01-31T12:00:00.000000Z WARN pose-2: message key=value`.
 struct Line {
     process: Arc<str>,
     /// True if details are logged.
     is_detailed: bool,
 }
 
-/// Returns true if an event comes from the link between hosts: its warnings are details, the bridge reports their meaning.
+/// Returns true if an event comes from the link between hosts. Its warnings count as details, because the bridge reports their
+/// meaning.
 fn is_of_link(event: &Event<'_>) -> bool {
     let about = event.metadata();
     about.target().starts_with("zenoh") && *about.level() != Level::ERROR

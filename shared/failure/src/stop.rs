@@ -21,15 +21,15 @@ use crate::now_nanos;
 
 /// The signals that request a stop.
 const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
-/// Signals so soon after the first count as one request: `timeout` sends two, and so does a closing terminal.
+/// Signals within this time after the first count as one request: `timeout` sends two, and so does a closing terminal.
 const SAME_WISH: Duration = Duration::from_millis(500);
-/// How long a process continues after a signal that is not from its supervisor, seconds. systemd signals all
-/// processes at once, including the supervisor, which then ends them in order.
+/// Time that a process continues after a signal that is not from its supervisor, seconds. systemd signals all
+/// processes at once, including the supervisor, which then ends the other processes in order.
 const UNASKED_SECONDS: u32 = 2;
 /// The exit status of a process that is ended by a second signal.
 const ENDED_AT_ONCE: i32 = 130;
 
-/// A stop request: a flag that is never cleared; clones share it.
+/// A stop request: a flag that is never cleared. Clones share the flag.
 #[derive(Debug, Clone)]
 pub struct Stop {
     inner: Arc<Inner>,
@@ -38,11 +38,11 @@ pub struct Stop {
 #[derive(Debug)]
 struct Inner {
     requested: AtomicBool,
-    /// The last signal; 0 if there was none.
+    /// Number of the last signal; 0 if there was none.
     signal: AtomicUsize,
-    /// Time of the first signal, [`now_nanos`]; 0 if there was none.
+    /// Time of the first signal, from [`now_nanos`]; 0 if there was none.
     first_at_nanos: AtomicU64,
-    /// The last signal that was not from the supervisor; 0 if there was none.
+    /// Number of the last signal that was not from the supervisor; 0 if there was none.
     unasked: AtomicUsize,
     /// Becomes readable when stop is requested, and is never read.
     reader: UnixStream,
@@ -50,11 +50,11 @@ struct Inner {
 }
 
 impl Stop {
-    /// A stop request that only [`request`](Self::request) raises.
+    /// Creates a stop request that only [`request`](Self::request) raises.
     ///
     /// # Errors
     ///
-    /// The operating system has no file descriptors left.
+    /// Fails if the operating system has no file descriptors left.
     pub fn new() -> io::Result<Self> {
         let (reader, writer) = UnixStream::pair()?;
         writer.set_nonblocking(true)?;
@@ -70,15 +70,16 @@ impl Stop {
         })
     }
 
-    /// A stop request that SIGINT, SIGTERM and SIGHUP raise as well. A second SIGINT or SIGTERM, half a
-    /// second or more after the first signal, ends the process at once with exit status 130. A second SIGHUP
-    /// does not: a closing terminal sends two.
+    /// Creates a stop request that SIGINT, SIGTERM and SIGHUP also raise.
     ///
-    /// Call it once in a process, before threads are started.
+    /// A second SIGINT or SIGTERM, half a second or more after the first signal, ends the process at once with exit status 130.
+    /// A second SIGHUP does not end it, because a closing terminal sends two.
+    ///
+    /// Call this function once in a process, before threads are started.
     ///
     /// # Errors
     ///
-    /// The operating system refuses a file descriptor or a signal handler.
+    /// Fails if the operating system refuses a file descriptor or a signal handler.
     pub fn on_signals() -> io::Result<Self> {
         let stop = Self::new()?;
         for signal in SIGNALS {
@@ -93,17 +94,17 @@ impl Stop {
         Ok(stop)
     }
 
-    /// A stop request that the same signals raise if the supervisor sends them.
+    /// Creates a stop request that the same signals raise if the supervisor sends them.
     ///
-    /// Signals of other processes concern only this process, not the run. They end it two seconds later, as
-    /// if they were not handled, unless the supervisor has requested a stop by then. The supervisor restarts
-    /// it as after any other death.
+    /// Signals of other processes concern only this process, not the run. They end this process two seconds later, as
+    /// if they were not handled, unless the supervisor has requested a stop by then. The supervisor then restarts
+    /// it, as after any other unexpected end.
     ///
-    /// * `supervisor`: its process id.
+    /// * `supervisor`: process id of the supervisor.
     ///
     /// # Errors
     ///
-    /// A signal handler cannot be installed.
+    /// Fails if a signal handler cannot be installed.
     pub fn on_signals_of(supervisor: u32) -> io::Result<Self> {
         let stop = Self::new()?;
         for signal in SIGNALS {
@@ -138,7 +139,7 @@ impl Stop {
         self.inner.requested.load(Ordering::Acquire)
     }
 
-    /// After a signal that is not from the supervisor: waits until it ends the process, or stop is requested. Such a
+    /// Waits until a signal that is not from the supervisor ends the process, or until stop is requested. Such a
     /// signal interrupts a wait inside iceoryx2, which then reports an error without a cause.
     pub fn wait_for_unasked_end(&self) {
         let limit = Duration::from_secs(u64::from(UNASKED_SECONDS) + 1);
@@ -151,7 +152,7 @@ impl Stop {
         }
     }
 
-    /// The number of the last signal, if there was one.
+    /// Returns the number of the last signal, if there was one.
     pub fn signal(&self) -> Option<i32> {
         match self.inner.signal.load(Ordering::Acquire) {
             0 => None,
@@ -161,7 +162,7 @@ impl Stop {
 }
 
 impl AsFd for Stop {
-    /// Readable once stop is requested; must not be read from.
+    /// Returns a descriptor that becomes readable when stop is requested. Do not read from it.
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.inner.reader.as_fd()
     }
@@ -176,7 +177,7 @@ impl Inner {
 
     fn wake(&self) {
         self.requested.store(true, Ordering::Release);
-        // A full socket is readable already.
+        // If the socket is full, it is already readable.
         rustix::io::write(&self.writer, &[1]).ok();
     }
 
@@ -198,12 +199,12 @@ fn on_signal(signal: i32, handler: impl Fn(&siginfo_t) + Send + Sync + 'static) 
     unsafe { register_sigaction(signal, handler) }.map(drop)
 }
 
-/// The process that has sent a signal; none if the kernel has.
+/// Returns the process that sent a signal; `None` if the kernel sent it.
 fn sender(info: &siginfo_t) -> Option<u32> {
     if info.si_code > 0 {
         return None;
     }
-    // SAFETY: signals sent by processes carry the sender (sigaction(2): codes that are not positive).
+    // SAFETY: a signal sent by a process has the sender's id (sigaction(2): codes that are not positive).
     let pid = unsafe { info.si_pid() };
     u32::try_from(pid).ok()
 }

@@ -1,5 +1,7 @@
-//! Error texts for users: an error with its causes in one line, the texts of TOML and JSON parsers and of the transport in
-//! words that users know; and words of commands, quoted; and tables, aligned.
+//! Error texts for users.
+//!
+//! This module writes an error with its causes in one line, and replaces terms of the TOML and JSON parsers and of the transport by
+//! words that users know. It also quotes words of commands and aligns tables.
 
 mod causes;
 mod table;
@@ -9,7 +11,7 @@ use core::fmt::Display;
 pub use causes::{chain, in_one_line};
 pub use table::Table;
 
-/// A word of a command that is printed, quoted where a shell would take it for something else.
+/// Returns a word of a printed command, quoted if a shell would misread it.
 ///
 /// ```
 /// assert_eq!(failure::wording::shell("runs/one.toml"), "runs/one.toml");
@@ -73,7 +75,7 @@ fn line(text: &str) -> String {
     .fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
 }
 
-/// Rewrites `SendError::InternalError`, which is the whole error text of iceoryx2.
+/// Rewrites texts such as `SendError::InternalError`, which is the whole error text of iceoryx2.
 fn of_transport(text: &str) -> Option<String> {
     let (of, what) = text.split_once("Error::")?;
     let is_name = |name: &str| {
@@ -89,13 +91,13 @@ fn of_transport(text: &str) -> Option<String> {
     ))
 }
 
-/// The name of a transport error that has no text, as words.
+/// Returns the name of a transport error that has no text, split into words.
 #[must_use]
 pub fn spaced(error: &impl std::fmt::Debug) -> String {
     split_words(&format!("{error:?}"))
 }
 
-/// `InternalError` in words.
+/// Splits a name such as `InternalError` into words.
 fn split_words(name: &str) -> String {
     let mut words = String::new();
     for letter in name.chars() {

@@ -1,4 +1,4 @@
-//! Pictures to a video, by an `ffmpeg` process that they are written to.
+//! Writes pictures to a video through an `ffmpeg` process.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,19 +8,19 @@ use crate::source::log::Log;
 use crate::source::program::missing;
 use crate::{FootageError, Size};
 
-/// Quality of H.264, of 0 (lossless) to 51; and of MPEG-4, of 1 (best) to 31.
+/// Quality of H.264, from 0 (lossless) to 51, and of MPEG-4, from 1 (best) to 31.
 const H264_CRF: &str = "20";
 const MPEG4_QUALITY: &str = "3";
 
-/// A video that is being written: MP4, H.264 where `ffmpeg` has it, else MPEG-4.
+/// A video that is being written: MP4 with H.264 if `ffmpeg` supports it, otherwise MPEG-4.
 ///
-/// The file is not whole before [`finish`](Self::finish) has returned. The process is killed when this is dropped before.
+/// The file is complete only after [`finish`](Self::finish) has returned. Dropping the writer before that kills the process.
 #[derive(Debug)]
 pub struct VideoWriter {
     path: PathBuf,
     size: Size,
     child: Child,
-    /// Closed at the end, which the encoder waits for.
+    /// Closed at the end, which tells the encoder to finish.
     stdin: Option<ChildStdin>,
     log: Log,
 }
@@ -28,13 +28,13 @@ pub struct VideoWriter {
 impl VideoWriter {
     /// Starts the encoder. An existing file is replaced.
     ///
-    /// * `path`: the file, of any name: it becomes an MP4.
-    /// * `size`: of the pictures; a side of an odd number of pixels grows by a black row or column, which the format wants.
+    /// * `path`: the file, which may have any name and becomes an MP4.
+    /// * `size`: size of the pictures. A side with an odd number of pixels grows by a black row or column, as the format requires.
     /// * `ffmpeg`: the executable.
     ///
     /// # Errors
     ///
-    /// [`FootageError::FfmpegMissing`]; [`FootageError::BadRate`].
+    /// Returns [`FootageError::FfmpegMissing`] or [`FootageError::BadRate`].
     pub fn create(
         path: &Path,
         size: Size,
@@ -91,11 +91,11 @@ impl VideoWriter {
     ///
     /// # Errors
     ///
-    /// [`FootageError::Encode`]: the encoder has ended, with what it said.
+    /// Returns [`FootageError::Encode`] with the encoder's message if the encoder has ended.
     ///
     /// # Panics
     ///
-    /// If `rgb` is not `width * height * 3` bytes.
+    /// Panics if `rgb` is not `width * height * 3` bytes.
     pub fn add(&mut self, rgb: &[u8]) -> Result<(), FootageError> {
         assert_eq!(
             rgb.len(),
@@ -111,11 +111,11 @@ impl VideoWriter {
         }
     }
 
-    /// Ends the video, and waits until the file is whole.
+    /// Ends the video, and waits until the file is complete.
     ///
     /// # Errors
     ///
-    /// [`FootageError::Encode`].
+    /// Returns [`FootageError::Encode`] on failure.
     pub fn finish(mut self) -> Result<(), FootageError> {
         drop(self.stdin.take());
         match self.child.wait() {
@@ -125,7 +125,7 @@ impl VideoWriter {
         }
     }
 
-    /// Returns the encoder's message, else `why`.
+    /// Returns an error with the encoder's message, or with `why` if there is none.
     fn failed(&mut self, why: &str) -> FootageError {
         drop(self.stdin.take());
         let said = self.log.finish();
@@ -142,7 +142,7 @@ impl VideoWriter {
 
 impl Drop for VideoWriter {
     fn drop(&mut self) {
-        // After the end both fail, and nothing is left to do.
+        // After the end, both calls fail, and nothing is left to do.
         drop(self.child.kill());
         drop(self.child.wait());
     }

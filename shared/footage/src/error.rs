@@ -4,20 +4,20 @@ use std::path::{Path, PathBuf};
 
 use crate::Size;
 
-/// Why footage cannot be opened or read. Names the file, and the numbers needed to act.
+/// Reason why footage cannot be opened or read. It names the file and the numbers that help to fix the problem.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FootageError {
-    /// There is no file, folder or match of that name.
+    /// There is no file, folder or match with this name.
     #[error("no such footage: {path}{}", what_is_missing(path))]
     NotFound {
-        /// As the user wrote it.
+        /// Path as the user wrote it.
         path: String,
     },
-    /// A camera, a stream or a device.
+    /// The path is a camera, a stream or a device.
     #[error("{path} is {what}, not footage: {instead}")]
     Live {
-        /// As the user wrote it.
+        /// Path as the user wrote it.
         path: String,
         /// Kind of source.
         what: &'static str,
@@ -27,27 +27,27 @@ pub enum FootageError {
     /// The name is empty.
     #[error("the footage has no name: it is \"\"")]
     NoName,
-    /// A name that is not UTF-8, so that it was changed by conversion.
+    /// The name is not UTF-8, and the conversion changed it.
     #[error(
         "no such footage: {path}; its name, or that of a folder above it, is not UTF-8 (the odd bytes are shown as \
          \u{fffd}): rename it"
     )]
     NotUtf8 {
-        /// With the invalid bytes replaced.
+        /// Path in which the invalid bytes are replaced.
         path: String,
     },
-    /// A glob that cannot be parsed.
+    /// The glob cannot be parsed.
     #[error("cannot understand the pattern {pattern}")]
     BadPattern {
-        /// As the user wrote it.
+        /// Pattern as the user wrote it.
         pattern: String,
-        /// Where and why.
+        /// Position and cause of the error.
         source: glob::PatternError,
     },
-    /// A folder or pattern without any image.
+    /// The folder or pattern has no image.
     #[error("no image (png, jpg, jpeg, bmp) in {path}")]
     NoImages {
-        /// As the user wrote it.
+        /// Path as the user wrote it.
         path: String,
     },
     /// The operating system reports an error.
@@ -55,59 +55,59 @@ pub enum FootageError {
     Io {
         /// Path that could not be read.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         source: std::io::Error,
     },
-    /// A file of 0 bytes.
+    /// The file has 0 bytes.
     #[error("{} is empty (0 bytes)", path.display())]
     Empty {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// Not an image, damaged, or cut off.
+    /// The file is not an image, or is damaged or cut off.
     #[error("cannot decode the image {}", path.display())]
     Image {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         source: image::ImageError,
     },
-    /// The images of one sequence must be of one size.
+    /// The images of a sequence do not have the same size.
     #[error("{} is {found}, but the sequence began with {expected} ({})", path.display(), first.display())]
     SizeDiffers {
-        /// The image that differs.
+        /// Path of the image that differs.
         path: PathBuf,
-        /// Its size.
+        /// Size of the image that differs.
         found: Size,
-        /// The first image.
+        /// Path of the first image.
         first: PathBuf,
-        /// The size of the first image.
+        /// Size of the first image.
         expected: Size,
     },
     /// A live stream cannot be opened, or has ended.
     #[error("no pictures from {address}: {message}")]
     Stream {
-        /// Which, without a password.
+        /// Address of the stream, without a password.
         address: String,
         /// Message of the decoder.
         message: String,
     },
-    /// A live stream has pictures of another size now.
+    /// The pictures of a live stream have changed their size.
     #[error("{} no longer has pictures of {expected}", path.display())]
     SizeChanged {
-        /// Which.
+        /// Path of the stream.
         path: PathBuf,
-        /// The size that it had.
+        /// Size of the first pictures.
         expected: Size,
     },
-    /// Too small to detect a person.
+    /// The pictures are too small to detect a person.
     #[error("{} is {size}: width and height must be at least {min_side} pixels", path.display())]
     TooSmall {
-        /// Which.
+        /// Path of the footage.
         path: PathBuf,
-        /// Its size.
+        /// Size of the pictures.
         size: Size,
-        /// The smallest side accepted.
+        /// Minimum width and height, pixels.
         min_side: usize,
     },
     /// `step` is 0.
@@ -119,45 +119,45 @@ pub enum FootageError {
     /// `frame_rate_hz` is not a positive number.
     #[error("frame rate must be a positive number of hertz, got {rate_hz}")]
     BadRate {
-        /// As given.
+        /// Value that was given.
         rate_hz: f64,
     },
-    /// `start` lies beyond the last frame.
-    #[error("first frame {start} lies beyond the {n_frames} frames (counted from 0) of {path}")]
+    /// `start` is after the last frame.
+    #[error("first frame {start} is beyond the {n_frames} frames (counted from 0) of {path}")]
     StartBeyondEnd {
-        /// As the user wrote it.
+        /// Path as the user wrote it.
         path: String,
-        /// First frame asked for, from 0.
+        /// Requested first frame, counted from 0.
         start: u64,
         /// Number of frames.
         n_frames: u64,
     },
-    /// The executable that decodes videos is absent.
+    /// The executable that decodes videos is missing.
     #[error(
         "cannot run {}, which is needed to read the video {}: install ffmpeg (`apt-get install ffmpeg`, \
          `brew install ffmpeg`, or https://ffmpeg.org/download.html) and put it on the PATH",
         executable.display(), path.display()
     )]
     FfmpegMissing {
-        /// Executable that was looked for.
+        /// Executable that was not found.
         executable: PathBuf,
-        /// The video that needs it.
+        /// Video that needs the executable.
         path: PathBuf,
-        /// Why it did not start.
+        /// Reason why the executable did not start.
         source: std::io::Error,
     },
     /// A video cannot be written.
     #[error("cannot write the video {}: {message}", path.display())]
     Encode {
-        /// Which.
+        /// Path of the video.
         path: PathBuf,
         /// Message of the encoder.
         message: String,
     },
-    /// Not a video, or damaged.
+    /// The file is not a video, or is damaged.
     #[error("cannot decode the video {}: {message}", path.display())]
     Video {
-        /// Which.
+        /// Path of the video.
         path: PathBuf,
         /// Message of the decoder.
         message: String,
@@ -165,18 +165,18 @@ pub enum FootageError {
     /// The video ends before its last frame.
     #[error("the video {} is cut off or damaged: {n_read} frames of {n_expected} could be read: {message}", path.display())]
     VideoTruncated {
-        /// Which.
+        /// Path of the video.
         path: PathBuf,
-        /// Frames that could be read.
+        /// Number of frames that could be read.
         n_read: u64,
-        /// Number of frames according to its header or index.
+        /// Number of frames according to the header or index.
         n_expected: u64,
         /// Message of the decoder.
         message: String,
     },
 }
 
-/// A hint for the message: the folder that is missing, or what the source of a webcam is called.
+/// Returns a hint for the message: the missing folder, or the correct name of a webcam as a source.
 fn what_is_missing(path: &str) -> String {
     let path = Path::new(path);
     let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -1,4 +1,4 @@
-//! Answers of an HTTP camera in which a decoder finds no pictures.
+//! Checks the answers of HTTP cameras in which a decoder finds no pictures.
 
 use std::io::{BufReader, Read as _, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
@@ -6,15 +6,15 @@ use std::time::Duration;
 
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Longest head of an answer, bytes.
+/// Maximum size of an answer's head, bytes.
 const MAX_HEAD: u64 = 16 << 10;
 
 /// Kind of answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Answer {
-    /// One picture, and no stream.
+    /// The answer is one picture, not a stream.
     Picture,
-    /// Something that is no picture: its media type.
+    /// The answer is not a picture. The text is its media type.
     Other(String),
 }
 
@@ -23,24 +23,25 @@ impl Answer {
     pub(crate) fn complaint(self) -> String {
         match self {
             Self::Picture => {
-                "it is the address of a single picture; that of the stream is another one (the manual of the camera has it)"
+                "this is the address of a single picture; the stream has another address (see the manual of the camera)"
                     .to_owned()
             }
             Self::Other(kind) if kind == "text/html" => {
-                "a page came (text/html) in place of pictures: does the camera want somebody to sign in (name and \
-                 password stand in front of the host, with an @ behind), or is it the address of its menu?"
+                "a page came (text/html) instead of pictures: does the camera require a login (write the name and the \
+                 password before the host, followed by @), or is this the address of its menu?"
                     .to_owned()
             }
-            Self::Other(kind) => format!("{kind} came in place of pictures"),
+            Self::Other(kind) => format!("{kind} came instead of pictures"),
         }
     }
 }
 
-/// Asks an address of `http://` what is there; none where nobody answers, or where it can be a stream.
+/// Requests an address of `http://` and returns the kind of the answer. Returns `None` if there is no answer, or if the answer may be
+/// a stream.
 pub(crate) fn ask(address: &str) -> Option<Answer> {
     let (scheme, rest) = address.split_once("://")?;
     let (host, path) = rest.split_at(rest.find(['/', '?']).unwrap_or(rest.len()));
-    // Without its password a camera refuses, and with TLS nothing can be read.
+    // Without its password, a camera refuses. With TLS, the answer cannot be read.
     if !scheme.eq_ignore_ascii_case("http") || host.contains('@') {
         return None;
     }

@@ -10,37 +10,37 @@ pub use text::{TEXT_HEIGHT, text_width};
 
 use crate::Size;
 
-/// Red, green, blue.
+/// A colour: red, green, blue.
 pub type Colour = [u8; 3];
 
-/// Limbs on the left: sky blue. [`LEFT`], [`RIGHT`] and [`ACCENT`] are told apart by every kind of colour
-/// vision (M. Okabe and K. Ito, *Color Universal Design*, 2008).
+/// Colour of limbs on the left: sky blue. People with any kind of colour vision can distinguish [`LEFT`], [`RIGHT`] and [`ACCENT`]
+/// (M. Okabe and K. Ito, *Color Universal Design*, 2008).
 pub const LEFT: Colour = [86, 180, 233];
-/// Limbs on the right: orange.
+/// Colour of limbs on the right: orange.
 pub const RIGHT: Colour = [230, 159, 0];
-/// Limbs in the middle: white.
+/// Colour of limbs in the middle: white.
 pub const CENTRE: Colour = [245, 245, 245];
-/// Other marks: epipolar lines, boxes. Reddish purple.
+/// Colour of other marks, such as epipolar lines and boxes: reddish purple.
 pub const ACCENT: Colour = [204, 121, 167];
-/// A pose to compare with. Grey.
+/// Colour of a pose for comparison: grey.
 pub const FAINT: Colour = [150, 150, 150];
 
-/// Drawn under lines and text, so that they show on any background.
+/// Colour drawn under lines and text, so that they are visible on any background.
 const SHADOW: Colour = [20, 20, 20];
 
 /// Side of the body, which decides the colour of a limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// [`LEFT`].
+    /// Left side, drawn in [`LEFT`].
     Left,
-    /// [`RIGHT`].
+    /// Right side, drawn in [`RIGHT`].
     Right,
-    /// [`CENTRE`].
+    /// Middle of the body, drawn in [`CENTRE`].
     Centre,
 }
 
 impl Side {
-    /// The colour of its limbs.
+    /// Returns the colour of the limbs on this side.
     pub const fn colour(self) -> Colour {
         match self {
             Self::Left => LEFT,
@@ -57,22 +57,22 @@ pub struct Limb {
     pub from: usize,
     /// Index of the other end.
     pub to: usize,
-    /// Which side it is drawn as.
+    /// Side of the body, which decides the colour.
     pub side: Side,
 }
 
-/// How wide a line must be to show on a picture of this size: 1/240 of its height, at least 1.5 pixels.
+/// Returns the line width that is visible on a picture of this size: 1/240 of its height, at least 1.5 pixels.
 ///
-/// That suits a person who fills the picture. Other marks are drawn in proportion to it.
+/// The width suits a person who fills the picture. Other marks are drawn in proportion to it.
 pub fn line_width(size: Size) -> f64 {
     (size.height as f64 / 240.0).max(1.5)
 }
 
-/// Draws a skeleton: limbs with a dark edge, and a dot on every end of one.
+/// Draws a skeleton: limbs with a dark edge, and a dot on each end of a limb.
 ///
 /// Lines have the width of [`line_width`].
 ///
-/// * `points`: pixels; limbs with an end that is missing or not finite are left out.
+/// * `points`: pixels. Limbs with an end that is missing or not finite are not drawn.
 pub fn draw_limbs(canvas: &mut Canvas, points: &[[f64; 2]], limbs: &[Limb]) {
     let width = line_width(canvas.size());
     let point = |index: usize| {

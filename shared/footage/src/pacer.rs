@@ -1,9 +1,9 @@
 //! The times at which frames are due.
 
-/// When frame `k` is due on a clock that the caller reads: `start + k / rate`.
+/// Computes when frame `k` is due on a clock that the caller reads: `start + k / rate`.
 ///
-/// All cameras of a deployment share the start, so that frames of one index are due together. Nothing
-/// here reads a clock or sleeps.
+/// All cameras of a deployment share the start, so that frames with the same index are due together. This type does not
+/// read a clock and does not sleep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pacer {
     start_nanos: u64,
@@ -11,7 +11,7 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// Every frame is due at once.
+    /// Returns a pacer with which every frame is due at once.
     pub const fn as_fast_as_possible() -> Self {
         Self {
             start_nanos: 0,
@@ -19,11 +19,11 @@ impl Pacer {
         }
     }
 
-    /// Frame `k` is due `k / rate_hz` seconds after `start_nanos`.
+    /// Returns a pacer with which frame `k` is due `k / rate_hz` seconds after `start_nanos`.
     ///
     /// # Panics
     ///
-    /// If `rate_hz` is not a positive finite number.
+    /// Panics if `rate_hz` is not a positive finite number.
     pub fn realtime(start_nanos: u64, rate_hz: f64) -> Self {
         assert!(
             rate_hz.is_finite() && rate_hz > 0.0,
@@ -35,7 +35,7 @@ impl Pacer {
         }
     }
 
-    /// When frame `k` is due, nanoseconds of the caller's clock; 0 without a rate.
+    /// Returns the time at which frame `k` is due, nanoseconds of the caller's clock; 0 without a rate.
     pub fn due_nanos(&self, k: u64) -> u64 {
         match self.rate_hz {
             None => 0,
@@ -45,15 +45,15 @@ impl Pacer {
         }
     }
 
-    /// How long after `now_nanos` frame `k` is due; 0 if it is due already.
+    /// Returns the time from `now_nanos` until frame `k` is due; 0 if it is already due.
     pub fn wait_nanos(&self, k: u64, now_nanos: u64) -> u64 {
         self.due_nanos(k).saturating_sub(now_nanos)
     }
 
-    /// The latest frame that is due, for a reader that drops frames it missed.
+    /// Returns the latest frame that is due, for a reader that drops missed frames.
     ///
-    /// `None` before the start, and always without a rate, where there is nothing to miss.
-    /// Satisfies `due_nanos(k) <= now_nanos < due_nanos(k + 1)`.
+    /// Returns `None` before the start. Without a rate, it always returns `None`, because no frame can be missed.
+    /// The result satisfies `due_nanos(k) <= now_nanos < due_nanos(k + 1)`.
     pub fn latest_due(&self, now_nanos: u64) -> Option<u64> {
         let rate_hz = self.rate_hz?;
         let elapsed = now_nanos.checked_sub(self.start_nanos)?;

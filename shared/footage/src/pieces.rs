@@ -1,38 +1,38 @@
-//! A stream as it came: the packets of `ffmpeg` in a Matroska stream, cut so that every picture is a piece.
+//! A stream in its original form: the packets of `ffmpeg` in a Matroska stream, cut so that every picture is a piece.
 
 use std::io::{self, Read};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Pieces that may wait to be taken; what does not fit is lost, and counted.
+/// Maximum number of pieces that may wait. Further pieces are lost and counted.
 const MAX_WAITING: usize = 128;
-/// Longest element that is believed, bytes.
+/// Maximum plausible length of an element, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
 /// Kind of a piece of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PieceKind {
-    /// The head, which says how to decode what follows. It stands before every picture that needs no other.
+    /// The head, which says how to decode the following pictures. There is one before every picture that needs no other picture.
     Head,
-    /// A picture that needs no other.
+    /// A picture that needs no other picture.
     Key,
-    /// A picture that needs those before it.
+    /// A picture that needs the pictures before it.
     Other,
 }
 
-/// A piece of a stream. A head and the pictures after it, one after the other, are a Matroska file.
+/// A piece of a stream. A head followed by its pictures is a Matroska file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Piece {
     /// Kind of the piece.
     pub kind: PieceKind,
-    /// Time of its picture in the stream, nanoseconds in whole milliseconds; 0 for a head.
+    /// Time of the piece's picture in the stream, nanoseconds in whole milliseconds; 0 for a head.
     pub nanos: u64,
-    /// Its bytes.
+    /// Bytes of the piece.
     pub bytes: Vec<u8>,
 }
 
-/// The pieces of a stream that is open.
+/// The pieces of an open stream.
 #[derive(Debug)]
 pub struct Pieces {
     waiting: Receiver<Piece>,
@@ -40,7 +40,7 @@ pub struct Pieces {
 }
 
 impl Pieces {
-    /// Follows a Matroska stream to its end, in a thread of its own, which never waits for who takes the pieces.
+    /// Reads a Matroska stream to its end on a separate thread, which never waits for the receiver of the pieces.
     pub(crate) fn follow(stream: impl Read + Send + 'static) -> io::Result<Self> {
         let (sender, waiting) = sync_channel(MAX_WAITING);
         let n_lost = Arc::new(AtomicU64::new(0));
@@ -53,24 +53,24 @@ impl Pieces {
                     counted.fetch_add(1, Ordering::Relaxed);
                 }
             }
-            // What cannot be cut is not kept: the decoder must not wait for a pipe that nobody reads.
+            // Data that cannot be cut are dropped, because the decoder must not wait for a pipe that is not read.
             io::copy(&mut cutter.input, &mut io::sink()).ok();
         })?;
         Ok(Self { waiting, n_lost })
     }
 
-    /// The next piece, if one is there.
+    /// Returns the next piece, if there is one.
     pub fn next(&self) -> Option<Piece> {
         self.waiting.try_recv().ok()
     }
 
-    /// Pieces that were lost since the last call, because nobody took them.
+    /// Returns the number of pieces since the last call that were lost because the receiver was too slow.
     pub fn take_lost(&self) -> u64 {
         self.n_lost.swap(0, Ordering::Relaxed)
     }
 }
 
-/// The elements of Matroska that are looked into.
+/// The Matroska elements that are parsed.
 mod id {
     pub(super) const SEGMENT: u32 = 0x1853_8067;
     pub(super) const CLUSTER: u32 = 0x1f43_b675;
@@ -84,7 +84,7 @@ mod id {
 struct Cutter<R> {
     input: R,
     head: Vec<u8>,
-    /// A picture that waits for its head to be read.
+    /// A picture that follows the head that was just returned.
     after_head: Option<Piece>,
 }
 
@@ -97,7 +97,7 @@ impl<R: Read> Cutter<R> {
         }
     }
 
-    /// The next piece; none at the end of the stream.
+    /// Returns the next piece; `None` at the end of the stream.
     fn next(&mut self) -> io::Result<Option<Piece>> {
         if let Some(piece) = self.after_head.take() {
             return Ok(Some(piece));
@@ -107,12 +107,12 @@ impl<R: Read> Cutter<R> {
             let Some((id, length)) = self.element(&mut bytes)? else {
                 return Ok(None);
             };
-            // The segment has no end: what it holds follows.
+            // The segment has no known end: its elements follow directly.
             if id != id::SEGMENT {
                 let begin = bytes.len();
                 let length = length.filter(|length| *length <= MAX_BYTES);
                 let length = length.ok_or(io::ErrorKind::InvalidData)?;
-                // Memory for what is there, whatever the length says.
+                // Memory is allocated only for the bytes that exist, regardless of the stated length.
                 let n = (&mut self.input).take(length).read_to_end(&mut bytes)?;
                 if n as u64 != length {
                     return Ok(None);
@@ -128,7 +128,7 @@ impl<R: Read> Cutter<R> {
         }
     }
 
-    /// The piece of a cluster, or the head before it.
+    /// Returns the piece of a cluster, or the head before it.
     fn picture(&mut self, begin: usize, bytes: Vec<u8>) -> Piece {
         let (nanos, is_key) = looked_into(&bytes[begin..]);
         let kind = if is_key {
@@ -148,7 +148,8 @@ impl<R: Read> Cutter<R> {
         }
     }
 
-    /// Id and length of the next element, which are appended to `bytes`; none at the end. No length if it is not known.
+    /// Returns the id and length of the next element, and appends them to `bytes`. Returns `None` at the end. The length is `None` if it
+    /// is not known.
     fn element(&mut self, bytes: &mut Vec<u8>) -> io::Result<Option<(u32, Option<u64>)>> {
         let mut first = [0];
         if self.input.read(&mut first)? == 0 {
@@ -161,7 +162,7 @@ impl<R: Read> Cutter<R> {
         Ok(Some((id, number(&bytes[length..]))))
     }
 
-    /// Appends a number of variable length to `bytes`; returns where it begins.
+    /// Appends a number of variable length to `bytes`. Returns the index at which it begins.
     fn vint(&mut self, first: u8, most: u32, bytes: &mut Vec<u8>) -> io::Result<usize> {
         let n_more = first.leading_zeros();
         if n_more >= most {
@@ -175,14 +176,14 @@ impl<R: Read> Cutter<R> {
     }
 }
 
-/// A number of variable length with its marker; none for "not known", all ones.
+/// Reads a number of variable length with its marker; `None` for "not known", which is all ones.
 fn number(bytes: &[u8]) -> Option<u64> {
     let all = bytes.iter().fold(0_u64, |sum, it| sum << 8 | u64::from(*it));
     let mask = (1_u64 << (7 * bytes.len())) - 1;
     Some(all & mask).filter(|value| *value != mask)
 }
 
-/// One element of a slice: its id, what it holds, and what follows.
+/// Splits off one element of a slice: returns its id, its content, and the rest.
 fn split(bytes: &[u8]) -> Option<(u32, &[u8], &[u8])> {
     let n_id = bytes.first()?.leading_zeros() as usize + 1;
     let id = bytes.get(..n_id).filter(|_| n_id <= 4)?;
@@ -196,7 +197,7 @@ fn split(bytes: &[u8]) -> Option<(u32, &[u8], &[u8])> {
     Some((id, inside, after))
 }
 
-/// Time in nanoseconds of the first picture of a cluster, and whether it needs no other.
+/// Returns the time in nanoseconds of the first picture of a cluster, and whether this picture needs no other.
 fn looked_into(mut cluster: &[u8]) -> (u64, bool) {
     let mut base = 0_i64;
     while let Some((id, inside, after)) = split(cluster) {
@@ -221,7 +222,7 @@ fn looked_into(mut cluster: &[u8]) -> (u64, bool) {
     (base.max(0).cast_unsigned().saturating_mul(1_000_000), false)
 }
 
-/// The block of a group, and whether it needs no other.
+/// Returns the block of a group, and whether it needs no other block.
 fn group(mut inside: &[u8]) -> (&[u8], bool) {
     let (mut block, mut is_key) = (&[][..], true);
     while let Some((id, it, after)) = split(inside) {

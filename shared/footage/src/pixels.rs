@@ -1,20 +1,20 @@
-//! Pictures of cameras in their own formats, turned into RGB.
+//! Converts pictures of cameras from their own formats to RGB.
 
 use crate::Size;
 use crate::source::{jpeg_into, jpeg_is_whole};
 
-/// A format in which cameras deliver, and that is read here.
+/// A pixel format of cameras that this crate reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PixelFormat {
-    /// A JPEG file for every picture.
+    /// Each picture is a JPEG file.
     Jpeg,
-    /// `Y U Y V` for two pixels side by side.
+    /// `Y U Y V` for two adjacent pixels.
     Yuyv,
-    /// `U Y V Y` for two pixels side by side.
+    /// `U Y V Y` for two adjacent pixels.
     Uyvy,
     /// All `Y`, then `U V` for every four pixels.
     Nv12,
-    /// Brightness alone.
+    /// Brightness only.
     Grey,
     /// Red, green, blue.
     Rgb,
@@ -23,7 +23,7 @@ pub enum PixelFormat {
 }
 
 impl PixelFormat {
-    /// All of them, the best first: what costs the cable least, then what loses least.
+    /// All formats, best first: first the formats with the fewest bytes, then those that lose least.
     pub const ALL: [Self; 7] = [
         Self::Jpeg,
         Self::Yuyv,
@@ -34,7 +34,7 @@ impl PixelFormat {
         Self::Grey,
     ];
 
-    /// The four letters of Linux.
+    /// Returns the four letters of the format in Linux.
     pub fn letters(self) -> [u8; 4] {
         *match self {
             Self::Jpeg => b"MJPG",
@@ -47,18 +47,18 @@ impl PixelFormat {
         }
     }
 
-    /// The format of four letters; `JPEG` is one for JPEG files too.
+    /// Returns the format with these four letters. `JPEG` also stands for JPEG files.
     pub fn of_letters(letters: [u8; 4]) -> Option<Self> {
         let is_jpeg = letters == *b"JPEG";
         let of = |known: &Self| known.letters() == letters || (is_jpeg && *known == Self::Jpeg);
         Self::ALL.into_iter().find(of)
     }
 
-    /// Turns a picture into RGB; `false` if it is damaged, cut off or of another size.
+    /// Converts a picture to RGB. Returns `false` if it is damaged, cut off or of another size.
     ///
-    /// Brightness and colour are those of BT.601 with 16 to 235, as webcams have them.
+    /// Brightness and colour are read as BT.601 with values from 16 to 235, which webcams use.
     ///
-    /// * `bytes_per_row`: from one row to the next; 0 for rows without a gap.
+    /// * `bytes_per_row`: bytes from one row to the next; 0 for rows without a gap.
     /// * `rgb`: `width * height * 3` bytes; undefined after `false`.
     pub fn to_rgb(self, bytes: &[u8], bytes_per_row: usize, size: Size, rgb: &mut [u8]) -> bool {
         if rgb.len() != size.rgb_bytes() || size.rgb_bytes() == 0 {
@@ -110,13 +110,13 @@ fn each(line: &mut [u8], pixels: impl Iterator<Item = [u8; 3]>) {
     }
 }
 
-/// A row of two pixels in four bytes.
+/// Converts a row with two pixels in four bytes.
 ///
-/// * `order`: where `Y`, `U`, the second `Y` and `V` stand.
+/// * `order`: indices of `Y`, `U`, the second `Y` and `V` in the four bytes.
 fn pairs(from: &[u8], line: &mut [u8], [y0, u, y1, v]: [usize; 4]) {
     for (to, four) in line.chunks_mut(6).zip(from.chunks(4)) {
         let &[_, _, _, _] = four else {
-            // An odd width: the last pixel lacks the colour of its neighbour.
+            // If the width is odd, the last pixel lacks the colour of its neighbour.
             to.fill(four.get(y0).copied().unwrap_or(0));
             continue;
         };
@@ -134,7 +134,7 @@ fn nv12(brightness: &[u8], colour: &[u8], line: &mut [u8]) {
     }
 }
 
-/// BT.601, 16 to 235, rounded.
+/// Converts a pixel by BT.601, values from 16 to 235, rounded.
 fn rgb_of(y: u8, u: u8, v: u8) -> [u8; 3] {
     let [y, u, v] = [i32::from(y) - 16, i32::from(u) - 128, i32::from(v) - 128];
     let to_byte = |value: i32| ((value + 128) >> 8).clamp(0, 255) as u8;
@@ -162,7 +162,7 @@ mod tests {
         let two = Size::new(2, 1);
         let of = |bytes: &[u8]| rgb(PixelFormat::Yuyv, bytes, 0, two).unwrap();
         assert_eq!(of(&[16, 128, 235, 128]), [0, 0, 0, 255, 255, 255]);
-        // Red of the colour bars, by the table of BT.601.
+        // Red of the colour bars, from the table of BT.601.
         assert_eq!(of(&[81, 90, 81, 240]), [255, 0, 0, 255, 0, 0]);
         let uyvy = rgb(PixelFormat::Uyvy, &[90, 81, 240, 81], 0, two).unwrap();
         assert_eq!(uyvy, [255, 0, 0, 255, 0, 0]);

@@ -1,11 +1,11 @@
-//! Programs of others: run with a time limit, and asked for their version.
+//! Runs external programs with a time limit, and reads their version.
 
 use std::io::{self, Read};
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Runs a program to its end, and returns what it wrote; none if it has to be killed because the time is over.
+/// Runs a program to its end and returns its output; `None` if the time is over and the program was killed.
 pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result<Option<Output>> {
     const PAUSE: Duration = Duration::from_millis(10);
     let mut child = command
@@ -20,7 +20,7 @@ pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result
     let read = |pipe: Option<Box<dyn Read + Send>>| {
         std::thread::Builder::new().spawn(move || {
             let mut bytes = Vec::new();
-            // What could be read up to an error counts.
+            // After an error, the bytes that were read before it are used.
             pipe.map(|mut pipe| pipe.read_to_end(&mut bytes).ok());
             bytes
         })
@@ -46,7 +46,7 @@ pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result
     }))
 }
 
-/// The version of `ffmpeg`; empty if it does not tell.
+/// Returns the version of `ffmpeg`; empty if it does not report one.
 pub(crate) fn version_of(ffmpeg: &PathBuf) -> String {
     let said = Command::new(ffmpeg).arg("-version").stdin(Stdio::null()).output();
     let said = said.map(|said| said.stdout).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The pictures of a stream that was kept as it came, decoded by an `ffmpeg` process.
+//! Decodes the pictures of a stream that was kept in its original form, with an `ffmpeg` process.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::unix::process::CommandExt as _;
@@ -12,7 +12,7 @@ use crate::source::program::missing;
 use crate::stream::{SHARE, outputs};
 use crate::{FootageError, Size, StreamEnd};
 
-/// A running decoder of pieces. It is killed when this is dropped.
+/// A running decoder of pieces. Dropping this value kills the decoder.
 #[derive(Debug)]
 pub struct RemadeStream {
     name: String,
@@ -25,12 +25,12 @@ pub struct RemadeStream {
 impl RemadeStream {
     /// Starts a decoder.
     ///
-    /// * `name`: for messages.
-    /// * `pieces`: the bytes of a head, and of the pictures after it, in order ([`Piece`](crate::Piece)); a thread takes them.
+    /// * `name`: name of the stream in error messages.
+    /// * `pieces`: the bytes of a head, followed by those of its pictures in order ([`Piece`](crate::Piece)). A separate thread reads them.
     ///
     /// # Errors
     ///
-    /// [`FootageError::FfmpegMissing`].
+    /// Returns [`FootageError::FfmpegMissing`] on failure.
     pub fn open(
         name: &str,
         pieces: impl Iterator<Item = Vec<u8>> + Send + 'static,
@@ -55,7 +55,7 @@ impl RemadeStream {
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
         let thread = std::thread::Builder::new().name("pieces".to_owned());
         let fed = thread.spawn(move || {
-            // A decoder that has ended takes no more.
+            // A decoder that has ended takes no more pieces.
             let mut pieces = pieces;
             pieces.all(|piece| stdin.write_all(&piece).is_ok());
         });
@@ -69,15 +69,15 @@ impl RemadeStream {
         })
     }
 
-    /// Reads the next picture into `rgb`, and returns its time in the stream, nanoseconds; none at the end.
+    /// Reads the next picture into `rgb`. Returns its time in the stream, nanoseconds; `None` at the end.
     ///
     /// # Errors
     ///
-    /// [`FootageError::Video`] if it cannot be decoded; [`FootageError::SizeChanged`].
+    /// Returns [`FootageError::Video`] if the picture cannot be decoded, or [`FootageError::SizeChanged`].
     ///
     /// # Panics
     ///
-    /// If `rgb` has another length than a picture.
+    /// Panics if the length of `rgb` is not that of a picture.
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<Option<i64>, FootageError> {
         assert_eq!(
             rgb.len(),

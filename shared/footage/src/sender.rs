@@ -1,9 +1,11 @@
 //! The clock of an RTSP camera: the times of its sender reports, which `ffmpeg` writes beside the packets.
 //!
-//! An RTSP camera that knows the time says now and then at what time of its own clock a time of its stream was (RTCP sender reports,
-//! RFC 3550, 6.4.1). `ffmpeg` tells neither a program nor its log, but writes it into fragmented MP4: a `prft` box before every
-//! fragment (ISO/IEC 14496-12, 8.16.5). Before the first report, and from a camera that sends none, that box holds the time at
-//! which the packet was written; this jitters, the camera's own does not.
+//! An RTSP camera that knows the time sends RTCP sender reports from time to time (RFC 3550, 6.4.1). A report gives a time of the stream
+//! and the time of the camera's own clock. `ffmpeg` reports this neither to a program nor in its log, but writes it
+//! into fragmented MP4: a `prft` box before every fragment (ISO/IEC 14496-12, 8.16.5).
+//!
+//! Before the first report, and if a camera sends no reports, the box has the time at
+//! which the packet was written. This time jitters, whereas the camera's own time does not.
 
 use std::io::{self, ErrorKind, PipeReader, PipeWriter, Read, pipe};
 use std::sync::Arc;
@@ -11,20 +13,21 @@ use std::sync::atomic::{AtomicI64, Ordering};
 
 use rustix::io::{FdFlags, fcntl_setfd};
 
-/// Offsets in a row that must agree, and by how much, nanoseconds: `ffmpeg` rounds to whole milliseconds.
+/// Number of consecutive offsets that must agree, and their tolerance, nanoseconds: `ffmpeg` rounds to whole milliseconds.
 const N_EQUAL: usize = 16;
 const EQUAL_NANOS: i64 = 1_100_000;
 /// Seconds from 1900, where NTP begins, to 1970.
 const NTP_TO_UNIX_S: i64 = 2_208_988_800;
 /// Value that stands for an unknown offset.
 const UNKNOWN: i64 = i64::MIN;
-/// Longest boxes that are believed, bytes.
+/// Maximum plausible length of a box, bytes.
 const MAX_HEAD: u64 = 1 << 20;
 const MAX_TIME: u64 = 64;
 
-/// The times of a camera beside the packets, to a pipe. Where that cannot be written, the pictures are decoded nevertheless.
+/// Returns the options that write the times of a camera and its packets to a pipe. If the pipe cannot be written, the pictures are
+/// decoded nevertheless.
 ///
-/// * `pipe`: its address, with `:` escaped.
+/// * `pipe`: address of the pipe, with `:` escaped.
 pub(crate) fn times_of_sender(pipe: &str) -> Vec<String> {
     let fragments = "frag_every_frame+empty_moov+default_base_moof+delay_moov";
     let written = format!(
@@ -34,19 +37,19 @@ pub(crate) fn times_of_sender(pipe: &str) -> Vec<String> {
     all.map(str::to_owned).into()
 }
 
-/// A pipe whose writer children inherit until it is dropped.
+/// Creates a pipe. Child processes inherit its writer until the writer is dropped.
 pub(crate) fn inherited_pipe() -> io::Result<(PipeReader, PipeWriter)> {
     let (reader, writer) = pipe()?;
     fcntl_setfd(&writer, FdFlags::empty())?;
     Ok((reader, writer))
 }
 
-/// Clock of a camera, as it is known while its stream is read.
+/// Clock of a camera, which becomes known while its stream is read.
 #[derive(Debug, Clone)]
 pub(crate) struct SenderClock(Arc<AtomicI64>);
 
 impl SenderClock {
-    /// Follows a fragmented MP4 stream to its end, in a thread of its own.
+    /// Reads a fragmented MP4 stream to its end on a separate thread.
     pub(crate) fn follow(stream: impl Read + Send + 'static) -> io::Result<Self> {
         let clock = Self(Arc::new(AtomicI64::new(UNKNOWN)));
         let told = clock.clone();
@@ -59,7 +62,7 @@ impl SenderClock {
                     told.0.store(offset, Ordering::Relaxed);
                 }
             }
-            // The decoder must not wait for a pipe that nobody reads.
+            // The decoder must not wait for a pipe that is not read.
             io::copy(&mut boxes.input, &mut io::sink()).ok();
         })?;
         Ok(clock)
@@ -71,15 +74,15 @@ impl SenderClock {
     }
 }
 
-/// A time of the stream, and what the clock showed then, nanoseconds.
+/// A time of the stream, and the time of the clock at that moment, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Told {
     presented: i64,
     unix: i64,
 }
 
-/// Distinguishes times of a camera, whose distance to those of the stream is constant, from the times at which packets
-/// were written.
+/// Distinguishes times of a camera from the times at which packets were written. Times of a camera have a constant distance to
+/// those of the stream.
 #[derive(Debug, Default)]
 struct Offsets(Vec<i64>);
 
@@ -102,7 +105,7 @@ impl Offsets {
 
 struct Boxes<R> {
     input: R,
-    /// Units of the stream's time in a second; 0 before it is known.
+    /// Number of the stream's time units in a second; 0 before it is known.
     units_per_s: u32,
 }
 
@@ -114,7 +117,7 @@ impl<R: Read> Boxes<R> {
         }
     }
 
-    /// The next time that is stated; `None` at the end of the stream.
+    /// Returns the next stated time; `None` at the end of the stream.
     fn next(&mut self) -> io::Result<Option<Told>> {
         loop {
             let Some((kind, length)) = self.head()? else {
@@ -141,7 +144,7 @@ impl<R: Read> Boxes<R> {
         }
     }
 
-    /// Kind and length of the body of the next box; none at the end.
+    /// Returns the kind of the next box and the length of its body; `None` at the end.
     fn head(&mut self) -> io::Result<Option<([u8; 4], u64)>> {
         let mut head = [0; 8];
         match self.input.read_exact(&mut head) {
@@ -157,7 +160,7 @@ impl<R: Read> Boxes<R> {
             }
             short => (u64::from(short), 8),
         };
-        // A length of 0, "to the end of the file", is none of a stream.
+        // A length of 0 means "to the end of the file" and does not occur in a stream.
         let length = length.checked_sub(n_read).ok_or(ErrorKind::InvalidData)?;
         Ok(Some((kind, length)))
     }
@@ -172,7 +175,7 @@ impl<R: Read> Boxes<R> {
     }
 }
 
-/// `N` bytes at a place.
+/// Returns `N` bytes from an index.
 fn bytes<const N: usize>(of: &[u8], at: usize) -> Option<[u8; N]> {
     of.get(at..)?.first_chunk().copied()
 }
@@ -189,7 +192,7 @@ fn inside(mut of: &[u8], kind: [u8; 4]) -> Option<&[u8]> {
     }
 }
 
-/// Units of time in a second, of the only track.
+/// Returns the number of time units in a second, from the only track.
 fn units_per_s(moov: &[u8]) -> Option<u32> {
     let media = inside(inside(moov, *b"trak")?, *b"mdia")?;
     let head = inside(media, *b"mdhd")?;
@@ -239,7 +242,9 @@ mod tests {
         boxed(*b"moov", &boxed(*b"trak", &media))
     }
 
-    /// * `ms`: after 1970 began.
+    /// Returns a `prft` box.
+    ///
+    /// * `ms`: milliseconds since 1970 began.
     fn time(units: u64, ms: u64) -> Vec<u8> {
         let seconds = (ms / 1000 + NTP_TO_UNIX_S as u64) << 32;
         let ntp = seconds | (((ms % 1000) << 32) / 1000);

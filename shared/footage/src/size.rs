@@ -3,24 +3,24 @@
 /// Width and height of an image, pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Size {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
 }
 
 impl Size {
-    /// Width first, as everywhere in this crate.
+    /// Creates a size. The width comes first, as everywhere in this crate.
     pub const fn new(width: usize, height: usize) -> Self {
         Self { width, height }
     }
 
-    /// Bytes of an RGB image of this size, `width * height * 3`.
+    /// Returns the number of bytes of an RGB image of this size, `width * height * 3`.
     pub const fn rgb_bytes(self) -> usize {
         self.width * self.height * 3
     }
 
-    /// The size of an image that is smaller by a factor of at least 1.
+    /// Returns the size of an image that is smaller by a factor of at least 1.
     #[must_use]
     pub const fn shrunk(self, by: usize) -> Self {
         Self::new(self.width / by, self.height / by)

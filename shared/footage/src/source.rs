@@ -1,4 +1,4 @@
-//! Footage, frame by frame.
+//! Reads footage frame by frame.
 
 mod answers;
 mod decode;
@@ -42,33 +42,33 @@ pub enum SourceKind {
     Video,
 }
 
-/// Facts about footage that are known before its first frame is read.
+/// Properties of footage that are known before its first frame is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceInfo {
-    /// Size of every frame, as it is handed out.
+    /// Size of every returned frame.
     pub size: Size,
-    /// Factor by which it was shrunk ([`SourceSpec::most_shrink`]).
+    /// Factor by which the frames were shrunk ([`SourceSpec::most_shrink`]).
     pub shrink: usize,
-    /// Number of frames to be read. A damaged video may have fewer; that is an error while reading.
+    /// Number of frames to be read. A damaged video may have fewer; this is an error while reading.
     pub n_frames: u64,
-    /// Frames read per second of the scene (the footage's rate over `step`), where it is known.
+    /// Number of frames read per second of the scene (the footage's rate divided by `step`), if known.
     pub frame_rate_hz: Option<f64>,
     /// Kind of footage.
     pub kind: SourceKind,
-    /// Turn in the tag of the first image or of the video, whether it is done or not; see [`Rotation`](crate::Rotation).
+    /// Turn in the tag of the first image or of the video, even if it is not applied; see [`Rotation`](crate::Rotation).
     pub tag: Turn,
-    /// How many bits images with 16 use, where these are fewer: they are scaled by that.
+    /// Number of bits that 16-bit images use, if it is less than 16. Their values are scaled accordingly.
     pub depth: Option<Depth>,
-    /// True if every picture of a video holds two of different moments, line by line.
+    /// True if a video is interlaced: every picture has alternate lines from two different moments.
     pub is_interlaced: bool,
 }
 
 /// One frame of footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameView<'a> {
-    /// Index in the footage, from 0: `start + k * step`; some `k` may be missing.
+    /// Index in the footage, counted from 0: `start + k * step`. Some `k` may be missing.
     pub index: u64,
-    /// Presentation time, seconds after frame 0 of the footage; `None` where no rate is known.
+    /// Presentation time, seconds after frame 0 of the footage; `None` if the rate is not known.
     pub time_s: Option<f64>,
     /// The pixels, RGB, row major, `width * height * 3` bytes.
     pub rgb: &'a [u8],
@@ -76,12 +76,11 @@ pub struct FrameView<'a> {
 
 /// Open footage, read frame by frame in order.
 ///
-/// A frame of a video that cannot be decoded is left out; the index of the next one shows the gap, where
-/// frames are equally spaced.
+/// A frame of a video that cannot be decoded is left out. If frames are equally spaced, the index of the next frame shows the gap.
 ///
-/// All frames have one size, and are 8-bit RGB whatever the file holds: grey is replicated, an alpha
-/// channel dropped, 16 bits are rounded to 8, and scaled where the pictures use fewer. Orientation tags (EXIF, or the display
-/// matrix of a phone's video) are applied as [`SourceSpec::rotation`] says.
+/// All frames have one size, and are 8-bit RGB regardless of the file's format. Grey is replicated, an alpha
+/// channel is dropped, and 16 bits are rounded to 8 (and scaled if the pictures use fewer than 16). Orientation tags (EXIF, or the
+/// display matrix of a phone's video) are applied according to [`SourceSpec::rotation`].
 ///
 /// ```no_run
 /// use footage::{Source, SourceSpec};
@@ -98,7 +97,7 @@ pub struct Source {
     info: SourceInfo,
     clock: Clock,
     reader: Reader,
-    /// The end was reached, or reading failed.
+    /// True if the end was reached, or reading failed.
     is_over: bool,
     buffer: Vec<u8>,
 }
@@ -111,12 +110,12 @@ enum Reader {
 }
 
 impl Source {
-    /// Opens footage; for a video this starts the decoder.
+    /// Opens footage. For a video, this starts the decoder.
     ///
     /// # Errors
     ///
-    /// Every [`FootageError`] except [`SizeDiffers`](FootageError::SizeDiffers) and
-    /// [`VideoTruncated`](FootageError::VideoTruncated), which can only occur while reading.
+    /// Returns every [`FootageError`] except [`SizeDiffers`](FootageError::SizeDiffers) and
+    /// [`VideoTruncated`](FootageError::VideoTruncated), which can occur only while reading.
     pub fn open(spec: &SourceSpec) -> Result<Self, FootageError> {
         spec.check()?;
         let (path, reader) = match listing::list(&spec.path)? {
@@ -147,16 +146,16 @@ impl Source {
         })
     }
 
-    /// Returns the facts that are known before the first frame is read.
+    /// Returns the properties that are known before the first frame is read.
     pub fn info(&self) -> &SourceInfo {
         &self.info
     }
 
-    /// The next frame, in a buffer of the source; `None` at the end and after it.
+    /// Returns the next frame, in a buffer of the source; `None` at the end and after it.
     ///
     /// # Errors
     ///
-    /// [`FootageError`], which names the file. After an error there are no more frames.
+    /// Returns a [`FootageError`], which names the file. After an error, there are no more frames.
     pub fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.resize(self.info.size.rgb_bytes(), 0);
@@ -169,23 +168,23 @@ impl Source {
         }))
     }
 
-    /// The pixels of the last frame of [`next_frame`](Self::next_frame); undefined before the first one, and
+    /// Returns the pixels of the last frame of [`next_frame`](Self::next_frame). They are undefined before the first frame, and
     /// after frames of a video were skipped.
     pub fn pixels(&self) -> &[u8] {
         &self.buffer
     }
 
-    /// The next frame, decoded into `rgb`; `None` at the end and after it.
+    /// Decodes the next frame into `rgb`; returns `None` at the end and after it.
     ///
-    /// * `rgb`: `width * height * 3` bytes, all of them written; undefined after `None` or an error.
+    /// * `rgb`: `width * height * 3` bytes, all of which are written. They are undefined after `None` or an error.
     ///
     /// # Errors
     ///
-    /// As [`next_frame`](Self::next_frame).
+    /// Fails in the same cases as [`next_frame`](Self::next_frame).
     ///
     /// # Panics
     ///
-    /// If `rgb` has another length.
+    /// Panics if `rgb` has another length.
     pub fn next_into<'a>(
         &mut self,
         rgb: &'a mut [u8],
@@ -196,7 +195,7 @@ impl Source {
         Ok(read.map(|(index, time_s)| FrameView { index, time_s, rgb }))
     }
 
-    /// Returns the complaints of a video's decoder so far; none for images.
+    /// Returns the error messages of a video's decoder so far; none for images.
     pub fn complaints(&self) -> Complaints {
         match &self.reader {
             Reader::Video(video) => video.complaints(),
@@ -206,11 +205,11 @@ impl Source {
 
     /// Skips the next `n` frames, and returns how many there were.
     ///
-    /// Images are not opened, and a frame without one counts; the frames of a video have to be decoded.
+    /// Images are not opened, and a frame without an image counts. The frames of a video have to be decoded.
     ///
     /// # Errors
     ///
-    /// As [`next_frame`](Self::next_frame).
+    /// Fails in the same cases as [`next_frame`](Self::next_frame).
     pub fn skip(&mut self, n: u64) -> Result<u64, FootageError> {
         for n_skipped in 0..n {
             let is_there = match &mut self.reader {
@@ -234,7 +233,7 @@ impl Source {
         if self.is_over {
             return Ok(None);
         }
-        // Also after an error there are no more frames.
+        // There are no more frames after an error either.
         self.is_over = true;
         let is_there = match &mut self.reader {
             Reader::Images(images) => self.clock.set(images.read_into(rgb)?),
@@ -278,11 +277,12 @@ impl Reader {
     }
 }
 
-/// The size of the pictures of footage as they are stored, and what the tag of the first one asks; quicker than to open it.
+/// Returns the size of the pictures of footage as they are stored, and the turn in the tag of the first one. Faster than opening the
+/// footage.
 ///
 /// # Errors
 ///
-/// As [`Source::open`].
+/// Fails in the same cases as [`Source::open`].
 pub fn stored(spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
     let image = match listing::list(&spec.path)? {
         Listing::Images(paths) => paths.into_iter().next().unwrap_or_default(),
@@ -299,7 +299,7 @@ struct Clock {
     step: u64,
     /// Rate of the footage, before `step`.
     rate_hz: Option<f64>,
-    /// Times of its frames, if they are not equally spaced.
+    /// Times of the frames, if they are not equally spaced.
     times_s: Option<Vec<f64>>,
 }
 
@@ -323,7 +323,7 @@ impl Clock {
         (self.index, listed.copied().or_else(by_rate))
     }
 
-    /// Goes to the frame that was read, if there was one.
+    /// Sets the index to that of the frame that was read, if there was one.
     fn set(&mut self, index: Option<u64>) -> bool {
         self.index = index.unwrap_or(self.index);
         index.is_some()

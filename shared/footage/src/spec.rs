@@ -4,51 +4,52 @@ use std::path::PathBuf;
 
 use crate::{FootageError, Rotation};
 
-/// Which numbers in the names of pictures are frames: `first`, `first + step`, ...
+/// Numbers in the names of pictures that are frames: `first`, `first + step`, ...
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PictureNumbers {
-    /// The number of frame 0.
+    /// Number of frame 0.
     pub first: u64,
-    /// Amount by which it rises from frame to frame, at least 1.
+    /// Difference of the numbers from frame to frame, at least 1.
     pub step: u64,
 }
 
-/// Footage as named by the user, and which of its frames to read.
+/// Footage as named by the user, and the choice of its frames.
 ///
-/// Frames are counted from 0 in the order of the footage; those read are `start`,
-/// `start + step`, `start + 2 step`, ..., `count` of them at most.
+/// Frames are counted from 0 in the order of the footage. The frames that are read are `start`,
+/// `start + step`, `start + 2 step`, ..., at most `count` of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceSpec {
-    /// One of: a folder of images; a glob (`frames/*.png`); a numbered pattern (`frames/%05d.png`);
-    /// an image; a video. A path that exists is never taken as a pattern, whatever it contains.
+    /// Path of a folder of images, a glob (`frames/*.png`), a numbered pattern (`frames/%05d.png`),
+    /// an image or a video. A path that exists is never interpreted as a pattern, whatever it contains.
     pub path: String,
-    /// First frame, from 0.
+    /// First frame, counted from 0.
     pub start: u64,
     /// Distance between frames, at least 1.
     pub step: u64,
-    /// Most frames to read, at least 1; all if not set. A still image is repeated this often (once if not set).
+    /// Maximum number of frames to read, at least 1; all if not set. A still image is repeated this often (once if not set).
     pub count: Option<u64>,
-    /// Frames per second of footage without a rate of its own: of images, not of videos.
+    /// Frames per second of footage that has no rate of its own: images, but not videos.
     pub frame_rate_hz: Option<f64>,
-    /// Pictures: the numbers in their names that are frames, so that a missing picture is a missing frame; without it frames are the
-    /// pictures one after the other, whatever they are called.
+    /// Numbers in the names of pictures that are frames, so that a missing picture is a missing frame. If not set, the frames are the
+    /// pictures in order, regardless of their names.
     pub numbers: Option<PictureNumbers>,
-    /// How pictures are turned.
+    /// Method to turn the pictures.
     pub rotation: Rotation,
-    /// Factor by which the pictures of a video may be shrunk as they are decoded: they are handed out smaller by the
-    /// largest whole number up to this that divides both of their sides, each pixel the mean of those that it covers. 1:
-    /// as they are.
+    /// Maximum factor by which the pictures of a video may be shrunk when they are decoded.
+    ///
+    /// The factor is the largest whole number up to this maximum that divides both sides of the pictures. Each pixel is the mean of the
+    /// pixels that it covers. With 1, the pictures are not shrunk.
     pub most_shrink: usize,
-    /// Smallest width and height accepted of pictures that are not shrunk, pixels.
+    /// Minimum width and height of pictures before shrinking, pixels.
     pub min_side: usize,
-    /// The `ffmpeg` executable, a name on the search path or a path. Needed for videos only.
+    /// The `ffmpeg` executable, a name on the search path or a path. Needed only for videos.
     pub ffmpeg: PathBuf,
-    /// The `ffprobe` executable, a name on the search path or a path. Needed for videos only.
+    /// The `ffprobe` executable, a name on the search path or a path. Needed only for videos.
     pub ffprobe: PathBuf,
 }
 
 impl SourceSpec {
-    /// All frames of `path`, of any size, with the `ffmpeg` and `ffprobe` on the search path.
+    /// Selects all frames of `path`, of any size, with the `ffmpeg` and `ffprobe` on the search path.
     pub fn new(path: impl Into<String>) -> Self {
         Self {
             path: path.into(),
@@ -65,7 +66,7 @@ impl SourceSpec {
         }
     }
 
-    /// The same with pictures as every player shows them.
+    /// Selects the same frames as [`Self::new`], with pictures turned as video players show them.
     pub fn upright(path: impl Into<String>) -> Self {
         Self {
             rotation: Rotation::Tag,
@@ -89,11 +90,11 @@ impl SourceSpec {
         }
     }
 
-    /// How many of `n_frames` are read.
+    /// Returns how many of `n_frames` are read.
     ///
     /// # Errors
     ///
-    /// [`FootageError`] of invalid values, or of a start beyond the end.
+    /// Returns a [`FootageError`] if a value is invalid, or if the start is after the end.
     pub fn n_delivered(&self, n_frames: u64) -> Result<u64, FootageError> {
         self.check()?;
         if self.start >= n_frames {

@@ -1,4 +1,4 @@
-//! A live stream of a network, decoded by an `ffmpeg` process.
+//! A live stream from a network, decoded by an `ffmpeg` process.
 
 use core::fmt;
 use std::ffi::OsString;
@@ -22,15 +22,15 @@ use crate::source::probe::{fraction, is_5_1};
 use crate::source::program::missing;
 use crate::{FootageError, Pieces, Size};
 
-/// How long a stream may be silent before it counts as gone, seconds.
+/// Time without data after which a stream counts as gone, seconds.
 const SILENCE_S: u64 = 5;
-/// How long a stream may take to show what it is: longer than any time limit of the decoder.
+/// Time that a stream may take to identify itself. It is longer than any time limit of the decoder.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Slowest and fastest rate that a header is believed, frames per second.
+/// Minimum and maximum plausible rate in a header, frames per second.
 const RATES_HZ: [f64; 2] = [1.0, 1000.0];
-/// Fraction by which the decoder reports the size of a frame: rows of the eighth part of the picture in grey.
+/// Divisor of a picture's rows: the decoder reports the size of the top eighth of each picture, in grey.
 pub(crate) const SHARE: usize = 8;
-/// The packets as they came, every picture a cluster of its own, to the pipe in place of the standard input.
+/// Options that write the original packets, with every picture as a separate cluster, to the pipe on standard input.
 const AS_IT_CAME: [&str; 14] = [
     "-map",
     "0:v:0",
@@ -48,55 +48,55 @@ const AS_IT_CAME: [&str; 14] = [
     "pipe:0",
 ];
 
-/// How the packets of an RTSP camera travel.
+/// Transport of the packets of an RTSP camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Transport {
-    /// Late packets delay the others.
+    /// TCP: late packets delay the packets after them.
     Tcp,
-    /// Late packets are lost.
+    /// UDP: late packets are lost.
     Udp,
 }
 
 /// A stream to open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StreamSpec {
-    /// Its address, `rtsp://...`.
+    /// Address of the stream, `rtsp://...`.
     pub address: String,
-    /// How RTSP packets travel; as server and decoder agree without it.
+    /// Transport of RTSP packets. If not set, server and decoder choose it.
     pub transport: Option<Transport>,
     /// The `ffmpeg` executable.
     pub ffmpeg: PathBuf,
     /// The `ffprobe` executable.
     pub ffprobe: PathBuf,
-    /// True if the packets are wanted as they came, beside the pictures.
+    /// True if the original packets are needed in addition to the pictures.
     pub keeps: bool,
-    /// HTTP: whether JPEG pictures come without a boundary in front of the first.
+    /// True if JPEG pictures over HTTP come without a boundary before the first one.
     pub is_bare: bool,
 }
 
-/// Facts about a stream from its first packets.
+/// Properties of a stream, read from its first packets.
 struct Asked {
     size: Size,
     rate_hz: Option<f64>,
-    /// True if it can be a single picture.
+    /// True if the answer may be a single picture.
     may_be_picture: bool,
 }
 
 /// One frame of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StreamFrame {
-    /// Its presentation time on the clock of the camera, nanoseconds after any moment; none where the stream has no
+    /// Presentation time of the frame on the clock of the camera, nanoseconds after an arbitrary moment; `None` if the stream has no
     /// times of its own.
     pub presented_nanos: Option<i64>,
-    /// When it was taken by the clock of the camera, nanoseconds since 1970 began; none where the camera does not tell, which RTSP
-    /// cameras do some seconds after they were opened.
+    /// Time at which the frame was taken by the clock of the camera, nanoseconds since 1970 began. `None` if the camera does not report
+    /// it; RTSP cameras report it some seconds after they were opened.
     pub unix_nanos: Option<i64>,
-    /// Its time as the decoder has it, nanoseconds, also where that is made up: [`Piece::nanos`](crate::Piece::nanos) to a
-    /// millisecond.
+    /// Time of the frame in the decoder, nanoseconds, even if the decoder invented it. It equals
+    /// [`Piece::nanos`](crate::Piece::nanos) to a millisecond.
     pub label_nanos: i64,
 }
 
-/// A running decoder of a stream. It is killed when this is dropped.
+/// A running decoder of a stream. Dropping this value kills the decoder.
 #[derive(Debug)]
 pub struct LiveStream {
     address: String,
@@ -110,7 +110,7 @@ pub struct LiveStream {
     pieces: Option<Pieces>,
 }
 
-/// Ends a stream from another thread than the one that waits for its frames.
+/// Ends a stream from a thread other than the one that waits for its frames.
 #[derive(Debug, Clone)]
 pub struct StreamEnd(pub(crate) Arc<Mutex<Child>>);
 
@@ -118,14 +118,14 @@ impl StreamEnd {
     /// Ends the decoder.
     pub fn end(&self) {
         let mut child = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        // Both fail only if it has ended and was waited for.
+        // Both calls fail only if the decoder has ended and was waited for.
         child.kill().ok();
         child.wait().ok();
     }
 }
 
 impl StreamSpec {
-    /// A stream with the `ffmpeg` and `ffprobe` on the search path.
+    /// Returns a stream with the `ffmpeg` and `ffprobe` on the search path.
     pub fn new(address: impl Into<String>) -> Self {
         Self {
             address: address.into(),
@@ -137,15 +137,15 @@ impl StreamSpec {
         }
     }
 
-    /// Size and rate of the stream, from its first packets; the rate is unknown where it does not tell.
+    /// Returns the size and rate of the stream, from its first packets. The rate is `None` if the stream does not state it.
     ///
     /// # Errors
     ///
-    /// [`FootageError::Stream`] if nobody answers, or it is no video; [`FootageError::FfmpegMissing`].
+    /// Returns [`FootageError::Stream`] if there is no answer or the answer is not a video, or [`FootageError::FfmpegMissing`].
     pub fn probe(&self) -> Result<(Size, Option<f64>), FootageError> {
         let answer = || http::ask(&self.address).map(http::Answer::complaint);
         let asked = match self.ask() {
-            // Some cameras send no boundary in front of the first picture.
+            // Some cameras send no boundary before the first picture.
             Err(error) if self.is_http() && !self.is_bare => {
                 let bare = Self {
                     is_bare: true,
@@ -197,14 +197,14 @@ impl StreamSpec {
         })
     }
 
-    /// Starts the decoder. Frames of another size than `size` end the stream.
+    /// Starts the decoder. A frame of another size than `size` ends the stream.
     ///
     /// # Errors
     ///
-    /// [`FootageError::FfmpegMissing`]. Whether the address answers shows at the first frame.
+    /// Returns [`FootageError::FfmpegMissing`]. An address that does not answer is reported only at the first frame.
     pub fn open(&self, size: Size) -> Result<LiveStream, FootageError> {
         let not_started = |source| missing(&self.ffmpeg, self.shown().as_ref(), source);
-        // The third pipe that a child has is its standard input, which it can write to as to any other.
+        // A child process has three pipes. The third one is its standard input, to which it can write like to any other pipe.
         let (kept, to_keep) = if self.keeps {
             let (reader, writer) = pipe().map_err(not_started)?;
             (Some(reader), Some(writer))
@@ -229,7 +229,7 @@ impl StreamSpec {
             .stdin(to_keep.map_or_else(Stdio::null, Stdio::from))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // Signals of the terminal end the run, and the run ends the decoder.
+            // Signals of the terminal end the run, and the run then ends the decoder.
             .process_group(0)
             .spawn()
             .map_err(not_started)?;
@@ -237,7 +237,7 @@ impl StreamSpec {
         let stdout = child.stdout.take().ok_or_else(no_pipe)?;
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
         let pieces = kept.map(Pieces::follow).transpose().map_err(not_started)?;
-        // The end of the decoder closes the pipe, once this process has no end to write to.
+        // The end of the decoder closes the pipe, once this process has closed its own writing end.
         let clock = times.map(|(reader, _closed)| SenderClock::follow(reader));
         Ok(LiveStream {
             pieces,
@@ -252,12 +252,12 @@ impl StreamSpec {
         })
     }
 
-    /// The address without a password.
+    /// Returns the address without a password.
     fn shown(&self) -> String {
         LiveAddress::Stream(self.address.clone()).to_string()
     }
 
-    /// The error, without a password that the decoder repeats.
+    /// Returns the error, without a password that the decoder repeats.
     fn failed(&self, message: &str) -> FootageError {
         failed(&self.shown(), &without_password_of(&self.address, message))
     }
@@ -275,7 +275,7 @@ impl StreamSpec {
         self.is("http") || self.is("https")
     }
 
-    /// Returns true if the frames have times of their own: those of JPEG pictures over HTTP are made up by the decoder.
+    /// Returns true if the frames have times of their own. The decoder invents the times of JPEG pictures over HTTP.
     fn has_times(&self) -> bool {
         !self.is_http()
     }
@@ -285,7 +285,7 @@ impl StreamSpec {
         let mut options = vec!["-fflags", "nobuffer", "-flags", "low_delay"];
         options.extend(["-analyzeduration", "1000000", "-probesize", "1000000"]);
         if !self.has_times() {
-            // A JPEG picture that is cut short is left out; otherwise its lower part would be grey.
+            // A JPEG picture that is cut short is dropped, because its lower part would otherwise be grey.
             options.extend(["-err_detect", "explode"]);
         }
         if self.is_bare {
@@ -311,9 +311,9 @@ impl StreamSpec {
     }
 }
 
-/// Time and size of each frame on standard error; and the pixels, after these as for files.
+/// Returns the options that write the time and size of each frame to standard error, and then its pixels as for files.
 ///
-/// * `version`: of `ffmpeg`.
+/// * `version`: version of `ffmpeg`.
 pub(crate) fn outputs(version: &str) -> Vec<String> {
     let mode = if is_5_1(version) {
         "-fps_mode"
@@ -321,7 +321,7 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
         "-vsync"
     };
     let common = ["-map", "0:v:0", mode, "passthrough", "-autoscale", "0"];
-    // With more threads, what copies the pixels holds a picture back until the next one comes.
+    // With more threads, the copying of the pixels holds a picture back until the next one comes.
     let alone = ["-threads", "1"];
     let shrink = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
     let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
@@ -361,16 +361,16 @@ fn failed(shown: &str, message: &str) -> FootageError {
 }
 
 impl LiveStream {
-    /// Reads the next frame into `rgb`; waits for it.
+    /// Waits for the next frame and reads it into `rgb`.
     ///
     /// # Errors
     ///
-    /// [`FootageError::Stream`] with what the decoder says if the stream has ended;
+    /// Returns [`FootageError::Stream`] with the decoder's message if the stream has ended, or
     /// [`FootageError::SizeChanged`] if its size has changed.
     ///
     /// # Panics
     ///
-    /// If `rgb` has another length than a frame of the size it was opened with.
+    /// Panics if the length of `rgb` is not that of a frame of the size with which the stream was opened.
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<StreamFrame, FootageError> {
         assert_eq!(
             rgb.len(),
@@ -398,7 +398,7 @@ impl LiveStream {
                 expected: self.size,
             });
         }
-        // Not a number becomes 0.
+        // A time that is not a number becomes 0.
         let nanos = (time.time_s * 1e9).round() as i64;
         let presented = (self.has_times && time.time_s.is_finite()).then_some(nanos);
         let offset = self.clock.as_ref().and_then(SenderClock::offset_nanos);
@@ -409,12 +409,12 @@ impl LiveStream {
         })
     }
 
-    /// The stream as it came, if that was asked for.
+    /// Returns the pieces of the original stream, if they were requested.
     pub fn pieces(&self) -> Option<&Pieces> {
         self.pieces.as_ref()
     }
 
-    /// Ends this stream from another thread.
+    /// Returns a handle that ends this stream from another thread.
     pub fn end(&self) -> StreamEnd {
         self.child.clone()
     }

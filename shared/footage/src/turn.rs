@@ -1,4 +1,4 @@
-//! How stored pixels are turned to show a picture upright.
+//! Turns stored pixels so that a picture is upright.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use image::{DynamicImage, RgbImage};
 
 use crate::Size;
 
-/// How stored pixels must be turned to show a picture upright: what the tag of an image (EXIF) or of a video (display matrix) asks.
+/// The turn that shows stored pixels upright, as given by the tag of an image (EXIF) or of a video (display matrix).
 ///
 /// ```
 /// use footage::{Size, Turn};
@@ -20,15 +20,15 @@ use crate::Size;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turn(pub(crate) Orientation);
 
-/// How the pictures of footage are turned.
+/// Method to turn the pictures of footage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rotation {
-    /// Not at all: pixels as they are stored, as a calibration made of stored pixels speaks of them.
+    /// Not turned: the pixels as they are stored. A calibration that was made of stored pixels refers to these.
     #[default]
     Stored,
-    /// As their tag asks: pictures as every player shows them.
+    /// Turned according to the tag: pictures as video players show them.
     Tag,
-    /// By this, whatever their tag asks.
+    /// Turned by this, regardless of the tag.
     By(Turn),
 }
 
@@ -86,7 +86,7 @@ const KNOWN: [(Orientation, &str, &str); 8] = [
 ];
 
 impl Turn {
-    /// A turn by 0, 90, 180 or 270 degrees to the right; none for any other.
+    /// Returns the clockwise turn by 0, 90, 180 or 270 degrees; `None` for any other angle.
     pub fn clockwise(degrees: u32) -> Option<Self> {
         let turn = match degrees {
             0 => Orientation::NoTransforms,
@@ -98,9 +98,9 @@ impl Turn {
         Some(Self(turn))
     }
 
-    /// The turn of a display matrix (ISO/IEC 14496-12, 8.2.2), to the nearest quarter.
+    /// Returns the turn of a display matrix (ISO/IEC 14496-12, 8.2.2), to the nearest quarter.
     ///
-    /// * `[a, b, c, d]`: a stored place `(x, y)` is shown at `(a x + c y, b x + d y)`.
+    /// * `[a, b, c, d]`: a stored point `(x, y)` is shown at `(a x + c y, b x + d y)`.
     pub(crate) fn of_matrix([a, b, c, d]: [f64; 4]) -> Self {
         let is_upright = a.abs() + d.abs() >= b.abs() + c.abs();
         let [first, second] = if is_upright { [a, d] } else { [b, c] };
@@ -132,7 +132,7 @@ impl Turn {
         )
     }
 
-    /// The size of the upright picture.
+    /// Returns the size of the upright picture.
     pub fn size(self, stored: Size) -> Size {
         if self.swaps_sides() {
             Size::new(stored.height, stored.width)
@@ -141,7 +141,7 @@ impl Turn {
         }
     }
 
-    /// The upright picture of stored pixels; unchanged if the number of bytes does not fit the size.
+    /// Returns the upright picture of stored pixels; unchanged if the number of bytes does not match the size.
     pub fn apply(self, size: Size, rgb: Vec<u8>) -> (Size, Vec<u8>) {
         if self.is_none() || rgb.len() != size.rgb_bytes() {
             return (size, rgb);
@@ -152,10 +152,10 @@ impl Turn {
         (self.size(size), image.into_rgb8().into_raw())
     }
 
-    /// The filters of `ffmpeg` that turn a picture in RGB; none where nothing is to be done.
+    /// Returns the filters of `ffmpeg` that turn an RGB picture; `None` if nothing has to be done.
     pub(crate) fn filters(self) -> Option<String> {
         let known = KNOWN.iter().find(|known| known.0 == self.0)?;
-        // In RGB, so that every pixel is the stored one at another place.
+        // The filters work in RGB, so that every pixel is a stored pixel in another place.
         (!known.2.is_empty()).then(|| format!("format=rgb24,{}", known.2))
     }
 }
@@ -171,7 +171,7 @@ impl fmt::Display for Turn {
 mod tests {
     use super::*;
 
-    /// Where a stored place is shown, by the pixels.
+    /// Returns the point at which a stored point is shown, from the pixels.
     fn shown([x, y]: [usize; 2], turn: Turn) -> [usize; 2] {
         let size = Size::new(3, 2);
         let mut rgb = vec![0; size.rgb_bytes()];
@@ -188,7 +188,7 @@ mod tests {
                 let [c, d] = [-b * sign, a * sign];
                 let turn = Turn::of_matrix([a, b, c, d]);
                 for (x, y) in [(0, 0), (2, 0), (1, 1)] {
-                    // Places count from the middle, so that no shift is needed.
+                    // Points count from the middle, so that no shift is needed.
                     let [u, v] = [x as f64 - 1.0, y as f64 - 0.5];
                     let due = [a * u + c * v, b * u + d * v];
                     let middle = if turn.swaps_sides() {

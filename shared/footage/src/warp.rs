@@ -15,13 +15,13 @@ use sampled::Sampled;
 
 use crate::Size;
 
-/// An affine map, `[u, v] = m[..][..2] * [x, y] + m[..][2]`, of pixels whose top-left centre is `(0, 0)`.
+/// An affine map, `[u, v] = m[..][..2] * [x, y] + m[..][2]`, of pixels. The centre of the top-left pixel is `(0, 0)`.
 pub type Affine = [[f64; 3]; 2];
 
-/// The largest factor by which an image is shrunk.
+/// Maximum factor by which an image is shrunk.
 const MAX_SCALE: f64 = 64.0;
 
-/// Largest translation, pixels: larger than any image, and exact in fixed point.
+/// Maximum translation, pixels: larger than any image, and exact in fixed point.
 const MAX_SHIFT: f64 = 1e6;
 
 /// The value of pixels outside of the source.
@@ -34,7 +34,7 @@ pub enum Fill {
     Replicate,
 }
 
-/// Why a warp cannot be made.
+/// Reason why a warp cannot be created.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum WarpError {
     /// The source or the output has no pixel.
@@ -48,7 +48,7 @@ pub enum WarpError {
     /// The map is singular, not finite, or its translation is too large.
     #[error("the map from output to source is singular or unbounded: {map:?}")]
     BadMap {
-        /// The map.
+        /// Map that was refused.
         map: Affine,
     },
     /// The image would shrink too much.
@@ -56,23 +56,23 @@ pub enum WarpError {
     ShrinksTooMuch {
         /// Source pixels per output pixel.
         scale: f64,
-        /// The largest factor accepted.
+        /// Maximum factor, source pixels per output pixel.
         limit: f64,
     },
 }
 
-/// A warp between two sizes, with everything precomputed that does not depend on the pixels.
+/// A warp between two sizes. Everything that does not depend on the pixels is precomputed.
 ///
 /// The value of an output pixel depends on the map:
-/// * the identity copies;
-/// * a map that keeps rows and columns and does not enlarge (resize, crop, mirror): the area mean of
-///   the rectangle that the output pixel covers, exact up to rounding to a grey level (half up);
-/// * any other: the mean of `n × m` bilinear samples, spread evenly over the output pixel and at most
-///   one source pixel apart. For a turned image this is what turning it at full size (bilinear) and
-///   averaging areas afterwards gives. Positions are rounded to 1/32 source pixel; from 4 source pixels
-///   per output pixel on coarser, but never coarser than 1/64 output pixel.
+/// * With the identity, the pixel is copied.
+/// * With a map that keeps rows and columns and does not enlarge (resize, crop, mirror), the value is the area mean of
+///   the rectangle that the output pixel covers. It is exact up to rounding to a grey level (half up).
+/// * With any other map, the value is the mean of `n × m` bilinear samples. They are spread evenly over the output pixel and are at most
+///   one source pixel apart. For a turned image, the result equals turning it at full size (bilinear) and
+///   then averaging areas. Positions are rounded to 1/32 source pixel. From 4 source pixels
+///   per output pixel on, the rounding is coarser, but never coarser than 1/64 output pixel.
 ///
-/// The same bits on every machine: sums are of integers, or of `f32` in a fixed order.
+/// The result has the same bits on every machine: sums are of integers, or of `f32` in a fixed order.
 #[derive(Debug, Clone)]
 pub struct Warp {
     source: Size,
@@ -92,13 +92,13 @@ impl Warp {
     /// Prepares the warp that gives output pixel `p` the colour of the source around
     /// `source_from_output(p)`.
     ///
-    /// * `source_from_output`: pixels of the output to pixels of the source, both with the centre of the
+    /// * `source_from_output`: map from pixels of the output to pixels of the source, both with the centre of the
     ///   top-left pixel at `(0, 0)`.
-    /// * `fill`: the value outside of the source. It is interpolated with the pixels of the border.
+    /// * `fill`: the value outside the source. It is interpolated with the pixels of the border.
     ///
     /// # Errors
     ///
-    /// [`Empty`](WarpError::Empty); [`BadMap`](WarpError::BadMap);
+    /// Returns [`Empty`](WarpError::Empty), [`BadMap`](WarpError::BadMap), or
     /// [`ShrinksTooMuch`](WarpError::ShrinksTooMuch) for more than 64 source pixels per output pixel.
     pub fn new(
         source: Size,
@@ -132,12 +132,12 @@ impl Warp {
         })
     }
 
-    /// Size of the images that are warped.
+    /// Returns the size of the source images.
     pub fn source_size(&self) -> Size {
         self.source
     }
 
-    /// Size of the images that come out.
+    /// Returns the size of the output images.
     pub fn output_size(&self) -> Size {
         self.output
     }
@@ -146,7 +146,7 @@ impl Warp {
     ///
     /// # Panics
     ///
-    /// If a buffer is not `width * height * 3` bytes of its size.
+    /// Panics if a buffer is not `width * height * 3` bytes of its size.
     pub fn apply(&mut self, source: &[u8], out: &mut [u8]) {
         assert_eq!(
             source.len(),
@@ -163,7 +163,7 @@ impl Warp {
         self.apply_with(Isa::best(), source, out);
     }
 
-    /// The same loops, compiled for every instruction set.
+    /// Applies the warp with the same loops, compiled for one instruction set.
     fn apply_with(&mut self, isa: Isa, source: &[u8], out: &mut [u8]) {
         let plan = &mut self.plan;
         dispatch(isa, Run { plan, source, out });
@@ -191,14 +191,14 @@ impl Body for Run<'_> {
 
 const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-/// The map that scales a source to an output, so that their outer borders coincide.
+/// Returns the map that scales a source to an output, so that their outer borders coincide.
 pub fn resize_map(source: Size, output: Size) -> Affine {
     let sx = source.width as f64 / output.width as f64;
     let sy = source.height as f64 / output.height as f64;
     [[sx, 0.0, (sx - 1.0) / 2.0], [0.0, sy, (sy - 1.0) / 2.0]]
 }
 
-/// Source pixels per output pixel along the output's rows and columns.
+/// Returns the number of source pixels per output pixel along the output's rows and columns.
 fn scales(map: &Affine) -> Result<[f64; 2], WarpError> {
     let [[a, b, tx], [c, d, ty]] = *map;
     let determinant = a * d - b * c;

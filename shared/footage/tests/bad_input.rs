@@ -19,7 +19,7 @@ fn refusal(path: &Path) -> FootageError {
     Source::open(&spec(path)).unwrap_err()
 }
 
-/// Reads to the end or to the first error.
+/// Reads to the end or to the first error. Returns the number of frames.
 fn read_all(spec: &SourceSpec) -> Result<u64, FootageError> {
     let mut source = Source::open(spec)?;
     let mut n = 0;
@@ -291,7 +291,7 @@ fn truncated_videos_are_an_error() {
     }
 }
 
-/// The frames read from a video of 60 with damage in the middle: index and last pixel.
+/// Returns the frames read from a video of 60 frames with damage in the middle: index and last pixel.
 fn frames_of_damaged_video(start: u64, step: u64) -> Vec<(u64, [u8; 3])> {
     let folder = images(60);
     let options = [

@@ -12,7 +12,9 @@ fn clip_frames(n: usize) -> Vec<Vec<u8>> {
     (0..n).map(|i| clip::frame(i).into_raw()).collect()
 }
 
-/// Checks everything that every source must do; `expected` are all frames of the footage.
+/// Checks the requirements that every source must meet.
+///
+/// * `expected`: all frames of the footage.
 fn check_conformance(spec: &SourceSpec, expected: &[Vec<u8>]) {
     check_all_frames(spec, expected);
     for (start, step, count) in [
@@ -35,7 +37,7 @@ fn check_all_frames(spec: &SourceSpec, expected: &[Vec<u8>]) {
     assert_eq!(source.info().n_frames, expected.len() as u64);
     let mut buffer = vec![99; clip::SIZE.rgb_bytes()];
     for (index, rgb) in expected.iter().enumerate() {
-        // Both ways to read, in turn.
+        // Alternate between both methods to read.
         if index % 2 == 0 {
             assert_frame(source.next_frame().unwrap(), index, rgb);
         } else {
@@ -106,7 +108,7 @@ fn kind(spec: &SourceSpec) -> SourceKind {
 fn images_of_a_folder_a_glob_and_a_numbered_pattern_conform() {
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), N_FRAMES);
-    // Files that a folder must ignore; a glob and a pattern do not match them.
+    // A folder must ignore these files; a glob and a pattern do not match them.
     std::fs::write(folder.path().join("notes.txt"), "not an image").unwrap();
     std::fs::write(folder.path().join(".im0.png"), "hidden").unwrap();
     for name in ["", "im*.png", "im%d.png", "im%04d.png", "im[0-9]*.png"] {

@@ -1,4 +1,4 @@
-//! HTTP cameras with habits of their own.
+//! HTTP cameras with unusual behaviour.
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -10,7 +10,7 @@ use image::codecs::jpeg::JpegEncoder;
 
 use crate::clip::{SIZE, frame, has_ffmpeg};
 
-/// The address of a camera that answers everybody so.
+/// Starts a camera that sends this answer to every client, and returns its address.
 fn camera(answer: fn(&mut TcpStream, &[u8]) -> std::io::Result<()>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -23,7 +23,7 @@ fn camera(answer: fn(&mut TcpStream, &[u8]) -> std::io::Result<()>) -> String {
                 picture.write_with_encoder(JpegEncoder::new(&mut jpeg)).unwrap();
                 let mut request = [0; 4096];
                 let read = stream.read(&mut request);
-                // Whoever hangs up has heard enough.
+                // A client may close the connection before the end of the answer.
                 read.and_then(|_| answer(&mut stream, &jpeg)).ok();
             };
             thread::Builder::new().spawn(answer_one).unwrap();
@@ -33,7 +33,7 @@ fn camera(answer: fn(&mut TcpStream, &[u8]) -> std::io::Result<()>) -> String {
     format!("http://{address}/stream")
 }
 
-/// Pictures for two seconds, each with what stands before and behind it.
+/// Sends pictures for two seconds, each with a text before and after it.
 fn pictures(to: &mut TcpStream, jpeg: &[u8], [before, behind]: [&str; 2]) -> std::io::Result<()> {
     to.write_all(
         b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundary=12345\r\n\r\n",

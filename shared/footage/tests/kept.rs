@@ -1,4 +1,4 @@
-//! A stream that is kept as it came gives the same pictures when it is decoded later.
+//! A stream that is kept in its original form gives the same pictures when it is decoded later.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -16,7 +16,7 @@ const SIZE: Size = Size {
     height: 48,
 };
 
-/// A stream of 80 pictures, of which every fifth needs no other. A decoder takes most of it to learn what it is.
+/// Returns a stream of 80 pictures. Every fifth picture needs no other. A decoder reads most of the stream to identify it.
 fn stream() -> Vec<u8> {
     let made = Command::new("ffmpeg")
         .args([
@@ -43,13 +43,13 @@ fn stream() -> Vec<u8> {
     made.stdout
 }
 
-/// The pictures of a live stream with their times, and its pieces.
+/// Returns the pictures of a live stream with their times, and its pieces.
 fn live() -> (Vec<(i64, Vec<u8>)>, Vec<Piece>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("tcp://{}", listener.local_addr().unwrap());
     let server = std::thread::Builder::new().spawn(move || {
         let (mut client, _) = listener.accept().unwrap();
-        // The decoder may end before it has read all.
+        // The decoder may end before it has read everything.
         client.write_all(&stream()).ok();
     });
     let spec = StreamSpec {

@@ -20,7 +20,7 @@ fn pixel(canvas: &Canvas, x: usize, y: usize) -> [u8; 3] {
     canvas.rgb()[at..at + 3].try_into().unwrap()
 }
 
-/// How much colour is on a black picture, in pixels of full colour.
+/// Returns the amount of colour on a black picture, in pixels of full colour.
 fn amount(canvas: &Canvas) -> f64 {
     let reds = canvas.rgb().iter().step_by(3);
     reds.map(|&red| f64::from(red)).sum::<f64>() / f64::from(INK[0])
@@ -75,7 +75,7 @@ fn a_disc_has_its_area_and_a_ring_has_a_hole() {
 #[test]
 fn a_box_covers_its_area_with_its_opacity() {
     let mut canvas = black();
-    // From the middle of one pixel to the middle of another.
+    // The box extends from the middle of one pixel to the middle of another.
     canvas.filled_box([10.0, 10.0, 20.0, 14.0], 0.5, INK);
     assert_eq!(pixel(&canvas, 15, 12), [100, 50, 25]);
     assert_eq!(pixel(&canvas, 10, 12), [50, 25, 13]);
@@ -210,7 +210,7 @@ fn coordinate() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// Right of the picture, whatever the other coordinate is.
+/// A coordinate to the right of the picture, so that the point is outside regardless of its other coordinate.
 fn outside() -> impl Strategy<Value = f64> {
     prop_oneof![
         80.0..1000.0,
@@ -234,7 +234,7 @@ proptest! {
         canvas.frame([a[0], a[1], b[0], b[1]], width, INK);
         canvas.filled_box([a[0], a[1], b[0], b[1]], 0.5, INK);
         prop_assert!(canvas == ground);
-        // Text has a dark edge; it must only not panic.
+        // Text has a dark edge, so this only checks that nothing panics.
         canvas.text(a, "text", INK);
     }
 

@@ -1,4 +1,4 @@
-//! A picture of a stream is there before the next one is sent.
+//! A picture of a stream is available before the next one is sent.
 
 use crate::clip;
 
@@ -14,12 +14,12 @@ const SIZE: Size = Size {
     width: 64,
     height: 48,
 };
-/// Pictures before the last: a decoder takes some to learn what it is, and may lose the first.
+/// Number of pictures before the last one. A decoder reads some of them to identify the stream, and may lose the first.
 const N: usize = 40;
-/// Bytes of the one after the last, one a second: far longer than anything takes.
+/// Number of bytes of the picture after the last one, sent at one byte per second: far longer than the test takes.
 const N_BYTES: u64 = 120;
 
-/// A picture of one colour as JPEG, as a part of a stream over HTTP.
+/// Returns a picture of one colour as JPEG, as a part of a stream over HTTP.
 fn part(colour: &str) -> Vec<u8> {
     let picture = format!("color={colour}:size=64x48");
     let made = Command::new("ffmpeg")
@@ -54,7 +54,7 @@ fn the_last_picture_that_was_sent_is_there_though_no_other_follows() {
             client.write_all(&black).unwrap();
         }
         client.write_all(&white).unwrap();
-        // The next one begins, byte by byte, so that the stream is not silent, until it is.
+        // The next picture begins, byte by byte, so that the stream is not silent while the last picture is awaited.
         client.write_all(b"--next\r\nX-Wait: ").unwrap();
         for _ in 0..N_BYTES {
             if wait.recv_timeout(Duration::from_secs(1)).is_ok() || client.write_all(b"a").is_err()

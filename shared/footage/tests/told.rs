@@ -1,4 +1,4 @@
-//! Statements of files about themselves: turns, trims, rates, covers, numbers, depths, and a decoder's messages about them.
+//! Properties that files state about themselves: turns, trims, rates, covers, numbers, depths, and a decoder's messages about them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,14 +10,14 @@ use image::{ExtendedColorType, ImageBuffer, ImageEncoder as _, Luma};
 
 use crate::clip::{SIZE, encode, frame, has_ffmpeg, write_images};
 
-/// A lossless film of pictures that stand alone, in a container with display matrix and edit list.
+/// Options for a lossless film of independent pictures, in a container with display matrix and edit list.
 const PNG: &[&str] = &["-c:v", "png"];
 
 fn spec(path: &Path) -> SourceSpec {
     SourceSpec::new(path.to_str().unwrap())
 }
 
-/// All frames with their numbers.
+/// Returns all frames with their numbers.
 fn frames(spec: &SourceSpec) -> (SourceInfo, Vec<(u64, Vec<u8>)>) {
     let mut source = Source::open(spec).unwrap();
     let mut all = Vec::new();
@@ -31,7 +31,7 @@ fn indices(spec: &SourceSpec) -> Vec<u64> {
     frames(spec).1.into_iter().map(|frame| frame.0).collect()
 }
 
-/// Replaces bytes behind the name of a box.
+/// Replaces bytes after the name of a box.
 fn patch(from: &Path, to: &str, (name, skipped): (&[u8; 4], usize), bytes: &[u8]) -> PathBuf {
     let mut file = fs::read(from).unwrap();
     let at = file.windows(4).position(|window| window == name).unwrap() + 4 + skipped;
@@ -41,7 +41,7 @@ fn patch(from: &Path, to: &str, (name, skipped): (&[u8; 4], usize), bytes: &[u8]
     to
 }
 
-/// With a display matrix.
+/// Writes a copy with another display matrix.
 fn turned(from: &Path, to: &str, [a, b, c, d]: [i32; 4]) -> PathBuf {
     let rows = [a, b, 0, c, d, 0].map(|number| (number << 16).to_be_bytes());
     patch(from, to, (b"tkhd", 40), rows.as_flattened())
@@ -148,7 +148,7 @@ fn films_are_shrunk_by_what_divides_their_sides_to_the_means_of_their_pixels() {
             );
         }
     }
-    // A film that is turned is shrunk as it is stored.
+    // A turned film is shrunk before it is turned.
     let (info, _) = frames(&SourceSpec {
         most_shrink: 3,
         rotation: Rotation::By(Turn::clockwise(90).unwrap()),
@@ -170,7 +170,8 @@ fn frames_that_an_edit_list_cuts_off_are_none() {
         &[PNG, &["-video_track_timescale", "100"]].concat(),
     );
     let (_, all) = frames(&spec(&whole));
-    // From the third frame on, four frames of 40 ms: units of the film are milliseconds, those of the track 10 ms.
+    // The edit list begins at the third frame and shows four frames of 40 ms. The units of the film are milliseconds, those of the track
+    // 10 ms.
     let edit = [160_u32.to_be_bytes(), 8_u32.to_be_bytes()];
     let trimmed = patch(&whole, "trimmed.mov", (b"elst", 8), edit.as_flattened());
     let (info, shown) = frames(&spec(&trimmed));
@@ -250,7 +251,7 @@ fn the_film_is_read_and_not_the_cover_in_front_of_it() {
     }
 }
 
-/// JPEG pictures one behind the other, some of them cut, in a container.
+/// Writes a sequence of JPEG pictures, some of which are cut, in a container.
 fn cut(folder: &Path, name: &str, is_cut: impl Fn(usize) -> bool) -> PathBuf {
     let mut stream = Vec::new();
     for nth in 0..8 {

@@ -1,11 +1,11 @@
-//! Warps of images whose result is known.
+//! Warps of images with a known result.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use footage::{Affine, Fill, Size, Warp, WarpError, resize_map};
 use proptest::prelude::*;
 
-/// An image whose pixels are given by a function of their place.
+/// Returns an image whose pixels are a function of their position.
 fn image(size: Size, pixel: impl Fn(usize, usize) -> [u8; 3]) -> Vec<u8> {
     let places = (0..size.height).flat_map(|y| (0..size.width).map(move |x| (x, y)));
     places.flat_map(|(x, y)| pixel(x, y)).collect()
@@ -24,7 +24,7 @@ fn warp(source: Size, rgb: &[u8], output: Size, map: &Affine, fill: Fill) -> Vec
     out
 }
 
-/// Turns by `degrees` and shrinks by `scale`, about the centres of both images.
+/// Returns the map that turns by `degrees` and shrinks by `scale`, about the centres of both images.
 fn turn(source: Size, output: Size, degrees: f64, scale: f64) -> Affine {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let centre = |value: usize| (value as f64 - 1.0) / 2.0;
@@ -245,7 +245,7 @@ impl Reference<'_> {
         weighted.iter().sum()
     }
 
-    /// `None` where rounding the position of the centre is ambiguous.
+    /// Returns a pixel; `None` if rounding the position of the centre is ambiguous.
     fn pixel(&self, x: usize, y: usize) -> Option<[f64; 3]> {
         let centre = self.map.map(|[a, b, t]| (a * x as f64 + b * y as f64 + t) * 32.0);
         if centre.iter().any(|value| ((value + 0.5) - (value + 0.5).round()).abs() < 1e-5) {
@@ -309,7 +309,7 @@ fn ramp_shows(degrees: f64, scale: f64, shift: [f64; 2]) -> Result<(), TestCaseE
         }
         let found = at(&out, output, x, y).map(f64::from);
         for (found, expect) in found.into_iter().zip([u, v, 255.0 - u]) {
-            // Half a grey level, and half a phase (phases are 1/16 pixel above scale 4).
+            // The tolerance is half a grey level, and half a phase (phases are 1/16 pixel above scale 4).
             prop_assert!(
                 (found - expect).abs() < 0.5 + 0.04,
                 "{found} for {expect} at {x}, {y}"

@@ -1,4 +1,4 @@
-//! Inputs and outputs of a network, as a TOML file describes them.
+//! Inputs and outputs of a network, as described by a TOML file.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,51 +11,51 @@ pub use kind::CardKind;
 pub(crate) use kind::{DETECTOR_FORMAT, FORMAT, VERSION, check_head};
 pub use value::{Refine, Score};
 
-/// Longest side of an input, pixels.
+/// Maximum side of an input, pixels.
 const MAX_SIDE: usize = 2048;
-/// Most keypoints.
+/// Maximum number of keypoints.
 const MAX_KEYPOINTS: usize = 256;
 
 /// The card of a network that finds keypoints.
 ///
-/// Every key is checked; unknown ones are refused.
+/// Every key is checked, and unknown keys are refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Card {
-    /// `parallax-keypoint-network`.
+    /// Name of the format: `parallax-keypoint-network`.
     pub format: String,
-    /// 1.
+    /// Version of the format: 1.
     pub version: u32,
     /// Name of the network.
     pub name: String,
-    /// Where its weights come from.
+    /// Source of the weights.
     #[serde(default)]
     pub weights: String,
-    /// The licence of the weights.
+    /// Licence of the weights.
     #[serde(default)]
     pub licence: String,
     /// Input of the network.
     pub input: Input,
-    /// How the box around a person becomes its input.
+    /// Method that turns the box around a person into the input.
     #[serde(default)]
     pub crop: Crop,
     /// Output of the network.
     pub output: Codec,
     /// Keypoints of the network.
     pub keypoints: KeypointNames,
-    /// Outputs beside the keypoints.
+    /// Outputs in addition to the keypoints.
     #[serde(default, skip_serializing_if = "Also::is_empty")]
     pub also: Also,
 }
 
-/// Outputs of a network beside its keypoints.
+/// Outputs of a network in addition to its keypoints.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Also {
-    /// The output with the direction in which the trunk faces, `[1, 2]`: towards the right of the picture, towards the camera. Twice
-    /// its scalar product with a direction of length 1 is the log-likelihood ratio of facing there over facing away from there.
+    /// Output with the direction in which the trunk faces, `[1, 2]`: towards the right of the picture, towards the camera. Twice
+    /// its scalar product with a direction of length 1 is the log-likelihood ratio of facing in this direction over facing away from it.
     pub front: Option<String>,
-    /// The output with the expected error of every keypoint, `[1, keypoints]`: heights of the input.
+    /// Output with the expected error of every keypoint, `[1, keypoints]`, in heights of the input.
     pub error: Option<String>,
 }
 
@@ -69,28 +69,28 @@ impl Also {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
-    /// Its name; left out: the only input.
+    /// Name of the input; if left out, the only input.
     pub name: Option<String>,
     /// Width, pixels.
     pub width: usize,
     /// Height, pixels.
     pub height: usize,
-    /// Order of its axes.
+    /// Order of the input's axes.
     #[serde(default)]
     pub layout: Layout,
     /// Order of the colours.
     #[serde(default)]
     pub colour: Colour,
-    /// Type of its numbers.
+    /// Type of the input's numbers.
     #[serde(default)]
     pub numbers: Numbers,
-    /// A colour from 0 to 255 is multiplied with it first.
+    /// Factor by which a colour from 0 to 255 is multiplied first.
     #[serde(default = "one")]
     pub scale: f32,
-    /// Then this is subtracted, one number for each colour in the network's order.
+    /// Numbers that are subtracted after that, one for each colour in the network's order.
     #[serde(default)]
     pub mean: [f32; 3],
-    /// Then it is divided by this.
+    /// Numbers by which the result is divided at the end.
     #[serde(default = "ones")]
     pub std: [f32; 3],
 }
@@ -102,7 +102,7 @@ pub enum Layout {
     /// One plane for each colour: `[1, 3, height, width]`.
     #[default]
     Planes,
-    /// The colours of a pixel beside each other: `[1, height, width, 3]`.
+    /// The colours of a pixel next to each other: `[1, height, width, 3]`.
     Pixels,
 }
 
@@ -130,15 +130,15 @@ pub enum Numbers {
     I32,
 }
 
-/// How the box around a person becomes the input.
+/// Method that turns the box around a person into the input.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Crop {
-    /// The box is enlarged by it about its middle.
+    /// Factor by which the box is enlarged about its middle.
     pub margin: f64,
-    /// How it gets the shape of the input.
+    /// Method that gives the box the shape of the input.
     pub fit: Fit,
-    /// The colour beyond the picture, 0 to 255.
+    /// Colour outside the picture, 0 to 255.
     pub fill: u8,
 }
 
@@ -152,39 +152,39 @@ impl Default for Crop {
     }
 }
 
-/// How a box gets the shape of the input.
+/// Method that gives a box the shape of the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fit {
-    /// Its shorter side is widened.
+    /// Widen the shorter side of the box.
     #[default]
     Widen,
-    /// It is stretched.
+    /// Stretch the box.
     Stretch,
 }
 
-/// Output of a network, and the way to read it.
+/// Output of a network, and the method to read it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Codec {
     /// A map for every keypoint.
     HeatMap {
-        /// The output; left out: the only one.
+        /// Name of the output; if left out, the only output.
         maps: Option<String>,
-        /// Order of its axes: `[1, keypoints, rows, columns]`, or keypoints last.
+        /// Order of the output's axes: `[1, keypoints, rows, columns]`, or keypoints last.
         #[serde(default)]
         layout: Layout,
-        /// Maps after those of the keypoints that are not read: the background, fields between joints.
+        /// Number of maps after those of the keypoints, which are not read: the background, fields between joints.
         #[serde(default)]
         further: usize,
-        /// True if the corner cells lie on the corner pixels, and these on the corners of the box (UDP: Huang et al. 2020; see
-        /// [`Window`](crate::Window)); else a cell covers a whole number of pixels from the corner of the input on.
+        /// True if the corner cells are on the corner pixels, and these on the corners of the box (UDP: Huang et al. 2020; see
+        /// [`Window`](crate::Window)). Otherwise, a cell covers a whole number of pixels, starting from the corner of the input.
         #[serde(default)]
         udp: bool,
-        /// True if each cell lies in the middle of the pixels that it covers; else on the first of them. Not with `udp`.
+        /// True if each cell is in the middle of the pixels that it covers; otherwise, it is on the first of them. Not allowed with `udp`.
         #[serde(default)]
         centred: bool,
-        /// How a maximum is refined.
+        /// Method to refine a maximum.
         #[serde(default)]
         refine: Refine,
         /// Meaning of a score.
@@ -193,19 +193,19 @@ pub enum Codec {
     },
     /// A distribution over columns and one over rows for every keypoint.
     Simcc {
-        /// The output of columns.
+        /// Name of the output of columns.
         x: String,
-        /// The output of rows.
+        /// Name of the output of rows.
         y: String,
-        /// Bins for a pixel of the input.
+        /// Number of bins per pixel of the input.
         bins_per_pixel: f64,
-        /// Natural logarithm of a likelihood for 1 of the output; it makes scores comparable.
+        /// Natural log-likelihood that one unit of the output stands for. It makes scores comparable.
         #[serde(default = "ten")]
         nats: f64,
     },
     /// Positions and scores.
     Keypoints {
-        /// The output; left out: the only one.
+        /// Name of the output; if left out, the only output.
         list: Option<String>,
         /// Meaning of the numbers of a keypoint, in order.
         fields: Vec<ListField>,
@@ -222,13 +222,13 @@ pub enum Codec {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ListField {
-    /// Column.
+    /// Column of the keypoint.
     X,
-    /// Row.
+    /// Row of the keypoint.
     Y,
-    /// Its score.
+    /// Score of the keypoint.
     Score,
-    /// Something else.
+    /// A number that is not read.
     Skip,
 }
 
@@ -247,9 +247,9 @@ pub enum ListUnit {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeypointNames {
-    /// A known set: [`SETS`](crate::SETS).
+    /// Name of a known set: [`SETS`](crate::SETS).
     pub set: Option<String>,
-    /// Their names, in the order of the output, in place of a set.
+    /// Names of the keypoints in the order of the output, instead of a set.
     pub names: Option<Vec<String>>,
     /// Meaning of left and right.
     #[serde(default)]
@@ -260,10 +260,10 @@ pub struct KeypointNames {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
-    /// The sides of the body.
+    /// Left and right are the sides of the body.
     #[default]
     Anatomical,
-    /// Exchanged for people who are seen from behind.
+    /// Left and right are exchanged for people who are seen from behind.
     Seen,
 }
 
@@ -279,28 +279,28 @@ fn ten() -> f64 {
     10.0
 }
 
-/// Why a text is not a card.
+/// Reason why a text is not a card.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CardError {
-    /// It is not TOML of this layout.
+    /// The text is not TOML of this layout.
     #[error(transparent)]
     Toml(#[from] toml::de::Error),
-    /// It is something else, or of another version.
+    /// The text has another format, or another version of it.
     #[error("`{format}` version {version}, expected `{expected}` version {VERSION}")]
     Version {
-        /// The format name that is read.
+        /// Expected name of the format.
         expected: &'static str,
-        /// Its format name.
+        /// Name of the format in the text.
         format: String,
-        /// Its version.
+        /// Version in the text.
         version: u32,
     },
     /// A value is out of range.
     #[error("`{key}` is {got}, expected {expected}")]
     Value {
-        /// The key with its section.
+        /// Key with its section.
         key: &'static str,
-        /// The value.
+        /// Value of the key.
         got: String,
         /// Description of the values that are accepted.
         expected: String,
@@ -308,7 +308,7 @@ pub enum CardError {
 }
 
 impl Input {
-    /// A colour of a picture (red first, 0 to 255) as the network takes it, in its own order.
+    /// Converts a colour of a picture (red first, 0 to 255) to the values and the order that the network takes.
     pub fn prepared(&self, colour: [f32; 3]) -> [f32; 3] {
         core::array::from_fn(|channel| {
             let source = match self.colour {
@@ -321,11 +321,11 @@ impl Input {
 }
 
 impl Card {
-    /// Reads a card.
+    /// Parses a card.
     ///
     /// # Errors
     ///
-    /// [`CardError`], naming the key.
+    /// Returns a [`CardError`], which names the key.
     pub fn parse(text: &str) -> Result<Self, CardError> {
         check_head(text, FORMAT)?;
         let card: Self = toml::from_str(text)?;
@@ -333,7 +333,7 @@ impl Card {
         Ok(card)
     }
 
-    /// The names of its keypoints, in the order of the output.
+    /// Returns the names of the network's keypoints, in the order of the output.
     pub fn names(&self) -> Vec<String> {
         let of_set = |set: &String| {
             let known = SETS.iter().find(|known| known.0 == set)?;
@@ -432,7 +432,7 @@ impl Card {
     }
 }
 
-/// Checks what any network takes.
+/// Checks the input against the limits that apply to any network.
 pub(crate) fn check_input(input: &Input) -> Result<(), CardError> {
     for (key, side) in [("input.width", input.width), ("input.height", input.height)] {
         let fits = (8..=MAX_SIDE).contains(&side);

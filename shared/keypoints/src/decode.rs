@@ -7,25 +7,25 @@ use crate::card::{Layout, ListField, ListUnit, Refine, Score};
 pub struct Keypoint {
     /// Column and row, pixels of the network's input.
     pub at: [f64; 2],
-    /// How sure the network is. From 0 to 1 where it gives a share or log-odds; else in its own unit.
+    /// Confidence of the network. It is from 0 to 1 if the network gives a share or log-odds, otherwise in the network's own unit.
     pub score: f64,
 }
 
-/// Why an output cannot be read.
+/// Reason why an output cannot be read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OutputError {
-    /// It has another shape.
+    /// The output has another shape.
     #[error("the output is {got:?}, expected {expected}")]
     Shape {
-        /// The shape.
+        /// Shape of the output.
         got: Vec<usize>,
-        /// Shape that the card asks for.
+        /// Shape that the card requires.
         expected: String,
     },
     /// A value is not a finite number.
     #[error("value {index} of the output is {value}")]
     NotANumber {
-        /// Which.
+        /// Index of the value.
         index: usize,
         /// Value in the output.
         value: f32,
@@ -38,21 +38,21 @@ pub struct HeatMaps<'a> {
     values: &'a [f32],
     layout: Layout,
     n: usize,
-    /// Maps of the output: of the keypoints, then others.
+    /// Number of maps of the output: those of the keypoints, then others.
     channels: usize,
     rows: usize,
     columns: usize,
 }
 
 impl<'a> HeatMaps<'a> {
-    /// Takes an output.
+    /// Interprets an output as maps.
     ///
-    /// * `shape`: of the output, one picture.
-    /// * `n`, `further`: number of keypoints of the card, and of maps after theirs, which are not read.
+    /// * `shape`: shape of the output, for one picture.
+    /// * `n`, `further`: number of keypoints of the card, and number of maps after theirs, which are not read.
     ///
     /// # Errors
     ///
-    /// [`OutputError`].
+    /// Returns an [`OutputError`] on failure.
     pub fn new(
         values: &'a [f32],
         shape: &[usize],
@@ -92,15 +92,15 @@ impl<'a> HeatMaps<'a> {
         })
     }
 
-    /// Rows and columns of a map.
+    /// Returns the numbers of rows and columns of a map.
     pub fn size(&self) -> [usize; 2] {
         [self.rows, self.columns]
     }
 
-    /// Pixels of the input between two cells, across and down.
+    /// Returns the number of pixels of the input between two cells, across and down.
     ///
     /// * `input`: width and height of the network's input, pixels.
-    /// * `udp`: whether corner cells lie on corner pixels; else as many pixels as cells fit into the input.
+    /// * `udp`: true if corner cells are on corner pixels. Otherwise, each cell covers an equal share of the input.
     pub fn step(&self, input: [usize; 2], udp: bool) -> [f64; 2] {
         let cells = [self.columns, self.rows];
         [0, 1].map(|axis| {
@@ -113,11 +113,11 @@ impl<'a> HeatMaps<'a> {
         })
     }
 
-    /// A value as it is.
+    /// Returns an unchanged value of a map.
     ///
     /// # Panics
     ///
-    /// Beyond the maps.
+    /// Panics if the index is outside the maps.
     pub fn value(&self, keypoint: usize, row: usize, column: usize) -> f32 {
         assert!(row < self.rows && column < self.columns && keypoint < self.n);
         let cell = row * self.columns + column;
@@ -127,11 +127,11 @@ impl<'a> HeatMaps<'a> {
         }]
     }
 
-    /// The maximum of every map.
+    /// Returns the maximum of every map.
     ///
     /// * `input`: width and height of the network's input, pixels.
-    /// * `udp`: whether corner cells lie on corner pixels; else the first cell lies on the first pixel, and as many pixels as
-    ///   cells fit into the input lie between two.
+    /// * `udp`: true if corner cells are on corner pixels. Otherwise, the first cell is on the first pixel, and each cell covers an equal
+    ///   share of the input.
     pub fn keypoints(
         &self,
         input: [usize; 2],
@@ -168,7 +168,7 @@ impl<'a> HeatMaps<'a> {
         best.0
     }
 
-    /// By how many cells a maximum is moved along one axis; 0 at the edge.
+    /// Returns the number of cells by which a maximum is moved along one axis; 0 at the edge.
     fn refined(
         &self,
         keypoint: usize,
@@ -217,15 +217,15 @@ pub struct SimCc<'a> {
 }
 
 impl<'a> SimCc<'a> {
-    /// Takes the outputs of columns and of rows.
+    /// Interprets outputs as distributions over columns and over rows.
     ///
-    /// * `shapes`: of the two.
-    /// * `bins`: of columns and of rows: the sides of the input times the card's bins for a pixel.
+    /// * `shapes`: shapes of the two outputs.
+    /// * `bins`: number of bins for columns and for rows: the sides of the input times the card's bins per pixel.
     /// * `n`: number of keypoints of the card.
     ///
     /// # Errors
     ///
-    /// [`OutputError`].
+    /// Returns an [`OutputError`] on failure.
     pub fn new(
         axes: [&'a [f32]; 2],
         shapes: [&[usize]; 2],
@@ -246,17 +246,17 @@ impl<'a> SimCc<'a> {
         Ok(Self { axes, bins, n })
     }
 
-    /// The values of a keypoint along an axis, columns first.
+    /// Returns the values of a keypoint along an axis, where axis 0 is that of the columns.
     ///
     /// # Panics
     ///
-    /// Beyond the keypoints.
+    /// Panics if the index is outside the keypoints.
     pub fn axis(&self, keypoint: usize, axis: usize) -> &'a [f32] {
         let n = self.bins[axis];
         &self.axes[axis][keypoint * n..(keypoint + 1) * n]
     }
 
-    /// The maximum of every keypoint; its score is the smaller one of its two axes, as the network gives it.
+    /// Returns the maximum of every keypoint. Its score is the smaller of the scores of its two axes, unchanged from the network.
     pub fn keypoints(&self, bins_per_pixel: f64) -> Vec<Keypoint> {
         let keypoint = |keypoint: usize| {
             let best = [0, 1].map(|axis| {
@@ -276,7 +276,7 @@ impl<'a> SimCc<'a> {
     }
 }
 
-/// Listed keypoints.
+/// Keypoints that are listed one by one.
 #[derive(Debug, Clone, Copy)]
 pub struct List<'a> {
     values: &'a [f32],
@@ -284,13 +284,13 @@ pub struct List<'a> {
 }
 
 impl<'a> List<'a> {
-    /// Takes an output of any shape.
+    /// Interprets an output of any shape as a list.
     ///
     /// * `n`: number of keypoints of the card.
     ///
     /// # Errors
     ///
-    /// [`OutputError`].
+    /// Returns an [`OutputError`] on failure.
     pub fn new(
         values: &'a [f32],
         shape: &[usize],
@@ -307,7 +307,7 @@ impl<'a> List<'a> {
         Ok(Self { values, fields })
     }
 
-    /// The keypoints; a list without scores gives 1.
+    /// Returns the keypoints. The score is 1 for a list without scores.
     ///
     /// * `input`: width and height of the network's input, pixels.
     pub fn keypoints(&self, input: [usize; 2], unit: ListUnit, score: Score) -> Vec<Keypoint> {
@@ -345,7 +345,7 @@ pub(crate) fn finite(values: &[f32]) -> Result<(), OutputError> {
 mod tests {
     use super::*;
 
-    /// A bump around a place of a map of 12 by 16 cells, and a flat map.
+    /// Returns a map of 12 by 16 cells with a bump at a point, and a flat map.
     fn bump([x, y]: [f64; 2], layout: Layout) -> Vec<f32> {
         let mut values = vec![0.0; 2 * 16 * 12];
         for row in 0..16 {

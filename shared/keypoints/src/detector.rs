@@ -1,4 +1,4 @@
-//! Networks that find the boxes of people: what a card says of them, and what their output means.
+//! Networks that find the boxes of people: their cards, and the decoding of their outputs.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,69 +11,69 @@ mod centres;
 
 /// The card of a network that finds the boxes of people.
 ///
-/// The whole picture is resized to fit into the input, its top-left corner in that of the input; the rest is filled.
+/// The whole picture is resized to fit into the input, with its top-left corner in that of the input. The rest is filled with a colour.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DetectorCard {
-    /// `parallax-detector`.
+    /// Name of the format: `parallax-detector`.
     pub format: String,
-    /// 1.
+    /// Version of the format: 1.
     pub version: u32,
     /// Name of the network.
     pub name: String,
-    /// Where its weights come from.
+    /// Source of the weights.
     #[serde(default)]
     pub weights: String,
-    /// The licence of the weights.
+    /// Licence of the weights.
     #[serde(default)]
     pub licence: String,
     /// Input of the network.
     pub input: Input,
-    /// The colour beyond the picture, 0 to 255.
+    /// Colour outside the picture, 0 to 255.
     #[serde(default = "grey")]
     pub fill: u8,
     /// Output of the network.
     pub output: Boxes,
-    /// Boxes with a lower score are dropped.
+    /// Minimum score of a box. Boxes with a lower score are dropped.
     #[serde(default = "least_score")]
     pub least_score: f64,
-    /// Largest overlap: of two boxes that share more than this of their union the worse is dropped.
+    /// Maximum overlap of two boxes, as a share of their union. If two boxes overlap more, the one with the lower score is dropped.
     #[serde(default = "most_overlap")]
     pub most_overlap: f64,
 }
 
-/// Output of a detector, and the way to read it.
+/// Output of a detector, and the method to read it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Boxes {
     /// The grids of YOLOX (Ge et al. 2021), `[1, cells, 5 + classes]`: middle, size, objectness, and classes. Positions are
-    /// in cells from the cell, sizes are logarithms in cells.
+    /// in cells relative to the cell, and sizes are logarithms in cells.
     Yolox {
-        /// The output; left out: the only one.
+        /// Name of the output; if left out, the only output.
         grids: Option<String>,
-        /// Pixels of the input for a cell of each grid.
+        /// Number of pixels of the input per cell of each grid.
         #[serde(default = "strides")]
         strides: Vec<usize>,
-        /// The number of the class of people.
+        /// Number of the class of people.
         #[serde(default)]
         person: usize,
-        /// True if positions and sizes are in pixels of the input already.
+        /// True if positions and sizes are already in pixels of the input.
         #[serde(default)]
         decoded: bool,
     },
-    /// Boxes of people alone, `[1, n, 5]`: left, top, right, bottom, pixels of the input, and score (`RTMDet` as exported by
+    /// Boxes of people only, `[1, n, 5]`: left, top, right, bottom, pixels of the input, and score (`RTMDet` as exported by
     /// mmdeploy).
     List {
-        /// The output.
+        /// Name of the output.
         boxes: String,
     },
-    /// A grid over the picture, `[1, 5, rows, columns]`: log-odds that the middle of a person's box lies in a cell, and
+    /// A grid over the picture, `[1, 5, rows, columns]`. The values are the log-odds that the middle of a person's box is in a cell, and
     /// the natural logarithms of the distances from the middle of the cell to the left, top, right and bottom of the
     /// box, in cells. Every cell that is higher than its eight neighbours is a person (`parallax-lab train finder`).
     Centres {
-        /// The output; left out: the only one.
+        /// Name of the output; if left out, the only output.
         boxes: Option<String>,
-        /// Pixels of the input for a cell.
+        /// Number of pixels of the input per cell.
         stride: usize,
     },
 }
@@ -99,16 +99,16 @@ fn strides() -> Vec<usize> {
 pub struct PersonBox {
     /// Left, top, right, bottom, pixels.
     pub outline: [f64; 4],
-    /// How sure the network is, 0 to 1.
+    /// Confidence of the network, 0 to 1.
     pub score: f64,
 }
 
 impl DetectorCard {
-    /// Reads a card.
+    /// Parses a card.
     ///
     /// # Errors
     ///
-    /// [`CardError`], naming the key.
+    /// Returns a [`CardError`], which names the key.
     pub fn parse(text: &str) -> Result<Self, CardError> {
         check_head(text, DETECTOR_FORMAT)?;
         let card: Self = toml::from_str(text)?;
@@ -141,11 +141,11 @@ impl DetectorCard {
         Ok(card)
     }
 
-    /// The boxes of people, the surest first, in pixels of the input.
+    /// Returns the boxes of people in pixels of the input, highest score first.
     ///
     /// # Errors
     ///
-    /// [`OutputError`] if the output has another shape, or a value is not finite.
+    /// Returns an [`OutputError`] if the output has another shape, or if a value is not finite.
     pub fn boxes(&self, values: &[f32], shape: &[usize]) -> Result<Vec<PersonBox>, OutputError> {
         finite(values)?;
         let mut found = match &self.output {
@@ -185,9 +185,9 @@ impl DetectorCard {
         Ok(kept)
     }
 
-    /// How many boxes the grids of these strides have.
+    /// Returns the number of boxes of the grids with these strides.
     ///
-    /// * `strides`: pixels of the input for a cell of each grid, at least 1.
+    /// * `strides`: number of pixels of the input per cell of each grid, at least 1.
     pub fn n_cells(&self, strides: &[usize]) -> usize {
         let [width, height] = [self.input.width, self.input.height];
         strides.iter().map(|stride| (width / stride) * (height / stride)).sum()
@@ -256,14 +256,14 @@ impl DetectorCard {
         Ok(grids.zip(values.chunks_exact(n)).map(one).collect())
     }
 
-    /// Writes the input of the network, and returns how many pixels of the picture lie between two of the input.
+    /// Writes the input of the network. Returns the number of pixels of the picture between two pixels of the input.
     ///
     /// * `rgb`: the picture, row major, red first; `size` is its width and height.
-    /// * `values`: three for every pixel of the input, all of them written.
+    /// * `values`: three values for every pixel of the input, all of which are written.
     ///
     /// # Panics
     ///
-    /// If the picture or the values have another length.
+    /// Panics if the picture or the values have another length.
     pub fn fill(&self, rgb: &[u8], size: [usize; 2], values: &mut [f32]) -> f64 {
         let [width, height] = [self.input.width, self.input.height];
         assert_eq!(rgb.len(), 3 * size[0] * size[1], "the picture is RGB");
@@ -284,7 +284,8 @@ impl DetectorCard {
         step
     }
 
-    /// The mean colour of the pixels of the picture that a pixel of the input covers; bilinear in a picture that is enlarged.
+    /// Returns the mean colour of the pixels of the picture that a pixel of the input covers. If the picture is enlarged, the colour is
+    /// interpolated bilinearly.
     fn cell(&self, rgb: &[u8], size: [usize; 2], (at, step): ([usize; 2], f64)) -> [f32; 3] {
         let span = [0, 1].map(|axis| {
             let begin = (at[axis] as f64 * step) as usize;
@@ -327,7 +328,7 @@ fn area([left, top, right, bottom]: &[f64; 4]) -> f64 {
     (right - left).max(0.0) * (bottom - top).max(0.0)
 }
 
-/// Returns the area that two boxes share, as a share of their union.
+/// Returns the intersection of two boxes as a share of their union.
 fn overlap(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     let shared = area(&[
         a[0].max(b[0]),
@@ -353,7 +354,7 @@ output = { codec = "yolox", strides = [16, 32] }
     #[test]
     fn boxes_of_grids_are_where_their_cells_say_and_the_surest_of_overlapping_ones_stays() {
         let card = DetectorCard::parse(YOLOX).unwrap();
-        // Grids of 4 by 2 and of 2 by 1 cells, two classes.
+        // The output has grids of 4 by 2 and of 2 by 1 cells, and two classes.
         let mut values = vec![0.0_f32; 10 * 7];
         let mut set =
             |cell: usize, it: [f32; 7]| values[7 * cell..7 * cell + 7].copy_from_slice(&it);
@@ -430,7 +431,7 @@ output = { codec = "yolox", strides = [16, 32] }
     #[test]
     fn a_picture_that_is_enlarged_is_bilinear() {
         let card = DetectorCard::parse(YOLOX).unwrap();
-        // Two by one pixels become 64 by 32: half of the input's width lies between the two middles.
+        // Two by one pixels become 64 by 32 pixels, so half of the input's width is between the two centres.
         let mut values = vec![f32::NAN; 3 * 64 * 32];
         let step = card.fill(&[0, 0, 0, 64, 64, 64], [2, 1], &mut values);
         assert_eq!(step, 1.0 / 32.0);

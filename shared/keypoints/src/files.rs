@@ -6,8 +6,8 @@
 //! | COCO's, a data set or a list of results | one for all frames | [`coco::parse`] |
 //! | mmpose's | one for every frame, or for all | either of the two |
 //!
-//! Positions are pixels of the footage with the centre of the top-left pixel at (0, 0). Nothing here reads a file; what is read
-//! is checked: numbers, lengths and counts have limits.
+//! Positions are pixels of the footage with the centre of the top-left pixel at (0, 0). This module takes text and opens no file. It
+//! checks all content: numbers, lengths and counts have limits.
 
 pub mod coco;
 pub mod openpose;

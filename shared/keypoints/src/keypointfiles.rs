@@ -1,6 +1,6 @@
 //! The keypoints of a film that another program found: a folder with a file for every frame, or one file for all frames.
 //!
-//! [`KeypointSource`] opens either and gives the people of a frame. What the files say is read by [`crate::files`].
+//! [`KeypointSource`] opens either of them and returns the people of a frame. [`crate::files`] parses the content of the files.
 
 mod error;
 mod folder;

@@ -1,19 +1,19 @@
-//! Networks that find the keypoints of one person in a box: what a card says of them, and what their output means.
+//! Networks that find the keypoints of one person in a box: their cards, and the decoding of their outputs.
 //!
-//! A [`Card`] is a TOML file beside an ONNX file. It says what the network takes ([`Input`]), how the box around a person
-//! becomes its input ([`Crop`]), what it gives ([`Codec`]), and what its keypoints are called ([`KeypointNames`]). With it any network
-//! can be used: nothing here knows a particular one.
+//! A [`Card`] is a TOML file beside an ONNX file. It describes the network's input ([`Input`]), the method that turns the box around a
+//! person into this input ([`Crop`]), the output ([`Codec`]), and the names of the keypoints ([`KeypointNames`]). With a card, any network
+//! can be used: this crate has no code for particular networks.
 //!
-//! | codec | the network gives | read by |
+//! | codec | output of the network | read by |
 //! |---|---|---|
 //! | `heat-map` | a map for every keypoint | [`HeatMaps`] |
 //! | `simcc` | a distribution over columns and one over rows for every keypoint (Li et al. 2022) | [`SimCc`] |
 //! | `keypoints` | positions and scores | [`List`] |
 //!
-//! Coordinates of the network's input have pixel centres at integers, column first. [`Window`] maps them to the picture. Results
-//! of other programs are read from their files by [`files`].
+//! Coordinates of the network's input have pixel centres at integers, column first. [`Window`] maps them to the picture. [`files`]
+//! reads the results of other programs from their files.
 //!
-//! Nothing here opens a file or runs a network.
+//! This crate runs no network.
 #![forbid(unsafe_code)]
 
 mod card;

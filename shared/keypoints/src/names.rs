@@ -1,8 +1,8 @@
-//! Names of keypoints, and the rules by which the joints of the skeleton follow from them.
+//! Names of keypoints, and the rules that compute the joints of the skeleton from them.
 
 use skeleton::PARSE14;
 
-/// COCO's, as its annotations order them.
+/// Keypoints of COCO, in the order of its annotations.
 pub const COCO_17: [&str; 17] = [
     "nose",
     "left eye",
@@ -23,7 +23,7 @@ pub const COCO_17: [&str; 17] = [
     "right ankle",
 ];
 
-/// Those of Halpe with feet (`AlphaPose`, RTMPose): COCO's, then nine more.
+/// Keypoints of Halpe with feet (`AlphaPose`, RTMPose): those of COCO, then nine more.
 pub const HALPE_26: [&str; 26] = [
     "nose",
     "left eye",
@@ -53,7 +53,7 @@ pub const HALPE_26: [&str; 26] = [
     "right heel",
 ];
 
-/// OpenPose's.
+/// Keypoints of `OpenPose`.
 pub const BODY_25: [&str; 25] = [
     "nose",
     "neck",
@@ -82,7 +82,7 @@ pub const BODY_25: [&str; 25] = [
     "right heel",
 ];
 
-/// Those of OpenPose's experimental model: COCO's, then those of MPII and of feet. Files do not distinguish them from
+/// Keypoints of OpenPose's experimental model: those of COCO, then those of MPII and of feet. Files do not distinguish them from
 /// [`BODY_25`].
 pub const BODY_25B: [&str; 25] = [
     "nose",
@@ -112,7 +112,7 @@ pub const BODY_25B: [&str; 25] = [
     "right heel",
 ];
 
-/// OpenPose's older set, of networks that were trained on COCO.
+/// Keypoints of OpenPose's older set, for networks that were trained on COCO.
 pub const OPENPOSE_18: [&str; 18] = [
     "nose",
     "neck",
@@ -134,7 +134,7 @@ pub const OPENPOSE_18: [&str; 18] = [
     "left ear",
 ];
 
-/// Those of MPII Human Pose.
+/// Keypoints of MPII Human Pose.
 pub const MPII_16: [&str; 16] = [
     "right ankle",
     "right knee",
@@ -154,7 +154,7 @@ pub const MPII_16: [&str; 16] = [
     "left wrist",
 ];
 
-/// Those of Leeds Sports Pose; the skeleton's own 14 joints.
+/// Keypoints of Leeds Sports Pose, which are the 14 joints of the skeleton itself.
 pub const LSP_14: [&str; 14] = [
     "right ankle",
     "right knee",
@@ -183,7 +183,7 @@ pub const SETS: [(&str, &[&str]); 7] = [
     ("lsp-14", &LSP_14),
 ];
 
-/// The first of COCO-WholeBody's 133 keypoints: COCO's, and those of the feet. Face and hands follow.
+/// First keypoints of COCO-WholeBody's 133: those of COCO and of the feet. Face and hands follow.
 pub const COCO_FEET_23: [&str; 23] = [
     "nose",
     "left eye",
@@ -210,32 +210,33 @@ pub const COCO_FEET_23: [&str; 23] = [
     "right heel",
 ];
 
-/// Sets of files that have face and hands after the body: name, the keypoints that are read, and how many a person has.
+/// Sets of files that have face and hands after the body: name, the keypoints that are read, and the number of keypoints of a person.
 ///
-/// `coco-wholebody-133` of mmpose, `RTMLib` and `AlphaPose`; `halpe-136` of `AlphaPose`; `body-135` of `OpenPose`.
+/// `coco-wholebody-133` is written by mmpose, `RTMLib` and `AlphaPose`, `halpe-136` by `AlphaPose`, and `body-135` by `OpenPose`.
 pub const WHOLE_BODIES: [(&str, &[&str], usize); 3] = [
     ("coco-wholebody-133", &COCO_FEET_23, 133),
     ("halpe-136", &HALPE_26, 136),
     ("body-135", &BODY_25B, 135),
 ];
 
-/// From the neck to the top of the head, in lengths of the way from the neck to the middle of eyes and ears.
+/// Distance from the neck to the top of the head, relative to the distance from the neck to the middle of eyes and ears.
 const HEAD_TOP: f64 = 1.6;
 
-/// A way in which a joint follows from keypoints.
+/// A rule that computes a joint from keypoints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Way {
-    /// The numbers of the keypoints, and weights that sum to 1.
+    /// Numbers of the keypoints, and weights that sum to 1.
     pub row: Vec<(usize, f64)>,
-    /// Standard deviation along one axis that this way adds to that of its keypoints, share of the height of the person's box enlarged
-    /// by a quarter.
+    /// Standard deviation along one axis that this rule adds to that of its keypoints. It is a share of the height of the person's box
+    /// enlarged by a quarter.
     pub spread: f64,
 }
 
-/// Ways from a part of the face to the top of the head: keypoints, lengths of the way from the neck to their middle, spread.
+/// Rules for the top of the head from a part of the face: keypoints, distance of the top from the neck relative to the distance of their
+/// middle from the neck, and spread.
 ///
-/// Factors of both ears and all spreads are measured: the keypoints of `body-25b`, which has the top of the head, in 421 people of the
-/// demonstration of Pose2Sim. The order is that of the spreads.
+/// The factors of both ears and all spreads were measured on the keypoints of `body-25b`, which has the top of the head, in 421 people of
+/// the demonstration of Pose2Sim. The rules are in the order of their spreads.
 const FACES: [(&[&str], f64, f64); 8] = [
     (
         &["left eye", "right eye", "left ear", "right ear"],
@@ -251,10 +252,11 @@ const FACES: [(&[&str], f64, f64); 8] = [
     (&["nose"], HEAD_TOP, 0.07),
 ];
 
-/// The ways in which every joint of `skeleton::PARSE14` follows from keypoints, the best first; none for a joint that does not.
+/// Returns the rules that compute every joint of `skeleton::PARSE14` from keypoints, best first. A joint that does not follow from
+/// keypoints has no rules.
 ///
-/// A keypoint of the joint's name is the joint. A neck is also the middle of the shoulders. The top of the head also lies beyond a part of
-/// the face, as seen from the neck: beyond the middle of eyes and ears by 0.6 of the way there.
+/// A keypoint with the joint's name is the joint. A neck is also the middle of the shoulders. The top of the head also follows from a part
+/// of the face: seen from the neck, it is beyond the middle of eyes and ears by 0.6 of the distance to that middle.
 pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     let find = |name: &str| names.iter().position(|known| known == name);
     let mean = |wanted: &[&str]| -> Option<Vec<(usize, f64)>> {
@@ -287,19 +289,19 @@ pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     PARSE14.joints.iter().map(|joint| ways(joint.name)).collect()
 }
 
-/// The best way of every joint where all keypoints are there, as a weighted sum of them: the first of [`joint_ways`]; `None` for a joint
-/// that does not follow from them.
+/// Returns the best rule of every joint as a weighted sum of keypoints, if all of them are there. It is the first rule of [`joint_ways`];
+/// `None` for a joint that does not follow from keypoints.
 pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
     let ways = joint_ways(names).into_iter();
     ways.map(|ways| Some(ways.into_iter().next()?.row)).collect()
 }
 
-/// Returns true if a keypoint is a joint of `skeleton::PARSE14` by its name; all others are extra keypoints.
+/// Returns true if the name of a keypoint is that of a joint of `skeleton::PARSE14`. All others are extra keypoints.
 pub fn is_joint(name: &str) -> bool {
     name == "head top" || PARSE14.joints.iter().any(|joint| joint.name == name)
 }
 
-/// The name on the other side of the body: `left heel` of `right heel`; `None` for a name without a side.
+/// Returns the name on the other side of the body: `left heel` for `right heel`; `None` for a name without a side.
 pub fn mirrored(name: &str) -> Option<String> {
     let other = |from: &str, to: &str| {
         let rest = name.strip_prefix(from)?;
@@ -370,7 +372,7 @@ mod tests {
     #[test]
     fn a_head_without_a_top_lies_beyond_the_face() {
         let rows = joint_rows(&owned(&COCO_17));
-        // The face at height 1.6, the shoulders at 1.4.
+        // The face is at height 1.6, and the shoulders are at 1.4.
         let height = |keypoint: usize| if keypoint < 5 { 1.6 } else { 1.4 };
         let head = rows[13].as_ref().unwrap();
         let top: f64 = head.iter().map(|head| head.1 * height(head.0)).sum();

@@ -1,6 +1,6 @@
-//! The cards of published networks that ship with Parallax; their weights do not.
+//! The cards of published networks that ship with Parallax. The weights of these networks do not.
 
-/// The cards of `configs/networks`: the name of the file without its ending, and the text.
+/// Cards of `configs/networks`: the name of the file without its ending, and the text.
 pub const SHIPPED: [(&str, &str); 9] = [
     (
         "rtmpose-coco17",
@@ -40,7 +40,7 @@ pub const SHIPPED: [(&str, &str); 9] = [
     ),
 ];
 
-/// The cards of `configs/detectors`, as [`SHIPPED`].
+/// Cards of `configs/detectors`, in the form of [`SHIPPED`].
 pub const SHIPPED_DETECTORS: [(&str, &str); 2] = [
     (
         "rtmdet-person",

@@ -3,49 +3,48 @@
 use crate::card::{Card, Codec, Fit, Layout};
 use crate::decode::Keypoint;
 
-/// Least side of the window over a grid, pixels of the picture.
+/// Minimum side of a window over a grid, pixels of the picture.
 const LEAST_SIDE_PX: f64 = 8.0;
-/// Most that one side of such a window is longer than the other.
+/// Maximum ratio of the sides of such a window.
 const MOST_SLENDER: f64 = 4.0;
 
-/// Where the input of a network lies in a picture.
+/// Window of the picture that becomes the input of a network.
 ///
-/// Coordinates have pixel centres at integers, in the picture and in the input. A box `s` pixels wide about `c` becomes the `W`
-/// columns of the input in one of two ways; rows likewise.
+/// Coordinates have pixel centres at integers, in the picture and in the input. A box that is `s` pixels wide about `c` becomes the `W`
+/// columns of the input by one of two formulas. Rows follow the same formula.
 ///
-/// * Usually `u = (x - c) W / s + W / 2`: lengths are counted in pixels. The left edge of the box comes to the centre of the
-///   first pixel, its right edge one pixel beyond the centre of the last (mmpose's plain recipe).
-/// * Where the card says `udp = true`, `u = (x - c) (W - 1) / s + (W - 1) / 2`: unbiased data processing (Huang et al. 2020)
-///   counts lengths in steps from one pixel centre to the next, of which `W` pixels have `W - 1`. The edges of the box come to
-///   the centres of the first and the last pixel, its middle to the middle between them (mmpose's `TopdownAffine` with
-///   `use_udp`). The shape of the box is still that of the input, `W / H`, so that the steps across and down differ a
-///   little. The corner cells of the maps lie on the corner pixels ([`HeatMaps::step`](crate::HeatMaps::step)), and hence on the
+/// * Usually, `u = (x - c) W / s + W / 2`: lengths are counted in pixels. The left edge of the box maps to the centre of the
+///   first pixel, and its right edge to one pixel beyond the centre of the last (mmpose's plain recipe).
+/// * If the card says `udp = true`, `u = (x - c) (W - 1) / s + (W - 1) / 2`. Unbiased data processing (Huang et al. 2020)
+///   counts lengths in steps between pixel centres, and `W` pixels have `W - 1` steps. The edges of the box map to
+///   the centres of the first and the last pixel, and its middle to the middle between them (mmpose's `TopdownAffine` with
+///   `use_udp`). The shape of the box is still that of the input, `W / H`, so the steps across and down differ a
+///   little. The corner cells of the maps are on the corner pixels ([`HeatMaps::step`](crate::HeatMaps::step)), and therefore on the
 ///   edges of the box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// Its middle in the picture, pixels.
+    /// Middle of the window in the picture, pixels.
     centre: [f64; 2],
-    /// Pixels of the picture for a pixel of the input, across and down.
+    /// Number of pixels of the picture per pixel of the input, across and down.
     step: [f64; 2],
     /// Width and height of the input.
     input: [usize; 2],
-    /// Where the middle of the window lies in the input.
+    /// Position of the window's middle in the input.
     middle: [f64; 2],
 }
 
 impl Window {
-    /// The window around a person.
+    /// Returns the window around a person; `None` for a box without an extent, or with numbers that are not finite.
     ///
     /// * `outline`: the box: left, top, right, bottom, pixels of the picture.
-    /// * Returns `None` for a box without an extent, or with numbers that are not finite.
     pub fn new(card: &Card, outline: [f64; 4]) -> Option<Self> {
         Self::of_input(card, outline, [card.input.width, card.input.height])
     }
 
-    /// The window around a person who lies in the picture: as high as the input is wide, and as wide as it is high. What it shows is
-    /// turned by a quarter before it becomes the input.
+    /// Returns the window around a person who is lying in the picture: as high as the input is wide, and as wide as it is high. The content
+    /// of the window is rotated by a quarter turn before it becomes the input.
     ///
-    /// * the others as for [`Self::new`].
+    /// * `card`, `outline`: as for [`Self::new`].
     pub fn sideways(card: &Card, outline: [f64; 4]) -> Option<Self> {
         Self::of_input(card, outline, [card.input.height, card.input.width])
     }
@@ -78,13 +77,14 @@ impl Window {
         })
     }
 
-    /// The window around a person without a network: its input is a grid of square cells over the box, none of them smaller than
-    /// a pixel. A box that is very slender, or a point, is widened.
+    /// Returns the window around a person for use without a network. Its input is a grid of square cells over the box, none of which is
+    /// smaller than a pixel. A box that is very slender, or a point, is widened.
+    ///
+    /// Returns `None` for numbers that are not finite, and for a box whose sides are exchanged.
     ///
     /// * `outline`: the box: left, top, right, bottom, pixels of the picture.
-    /// * `margin`: the box is enlarged by it about its middle.
-    /// * `most_rows`: most cells down; across there are at most four times as many.
-    /// * Returns `None` for numbers that are not finite, and for a box whose sides are exchanged.
+    /// * `margin`: factor by which the box is enlarged about its middle.
+    /// * `most_rows`: maximum number of rows of cells. There are at most four times as many columns.
     pub fn grid(outline: [f64; 4], margin: f64, most_rows: usize) -> Option<Self> {
         let [left, top, right, bottom] = outline;
         let [width, height] = [right - left, bottom - top].map(|value| value * margin);
@@ -108,41 +108,41 @@ impl Window {
         })
     }
 
-    /// Width and height of the input.
+    /// Returns the width and height of the input.
     pub fn input(&self) -> [usize; 2] {
         self.input
     }
 
-    /// The point of the picture at a point of the input.
+    /// Returns the point of the picture at a point of the input.
     pub fn in_picture(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| self.centre[axis] + (at[axis] - self.middle[axis]) * self.step[axis])
     }
 
-    /// The point of the input at a point of the picture.
+    /// Returns the point of the input at a point of the picture.
     pub fn in_input(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| (at[axis] - self.centre[axis]) / self.step[axis] + self.middle[axis])
     }
 
-    /// The same window elsewhere in the picture.
+    /// Returns the same window at another position in the picture.
     #[must_use]
     pub fn shifted(self, by: [f64; 2]) -> Self {
         let centre = [self.centre[0] + by[0], self.centre[1] + by[1]];
         Self { centre, ..self }
     }
 
-    /// Pixels of the picture for a pixel of the input, across and down.
+    /// Returns the number of pixels of the picture per pixel of the input, across and down.
     pub fn step(&self) -> [f64; 2] {
         self.step
     }
 
-    /// Writes the input of the network: the window, bilinear, prepared as the card says.
+    /// Writes the input of the network: the window, sampled bilinearly and prepared as the card says.
     ///
     /// * `rgb`: the picture, row major, red first; `size` is its width and height.
-    /// * `values`: three for every pixel of the input, all of them written.
+    /// * `values`: three values for every pixel of the input, all of which are written.
     ///
     /// # Panics
     ///
-    /// If the picture or the values have another length.
+    /// Panics if the picture or the values have another length.
     pub fn fill(&self, card: &Card, rgb: &[u8], size: [usize; 2], values: &mut [f32]) {
         let [width, height] = self.input;
         assert_eq!(rgb.len(), 3 * size[0] * size[1], "the picture is RGB");
@@ -169,7 +169,7 @@ fn is_unbiased(card: &Card) -> bool {
     matches!(card.output, Codec::HeatMap { udp: true, .. })
 }
 
-/// The box around the keypoints that were found with a score above 0: left, top, right, bottom.
+/// Returns the box around the keypoints that were found with a score above 0: left, top, right, bottom.
 pub fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
     let found = keypoints.iter().flatten().filter(|keypoint| keypoint.score > 0.0);
     found.fold(None, |around: Option<[f64; 4]>, it| {
@@ -179,8 +179,8 @@ pub fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
     })
 }
 
-/// The colour at a point, between four pixels; `fill` for those beyond the picture. The same bits as [`sample_anywhere`], without its
-/// question for every pixel whether it is in the picture.
+/// Returns the colour at a point, interpolated between four pixels; `fill` is the colour outside the picture. The result has the same bits
+/// as that of [`sample_anywhere`], but the function does not check for every pixel whether it is in the picture.
 pub(crate) fn sample(rgb: &[u8], size: [usize; 2], [x, y]: [f64; 2], fill: f32) -> [f32; 3] {
     let [width, height] = size;
     if !(x >= 0.0 && y >= 0.0 && x + 1.0 < width as f64 && y + 1.0 < height as f64) {
@@ -201,7 +201,7 @@ pub(crate) fn sample(rgb: &[u8], size: [usize; 2], [x, y]: [f64; 2], fill: f32) 
     })
 }
 
-/// The readable reference of [`sample`].
+/// Readable reference of [`sample`].
 fn sample_anywhere(
     rgb: &[u8],
     [width, height]: [usize; 2],

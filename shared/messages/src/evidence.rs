@@ -5,30 +5,32 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_CANDIDATES, MAX_LEVELS, Stamp, Status, Timing};
 
-/// Where the cells of one person's maps lie in the picture: `posenetwork::MapGrid`.
+/// Grid of the cells of one person's maps in the picture: `posenetwork::MapGrid`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("GridMessage.v1")]
 #[repr(C)]
 pub struct GridMessage {
     /// Centre of the first cell, pixels of the frame.
     pub first_px: [f64; 2],
-    /// Distance of neighbouring cells, across and down, pixels of the frame.
+    /// Distance between neighbouring cells, across and down, pixels of the frame.
     pub cell_px: [f64; 2],
     /// Number of columns and rows.
     pub size: [u32; 2],
 }
 
-/// The user header of a sample of `[f32]`, without gaps. By the method of networks these are the maps of one person after the other,
-/// in the order of the candidates, `[joint][row][column]`; by the paper's method the responses of an `fmp::Scope`. Its alignment
-/// places the values at the start of a cache line.
+/// The user header of a sample of `[f32]`, without gaps.
+///
+/// With the method of networks, the sample has the maps of one person after the other, in the order of the candidates:
+/// `[joint][row][column]`. With the paper's method, it has the responses of an `fmp::Scope`. The header's alignment places the
+/// values at the start of a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("EvidenceHeader.v4")]
 #[repr(C)]
 #[repr(align(64))]
 pub struct EvidenceHeader {
-    /// The frame.
+    /// Identity of the frame.
     pub stamp: Stamp,
-    /// When it was received and sent.
+    /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
     /// Width of the image, pixels.
     pub width: u32,
@@ -38,24 +40,23 @@ pub struct EvidenceHeader {
     pub status: Status,
     /// Number of valid entries of `levels`.
     pub n_levels: u32,
-    /// Number of people with maps; 0 by the paper's method. The fields after `people` are of the paper's method.
+    /// Number of people with maps; 0 with the paper's method. Only the paper's method uses the fields after `people`.
     pub n_people: u32,
     /// Explicit padding.
     pub padding: u32,
     /// The maps of each person.
     pub people: [GridMessage; MAX_CANDIDATES],
-    /// First column of the image that the responses cover, and the one after the last, pixels.
+    /// First column of the image with responses, and the column after the last, pixels.
     pub x: [u32; 2],
-    /// First row that they cover, and the one after the last, pixels.
+    /// First row of the image with responses, and the row after the last, pixels.
     pub y: [u32; 2],
-    /// First level that has responses, and the one after the last.
+    /// First level that has responses, and the level after the last.
     pub scope_levels: [u16; 2],
-    /// Levels of the pyramid that hold valid values, ascending.
+    /// Levels of the pyramid with valid values, ascending.
     pub levels: [u16; MAX_LEVELS],
-    /// Score of the best pose on each of `levels`, by this view alone; infinite where it is
-    /// unknown.
+    /// Score of the best pose on each of `levels`, from this view alone; infinite if unknown.
     pub best: [f32; MAX_LEVELS],
-    /// Upper bound of all partial sums of a score on each of `levels`, by this view alone.
+    /// Upper bound of all partial sums of a score on each of `levels`, from this view alone.
     pub size: [f32; MAX_LEVELS],
     /// Explicit padding.
     pub reserved: [u32; 9],

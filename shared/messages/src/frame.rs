@@ -7,16 +7,16 @@ use crate::{Stamp, Status, Timing};
 
 /// The user header of a sample of pixels: `[u8]`, RGB, row major, `width * height * 3` bytes.
 ///
-/// The image is the one that all later stages process: turned upright, resized and cropped. The
+/// All later stages process this image, which is already turned upright, resized and cropped. The
 /// header's alignment places the pixels at the start of a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("FrameHeader.v1")]
 #[repr(C)]
 #[repr(align(64))]
 pub struct FrameHeader {
-    /// The frame.
+    /// Identity of the frame.
     pub stamp: Stamp,
-    /// When it was received and sent.
+    /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
     /// Width, pixels; 0 if there is no image.
     pub width: u32,
@@ -26,10 +26,10 @@ pub struct FrameHeader {
     pub status: Status,
     /// Explicit padding.
     pub reserved: u32,
-    /// Number of frames of this view that were due but never sent, since the session began.
+    /// Number of frames of this view since the session began that were due but never sent.
     pub n_dropped: u64,
-    /// How long after the instant of the frame, which all views have in common, the picture was taken, nanoseconds;
-    /// negative for before, 0 if it is not known.
+    /// Time from the instant of the frame, which all views share, until the picture was taken, nanoseconds. Negative if the
+    /// picture was taken earlier; 0 if the time is not known.
     pub skew_nanos: i64,
     /// Explicit padding.
     pub reserved_end: [u64; 6],

@@ -17,16 +17,15 @@ pub struct Health {
     pub pid: u32,
     /// Number of restarts of the process.
     pub epoch: u32,
-    /// Number of turns of the process's main loop.
+    /// Number of iterations of the process's main loop.
     pub n_loops: u64,
-    /// When it was sent, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time of sending, `CLOCK_MONOTONIC`, nanoseconds.
     pub at_nanos: u64,
     /// Number of messages received.
     pub n_received: u64,
     /// Number of messages sent.
     pub n_sent: u64,
-    /// Number of messages or frames that were lost before they reached this process, or arrived too
-    /// late.
+    /// Number of messages or frames that were lost before they reached this process or arrived too late.
     pub n_dropped: u64,
     /// Last frame sent.
     pub last_frame: u64,
@@ -34,15 +33,13 @@ pub struct Health {
     pub p50_micros: u64,
     /// 99th percentile of the computing time, microseconds.
     pub p99_micros: u64,
-    /// Peak physical memory of the process, mapped shared memory included, bytes; 0 where the
-    /// system does not report it.
+    /// Peak physical memory of the process, including mapped shared memory, bytes; 0 if the system does not report it.
     pub peak_memory_bytes: u64,
     /// 1 once the process has reached the end of the stream and forwarded it.
     pub finished: u32,
-    /// Processor time of all threads of the process, milliseconds, modulo 2^32; 0 where the system
-    /// does not report it.
+    /// Processor time of all threads of the process, milliseconds, modulo 2^32; 0 if the system does not report it.
     pub cpu_millis: u32,
-    /// Total amount of work, if the process knows it (capture: frames in the footage), else 0.
+    /// Total amount of work, if the process knows it (for `capture`, the number of frames in the footage); otherwise 0.
     pub n_total: u64,
     /// Number of frames that the processor computed because the GPU was lost.
     pub n_without_gpu: u64,

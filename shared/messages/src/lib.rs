@@ -1,9 +1,9 @@
 //! Plain data that crosses process boundaries, and the names of the topics.
 //!
-//! Every message begins with a [`Stamp`]; a [`Status`] says that it carries a result, or why it does not; [`Timing`]
-//! tells when it was made. Counts come before fixed-size arrays; entries beyond the count are zero. Receivers must treat
-//! every count and index as untrusted (`wire` checks them). All messages are `Pod`: they have no padding and every bit
-//! pattern is valid, so they can be written to a file and read again.
+//! Every message begins with a [`Stamp`]. Its [`Status`] says that it carries a result, or why it has none. Its [`Timing`]
+//! has the times of receiving and sending. Counts come before fixed-size arrays; entries beyond the count are zero. Receivers
+//! must treat every count and index as untrusted (`wire` checks them). All messages are `Pod`: they have no padding and every
+//! bit pattern is valid, so they can be written to a file and read again.
 #![forbid(unsafe_code)]
 
 mod evidence;
@@ -34,21 +34,21 @@ pub use refusal::Refusal;
 pub use skeletons::{FusedView, Joint3d, Kept, Sides, SkeletonMessage, Skeletons};
 pub use stamp::{Stamp, Status, Timing};
 
-/// Largest number of parts of a model.
+/// Maximum number of parts of a model.
 pub const MAX_PARTS: usize = 32;
-/// Largest number of views of a rig.
+/// Maximum number of views of a rig.
 pub const MAX_VIEWS: usize = 16;
-/// Largest number of candidates of a view.
+/// Maximum number of candidates of a view.
 pub const MAX_CANDIDATES: usize = 8;
-/// Largest number of people of a frame.
+/// Maximum number of people in a frame.
 pub const MAX_PEOPLE: usize = 8;
-/// Largest number of joints of a joint set.
+/// Maximum number of joints of a joint set.
 pub const MAX_JOINTS: usize = 32;
-/// Largest number of extra keypoints of a person: those of networks beside the joints.
+/// Maximum number of extra keypoints of a person: keypoints of networks that are not joints.
 pub const MAX_KEYPOINTS: usize = 128;
-/// Largest number of extra keypoints of all candidates of a view.
+/// Maximum number of extra keypoints of all candidates of a view.
 pub const MAX_VIEW_KEYPOINTS: usize = 384;
-/// Largest number of levels of a pyramid (96 is enough for 15 000 pixels at ten levels per octave).
+/// Maximum number of levels of a pyramid (96 is enough for 15 000 pixels at ten levels per octave).
 pub const MAX_LEVELS: usize = 96;
 
 const _: () = {

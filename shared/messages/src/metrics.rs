@@ -1,27 +1,28 @@
-//! Where a process spends its time, and what it has lost.
+//! Times and losses of a process.
 
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Largest number of rows of a [`Metrics`]: one wait per view, and those that belong to no view.
+/// Maximum number of rows of a [`Metrics`]: one row of waiting per view, and the rows that belong to no view.
 pub const MAX_ROWS: usize = 24;
-/// Longest view name in [`Metrics`], bytes; longer names are cut.
+/// Maximum length of a view name in [`Metrics`], bytes; longer names are cut.
 pub const MAX_NAME: usize = 32;
 /// Number of causes in [`Metrics::n_dropped`].
 pub const N_CAUSES: usize = 5;
-/// Replaces the view index of a number that belongs to no view, or to all.
+/// Stands for the view index where a number belongs to no view, or to all views.
 pub const NO_VIEW: u32 = u32::MAX;
-/// Replaces the queue length of a process without a queue.
+/// Stands for the queue length of a process without a queue.
 pub const NO_QUEUE: u32 = u32::MAX;
-/// Replaces the number of people of a process that does not count them.
+/// Stands for the number of people if a process does not count them.
 pub const NO_PEOPLE: u32 = u32::MAX;
 
-/// Replaces a measurement of a camera that there is not yet.
+/// Stands for a measurement of a camera that does not exist yet.
 pub const UNMEASURED: i64 = i64::MIN;
 
-/// The metrics of a process since its last start. Every process sends them about once a second,
-/// when a subscriber connects, and at its end. Percentiles are taken over the whole time, from a
-/// histogram with two significant digits.
+/// The metrics of a process since its last start.
+///
+/// Every process sends them about once a second, when a subscriber connects, and at its end. Percentiles cover
+/// the whole time since the start. They come from a histogram with two significant digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Metrics.v5")]
 #[repr(C)]
@@ -32,30 +33,29 @@ pub struct Metrics {
     pub pid: u32,
     /// Number of restarts of the process.
     pub epoch: u32,
-    /// When counting began, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which counting began, `CLOCK_MONOTONIC`, nanoseconds.
     pub began_at_nanos: u64,
-    /// When this was sent, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time of sending, `CLOCK_MONOTONIC`, nanoseconds.
     pub at_nanos: u64,
     /// Number of messages received.
     pub n_received: u64,
-    /// Number of messages sent; the process `results`: results written.
+    /// Number of messages sent; for the process `results`, the number of results written.
     pub n_sent: u64,
-    /// Messages sent per second over the last seconds, in thousandths.
+    /// Messages sent per second, averaged over the last seconds, in thousandths.
     pub sent_millihertz: u64,
     /// Number of messages or frames lost, by [`Cause`].
     pub n_dropped: [u64; N_CAUSES],
-    /// Evidence sent, bytes.
+    /// Size of the evidence sent, bytes.
     pub evidence_bytes: u64,
-    /// Physical memory of the process, mapped shared memory included, bytes; 0 where the system
-    /// does not report it.
+    /// Physical memory of the process, including mapped shared memory, bytes; 0 if the system does not report it.
     pub memory_bytes: u64,
-    /// Its peak, bytes.
+    /// Peak physical memory of the process, bytes.
     pub peak_memory_bytes: u64,
     /// Number of frames or results that wait in the process, or [`NO_QUEUE`].
     pub queue: u32,
-    /// The largest number that ever waited, or [`NO_QUEUE`].
+    /// Maximum number of frames or results that ever waited, or [`NO_QUEUE`].
     pub longest_queue: u32,
-    /// The view of the process, or [`NO_VIEW`].
+    /// Index of the process's view, or [`NO_VIEW`].
     pub view: u32,
     /// 1 once the process has reached the end of the stream and forwarded it.
     pub finished: u32,
@@ -65,7 +65,7 @@ pub struct Metrics {
     pub n_rows: u32,
     /// Number of people in the last result, or [`NO_PEOPLE`].
     pub n_people: u32,
-    /// Counts of the pictures of its live camera; all 0 without one.
+    /// Counts of the pictures of the process's live camera; all 0 without a live camera.
     pub camera: CameraCounts,
     /// Durations, at most one row for each span and view.
     pub rows: [MetricsRow; MAX_ROWS],
@@ -73,63 +73,63 @@ pub struct Metrics {
 
 /// Counts of the pictures of a live camera since the process began.
 ///
-/// Every picture that the camera made is lost by it or delivered; every one that was delivered is used, surplus, overtaken
-/// or refused, but for those under way.
+/// The camera either loses or delivers each picture that it makes. Each delivered picture is used, surplus, overtaken
+/// or refused, unless it is still being processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("CameraCounts.v3")]
 #[repr(C)]
 pub struct CameraCounts {
-    /// How often the camera was opened; 0 for footage.
+    /// Number of times that the camera was opened; 0 for footage.
     pub n_connections: u64,
-    /// Pictures that the camera made: by its own numbers, or by its times where it has none.
+    /// Number of pictures that the camera made, from the camera's own picture numbers, or from its times if it has no numbers.
     pub n_made: u64,
-    /// Pictures among them that the camera never delivered.
+    /// Number of pictures that the camera made but never delivered.
     pub n_lost: u64,
-    /// Pictures among them that the camera delivered.
+    /// Number of pictures that the camera delivered.
     pub n_delivered: u64,
-    /// Delivered pictures that were sent on.
+    /// Number of delivered pictures that were sent on.
     pub n_used: u64,
-    /// Those for which there was no place in the grid of common instants.
+    /// Number of delivered pictures for which the grid of common instants had no place.
     pub n_surplus: u64,
-    /// Those in whose place a newer one was taken, because this process was slow.
+    /// Number of delivered pictures that a newer one replaced because this process was slow.
     pub n_overtaken: u64,
-    /// Those that are damaged, frozen or without a time that can be.
+    /// Number of delivered pictures that are damaged, frozen or have an impossible time.
     pub n_refused: u64,
     /// Pictures per second, in millionths, measured by the times of the camera; 0 if unknown.
     pub rate_microhertz: u64,
-    /// How long after its common instant the last picture that was used was taken, nanoseconds; negative for before.
+    /// Time from the common instant until the last used picture was taken, nanoseconds; negative if it was taken earlier.
     pub off_grid_nanos: i64,
-    /// The median of that over the last pictures, nanoseconds, or [`UNMEASURED`].
+    /// Median of `off_grid_nanos` over the last pictures, nanoseconds, or [`UNMEASURED`].
     pub skew_nanos: i64,
-    /// Amount by which the camera falls behind the common instants, parts per billion, negative for one that is faster; or
-    /// [`UNMEASURED`].
+    /// Rate at which the camera falls behind the common instants, parts per billion, or [`UNMEASURED`]. Negative for a camera
+    /// that is faster.
     pub drift_ppb: i64,
-    /// The shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds;
+    /// Shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds;
     /// [`UNMEASURED`] if it is not known.
     pub delay_nanos: i64,
     /// Source of the time at which the last picture was taken.
     pub timed_by: TimedBy,
 }
 
-/// Source of the times at which the pictures of a camera were taken. A transparent number, as [`Status`](crate::Status).
+/// Source of the times at which the pictures of a camera were taken. A transparent number, like [`Status`](crate::Status).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("TimedBy.v1")]
 #[repr(C)]
 pub struct TimedBy(pub u64);
 
 impl TimedBy {
-    /// There is no picture yet, or it is footage.
+    /// No source: there is no picture yet, or the pictures are footage.
     pub const NOTHING: Self = Self(0);
-    /// The kernel, when it had the picture from the camera.
+    /// The kernel: the time at which it received the picture from the camera.
     pub const DRIVER: Self = Self(1);
     /// The clock of the camera.
     pub const CAMERA: Self = Self(2);
-    /// Their arrival: they were taken earlier, by the time that they were on their way.
+    /// The arrival of the pictures, which were taken earlier by the time of the transfer.
     pub const ARRIVAL: Self = Self(3);
-    /// Their arrival, because the time that the camera gives is not plausible.
+    /// The arrival of the pictures, because the time that the camera gives is not plausible.
     pub const DISBELIEVED: Self = Self(4);
 
-    /// Name for messages to users.
+    /// Returns the name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -142,7 +142,7 @@ impl TimedBy {
         }
     }
 
-    /// Returns true if pictures count as taken when they came.
+    /// Returns true if the time of a picture is the time of its arrival.
     #[must_use]
     pub fn is_arrival(self) -> bool {
         matches!(self, Self::ARRIVAL | Self::DISBELIEVED)
@@ -177,30 +177,30 @@ impl Default for Metrics {
     }
 }
 
-/// Durations of one span, nanoseconds.
+/// Statistics of the durations of one span, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("MetricsRow.v1")]
 #[repr(C)]
 pub struct MetricsRow {
-    /// The span.
+    /// Span that was measured.
     pub span: Span,
-    /// The view, or [`NO_VIEW`].
+    /// Index of the view, or [`NO_VIEW`].
     pub view: u32,
     /// Number of measurements.
     pub count: u64,
-    /// Measurements per second over the last seconds, in thousandths.
+    /// Measurements per second, averaged over the last seconds, in thousandths.
     pub millihertz: u64,
-    /// Median.
+    /// Median duration.
     pub p50_nanos: u64,
-    /// 99th percentile.
+    /// 99th percentile of the durations.
     pub p99_nanos: u64,
-    /// 99.9th percentile.
+    /// 99.9th percentile of the durations.
     pub p99_9_nanos: u64,
-    /// Maximum.
+    /// Maximum duration.
     pub max_nanos: u64,
 }
 
-/// Span that a duration measures. A transparent number, as [`Status`](crate::Status).
+/// Span that a duration measures. A transparent number, like [`Status`](crate::Status).
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, ZeroCopySend, Pod, Zeroable,
 )]
@@ -209,17 +209,17 @@ pub struct MetricsRow {
 pub struct Span(pub u32);
 
 impl Span {
-    /// From the sending of a message until work on it begins: transport, a busy receiver, waiting
+    /// Time from the sending of a message until work on it begins. It includes transport, a busy receiver, and waiting
     /// for other views.
     pub const WAITING: Self = Self(0);
-    /// Work on a frame.
+    /// Time spent on computing the result of a frame.
     pub const COMPUTING: Self = Self(1);
-    /// Reserving memory for the result and sending it; in lossless delivery also waiting for slow
+    /// Time to reserve memory for the result and send it. In lossless delivery, it includes waiting for slow
     /// receivers.
     pub const PUBLISHING: Self = Self(2);
-    /// From the capture of a frame until the result of this process is ready to be sent.
+    /// Time from the capture of a frame until the result of this process is ready to be sent.
     pub const SINCE_CAPTURE: Self = Self(3);
-    /// From the capture of a frame until its final result is ready to be sent.
+    /// Time from the capture of a frame until its final result is ready to be sent.
     pub const END_TO_END: Self = Self(4);
 
     /// All spans.
@@ -231,7 +231,7 @@ impl Span {
         Self::END_TO_END,
     ];
 
-    /// Name for messages to users.
+    /// Returns the name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -245,12 +245,12 @@ impl Span {
     }
 }
 
-/// Why messages or frames were lost; the discriminant is the index into [`Metrics::n_dropped`].
+/// Cause of a loss of messages or frames. The discriminant is the index into [`Metrics::n_dropped`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Cause {
     /// The frame source fell behind its clock and skipped frames.
     BehindClock,
-    /// The process was busy, and newer frames replaced these.
+    /// The process was busy, and newer frames replaced the lost ones.
     Busy,
     /// The message arrived after its frame had been processed.
     Late,
@@ -270,7 +270,7 @@ impl Cause {
         Self::Malformed,
     ];
 
-    /// Name for messages to users.
+    /// Returns the name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! Who is in a frame: which candidate of every view is which person.
+//! People in a frame, and the candidate of every view that shows each person.
 
 use bytemuck::Zeroable as _;
 use bytemuck_derive::{Pod, Zeroable};
@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_PEOPLE, MAX_VIEWS, Stamp, Status, Timing};
 
-/// In [`PersonMessage::candidates`]: the view does not show the person.
+/// Entry of [`PersonMessage::candidates`] for a view that does not show the person.
 pub const NO_CANDIDATE: u8 = u8::MAX;
 
 /// One person.
@@ -14,27 +14,27 @@ pub const NO_CANDIDATE: u8 = u8::MAX;
 #[type_name("PersonMessage.v1")]
 #[repr(C)]
 pub struct PersonMessage {
-    /// Identity within the run, from 1; never used for another person.
+    /// Person's identity within the run, counted from 1; never reused for another person.
     pub id: u64,
-    /// Index of the person among the candidates of every view; [`NO_CANDIDATE`] where the view does not show the person, and beyond the
+    /// Index of the person among the candidates of every view. [`NO_CANDIDATE`] if the view does not show the person, and beyond the
     /// last view.
     pub candidates: [u8; MAX_VIEWS],
 }
 
-/// The people of one frame, the followed person first.
+/// The people of one frame. The followed person comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("People.v1")]
 #[repr(C)]
 pub struct People {
-    /// The frame; `view` is 0.
+    /// Identity of the frame; `view` is 0.
     pub stamp: Stamp,
-    /// When it was received and sent.
+    /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
     /// Says that there is at least one person, or why there is none.
     pub status: Status,
     /// Number of valid people.
     pub n_people: u32,
-    /// Number of people that several views agree on, whether or not they are in the list.
+    /// Number of people that several views agree on, including people that are not in the list.
     pub n_seen: u32,
     /// Bit `v` is set if the candidates of view `v` arrived in time.
     pub views_present: u32,

@@ -13,7 +13,7 @@ use crate::{MAX_CANDIDATES, MAX_JOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, Stamp, St
 pub struct PoseMessage {
     /// Score of the pose.
     pub score: f32,
-    /// Level of the pyramid, from 0.
+    /// Level of the pyramid, counted from 0.
     pub level: u16,
     /// Number of valid entries of the arrays.
     pub n_parts: u16,
@@ -21,24 +21,24 @@ pub struct PoseMessage {
     pub x: [u16; MAX_PARTS],
     /// Row of every part, response cells.
     pub y: [u16; MAX_PARTS],
-    /// Type of every part, from 0.
+    /// Type of every part, counted from 0.
     pub mixture: [u8; MAX_PARTS],
 }
 
-/// How well one part of the best candidate fits at its position: `fmp::LocalScore`.
+/// Measures of how well one part of the best candidate fits at its position: `fmp::LocalScore`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("LocalMessage.v1")]
 #[repr(C)]
 pub struct LocalMessage {
     /// Response of the part's filter.
     pub response: f32,
-    /// The response minus the mean response around it.
+    /// Response minus the mean response around the position.
     pub contrast: f32,
-    /// The response minus the best response of the part's other types.
+    /// Response minus the best response of the part's other types.
     pub margin: f32,
 }
 
-/// How much of the image and of its pyramid was searched for poses.
+/// Extent of the image and its pyramid that was searched for poses.
 ///
 /// A transparent number rather than an enum: any received bit pattern is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
@@ -52,7 +52,7 @@ impl Searched {
     /// The surroundings of the last pose.
     pub const TRACKED: Self = Self(1);
 
-    /// The name for people.
+    /// Returns the name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -68,9 +68,9 @@ impl Searched {
 #[type_name("ViewPose.v8")]
 #[repr(C)]
 pub struct ViewPose {
-    /// The frame and the view.
+    /// Identity of the frame and the view.
     pub stamp: Stamp,
-    /// When it was received and sent.
+    /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
     /// Says that there is a candidate, or why there is none.
     pub status: Status,
@@ -82,25 +82,27 @@ pub struct ViewPose {
     pub height: u32,
     /// Size of the responses that were sent as evidence, bytes; 0 without a subscriber.
     pub evidence_bytes: u64,
-    /// How long after the instant of the frame the picture was taken ([`FrameHeader`](crate::FrameHeader)), nanoseconds.
+    /// Time from the instant of the frame until the picture was taken, nanoseconds, as in [`FrameHeader`](crate::FrameHeader).
     pub skew_nanos: i64,
     /// Region that was searched.
     pub searched: Searched,
-    /// Number of extra keypoints of a candidate, as many as all views of the deployment know together.
+    /// Number of extra keypoints per candidate: all keypoints that any view of the deployment knows.
     pub n_keypoints: u32,
-    /// The candidates: cells by the paper's method, by that of networks the score alone, with `joints` and `heats`.
+    /// The candidates. With the paper's method, they have cells. With the method of networks, they have a score only; `joints`
+    /// and `heats` have the rest.
     pub candidates: [PoseMessage; MAX_CANDIDATES],
-    /// By the method of networks: where every joint of every candidate is seen best, pixels of the frame.
+    /// Best position of every joint of every candidate, pixels of the frame. Used by the method of networks only.
     pub joints: [[[f32; 2]; MAX_JOINTS]; MAX_CANDIDATES],
     /// Local scores of the parts of the first candidate.
     pub local: [LocalMessage; MAX_PARTS],
-    /// Evidence of the picture about the direction in which the person of every candidate faces: `multiview::FrontEvidence`,
-    /// `[towards the right of the picture, towards the camera]`; zeros where there is no evidence.
+    /// Evidence in the picture for the direction in which the person of every candidate faces: `multiview::FrontEvidence`,
+    /// `[towards the right of the picture, towards the camera]`. Zeros if there is no evidence.
     pub front: [[f32; 2]; MAX_CANDIDATES],
-    /// How sure the network is of every joint of every candidate, 0 to 1: 0 for one that is not seen; zeros of filters.
+    /// Confidence of the network in every joint of every candidate, from 0 to 1. It is 0 for a joint that is not seen, and always with
+    /// the paper's method.
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
-    /// The extra keypoints of one candidate after the other, for as many candidates as there is room: `[column, row, standard
-    /// deviation along one axis]`, pixels of the frame; a deviation of 0 for one that was not found.
+    /// The extra keypoints of one candidate after the other, for as many candidates as fit: `[column, row, standard
+    /// deviation along one axis]`, pixels of the frame. The deviation is 0 for a keypoint that was not found.
     pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],
 }
 
@@ -121,7 +123,7 @@ pub struct PairHypothesis {
     pub n_iterations: u32,
     /// 1 if the poses had converged at the end, 0 if the limit of iterations was reached.
     pub converged: u32,
-    /// 1 if left and right of the second view are exchanged with respect to the first.
+    /// 1 if left and right of the second view are exchanged relative to the first view.
     pub exchanged: u32,
     /// The candidate of each view from which the pair started.
     pub start: [u8; 2],
@@ -135,31 +137,30 @@ pub struct PairHypothesis {
 
 /// The result of one pair of views.
 ///
-/// Where all views are solved at once, the message carries the part of the result about one view
-/// and the first view with a result; the energies are then those of all views, and `view` of the
-/// stamp is the index of the view minus 1.
+/// If all views are solved at once, the message carries the result for one view and for the first view with a result.
+/// The energies are then those of all views, and `view` of the stamp is the index of the view minus 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("PairPose.v3")]
 #[repr(C)]
 pub struct PairPose {
-    /// The frame; `view` is the index of the pair.
+    /// Identity of the frame; `view` is the index of the pair.
     pub stamp: Stamp,
-    /// When it was received and sent.
+    /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
     /// Says that there is a hypothesis, or why there is none.
     pub status: Status,
     /// Number of valid hypotheses.
     pub n_hypotheses: u32,
-    /// The two views, ascending.
+    /// Indices of the two views, ascending.
     pub views: [u32; 2],
-    /// Same facing, then opposite facing; only one where facing is not decided.
+    /// The hypothesis of the same facing, then that of opposite facing. There is only one if facing is not decided.
     pub hypotheses: [PairHypothesis; 2],
     /// Bit `v` is set if the pose of view `v` arrived in time.
     pub views_present: u32,
-    /// For either view: the age of its expected errors in frames, plus 1, so that 1 means this very
-    /// frame; 0 without expected errors, in which case every part counts as usable.
+    /// Age of the expected errors of each of the two views, in frames, plus 1. The value 1 means this very frame; 0 means that
+    /// there are no expected errors, and every part counts as usable.
     pub sigma_age: [u16; 2],
-    /// For either view: the predicted distance of every part's centre from the truth, pixels of the
-    /// frame; for as many parts as the poses have, and only if `sigma_age` is not 0.
+    /// Predicted distance of every part's centre from the truth in each of the two views, pixels of the frame. It is valid for
+    /// as many parts as the poses have, and only if `sigma_age` is not 0.
     pub sigma_px: [[f32; MAX_PARTS]; 2],
 }

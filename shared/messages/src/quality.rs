@@ -10,25 +10,24 @@ use crate::{MAX_PARTS, Stamp, Status, Timing};
 #[type_name("ViewQuality.v2")]
 #[repr(C)]
 pub struct ViewQuality {
-    /// The frame and the view.
+    /// Identity of the frame and the view.
     pub stamp: Stamp,
-    /// When it was received and sent.
+    /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// Says that there is a prediction, or why there is none; without one, fusion treats every part as usable.
+    /// Says that there is a prediction, or why there is none. Without a prediction, fusion treats every part as usable.
     pub status: Status,
     /// Number of valid parts.
     pub n_parts: u32,
     /// Expected distance of the part's centre from the truth, pixels of the frame.
     pub sigma_px: [f32; MAX_PARTS],
-    /// Number of valid thresholds: all parts, or none.
+    /// Number of valid thresholds: the number of parts, or 0.
     pub n_thresholds: u32,
     /// Fingerprint of the network's file; 0 without a network.
     pub network: u32,
     /// Error above which a part is switched off, pixels of the frame, from the network's file.
     pub tau_px: [f32; MAX_PARTS],
-    /// The input tile of the network: `[x1, y1, x2, y2]`, centres of the outermost pixels of the
-    /// frame.
+    /// Input tile of the network: `[x1, y1, x2, y2]`, the centres of its outermost pixels in pixels of the frame.
     pub tile: [f32; 4],
-    /// Time that the prediction took, nanoseconds.
+    /// Duration of the prediction, nanoseconds.
     pub took_nanos: u64,
 }

@@ -1,15 +1,15 @@
-//! Why a receiver refused a message.
+//! Reasons why a receiver refuses a message.
 
-/// Why a receiver refused a message: its sender is faulty, or does not belong to the deployment.
+/// Reason why a receiver refused a message: its sender is faulty, or does not belong to the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Refusal {
-    /// It belongs to another session.
+    /// The message belongs to another session.
     Session,
-    /// Its view, pair or process is not the one that the topic belongs to.
+    /// The view, pair or process of the message is not the one that the topic belongs to.
     Sender,
-    /// Its time or frame number lies in the future.
+    /// The time or frame number of the message is in the future.
     Time,
-    /// A count or a size does not match the receiver's.
+    /// A count or a size does not match that of the receiver.
     Size,
     /// An index is out of range.
     Index,
@@ -31,7 +31,7 @@ impl Refusal {
         Self::Number,
     ];
 
-    /// The name for people.
+    /// Returns the name for messages to users.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! The final result: the people of a frame, each with its joints in the world and its fused pose in every view.
+//! The final result: the people of a frame, each with joints in the world and a fused pose in every view.
 
 use bytemuck::Zeroable as _;
 use bytemuck_derive::{Pod, Zeroable};
@@ -31,7 +31,7 @@ pub struct Joint3d {
 pub struct FusedView {
     /// Sum of the joint energies of the pairs that were averaged.
     pub energy: f64,
-    /// Pairs that were averaged; 0 if the pose is the view's own, or if there is none.
+    /// Number of pairs that were averaged; 0 if the pose is the view's own, or if there is no pose.
     pub n_pairs: u32,
     /// Says that there is a pose, or why there is none.
     pub status: Status,
@@ -45,21 +45,21 @@ pub struct FusedView {
     pub single_score: f64,
 }
 
-/// Certainty of left and right of a skeleton. A transparent number, as [`Status`].
+/// Certainty of left and right of a skeleton. A transparent number, like [`Status`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Sides.v1")]
 #[repr(C)]
 pub struct Sides(pub u32);
 
 impl Sides {
-    /// Nothing was decided: left and right are those of the pictures.
+    /// Left and right were not decided: they are those of the pictures.
     pub const AS_SEEN: Self = Self(0);
-    /// They are decided.
+    /// Left and right were decided with certainty.
     pub const SURE: Self = Self(1);
-    /// They are decided, but too little speaks for it.
+    /// Left and right were decided on too little evidence.
     pub const UNSURE: Self = Self(2);
 
-    /// The name for people and files.
+    /// Returns the name for messages to users and for files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -71,19 +71,19 @@ impl Sides {
     }
 }
 
-/// Which poses the skeleton was triangulated from. A transparent number, as [`Status`].
+/// Poses from which the skeleton was triangulated. A transparent number, like [`Status`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Kept.v1")]
 #[repr(C)]
 pub struct Kept(pub u32);
 
 impl Kept {
-    /// Those that fusion solved for.
+    /// The poses that fusion solved for.
     pub const SOLVED: Self = Self(0);
-    /// The single-view poses that fusion started from: they agree better.
+    /// The single-view poses from which fusion started, because they agree better.
     pub const START: Self = Self(1);
 
-    /// The name for people and files.
+    /// Returns the name for messages to users and for files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -99,9 +99,10 @@ impl Kept {
 #[type_name("SkeletonMessage.v1")]
 #[repr(C)]
 pub struct SkeletonMessage {
-    /// Identity within the run, from 1, as [`PersonMessage::id`](crate::PersonMessage::id); 1 by the paper's method, which names nobody.
+    /// Person's identity within the run, counted from 1, as in [`PersonMessage::id`](crate::PersonMessage::id). Always 1 with the
+    /// paper's method, which does not identify people.
     pub id: u64,
-    /// State of the person: [`Status::OK`] with a skeleton, else why there is none.
+    /// [`Status::OK`] if the person has a skeleton, otherwise the reason why not.
     pub status: Status,
     /// Number of valid joints.
     pub n_joints: u32,
@@ -111,65 +112,65 @@ pub struct SkeletonMessage {
     pub n_views: u32,
     /// Bit `v` is set if any joint uses view `v`.
     pub views_used: u32,
-    /// Number of pairs of views with a part in the skeleton.
+    /// Number of pairs of views that contributed to the skeleton.
     pub n_pairs: u32,
-    /// Certainty of left and right, by the margin of the decision.
+    /// Certainty of left and right, from the margin of the decision.
     pub sides: Sides,
     /// Poses from which the skeleton was triangulated.
     pub kept: Kept,
-    /// How certain it is which views see the person from the same side: energy of the chosen assignment
-    /// minus that of the best other one.
+    /// Certainty of which views see the person from the same side: energy of the chosen assignment
+    /// minus that of the best other assignment.
     pub facing_margin: f64,
-    /// How certain it is that left and right are not exchanged in all views: log-odds, nats.
+    /// Certainty that left and right are not exchanged in all views: log-odds, nats.
     pub sides_margin: f64,
-    /// Height of the person standing upright, by the lengths of the bones, metres; 0 if it is not known.
+    /// Height of the person when standing upright, from the lengths of the bones, metres; 0 if it is not known.
     pub stature_m: f64,
-    /// Root mean square deviation of the bones' lengths from those of people, standard deviations.
+    /// Root mean square deviation of the bone lengths from those of real people, in standard deviations.
     pub body_deviation: f64,
-    /// The joints.
+    /// The joints of the person.
     pub joints: [Joint3d; MAX_JOINTS],
-    /// The views.
+    /// The fused pose in every view.
     pub views: [FusedView; MAX_VIEWS],
-    /// Keypoints that networks name beside the joints, as the deployment numbers them; nothing holds them together.
+    /// Extra keypoints of networks, in the numbering of the deployment. No bones connect them.
     pub keypoints: [Joint3d; MAX_KEYPOINTS],
 }
 
 impl SkeletonMessage {
-    /// The valid joints, at most as many as fit.
+    /// Returns the valid joints, at most as many as fit.
     #[must_use]
     pub fn listed_joints(&self) -> &[Joint3d] {
         &self.joints[..(self.n_joints as usize).min(MAX_JOINTS)]
     }
 
-    /// The valid extra keypoints, at most as many as fit.
+    /// Returns the valid extra keypoints, at most as many as fit.
     #[must_use]
     pub fn listed_keypoints(&self) -> &[Joint3d] {
         &self.keypoints[..(self.n_keypoints as usize).min(MAX_KEYPOINTS)]
     }
 
-    /// The valid views, at most as many as fit.
+    /// Returns the valid views, at most as many as fit.
     #[must_use]
     pub fn listed_views(&self) -> &[FusedView] {
         &self.views[..(self.n_views as usize).min(MAX_VIEWS)]
     }
 }
 
-/// The skeletons of one frame, that of the person who is followed first.
+/// The skeletons of one frame. The followed person comes first.
 ///
-/// The count stands right before the list, so that what is in use is one piece of memory: a recording holds that and no more.
+/// The count is directly before the list, so that the used part is one block of memory. A recording has only this block.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Skeletons.v1")]
 #[repr(C)]
 pub struct Skeletons {
-    /// The frame; `view` is 0.
+    /// Identity of the frame; `view` is 0.
     pub stamp: Stamp,
-    /// When it was received and sent.
+    /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
-    /// [`Status::OK`] if any person has a skeleton, else why nobody has.
+    /// [`Status::OK`] if any person has a skeleton, otherwise the reason why not.
     pub status: Status,
-    /// Bit `v` is set if what view `v` found arrived in time.
+    /// Bit `v` is set if the result of view `v` arrived in time.
     pub views_present: u32,
-    /// Number of people that several views agree on, whether or not they are in the list; 0 if it was not counted.
+    /// Number of people that several views agree on, including people that are not in the list; 0 if they were not counted.
     pub n_seen: u32,
     /// Number of valid people.
     pub n_people: u32,
@@ -190,13 +191,13 @@ impl Default for SkeletonMessage {
 }
 
 impl Skeletons {
-    /// The valid people, at most as many as fit.
+    /// Returns the valid people, at most as many as fit.
     #[must_use]
     pub fn listed(&self) -> &[SkeletonMessage] {
         &self.people[..(self.n_people as usize).min(MAX_PEOPLE)]
     }
 
-    /// The followed person; `None` if there is nobody.
+    /// Returns the followed person; `None` if there is no person.
     #[must_use]
     pub fn followed(&self) -> Option<&SkeletonMessage> {
         self.listed().first()

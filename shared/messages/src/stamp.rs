@@ -3,16 +3,16 @@
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Run, frame and times to which a message belongs. Stages join by (session, frame), never by time of arrival.
+/// Run, frame and times to which a message belongs. Stages match messages by session and frame, never by time of arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Stamp.v1")]
 #[repr(C)]
 pub struct Stamp {
     /// Run of the deployment; a message of another session is ignored.
     pub session: u64,
-    /// Index of the frame in the footage, from 0, the same in all synchronised views.
+    /// Index of the frame in the footage, counted from 0; the same in all synchronised views.
     pub frame: u64,
-    /// When the frame was captured, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the frame was captured, `CLOCK_MONOTONIC`, nanoseconds.
     pub captured_at_nanos: u64,
     /// Index of the view in the rig, or of the pair in a [`PairPose`](crate::PairPose); 0 in a
     /// message about all views.
@@ -21,7 +21,7 @@ pub struct Stamp {
     pub epoch: u32,
 }
 
-/// State of a message: it carries a result, or the reason why not.
+/// State of a message: it carries a result, or the reason why there is none.
 ///
 /// A transparent number rather than an enum: any received bit pattern is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
@@ -62,10 +62,10 @@ impl Status {
     /// The picture cannot be decoded.
     pub const DAMAGED: Self = Self(14);
 
-    /// The body that was found is not one that a person can have.
+    /// The body that was found cannot be that of a person.
     pub const IMPLAUSIBLE: Self = Self(15);
 
-    /// It did not come from its host in time.
+    /// The frame did not arrive from its host in time.
     pub const LATE: Self = Self(16);
     /// The host of the camera does not answer.
     pub const HOST_GONE: Self = Self(17);
@@ -85,7 +85,7 @@ impl Status {
         Self::HOST_GONE,
     ];
 
-    /// The reason for people.
+    /// Returns the text for messages to users.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
@@ -112,17 +112,16 @@ impl Status {
     }
 }
 
-/// When a stage had received all inputs, and when it sent its result; `CLOCK_MONOTONIC`,
-/// nanoseconds.
+/// Times at which a stage received its last input and sent its result; `CLOCK_MONOTONIC`, nanoseconds.
 ///
-/// The difference is computing time; the time from one stage's `sent` to the next stage's
-/// `received` is transport.
+/// The difference is computing time. The time from one stage's `sent_at_nanos` to the next stage's
+/// `received_at_nanos` is transport.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Timing.v1")]
 #[repr(C)]
 pub struct Timing {
-    /// When the last input arrived (capture: when the pixels were requested).
+    /// Time at which the last input arrived. For `capture`, the time at which the pixels were requested.
     pub received_at_nanos: u64,
-    /// Just before the message was sent.
+    /// Time just before the message was sent.
     pub sent_at_nanos: u64,
 }

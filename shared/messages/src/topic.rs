@@ -1,57 +1,58 @@
-//! Names of the topics of a deployment. The number is the version of the message type.
+//! Names of the topics of a deployment.
 //!
-//! Views, pairs and processes are named by index or by role, so that no text from the user gets
-//! into a topic name.
+//! The number in a name is the version of the message type. Views, pairs and processes are named by index or by role,
+//! so that topic names never contain text from the user.
 
-/// Pixels of a view: `[u8]` with [`FrameHeader`](crate::FrameHeader).
+/// Returns the topic for the pixels of a view: `[u8]` with [`FrameHeader`](crate::FrameHeader).
 #[must_use]
 pub fn frame(view: usize) -> String {
     format!("frame/v1/{view}")
 }
 
-/// Pictures of the live camera of a view as they came, for recordings: `[u8]` with [`PictureHeader`](crate::PictureHeader).
+/// Returns the topic for the original pictures of the live camera of a view, for recordings: `[u8]` with
+/// [`PictureHeader`](crate::PictureHeader).
 #[must_use]
 pub fn picture(view: usize) -> String {
     format!("picture/v1/{view}")
 }
 
-/// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
+/// Returns the topic for the single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {
     format!("view-pose/v8/{view}")
 }
 
-/// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
+/// Returns the topic for the response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
 #[must_use]
 pub fn evidence(view: usize) -> String {
     format!("evidence/v4/{view}")
 }
 
-/// Expected errors of a view: [`ViewQuality`](crate::ViewQuality).
+/// Returns the topic for the expected errors of a view: [`ViewQuality`](crate::ViewQuality).
 #[must_use]
 pub fn view_quality(view: usize) -> String {
     format!("view-quality/v2/{view}")
 }
 
-/// Results of one fusion worker: [`PairPose`](crate::PairPose).
+/// Returns the topic for the results of one fusion worker: [`PairPose`](crate::PairPose).
 #[must_use]
 pub fn pair_pose(worker: usize) -> String {
     format!("pair-pose/v3/{worker}")
 }
 
-/// Who is in a frame: [`People`](crate::People).
+/// Returns the topic for the people in every frame: [`People`](crate::People).
 #[must_use]
 pub fn people() -> String {
     "people/v1".to_owned()
 }
 
-/// The result: [`Skeletons`](crate::Skeletons).
+/// Returns the topic for the final result: [`Skeletons`](crate::Skeletons).
 #[must_use]
 pub fn skeletons() -> String {
     "skeletons/v1".to_owned()
 }
 
-/// Heartbeats of a process: [`Health`](crate::Health).
+/// Returns the topic for the heartbeats of a process: [`Health`](crate::Health).
 ///
 /// * `process`: its unique name in the deployment, for example `pose-2`.
 #[must_use]
@@ -59,7 +60,7 @@ pub fn health(process: &str) -> String {
     format!("health/v5/{process}")
 }
 
-/// Times and counts of a process: [`Metrics`](crate::Metrics).
+/// Returns the topic for the times and counts of a process: [`Metrics`](crate::Metrics).
 ///
 /// * `process`: its unique name in the deployment.
 #[must_use]
@@ -67,7 +68,7 @@ pub fn metrics(process: &str) -> String {
     format!("{METRICS}{process}")
 }
 
-/// The process whose [`metrics`] are sent on a topic; `None` for other topics.
+/// Returns the process whose [`metrics`] are sent on a topic; `None` for other topics.
 #[must_use]
 pub fn process_of_metrics(topic: &str) -> Option<&str> {
     topic.strip_prefix(METRICS)

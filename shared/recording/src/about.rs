@@ -1,53 +1,53 @@
-//! Metadata of a recording: its run, and what was left out on purpose.
+//! Metadata of a recording: its run, and the data that were left out on purpose.
 
 use std::collections::BTreeMap;
 
 /// Name of the metadata record.
 pub(crate) const NAME: &str = "parallax";
-/// Name of the metadata record that names the topics by the numbers of their channels.
+/// Name of the metadata record that gives the topic of each channel number.
 pub(crate) const TOPICS: &str = "parallax.topics";
-/// Version of the format that this crate writes, and the only one that it reads.
+/// Version of the format that this crate writes. It reads no other version.
 const FORMAT: &str = "3";
 
 /// Data that were left out on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Without {
-    /// Frames are recorded without pixels.
+    /// True if frames are recorded without pixels.
     pub pixels: bool,
-    /// Evidence is not recorded.
+    /// True if evidence is not recorded.
     pub evidence: bool,
 }
 
 /// The run of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct About {
-    /// Version of the program that wrote it.
+    /// Version of the program that wrote the recording.
     pub version: String,
-    /// The session in the stamp of every message.
+    /// Session in the stamp of every message.
     pub session: u64,
     /// Start time, nanoseconds since 1970.
     pub began_unix_nanos: u64,
-    /// The settings of the run, as JSON.
+    /// Settings of the run, as JSON.
     pub settings: String,
     /// Data that were left out on purpose.
     pub without: Without,
 }
 
-/// The metadata of a recording is missing or invalid.
+/// Reason why the metadata of a recording is missing or invalid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AboutError {
     /// A key is missing.
-    #[error("the recording does not say its {0}")]
+    #[error("the recording does not state its {0}")]
     Missing(&'static str),
     /// A value is not a number.
     #[error("the recording's {key} is {got:?}")]
     Value {
-        /// Which.
+        /// Name of the key.
         key: &'static str,
         /// Value in the file.
         got: String,
     },
-    /// It was written by another version.
+    /// Another version of the program wrote the recording.
     #[error("the recording has format {got:?}, this program reads format {FORMAT}")]
     Format {
         /// Format in the file.

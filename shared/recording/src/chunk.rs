@@ -1,28 +1,28 @@
-//! The head of a chunk that is not compressed, and of its messages.
+//! The head of an uncompressed chunk, and the heads of its messages.
 
 use crate::Entry;
 use crate::message::PREAMBLE;
 
-/// Bytes of the head of a record: opcode and length.
+/// Size of the head of a record, bytes: opcode and length.
 pub(crate) const RECORD_HEAD_BYTES: u64 = 1 + 8;
-/// Bytes before the records of a chunk: the head of the record, times, length, checksum, compression, length.
+/// Number of bytes before the records of a chunk: the head of the record, times, length, checksum, compression, length.
 pub(crate) const HEAD_BYTES: usize = 1 + 8 + 8 + 8 + 8 + 4 + 4 + 8;
-/// Longest chunk that is read, bytes.
+/// Maximum size of a chunk that is read, bytes.
 const MOST_BYTES: u64 = 1 << 30;
-/// Bytes of a message before its data.
+/// Number of bytes of a message before its data.
 pub(crate) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
 
-/// Where the records of a chunk lie.
+/// Size and checksum of the records of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Chunk {
-    /// Bytes of its records.
+    /// Size of the chunk's records, bytes.
     pub(crate) n_bytes: u64,
-    /// Their checksum.
+    /// Checksum of the records.
     pub(crate) checksum: u32,
 }
 
 impl Chunk {
-    /// Reads the head of a chunk; `None` if it is not that of an uncompressed chunk, or its lengths contradict each other.
+    /// Reads the head of a chunk. Returns `None` if it is not that of an uncompressed chunk, or if its lengths contradict each other.
     pub(crate) fn read(head: &[u8; HEAD_BYTES]) -> Option<Self> {
         let number = |at: usize| -> Option<u64> {
             Some(u64::from_le_bytes(*head.get(at..)?.first_chunk()?))
@@ -48,7 +48,7 @@ impl Chunk {
 pub(crate) struct MessageHead {
     pub(crate) channel: u16,
     pub(crate) nth: u64,
-    /// Without its place.
+    /// Entry of the message, without its position.
     pub(crate) entry: Entry,
 }
 
@@ -69,5 +69,5 @@ impl MessageHead {
     }
 }
 
-/// Bytes at the beginning of a message up to the end of its frame: what stands before CDR, the session, the frame.
+/// Number of bytes from the beginning of a message to the end of its frame number: the preamble of CDR, the session, the frame.
 pub(crate) const FRAME_END: usize = PREAMBLE.len() + 8 + 8;

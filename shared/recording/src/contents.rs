@@ -6,7 +6,7 @@ use crate::chunk::MessageHead;
 use crate::{About, AboutError, Count, Damage, Entry, Extent, Kind, Recording, Track};
 use crate::{about, count, message};
 
-/// Most damaged positions that are kept.
+/// Maximum number of damaged positions that are kept.
 const MOST_DAMAGE: usize = 1000;
 
 #[derive(Debug)]
@@ -14,10 +14,10 @@ pub(crate) struct Contents {
     about: Result<About, AboutError>,
     counts: BTreeMap<String, Count>,
     pub(crate) extent: Extent,
-    /// Names of the topics; none for one that this program does not know.
+    /// Names of the topics; `None` for a topic that this program does not know.
     pub(crate) channels: BTreeMap<u16, Option<String>>,
     messages: BTreeMap<u16, Vec<Entry>>,
-    /// Expected and found messages of a channel.
+    /// Numbers of expected and of found messages of a channel.
     numbers: BTreeMap<u16, [u64; 2]>,
 }
 
@@ -46,7 +46,7 @@ impl Contents {
         }
     }
 
-    /// Takes in a message.
+    /// Adds a message to the contents.
     pub(crate) fn message(&mut self, message: &MessageHead) {
         let [due, n] = self.numbers.entry(message.channel).or_default();
         *due = (*due).max(message.nth.saturating_add(1));

@@ -1,17 +1,17 @@
-//! Recorded and lost messages of a topic.
+//! Numbers of recorded and of lost messages of a topic.
 
 use core::fmt;
 use core::str::FromStr;
 
-/// Name of the metadata record; the last one of a file is valid.
+/// Name of the metadata record. If a file has several, the last one is valid.
 pub(crate) const NAME: &str = "parallax.counts";
 
-/// Messages of one topic.
+/// Counts of the messages of one topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Count {
-    /// Written to the file.
+    /// Number of messages written to the file.
     pub recorded: u64,
-    /// Sent, but not recorded, since they came faster than they could be received or written.
+    /// Number of messages that were sent but not recorded, because they came faster than they could be received or written.
     pub lost: u64,
 }
 

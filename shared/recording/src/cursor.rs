@@ -1,8 +1,8 @@
-//! Sequential reading of a file of known length, so that every length in it is checked.
+//! Sequential reading of a file of known length. Every length in the file is checked against it.
 
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
-/// Why reading stops.
+/// Reason why reading stops.
 #[derive(Debug)]
 pub(crate) enum Stop {
     /// The file is truncated.
@@ -21,7 +21,7 @@ pub(crate) struct Cursor<'a, R: Read + Seek> {
 }
 
 impl<'a, R: Read + Seek> Cursor<'a, R> {
-    /// At the start of a file.
+    /// Creates a cursor at the start of a file.
     pub(crate) fn new(input: &'a mut R) -> io::Result<Self> {
         let end = input.seek(SeekFrom::End(0))?;
         input.seek(SeekFrom::Start(0))?;
@@ -32,12 +32,12 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         })
     }
 
-    /// Position, bytes from the start.
+    /// Returns the position, bytes from the start of the file.
     pub(crate) fn at(&self) -> u64 {
         self.at
     }
 
-    /// Length of the file, bytes.
+    /// Returns the length of the file, bytes.
     pub(crate) fn end(&self) -> u64 {
         self.end
     }
@@ -72,7 +72,7 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         self.input.seek_relative(n).map_err(Stop::Io)
     }
 
-    /// Kind and length of a record.
+    /// Reads the kind and length of a record.
     pub(crate) fn record_head(&mut self) -> Result<(u8, u64), Stop> {
         let [op] = self.array()?;
         Ok((op, u64::from_le_bytes(self.array()?)))
@@ -84,7 +84,7 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         self.input.seek(SeekFrom::Start(at)).map(drop)
     }
 
-    /// The checksum of the following bytes; the position does not change.
+    /// Returns the checksum of the next `n` bytes. The position does not change.
     pub(crate) fn checksum(&mut self, mut n: u64) -> Result<u32, Stop> {
         let begin = self.at;
         let mut hasher = crc32fast::Hasher::new();
@@ -97,7 +97,7 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         Ok(hasher.finalize())
     }
 
-    /// Moves to the end; returns whether the file ends with these bytes.
+    /// Moves to the end. Returns true if the file ends with these bytes.
     pub(crate) fn ends_with(&mut self, bytes: &[u8]) -> Result<bool, Stop> {
         if self.end - self.at < bytes.len() as u64 {
             return Ok(false);
@@ -108,7 +108,7 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
     }
 }
 
-/// A file that becomes shorter while it is read counts as truncated.
+/// Converts an error. A file that becomes shorter while it is read counts as truncated.
 fn short(error: io::Error) -> Stop {
     if error.kind() == io::ErrorKind::UnexpectedEof {
         Stop::Cut

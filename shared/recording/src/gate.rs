@@ -1,10 +1,10 @@
-//! The way to the file: counts what it holds, and closes once something could not be written.
+//! A writer between the recording and its file. It counts the bytes of the file, and closes once a write has failed.
 
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Counts the bytes of the file, and closes the way to it; shared with the [`Gate`].
+/// Counts the bytes of the file, and closes the [`Gate`] with which it is shared.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Keeper(Arc<State>);
 
@@ -15,17 +15,17 @@ struct State {
 }
 
 impl Keeper {
-    /// Returns the number of bytes that the file holds.
+    /// Returns the number of bytes of the file.
     pub(crate) fn n_bytes(&self) -> u64 {
         self.0.n_bytes.load(Ordering::Relaxed)
     }
 
-    /// Returns whether nothing more is written.
+    /// Returns true if nothing more is written.
     pub(crate) fn is_closed(&self) -> bool {
         self.0.is_closed.load(Ordering::Relaxed)
     }
 
-    /// Lets nothing more through: what follows would lie in a wrong place.
+    /// Stops all further writes, because they would be at a wrong position.
     pub(crate) fn close(&self) {
         self.0.is_closed.store(true, Ordering::Relaxed);
     }

@@ -7,50 +7,50 @@ use crate::{About, AboutError, Count, Kind};
 /// Position and times of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Entry {
-    /// When it was received, nanoseconds, `CLOCK_MONOTONIC` of the recording machine.
+    /// Time at which the message was received, nanoseconds, `CLOCK_MONOTONIC` of the recording machine.
     pub log_time: u64,
-    /// When it was sent, by the same clock.
+    /// Time at which the message was sent, by the same clock.
     pub publish_time: u64,
-    /// Offset of its data, bytes from the start of the file.
+    /// Offset of the message's data, bytes from the start of the file.
     pub offset: u64,
-    /// Its length, bytes.
+    /// Length of the data, bytes.
     pub len: u64,
-    /// Its frame; none for heartbeats, and where the topic was not known yet.
+    /// Frame of the message; `None` for heartbeats, and if the topic was not known yet.
     pub frame: Option<u64>,
-    /// Offset of its chunk, bytes from the start of the file.
+    /// Offset of the message's chunk, bytes from the start of the file.
     pub chunk: u64,
 }
 
-/// One topic.
+/// Messages of one topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Track {
-    /// The type of its messages.
+    /// Type of the messages.
     pub kind: Kind,
-    /// Its messages, in the order of the file.
+    /// Messages of the topic, in the order of the file.
     pub entries: Vec<Entry>,
 }
 
-/// How much of a file could be read.
+/// Part of a file that could be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Extent {
-    /// Bytes of the file.
+    /// Size of the file, bytes.
     pub file_bytes: u64,
-    /// End of the last complete record.
+    /// Offset of the end of the last complete record, bytes.
     pub whole_bytes: u64,
     /// True if the file is complete.
     pub is_complete: bool,
-    /// Damaged positions; the first thousand.
+    /// Damaged positions, at most the first thousand.
     pub damage: Vec<Damage>,
-    /// Malformed messages, which were skipped.
+    /// Number of malformed messages, which were skipped.
     pub n_malformed: u64,
-    /// Messages that were written but not found, by topic: gaps in the consecutive numbers.
+    /// Number of messages that were written but not found, by topic. They leave gaps in the consecutive numbers.
     pub missing: BTreeMap<String, u64>,
 }
 
 /// A damaged position in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Damage {
-    /// Offset, bytes from the start.
+    /// Offset of the damage, bytes from the start of the file.
     pub offset: u64,
     /// Description of the damage.
     pub what: &'static str,
@@ -59,35 +59,35 @@ pub struct Damage {
 /// The contents of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Recording {
-    /// Its metadata.
+    /// Metadata of the recording.
     pub about: Result<About, AboutError>,
-    /// Its topics by name, without those that this program does not know.
+    /// Topics by name, without those that this program does not know.
     pub tracks: BTreeMap<String, Track>,
-    /// Recorded and lost messages of every topic, as far as the file contains the counts.
+    /// Numbers of recorded and of lost messages of every topic whose counts the file contains.
     pub counts: BTreeMap<String, Count>,
-    /// How much of it could be read.
+    /// Part of the file that could be read.
     pub extent: Extent,
 }
 
 impl Recording {
-    /// All messages that can be read.
+    /// Returns the number of all messages that can be read.
     pub fn n_messages(&self) -> u64 {
         let tracks = self.tracks.values();
         tracks.map(|track| track.entries.len() as u64).sum()
     }
 
-    /// Messages of all topics that were sent but not recorded, as far as the file contains the counts.
+    /// Returns the number of messages that were sent but not recorded, over all topics whose counts the file contains.
     pub fn n_lost(&self) -> u64 {
         let lost = self.counts.values().map(|value| value.lost);
         lost.fold(0, u64::saturating_add)
     }
 
-    /// Messages of all topics that were written but not found.
+    /// Returns the number of messages of all topics that were written but not found.
     pub fn n_missing(&self) -> u64 {
         self.extent.missing.values().sum()
     }
 
-    /// When the first and the last message with a time were sent, without heartbeats and pictures of cameras.
+    /// Returns the times at which the first and the last message with a time were sent. Heartbeats and pictures of cameras are left out.
     pub fn span(&self) -> Option<[u64; 2]> {
         let is_stamped = |track: &&Track| !matches!(track.kind, Kind::Health | Kind::Picture);
         let stamped = self.tracks.values().filter(is_stamped);
@@ -100,8 +100,8 @@ impl Recording {
     }
 }
 
-/// The messages of several topics in the order in which they were sent, each with the number of its
-/// topic. Messages sent at the same time are in the order of reception, then in that of the file.
+/// Returns the messages of several topics in the order in which they were sent, each with the number of its
+/// topic. Messages sent at the same time are in the order of reception, then in the order of the file.
 pub fn in_order(tracks: &[&Track]) -> Vec<(usize, Entry)> {
     let numbered = tracks.iter().enumerate();
     let mut all: Vec<(usize, Entry)> = numbered

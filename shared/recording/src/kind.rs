@@ -18,13 +18,13 @@ pub enum Kind {
     ViewQuality,
     /// Results of a fusion worker.
     PairPose,
-    /// Who is in a frame.
+    /// The people in a frame.
     People,
-    /// The result.
+    /// The final result.
     Skeletons,
     /// Heartbeats of a process.
     Health,
-    /// Pictures of a live camera as they came.
+    /// Pictures of a live camera in their original form.
     Picture,
 }
 
@@ -43,7 +43,7 @@ const PARTS: [(&str, &str); 10] = [
 ];
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 9] = [
         Self::Frame,
         Self::Evidence,
@@ -56,7 +56,7 @@ impl Kind {
         Self::Picture,
     ];
 
-    /// The message type of a topic; none for an unknown one.
+    /// Returns the message type of a topic; `None` for an unknown topic.
     pub fn of_topic(name: &str) -> Option<Self> {
         let family = |name: &str| name.rsplit_once('/').map(|parts| parts.0.to_owned());
         Self::ALL.into_iter().find(|kind| match kind {
@@ -71,7 +71,7 @@ impl Kind {
         Self::of_topic(name).is_none() && base(&self.example()) == base(name)
     }
 
-    /// A topic of this kind.
+    /// Returns the name of a topic of this kind.
     fn example(self) -> String {
         match self {
             Self::Frame => topic::frame(0),
@@ -86,7 +86,8 @@ impl Kind {
         }
     }
 
-    /// Size of the message without its array, bytes; of skeletons, whose list of people is written as one, what stands before its count.
+    /// Returns the size of the message without its array, bytes. For skeletons, whose list of people is written as an array, this is the
+    /// size of the fields before the count.
     pub fn head_bytes(self) -> usize {
         match self {
             Self::Frame => size_of::<FrameHeader>(),
@@ -101,7 +102,7 @@ impl Kind {
         }
     }
 
-    /// Size of an element of its array, bytes; none if it has no array.
+    /// Returns the size of an element of the message's array, bytes; `None` if it has no array.
     pub fn element_bytes(self) -> Option<usize> {
         match self {
             Self::Frame | Self::Picture => Some(size_of::<u8>()),
@@ -111,7 +112,7 @@ impl Kind {
         }
     }
 
-    /// Most elements that its array has.
+    /// Returns the maximum number of elements of the message's array.
     pub(crate) fn most_elements(self) -> u64 {
         match self {
             Self::Skeletons => MAX_PEOPLE as u64,
@@ -119,7 +120,7 @@ impl Kind {
         }
     }
 
-    /// Offset of its status, bytes; none if it has no stamp.
+    /// Returns the offset of the message's status, bytes; `None` if it has no stamp.
     pub(crate) fn status_at(self) -> Option<usize> {
         match self {
             Self::Frame => Some(core::mem::offset_of!(FrameHeader, status)),
@@ -134,7 +135,7 @@ impl Kind {
         }
     }
 
-    /// The name of its schema.
+    /// Returns the name of the message's schema.
     pub fn schema_name(self) -> &'static str {
         match self {
             Self::Frame => "parallax/msg/Frame",
@@ -163,7 +164,7 @@ impl Kind {
         }
     }
 
-    /// Its schema, `ros2msg`: its definition and those of all types that it refers to.
+    /// Returns the message's schema, `ros2msg`: its definition and those of all types that it refers to.
     pub fn schema(self) -> String {
         let mut text = self.own_schema().to_owned();
         let rule = "=".repeat(80);
@@ -193,7 +194,7 @@ impl Kind {
 mod tests {
     use super::*;
 
-    /// Size and alignment of a type in CDR, bytes; an array of variable length counts as 0.
+    /// Returns the size and alignment of a type in CDR, bytes. An array of variable length counts as 0.
     fn size(kind: &str) -> [usize; 2] {
         if let Some((one, n)) = kind.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')) {
             let [size, alignment] = size(one);
@@ -213,7 +214,7 @@ mod tests {
         let mut most = 1;
         for line in text.lines() {
             let [bytes, alignment] = size(line.split_whitespace().next().unwrap());
-            // The count of a list stands before it.
+            // The count of a list precedes it.
             let begin = at + if line.contains("[] ") { 4 } else { 0 };
             assert_eq!(
                 begin % alignment,

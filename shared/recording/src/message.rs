@@ -5,7 +5,7 @@ use messages::{Skeletons, Stamp, Status, Timing};
 
 use crate::Kind;
 
-/// The head of CDR: little endian, no options.
+/// Preamble of CDR: little endian, no options.
 pub(crate) const PREAMBLE: [u8; 4] = [0, 1, 0, 0];
 
 const _: () = assert!(
@@ -13,26 +13,26 @@ const _: () = assert!(
     "messages are written in the layout of memory"
 );
 
-/// The bytes of a message do not match its type.
+/// Reason why the bytes of a message do not match its type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
-    /// Its length does not match its type and its count.
+    /// The length of the message does not match its type and its count.
     #[error("the message has {len} bytes, expected {expected}")]
     Length {
-        /// Its length, bytes.
+        /// Length of the message, bytes.
         len: u64,
-        /// The expected length, bytes; the smallest one if the count is missing.
+        /// Expected length, bytes. If the count is missing, this is the minimum length.
         expected: u64,
     },
-    /// It is not little-endian CDR.
+    /// The message is not little-endian CDR.
     #[error("the message begins with {0:02x?}, which is not little-endian CDR")]
     Encoding([u8; 4]),
 }
 
 /// Appends a message to `out`.
 ///
-/// * `head`: the struct, [`Kind::head_bytes`] long; truncated or padded to that length.
-/// * `elements`: its array as bytes, if it has one.
+/// * `head`: the struct. It is truncated or padded to [`Kind::head_bytes`].
+/// * `elements`: the array of the message as bytes, if it has one.
 pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
     out.extend_from_slice(&PREAMBLE);
     let begin = out.len();
@@ -45,7 +45,7 @@ pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
     }
 }
 
-/// Skeletons as a struct and its array: the fields before the count, and the people.
+/// Splits skeletons into the fields before the count, and the array of people.
 pub fn split_skeletons(skeletons: &Skeletons) -> [&[u8]; 2] {
     let head = &bytes_of(skeletons)[..Kind::Skeletons.head_bytes()];
     [head, cast_slice(skeletons.listed())]
@@ -54,9 +54,9 @@ pub fn split_skeletons(skeletons: &Skeletons) -> [&[u8]; 2] {
 /// A parsed message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
-    /// The struct.
+    /// Bytes of the struct.
     pub head: &'a [u8],
-    /// The array; empty if it has none.
+    /// Bytes of the array; empty if the message has none.
     pub elements: &'a [u8],
 }
 
@@ -65,7 +65,7 @@ impl<'a> Message<'a> {
     ///
     /// # Errors
     ///
-    /// [`Malformed`].
+    /// Returns a [`Malformed`] on failure.
     pub fn parse(kind: Kind, data: &'a [u8]) -> Result<Self, Malformed> {
         let fixed = PREAMBLE.len() + kind.head_bytes();
         check_length(kind, data.len() as u64)?;
@@ -91,7 +91,7 @@ impl<'a> Message<'a> {
         Ok(Self { head, elements })
     }
 
-    /// The message as [`Skeletons`]; `None` if it is of another kind.
+    /// Returns the message as [`Skeletons`]; `None` if it is of another kind.
     pub fn skeletons(&self) -> Option<Box<Skeletons>> {
         let mut skeletons = Box::<Skeletons>::default();
         let size = Kind::Skeletons.element_bytes()?;
@@ -133,16 +133,16 @@ pub(crate) fn check_length(kind: Kind, len: u64) -> Result<(), Malformed> {
 /// Stamp, timing and status of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Envelope {
-    /// Its stamp.
+    /// Stamp of the message.
     pub stamp: Stamp,
-    /// Its times.
+    /// Times of the message.
     pub timing: Timing,
-    /// Says that the message contains a result, or why it does not.
+    /// Says that the message contains a result, or why it has none.
     pub status: Status,
 }
 
 impl Envelope {
-    /// Reads it from a struct; none for heartbeats, which have no stamp, and for a struct that is too short.
+    /// Reads the envelope from a struct. Returns `None` for heartbeats, which have no stamp, and for a struct that is too short.
     pub fn of(kind: Kind, head: &[u8]) -> Option<Self> {
         let at = kind.status_at()?;
         let stamp = head.get(..size_of::<Stamp>())?;
@@ -155,7 +155,7 @@ impl Envelope {
         })
     }
 
-    /// Writes it into a struct of the type; heartbeats and structs that are too short are not changed.
+    /// Writes the envelope into a struct of the type. Heartbeats and structs that are too short are not changed.
     pub fn put(&self, kind: Kind, head: &mut [u8]) {
         let Some(at) = kind.status_at().filter(|_| head.len() >= kind.head_bytes()) else {
             return;
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// The bytes of messages with this envelope, one of every kind that has any.
+    /// Returns the bytes of messages with this envelope, one of every kind that has an envelope.
     fn heads(it: Envelope) -> Vec<(Kind, Vec<u8>)> {
         let (mut frame, mut evidence) = (FrameHeader::default(), EvidenceHeader::default());
         let (mut pose, mut quality) = (ViewPose::default(), ViewQuality::default());
@@ -259,7 +259,7 @@ mod tests {
             let [head, elements] = split_skeletons(&skeletons);
             let mut data = Vec::new();
             encode(Kind::Skeletons, head, elements, &mut data);
-            // As memory holds them: the count right before the list.
+            // The layout is that of memory, with the count directly before the list.
             let n_bytes = core::mem::offset_of!(Skeletons, people) + elements.len();
             assert_eq!(data[PREAMBLE.len()..], bytes_of(&*skeletons)[..n_bytes]);
             let got = Message::parse(Kind::Skeletons, &data).unwrap();

@@ -1,4 +1,4 @@
-//! Reads single messages, each out of a chunk that is what its checksum says.
+//! Reads single messages, each from a chunk that matches its checksum.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -6,39 +6,39 @@ use crate::chunk::{Chunk, HEAD_BYTES};
 use crate::message::PREAMBLE;
 use crate::{Entry, Kind, Message, Recording, message};
 
-/// Most bytes that are reserved on the word of a file.
+/// Maximum number of bytes that are reserved because a file states this length.
 const MOST_RESERVED: u64 = 64 << 20;
 
-/// A recording cannot be read.
+/// Reason why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// It is another kind of file.
+    /// The file is not an MCAP file.
     #[error("this is not an MCAP file")]
     NotMcap,
     /// The file cannot be read.
     #[error("cannot read the recording")]
     Read(#[from] io::Error),
-    /// A chunk does not match its checksum, and with it all its messages.
+    /// A chunk does not match its checksum, so none of its messages can be trusted.
     #[error("the chunk at byte {offset} does not match its checksum")]
     Checksum {
-        /// Its offset in the file, bytes.
+        /// Offset of the chunk in the file, bytes.
         offset: u64,
     },
     /// A message has changed since the file was scanned.
     #[error("the message at byte {offset} cannot be read")]
     Message {
-        /// Its offset in the file, bytes.
+        /// Offset of the message in the file, bytes.
         offset: u64,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: message::Malformed,
     },
 }
 
-/// The chunks that were read last: messages that lie side by side are read and checked together. Belongs to one file.
+/// The chunks of one file that were read last. Messages of the same chunk are read and checked together.
 #[derive(Debug, Default)]
 pub struct Buffer {
-    /// The one that was used last comes first.
+    /// Chunks in order of use; the last used one comes first.
     chunks: [Loaded; 2],
 }
 
@@ -51,7 +51,7 @@ struct Loaded {
 }
 
 impl Buffer {
-    /// Returns the chunk at an offset, of the file if it is not here already.
+    /// Returns the chunk at an offset. Reads it from the file if it is not in the buffer.
     fn chunk<R: Read + Seek>(&mut self, input: &mut R, at: u64) -> io::Result<&Loaded> {
         let [first, second] = &self.chunks;
         if first.at != Some(at) {
@@ -86,13 +86,13 @@ impl Loaded {
     }
 }
 
-/// Reads a message, compares the checksum of its chunk, and takes it apart.
+/// Reads a message, compares the checksum of its chunk, and parses it.
 ///
 /// * `buffer`: keeps the chunk for the next message.
 ///
 /// # Errors
 ///
-/// [`ReadError::Read`], [`ReadError::Checksum`], [`ReadError::Message`].
+/// Returns [`ReadError::Read`], [`ReadError::Checksum`] or [`ReadError::Message`].
 pub fn read<'a, R: Read + Seek>(
     input: &mut R,
     kind: Kind,
@@ -113,11 +113,11 @@ pub fn read<'a, R: Read + Seek>(
     Message::parse(kind, data).map_err(|source| ReadError::Message { offset, source })
 }
 
-/// Reads the struct of a message into `buffer`, without its array, and so without a checksum.
+/// Reads the struct of a message into `buffer`, without its array, and therefore without comparing a checksum.
 ///
 /// # Errors
 ///
-/// [`ReadError::Read`].
+/// Returns [`ReadError::Read`] on failure.
 pub fn read_head<'a, R: Read + Seek>(
     input: &mut R,
     kind: Kind,
@@ -133,23 +133,23 @@ pub fn read_head<'a, R: Read + Seek>(
 /// A message that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Damaged {
-    /// Its topic.
+    /// Topic of the message.
     pub topic: String,
-    /// Its frame.
+    /// Frame of the message.
     pub frame: Option<u64>,
-    /// Its offset, bytes from the start of the file.
+    /// Offset of the message, bytes from the start of the file.
     pub offset: u64,
-    /// Offset of its chunk, bytes from the start of the file: one changed byte in it damages all its messages.
+    /// Offset of the message's chunk, bytes from the start of the file. One changed byte in a chunk damages all its messages.
     pub chunk: u64,
 }
 
 /// Reads all messages of some topics, and returns those that [`read`] would refuse.
 ///
-/// * `wanted`: whether a topic is checked.
+/// * `wanted`: returns true if a topic has to be checked.
 ///
 /// # Errors
 ///
-/// If the file cannot be read.
+/// Fails if the file cannot be read.
 pub fn check<R: Read + Seek>(
     input: &mut R,
     recording: &Recording,

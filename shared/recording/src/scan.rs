@@ -1,8 +1,8 @@
 //! Scans a recording for the positions of all messages, up to the last complete chunk.
 //!
-//! Reads the file from its start, and skips the contents of messages. So it needs no index at the end, and what a killed
-//! run leaves is read like a complete file. After damage it searches for the next chunk. The reader of the crate `mcap`
-//! reads every byte that it passes, and stops at the first that is wrong.
+//! The scan reads the file from its start, and skips the contents of messages. It needs no index at the end, so
+//! the file of a killed run is read like a complete file. After damage, it searches for the next chunk. By contrast, the reader of the
+//! crate `mcap` reads every byte, and stops at the first wrong one.
 
 use std::io::{self, Read, Seek};
 
@@ -19,21 +19,23 @@ use crate::{ReadError, Recording, about};
 
 /// Block size of the search, bytes.
 const WINDOW_BYTES: u64 = 1 << 16;
-/// Longest record that is not a message or a chunk, bytes.
+/// Maximum length of a record that is not a message or a chunk, bytes.
 const MAX_RECORD_BYTES: u64 = 16 << 20;
-/// Most false starts of records in a search.
+/// Maximum number of false starts of records in a search.
 const MOST_FALSE_STARTS: u32 = 10_000;
-/// Bytes of a record of metadata before the text of its name.
+/// Number of bytes of a metadata record before the text of its name.
 const NAME_AT: usize = RECORD_HEAD_BYTES as usize + 4;
-/// Most topics.
+/// Maximum number of topics.
 const MOST_TOPICS: usize = 1024;
 
-/// Finds every message of a file. For any file content it takes memory only for existing messages, 56 bytes
+/// Finds every message of a file.
+///
+/// Regardless of the file's content, it needs memory only for existing messages, 56 bytes
 /// each. Contents of messages are not read: see [`read`](crate::read()) and [`check`](crate::check).
 ///
 /// # Errors
 ///
-/// [`ReadError::NotMcap`], [`ReadError::Read`]. A truncated or damaged file is not an error: see
+/// Returns [`ReadError::NotMcap`] or [`ReadError::Read`]. A truncated or damaged file is not an error: see
 /// [`Extent`](crate::Extent).
 pub fn scan<R: Read + Seek>(input: &mut R) -> Result<Recording, ReadError> {
     let mut cursor = Cursor::new(input)?;
@@ -85,7 +87,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         }
     }
 
-    /// Reads a record; returns whether it was the last.
+    /// Reads a record. Returns true if it was the last one.
     fn record(&mut self) -> Result<bool, Stop> {
         let begin = self.cursor.at();
         let (op, len) = self.cursor.record_head()?;
@@ -108,7 +110,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(false)
     }
 
-    /// Takes in what is said about the run; none if it is damaged.
+    /// Reads the metadata of the run. Returns `None` if it is damaged.
     fn metadata(&mut self, body: &[u8]) -> Option<()> {
         let Ok(Record::Metadata(said)) = mcap::parse_record(op::METADATA, body) else {
             return None;
@@ -118,7 +120,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         Some(())
     }
 
-    /// Finds the messages of a chunk. One that contradicts itself is left out as a whole.
+    /// Finds the messages of a chunk. A chunk with contradictions is left out as a whole.
     fn chunk(&mut self, begin: u64) -> Result<(), Stop> {
         self.cursor.go(begin).map_err(Stop::Io)?;
         let head = self.cursor.array::<HEAD_BYTES>()?;
@@ -167,7 +169,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                     message.entry.chunk = begin;
                     message.entry.offset = self.cursor.at();
                     message.entry.len = len - MESSAGE_HEAD_BYTES;
-                    // Names of topics may follow at the end only: which messages have a frame is decided then.
+                    // The names of topics may follow at the end only, so it is decided there which messages have a frame.
                     if message.entry.len >= FRAME_END as u64 {
                         let head = self.cursor.array::<FRAME_END>()?;
                         let frame = head.last_chunk().copied();
@@ -217,7 +219,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(())
     }
 
-    /// Moves to the next chunk or metadata; `false` if there is none.
+    /// Moves to the next chunk or metadata. Returns false if there is none.
     fn go_to_next(&mut self, mut from: u64) -> io::Result<bool> {
         let overlap = HEAD_BYTES as u64 - 1;
         while from < self.cursor.end() {
@@ -249,14 +251,14 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(false)
     }
 
-    /// Returns true if the head of a whole chunk stands here. Its lengths say so in three places.
+    /// Returns true if the head of a complete chunk begins here. Three of its lengths must agree.
     fn is_chunk(&self, bytes: &[u8], begin: u64) -> bool {
         let chunk = bytes.first_chunk().and_then(Chunk::read);
         let head = begin + HEAD_BYTES as u64;
         chunk.is_some_and(|chunk| head + chunk.n_bytes <= self.cursor.end())
     }
 
-    /// Returns true if undamaged metadata stands here.
+    /// Returns true if undamaged metadata begins here.
     fn is_metadata(&mut self, begin: u64) -> io::Result<bool> {
         self.cursor.go(begin)?;
         let Some((_, len)) = or_io(self.cursor.record_head())? else {
@@ -282,7 +284,7 @@ fn is_ours(bytes: &[u8]) -> bool {
     name.is_some_and(|name| name.starts_with(about::NAME.as_bytes()))
 }
 
-/// None if the file is truncated or the content invalid.
+/// Returns `None` if the file is truncated or its content is invalid.
 fn or_io<T>(it: Result<T, Stop>) -> io::Result<Option<T>> {
     match it {
         Ok(it) => Ok(Some(it)),

@@ -1,8 +1,8 @@
-//! Metadata with a checksum, which MCAP has for chunks only.
+//! Adds a checksum to metadata, because MCAP has checksums for chunks only.
 
 use std::collections::BTreeMap;
 
-/// The key of the checksum in the map.
+/// Key of the checksum in the map.
 const KEY: &str = "checksum";
 
 fn checksum(name: &str, map: &BTreeMap<String, String>) -> String {
@@ -22,7 +22,7 @@ pub(crate) fn seal(name: &str, mut map: BTreeMap<String, String>) -> BTreeMap<St
     map
 }
 
-/// Returns the map without its checksum; none if it is damaged.
+/// Returns the map without its checksum; `None` if it is damaged.
 pub(crate) fn unseal(
     name: &str,
     mut map: BTreeMap<String, String>,

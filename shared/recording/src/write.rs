@@ -1,4 +1,4 @@
-//! Writing a recording: append only, so that what has been written stays whatever comes after.
+//! Writes a recording. The file is only appended to, so that later failures do not damage what has been written.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -12,49 +12,49 @@ use crate::gate::{Gate, Keeper};
 use crate::seal::seal;
 use crate::{About, Count, Entry, Envelope, Kind, about, count, message};
 
-/// A chunk ends with the message that makes it longer than this, or with its frame.
+/// Size at which a chunk ends, bytes. It ends with the message that exceeds this size, or earlier, with the last message of its frame.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// A recording cannot be written.
+/// Reason why a recording cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The file cannot be written to. What it holds already stays readable.
+    /// The file cannot be written to. Its present content stays readable.
     #[error("cannot write the recording beyond {n_bytes} bytes")]
     Write {
-        /// Bytes that it holds.
+        /// Size of the file, bytes.
         n_bytes: u64,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: io::Error,
     },
-    /// The topic is not one of this program's.
+    /// This program does not know the topic.
     #[error("topic {0:?} is unknown")]
     Topic(String),
 }
 
 /// Writes a recording.
 ///
-/// A chunk of the file ends when a message of a later frame comes: a chunk is what one changed byte costs, and what a
-/// killed run loses, and a frame is what a replay can do without. A frame of more than 4 MiB has several. In memory are
-/// the chunk, and an entry of some hundred bytes in the index for every chunk before it.
+/// A chunk of the file ends when a message of a later frame comes. One changed byte or a
+/// killed run costs one chunk, and a replay can do without one frame. A frame of more than 4 MiB has several chunks. The writer keeps in
+/// memory the current chunk, and an index entry of some hundred bytes for every chunk before it.
 ///
-/// Every chunk has a checksum. What is said about the run has one, too, and stands in the file twice, at its beginning
+/// Every chunk has a checksum. The metadata of the run has one, too, and is in the file twice, at its beginning
 /// and at its end.
 pub struct Writer<W: Write> {
     out: mcap::Writer<NoSeek<BufWriter<Gate<W>>>>,
     keeper: Keeper,
     topics: Vec<Topic>,
-    /// Said again at the end.
+    /// Metadata, which is written again at the end.
     about: [(&'static str, BTreeMap<String, String>); 2],
-    /// The latest frame of a message.
+    /// Latest frame of a message.
     latest: Option<u64>,
-    /// Losses that the file speaks of already.
+    /// Numbers of lost messages that the file already states.
     told: Vec<u64>,
 }
 
 struct Topic {
     name: String,
-    /// None for a topic of other programs.
+    /// Kind of the messages; `None` for a topic for other programs.
     kind: Option<Kind>,
     n_recorded: u64,
 }
@@ -67,14 +67,14 @@ struct Schema<'a> {
     text: &'a str,
 }
 
-/// A topic whose messages are for other programs: JSON, by a JSON schema. Readers of recordings leave it out.
+/// A topic whose messages are for other programs: JSON with a JSON schema. Readers of recordings ignore it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Foreign {
-    /// Its name.
+    /// Name of the topic.
     pub topic: String,
-    /// The name of its schema, by which programs know what they can show.
+    /// Name of the schema, by which programs recognise content that they can show.
     pub schema_name: &'static str,
-    /// The JSON schema.
+    /// Text of the JSON schema.
     pub schema: &'static str,
 }
 
@@ -87,22 +87,22 @@ impl<W: Write> fmt::Debug for Writer<W> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins a recording; what it says about itself is written at once.
+    /// Begins a recording and writes its metadata at once.
     ///
-    /// * `topics`: their names; messages are written by their number here.
+    /// * `topics`: names of the topics. The position of a topic in this list is its number for [`Self::write`].
     ///
     /// # Errors
     ///
-    /// [`WriteError`].
+    /// Returns a [`WriteError`] on failure.
     pub fn begin(out: W, about: &About, topics: &[String]) -> Result<Self, WriteError> {
         Self::begin_with(out, about, topics, &[])
     }
 
-    /// The same, with topics for other programs, whose numbers follow.
+    /// Begins a recording with additional topics for other programs, whose numbers follow.
     ///
     /// # Errors
     ///
-    /// [`WriteError`].
+    /// Returns a [`WriteError`] on failure.
     pub fn begin_with(
         out: W,
         about: &About,
@@ -117,7 +117,7 @@ impl<W: Write> Writer<W> {
             .library(format!("parallax {}", about.version))
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true)
-            // Every chunk has a checksum of its own.
+            // Every chunk has its own checksum.
             .calculate_data_section_crc(false)
             .create(NoSeek::new(BufWriter::new(gate)));
         let names = foreign.iter().map(|strange| &strange.topic);
@@ -155,7 +155,7 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
-    /// Writes which run it is of, and which topics there are.
+    /// Writes the metadata of the run and the names of the topics.
     fn say_about(&mut self) -> Result<(), WriteError> {
         let about = self.about.clone();
         about.into_iter().try_for_each(|(name, map)| self.describe(name, map))
@@ -187,13 +187,13 @@ impl<W: Write> Writer<W> {
 
     /// Writes a message.
     ///
-    /// * `topic`: its number; a message of another is left out.
-    /// * `entry`: when it came and when it was sent; where it lies is for the file to say.
-    /// * `data`: what [`encode`](crate::encode) made of it; JSON where the topic is for other programs.
+    /// * `topic`: number of the topic. A message with an unknown number is ignored.
+    /// * `entry`: times of receiving and of sending. Its position in the file is ignored.
+    /// * `data`: result of [`encode`](crate::encode), or JSON if the topic is for other programs.
     ///
     /// # Errors
     ///
-    /// [`WriteError::Write`]; then no more can be written.
+    /// Returns [`WriteError::Write`]. After that, nothing more can be written.
     pub fn write(&mut self, topic: usize, entry: &Entry, data: &[u8]) -> Result<(), WriteError> {
         self.check()?;
         let Some(known) = self.topics.get_mut(topic) else {
@@ -218,13 +218,13 @@ impl<W: Write> Writer<W> {
         written.map_err(|error| failed(&self.keeper, error))
     }
 
-    /// Puts everything so far into the file; says there how much was lost, if that is more than before.
+    /// Writes everything so far into the file, and the number of lost messages if it has increased.
     ///
-    /// * `lost`: messages of every topic that were not kept, in the order in which the topics were given.
+    /// * `lost`: number of lost messages of every topic, in the order in which the topics were given.
     ///
     /// # Errors
     ///
-    /// [`WriteError::Write`]; then no more can be written.
+    /// Returns [`WriteError::Write`]. After that, nothing more can be written.
     pub fn flush(&mut self, lost: &[u64]) -> Result<(), WriteError> {
         self.check()?;
         if self.told != lost {
@@ -236,11 +236,11 @@ impl<W: Write> Writer<W> {
 
     /// Ends the recording with its counts and its index.
     ///
-    /// * `lost`: as in [`Self::flush`].
+    /// * `lost`: number of lost messages, as in [`Self::flush`].
     ///
     /// # Errors
     ///
-    /// [`WriteError::Write`].
+    /// Returns [`WriteError::Write`] on failure.
     pub fn finish(mut self, lost: &[u64]) -> Result<(), WriteError> {
         self.check()?;
         self.tell(lost)?;
@@ -249,7 +249,7 @@ impl<W: Write> Writer<W> {
         finished.map_err(|error| failed(&self.keeper, error))
     }
 
-    /// Bytes that have been written.
+    /// Returns the number of bytes that have been written.
     pub fn n_bytes(&self) -> u64 {
         self.keeper.n_bytes()
     }
@@ -266,7 +266,7 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Writes metadata; this ends the chunk.
+    /// Writes metadata, which ends the chunk.
     fn describe(&mut self, name: &str, map: BTreeMap<String, String>) -> Result<(), WriteError> {
         let metadata = Metadata {
             name: name.to_owned(),
@@ -285,14 +285,14 @@ impl<W: Write> Writer<W> {
     }
 }
 
-/// A recording that was not finished gets no end.
+/// Closes a recording that was not finished, without writing its end.
 impl<W: Write> Drop for Writer<W> {
     fn drop(&mut self) {
         self.keeper.close();
     }
 }
 
-/// Lets nothing more into the file.
+/// Stops all further writes to the file, and returns the error.
 fn failed(keeper: &Keeper, error: McapError) -> WriteError {
     keeper.close();
     WriteError::Write {
@@ -304,7 +304,7 @@ fn failed(keeper: &Keeper, error: McapError) -> WriteError {
     }
 }
 
-/// Names of topics by the numbers of their channels.
+/// Returns the names of topics by the numbers of their channels.
 fn numbered(topics: &[String]) -> BTreeMap<String, String> {
     let numbered = (1_u16..).zip(topics);
     numbered.map(|(channel, name)| (channel.to_string(), name.clone())).collect()

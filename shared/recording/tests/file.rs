@@ -12,7 +12,7 @@ use recording::{
     read, scan,
 };
 
-/// One message of the tests: its topic, when it was sent, and its array.
+/// One message of the tests: its topic, its time of sending, and its array.
 type Sent = (usize, u64, Vec<u8>);
 
 fn topics() -> Vec<String> {
@@ -36,7 +36,7 @@ fn kind(topic: usize) -> Kind {
     [Kind::Frame, Kind::ViewPose, Kind::Health][topic]
 }
 
-/// A message of the frame of its time.
+/// Returns the bytes of a message, whose frame is its time.
 fn data((topic, time, elements): &Sent) -> Vec<u8> {
     let mut data = Vec::new();
     let head = [time.to_le_bytes(); 2].concat();
@@ -44,7 +44,7 @@ fn data((topic, time, elements): &Sent) -> Vec<u8> {
     data
 }
 
-/// A file, and the lengths at which every message was whole in it.
+/// Returns the bytes of a recording with these messages.
 fn written(sent: &[Sent], flush_every: usize) -> Vec<u8> {
     let mut file = Vec::new();
     let mut writer = Writer::begin(&mut file, &about(), &topics()).unwrap();
@@ -63,7 +63,7 @@ fn written(sent: &[Sent], flush_every: usize) -> Vec<u8> {
     file
 }
 
-/// Checks the messages of a file, in its order, against the sent ones; returns their number.
+/// Checks the messages of a file, in its order, against the sent ones. Returns their number.
 fn held(recording: &Recording, file: &[u8], sent: &[Sent]) -> usize {
     let mut found = Vec::new();
     for (nth, name) in topics().iter().enumerate() {
@@ -137,7 +137,7 @@ fn a_file_truncated_at_any_byte_contains_the_messages_of_its_complete_chunks() {
     let whole = scan(&mut Cursor::new(&file)).unwrap();
     let chunks = whole.tracks.values().flat_map(|track| &track.entries);
     let chunks: Vec<u64> = chunks.map(|entry| entry.chunk).collect();
-    // A chunk has a frame of ours, or two messages without.
+    // A chunk has one frame of known topics, or two messages without a frame.
     let n_of = |chunk: u64| chunks.iter().filter(|other| **other == chunk).count();
     assert!(chunks.iter().all(|chunk| n_of(*chunk) <= 2));
     for n in 0..=file.len() {
@@ -185,7 +185,7 @@ fn an_unknown_topic_cannot_be_written() {
     assert!(matches!(refused, Err(WriteError::Topic(it)) if it == "frame/v9/0"));
 }
 
-/// A disk with little room.
+/// A disk with limited room.
 #[derive(Clone)]
 struct Disk {
     file: Rc<RefCell<Vec<u8>>>,
@@ -287,7 +287,7 @@ proptest! {
 /// Topic, entry and bytes of a message.
 type Given = (String, Vec<Entry>, Vec<u8>);
 
-/// Everything read from a recording: its metadata, and the readable messages of every topic.
+/// Returns everything that can be read from a recording: its metadata, and the readable messages of every topic.
 fn given(file: &[u8]) -> Option<(Recording, Vec<Given>, usize)> {
     let recording = scan(&mut Cursor::new(file)).ok()?;
     let damaged = check(&mut Cursor::new(file), &recording, |_| true).unwrap();
@@ -380,7 +380,7 @@ fn one_changed_byte_loses_only_its_chunk_whose_messages_are_named() {
     assert!(other.unwrap().is_empty());
 }
 
-/// Messages that a scan finds, those that it misses, places that it calls damaged, and messages that cannot be read.
+/// Returns the numbers of messages that a scan finds and misses, of positions that it calls damaged, and of unreadable messages.
 fn judged(file: &[u8]) -> [u64; 4] {
     let recording = scan(&mut Cursor::new(file)).unwrap();
     let damaged = check(&mut Cursor::new(file), &recording, |_| true).unwrap();
@@ -401,21 +401,21 @@ fn damage_between_two_chunks_loses_no_later_chunk() {
     let recording = scan(&mut Cursor::new(&whole)).unwrap();
     let entries = recording.tracks["frame/v1/0"].entries.iter();
     let chunks: Vec<usize> = entries.map(|entry| entry.chunk as usize).collect();
-    // The length of the record of a chunk, and of what is in it.
+    // Change the length of a chunk's record, or one of the two lengths in it.
     for at in [1, 25, 41] {
         let mut file = whole.clone();
         file[chunks[12] + at..chunks[12] + at + 8].fill(0xff);
         assert_eq!(judged(&file), [29, 1, 1, 0], "{at}");
     }
-    // Its checksum.
+    // Change the checksum of the chunk.
     let mut file = whole.clone();
     file[chunks[12] + 33] ^= 1;
     assert_eq!(judged(&file), [30, 0, 0, 1]);
-    // The length of its message.
+    // Change the length of the chunk's message.
     let mut file = whole.clone();
     file[chunks[12] + 50] ^= 1;
     assert_eq!(judged(&file), [29, 1, 1, 0]);
-    // Whole chunks, with what is between them.
+    // Change complete chunks, with the bytes between them.
     let mut file = whole;
     file[chunks[12]..chunks[14]].fill(0);
     let [held, missing, damage, _] = judged(&file);
@@ -439,7 +439,7 @@ fn a_chunk_that_claims_a_terabyte_takes_no_memory_and_loses_itself_only() {
 fn a_damaged_end_is_told_and_loses_no_message() {
     let (sent, whole) = (some(), written(&some(), 4));
     let end = whole.len();
-    // The magic of the end, the checksum of the index, the index, the record that ends the messages.
+    // Damage the closing magic, the checksum of the index, the index, and the record that ends the messages.
     let data_end = (0..end)
         .rev()
         .find(|&at| whole[at..].starts_with(&[0x0f, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]));

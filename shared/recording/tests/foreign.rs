@@ -1,4 +1,4 @@
-//! Topics for other programs in a recording: they read them, and we leave them out.
+//! Topics for other programs in a recording: those programs read them, and this crate ignores them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::io::Cursor;
@@ -14,7 +14,7 @@ fn foreign(topic: &str, schema_name: &'static str) -> Foreign {
     }
 }
 
-/// A recording of three messages of ours, each followed by two for others.
+/// Returns a recording of three messages of known topics, each followed by two messages for other programs.
 fn written() -> Vec<u8> {
     let mut file = Vec::new();
     let about = About::default();

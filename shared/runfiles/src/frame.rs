@@ -1,4 +1,4 @@
-//! `pose3d.jsonl`: a line for every frame, its skeleton or why there is none.
+//! `pose3d.jsonl`: a line for every frame, with its skeletons or the reason why there is none.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::Missing;
 use crate::nullable::{nullable, numbers};
 
-/// Most people of a line.
+/// Maximum number of people of a line.
 pub const MOST_PEOPLE: usize = 8;
 
 /// A line of `pose3d.jsonl`, and of `pose3d-smooth.jsonl`.
@@ -16,49 +16,49 @@ pub const MOST_PEOPLE: usize = 8;
 pub struct FrameLine {
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// The people, each with an identity of its own, the followed person first; none in a line without a result.
+    /// The people, the followed person first, with distinct identities. Empty in a line without a result.
     #[serde(deserialize_with = "people")]
     pub people: Vec<PersonLine>,
-    /// Why there is no result; only in a line without one.
+    /// Reason why there is no result; only in a line without a result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// How many people the views agree on, whether or not they are in the list; none in a line without a result, and where the model is
-    /// not of people.
+    /// Number of people that the views agree on, including people that are not in the list. `None` in a line without a result, and if the
+    /// model is not of people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<u32>,
-    /// [`FrameLine::OK`] if anybody has a skeleton, [`FrameLine::NO_RESULT`], or why nobody has.
+    /// [`FrameLine::OK`] if any person has a skeleton, [`FrameLine::NO_RESULT`], or the reason why no person has one.
     pub status: String,
-    /// When the frame was taken, seconds after frame 0 of the footage, where its rate is known.
+    /// Time at which the frame was taken, seconds after frame 0 of the footage, if its rate is known.
     #[serde(deserialize_with = "nullable")]
     pub time_s: Option<f64>,
-    /// The views that have no part in the result.
+    /// Views that did not contribute to the result, with the reasons.
     pub views_missing: BTreeMap<String, Missing>,
-    /// The views that have a part in the result.
+    /// Views that contributed to the result.
     pub views_present: Vec<String>,
 }
 
 /// A person of a line.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PersonLine {
-    /// How much the lengths of the bones differ from those of people, standard deviations; none where there is no body.
+    /// Deviation of the bone lengths from those of real people, in standard deviations; `None` if there is no body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_deviation: Option<f64>,
-    /// Amount by which the decision which views see the person from the same side was won; none where it was
+    /// Margin of the decision about which views see the person from the same side; `None` if it was
     /// not made.
     #[serde(deserialize_with = "nullable")]
     pub facing_margin: Option<f64>,
-    /// Identity within the run, from 1.
+    /// Person's identity within the run, counted from 1.
     pub id: u64,
     /// The joints, by name.
     pub joints: BTreeMap<String, JointLine>,
-    /// Poses that the skeleton is made of: those that fusion solved for, or those that it started from.
+    /// Poses from which the skeleton was made: the poses that fusion solved for, or those from which it started.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kept: Option<Kept>,
-    /// Keypoints of networks beside the joints (face, feet, hands), by name, each triangulated alone. Empty without such
+    /// Extra keypoints of networks, which are not joints (face, feet, hands), by name. Each was triangulated alone. Empty without such
     /// networks.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub keypoints: BTreeMap<String, JointLine>,
-    /// Pairs of views that have a part in the skeleton.
+    /// Number of pairs of views that contributed to the skeleton.
     pub pairs: u32,
     /// Certainty of left and right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -70,41 +70,41 @@ pub struct PersonLine {
     /// `pose3d-smooth.jsonl`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub states: BTreeMap<String, String>,
-    /// Height of the person standing upright, by the lengths of the bones, metres; none where too few are known.
+    /// Height of the person when standing upright, from the lengths of the bones, metres; `None` if too few lengths are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stature_m: Option<f64>,
-    /// [`FrameLine::OK`], or why there is no skeleton.
+    /// [`FrameLine::OK`], or the reason why there is no skeleton.
     pub status: String,
-    /// The views that some joint was triangulated from.
+    /// Views from which at least one joint was triangulated.
     pub views_used: Vec<String>,
 }
 
 impl FrameLine {
-    /// Name of the file of lines whose joints were smoothed. Their status is [`FrameLine::OK`] where any joint has a position, measured
-    /// or not; positions have no `reprojection_px`.
+    /// Name of the file of lines whose joints were smoothed. Their status is [`FrameLine::OK`] if any joint has a position, measured
+    /// or not. The positions have no `reprojection_px`.
     pub const SMOOTHED_FILE: &'static str = "pose3d-smooth.jsonl";
     /// Status of a frame with a skeleton.
     pub const OK: &'static str = "ok";
     /// Status of a frame without a result.
     pub const NO_RESULT: &'static str = "no result";
 
-    /// Returns true if there is a result, with a skeleton or without.
+    /// Returns true if there is a result, with or without a skeleton.
     pub fn has_result(&self) -> bool {
         self.status != Self::NO_RESULT
     }
 
-    /// Returns true if anybody has a skeleton.
+    /// Returns true if any person has a skeleton.
     pub fn has_pose(&self) -> bool {
         self.status == Self::OK
     }
 
-    /// The followed person; `None` if there is nobody.
+    /// Returns the followed person; `None` if there is no person.
     pub fn followed(&self) -> Option<&PersonLine> {
         self.people.first()
     }
 }
 
-/// Reads at most as many people as fit, no two with one identity.
+/// Reads at most as many people as fit. No two of them may share an identity.
 fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Error> {
     let people = Vec::<PersonLine>::deserialize(from)?;
     if people.len() > MOST_PEOPLE {
@@ -127,21 +127,21 @@ fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Erro
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
-    /// They are not decided, but those of the pictures.
+    /// Left and right were not decided: they are those of the pictures.
     AsSeen,
-    /// They are certain.
+    /// Left and right are certain.
     Sure,
-    /// Too little speaks for them.
+    /// Left and right were decided on too little evidence.
     Unsure,
 }
 
-/// Which poses a skeleton is made of.
+/// Poses from which a skeleton was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kept {
-    /// Those that fusion solved for.
+    /// The poses that fusion solved for.
     Solved,
-    /// The single-view poses that it started from, which agree better.
+    /// The single-view poses from which fusion started, because they agree better.
     Start,
 }
 
@@ -149,11 +149,11 @@ pub enum Kept {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, try_from = "AnyJoint")]
 pub enum JointLine {
-    /// It has a position.
+    /// The joint has a position.
     Placed(PlacedJoint),
-    /// It has none.
+    /// The joint has no position.
     Missing {
-        /// Why.
+        /// Reason why the joint has no position.
         status: String,
     },
 }
@@ -161,18 +161,18 @@ pub enum JointLine {
 /// A joint with a position.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlacedJoint {
-    /// Covariance of the position, square metres: xx, xy, xz, yy, yz, zz. NaN where it is not known.
+    /// Covariance of the position, square metres: xx, xy, xz, yy, yz, zz. NaN if it is not known.
     pub covariance_m2: [f64; 6],
-    /// In the world, metres.
+    /// Position in the world, metres.
     pub position_m: [f64; 3],
-    /// Root mean square distance to what the views found, pixels of their frames; none where it is not known.
+    /// Root mean square distance from the observations of the views, pixels of their frames; `None` if it is not known.
     pub reprojection_px: Option<f64>,
-    /// The views that it was triangulated from.
+    /// Views from which the joint was triangulated.
     pub views: Vec<String>,
 }
 
 impl JointLine {
-    /// The joint, if it has a position.
+    /// Returns the joint, if it has a position.
     pub fn placed(&self) -> Option<&PlacedJoint> {
         match self {
             Self::Placed(it) => Some(it),
@@ -181,13 +181,13 @@ impl JointLine {
     }
 }
 
-/// The fields of either kind.
+/// The fields of both kinds of joints.
 #[derive(Deserialize)]
 struct AnyJoint {
     status: Option<String>,
     covariance_m2: Option<Covariance>,
     position_m: Option<[f64; 3]>,
-    /// May be null, so that it may not be missing is not checked.
+    /// The field may be null, so a missing field is not detected.
     reprojection_px: Option<f64>,
     views: Option<Vec<String>>,
 }

@@ -1,4 +1,4 @@
-//! `latency.json`: where the time went, from the stamps in the messages.
+//! `latency.json`: use of the time, from the stamps in the messages.
 
 use std::collections::BTreeMap;
 
@@ -11,24 +11,24 @@ use crate::read::{parse, to_text};
 /// Percentiles of one duration, milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Percentiles {
-    /// How many were measured.
+    /// Number of measured durations.
     pub count: u64,
-    /// The longest.
+    /// Longest duration.
     pub max_ms: f64,
-    /// Half are shorter.
+    /// Median duration.
     pub p50_ms: f64,
-    /// 999 of 1000 are shorter; the longest where fewer were measured.
+    /// Duration below which 999 of 1000 measurements are; the longest one if there are fewer measurements.
     pub p99_9_ms: f64,
-    /// 99 of 100 are shorter.
+    /// Duration below which 99 of 100 measurements are.
     pub p99_ms: f64,
 }
 
 /// Use of the time, over all frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LatencyReport {
-    /// From capture to the result.
+    /// Time from capture to the result.
     pub end_to_end: Percentiles,
-    /// Share of the end-to-end time that is not computation on the way that took longest.
+    /// Share of the end-to-end time that is not computation, on the path through the pipeline that took longest.
     #[serde(deserialize_with = "nullable")]
     pub share_not_computation: Option<f64>,
     /// Share of the end-to-end time that is transport.
@@ -39,9 +39,9 @@ pub struct LatencyReport {
     pub share_waiting: Option<f64>,
     /// Computing time of every stage.
     pub stages: BTreeMap<String, Percentiles>,
-    /// From sent to received, the receiver being free: what the transport costs.
+    /// Time from sending to receiving if the receiver was free, which is the cost of the transport.
     pub transport: BTreeMap<String, Percentiles>,
-    /// From sent to received while the receiver was still busy with something earlier.
+    /// Time from sending to receiving while the receiver was still busy with earlier work.
     pub waiting: BTreeMap<String, Percentiles>,
 }
 
@@ -49,20 +49,20 @@ impl LatencyReport {
     /// Name of the file.
     pub const FILE: &'static str = "latency.json";
 
-    /// Reads the file.
+    /// Parses the text of the file.
     ///
     /// # Errors
     ///
-    /// [`ReadError`].
+    /// Returns a [`ReadError`] on failure.
     pub fn parse(text: &str) -> Result<Self, ReadError> {
         parse(text)
     }
 
-    /// The file.
+    /// Returns the text of the file.
     ///
     /// # Errors
     ///
-    /// None; those of `serde_json`.
+    /// Never fails for this type. The error type is that of `serde_json`.
     pub fn to_text(&self) -> Result<String, serde_json::Error> {
         to_text(self)
     }

@@ -1,4 +1,4 @@
-//! The files that a run leaves behind, as types: written by `results`, read by everything that comes after a run.
+//! The files that a run leaves behind, as types. `results` writes them, and all later programs read them.
 //!
 //! | file | type | one for each |
 //! |---|---|---|
@@ -8,13 +8,13 @@
 //! | `pose3d-smooth.jsonl` | [`FrameLine`] | frame of a run that was smoothed |
 //! | `smooth.json` | [`SmoothReport`] | run that was smoothed |
 //! | `latency.json` | [`LatencyReport`] | run |
-//! | `summary.json` | [`RunSummary`] | run; holds the version of all files |
+//! | `summary.json` | [`RunSummary`] | run; has the version of all files |
 //!
-//! [`Running`] is no file of a run: a running deployment describes itself with it to other programs.
+//! [`Running`] is not a file of a run. It is the description that a running deployment gives of itself to other programs.
 //!
-//! Text in, types out: this crate opens no file. A field that is missing, unknown in its type or out of range is a
-//! [`ReadError`] that names the line and the field; only fields that were added later may be absent. Unknown fields are passed over, so that a
-//! program reads what a later one has written as long as [`VERSION`] is the same.
+//! This crate converts text to types and opens no file. A field that is missing, has an unknown type or is out of range is a
+//! [`ReadError`] that names the line and the field. Only fields that were added later may be missing. Unknown fields are ignored, so that
+//! a program can read the files of a later one as long as [`VERSION`] is the same.
 //!
 //! Fields are written in alphabetical order, so they are declared in that order.
 #![forbid(unsafe_code)]
@@ -44,7 +44,7 @@ pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 pub use trust::{Doubt, Trust};
 pub use view::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
 
-/// Version of all files of a run; it rises when a field changes its meaning or is removed.
+/// Version of all files of a run. It increases when a field changes its meaning or is removed.
 pub const VERSION: u64 = 2;
 
 #[cfg(test)]

@@ -1,23 +1,23 @@
-//! Why a view has no part in a result.
+//! Reasons why a view did not contribute to a result.
 
 use core::cmp::Ordering;
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Why a view has no part in a result; written as its text.
+/// Reason why a view did not contribute to a result, written as its text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub enum Missing {
-    /// It answered too late, or had not answered yet.
+    /// The view answered too late, or had not answered yet.
     Late,
-    /// It passed the frame over and went on.
+    /// The view skipped the frame and continued.
     Dropped,
-    /// Its process, or the one that puts the views together, had died.
+    /// The process of the view, or the process that combines the views, had died.
     ProcessLost,
-    /// Its footage has fewer frames.
+    /// The footage of the view has fewer frames.
     EndOfFootage,
-    /// It answered without a pose, for the reason that is given; or the frame could not be written.
+    /// The view answered without a pose, for the given reason, or the frame could not be written.
     Other(String),
 }
 
@@ -31,7 +31,7 @@ impl Missing {
     /// Text of [`Missing::EndOfFootage`].
     pub const END_OF_FOOTAGE: &'static str = "end of footage";
 
-    /// As it is written.
+    /// Returns the text that is written.
     pub fn text(&self) -> &str {
         match self {
             Self::Late => Self::LATE,
@@ -78,7 +78,7 @@ impl fmt::Display for Missing {
     }
 }
 
-/// By text, which is the order of keys in the files.
+/// Orders by text, which is the order of keys in the files.
 impl Ord for Missing {
     fn cmp(&self, other: &Self) -> Ordering {
         self.text().cmp(other.text())

@@ -1,8 +1,8 @@
-//! Fields that may be null and may not be missing, and numbers that are null where they are not finite.
+//! Fields that may be null but not missing, and numbers that are null if they are not finite.
 
 use serde::{Deserialize, Deserializer};
 
-/// A field that may be null. Without this, serde takes a missing field for null.
+/// Reads a field that may be null. Without this function, serde treats a missing field as null.
 pub(crate) fn nullable<'de, D, T>(deserializer: D) -> Result<Option<T>, D::Error>
 where
     D: Deserializer<'de>,
@@ -11,7 +11,7 @@ where
     Option::deserialize(deserializer)
 }
 
-/// Numbers of which some may be null, which is how JSON writes one that is not finite: those are NaN.
+/// Reads numbers, some of which may be null. JSON writes numbers that are not finite as null, so they become NaN.
 pub(crate) fn numbers<'de, D, const N: usize>(deserializer: D) -> Result<[f64; N], D::Error>
 where
     D: Deserializer<'de>,

@@ -1,13 +1,13 @@
-//! From text to types and back, with errors that name the line and the field.
+//! Converts text to types and back, with errors that name the line and the field.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::{FrameLine, TimesLine, ViewLine};
 
-/// A line of one of the files of lines.
+/// A line of a file with one JSON object per line.
 pub trait Line: Serialize + DeserializeOwned {
-    /// The name of the file.
+    /// Name of the file.
     const FILE: &'static str;
 }
 
@@ -23,15 +23,15 @@ impl Line for TimesLine {
     const FILE: &'static str = "times.jsonl";
 }
 
-/// A text is not what its file should hold. Says where and what was found, not in which file.
+/// Reason why a text is not valid content of its file. It names the position and the problem, but not the file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}, column {column}: {}{problem}", in_field(field))]
 pub struct ReadError {
-    /// From 1.
+    /// Number of the line, counted from 1.
     pub line: usize,
-    /// From 1.
+    /// Number of the column, counted from 1.
     pub column: usize,
-    /// The field and those that it lies in, such as `summary.frames`; empty for the whole text.
+    /// Path of the field, such as `summary.frames`; empty for the whole text.
     pub field: String,
     /// Content that was found, and content that was expected.
     pub problem: String,
@@ -49,7 +49,7 @@ fn in_field(field: &str) -> String {
 ///
 /// # Errors
 ///
-/// [`ReadError`] for each line that is not one.
+/// Returns a [`ReadError`] for each malformed line.
 pub fn lines<L: Line>(text: &str) -> impl Iterator<Item = Result<L, ReadError>> {
     let numbered = text.lines().enumerate();
     numbered.map(|(before, line)| {
@@ -61,16 +61,16 @@ pub fn lines<L: Line>(text: &str) -> impl Iterator<Item = Result<L, ReadError>> 
     })
 }
 
-/// One line, with its end.
+/// Returns the text of one line, with its line end.
 ///
 /// # Errors
 ///
-/// None for the lines of this crate; those of `serde_json`.
+/// Never fails for the lines of this crate. The error type is that of `serde_json`.
 pub fn to_line<L: Line>(line: &L) -> Result<String, serde_json::Error> {
     Ok(serde_json::to_string(line)? + "\n")
 }
 
-/// A file that is one object, with its end.
+/// Returns the text of a file that is one object, with its line end.
 pub(crate) fn to_text(object: &impl Serialize) -> Result<String, serde_json::Error> {
     Ok(serde_json::to_string_pretty(object)? + "\n")
 }

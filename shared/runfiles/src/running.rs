@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Running {
     /// Version of this description, [`Running::VERSION`].
     pub format: u64,
-    /// Step between the frames of the footage that are used: frame numbers increase by it.
+    /// Step between the used frames of the footage, by which frame numbers increase.
     pub frame_step: u64,
     /// Names of the joints, in the order of the messages.
     pub joints: Vec<String>,
@@ -22,11 +22,11 @@ pub struct Running {
     pub lossless: bool,
     /// Name of the deployment.
     pub name: String,
-    /// Its folder of results.
+    /// Folder of results of the deployment.
     pub output: PathBuf,
-    /// Version of Parallax that runs it.
+    /// Version of Parallax that runs the deployment.
     pub parallax: String,
-    /// The session, as in the stamp of every message.
+    /// Session of the run, as in the stamp of every message.
     pub session: u64,
     /// The views, in the order of their numbers.
     pub views: Vec<RunningView>,
@@ -35,48 +35,48 @@ pub struct Running {
 /// One view of a running deployment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunningView {
-    /// Height of its frames, pixels.
+    /// Height of the view's frames, pixels.
     pub height: u32,
     /// Name of the camera.
     pub name: String,
-    /// Width of its frames, pixels.
+    /// Width of the view's frames, pixels.
     pub width: u32,
 }
 
-/// A description cannot be read.
+/// Reason why a description cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RunningError {
-    /// It is not JSON, or not a description.
+    /// The text is not JSON, or not a description.
     #[error("the description of the deployment cannot be read")]
     Malformed(#[source] serde_json::Error),
-    /// It has no part for other programs: the deployment is of another version.
+    /// The description has no part for other programs, because the deployment is of another version.
     #[error(
         "the deployment does not describe itself to other programs: it is of another version of Parallax"
     )]
     Absent,
-    /// It is of another version.
+    /// The description is of another version.
     #[error(
         "the description of the deployment is of version {theirs}, this program reads version {ours}"
     )]
     Version {
-        /// The version of the deployment.
+        /// Version of the deployment.
         theirs: u64,
-        /// The version of this program.
+        /// Version of this program.
         ours: u64,
     },
 }
 
 impl Running {
-    /// Version of the description; it rises when a field changes its meaning or is removed.
+    /// Version of the description. It increases when a field changes its meaning or is removed.
     pub const VERSION: u64 = 1;
-    /// The entry of `deployment.json` that holds it.
+    /// Key of the description in `deployment.json`.
     pub const KEY: &'static str = "programs";
 
-    /// Reads the description off the text of `deployment.json`.
+    /// Reads the description from the text of `deployment.json`.
     ///
     /// # Errors
     ///
-    /// [`RunningError`].
+    /// Returns a [`RunningError`] on failure.
     pub fn read(text: &str) -> Result<Self, RunningError> {
         let mut whole: serde_json::Value =
             serde_json::from_str(text).map_err(RunningError::Malformed)?;

@@ -1,4 +1,4 @@
-//! `smooth.json`: how trajectories were smoothed.
+//! `smooth.json`: report on the smoothing of trajectories.
 
 use std::collections::BTreeMap;
 
@@ -7,74 +7,74 @@ use serde::{Deserialize, Serialize};
 use crate::ReadError;
 use crate::read::{parse, to_text};
 
-/// The file `smooth.json`: how `pose3d-smooth.jsonl` was made.
+/// The file `smooth.json`: report on how `pose3d-smooth.jsonl` was made.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmoothReport {
-    /// Cutoff of the low-pass filter, Hz, where there is one.
+    /// Cutoff of the low-pass filter, Hz, if there is one.
     pub cutoff_hz: Option<f64>,
-    /// Amount by which the positions are late, milliseconds; 0 for methods that look ahead.
+    /// Delay of the positions, milliseconds; 0 for methods that look ahead.
     pub delay_ms: f64,
     /// Reasons to doubt the result, in words; an empty list is good.
     pub doubts: Vec<String>,
-    /// The longest time between measurements that was filled, seconds.
+    /// Maximum time between measurements that was filled, seconds.
     pub fill_s: f64,
-    /// `rts`, `butterworth`, `kalman` or `none`.
+    /// Name of the method: `rts`, `butterworth`, `kalman` or `none`.
     pub method: String,
-    /// Lines.
+    /// Number of lines.
     pub n_frames: u64,
-    /// The people, by ascending identity; each was smoothed alone.
+    /// The people, by ascending identity. Each was smoothed alone.
     pub people: Vec<SmoothedPerson>,
-    /// Frames per second: the inverse of the median time between two.
+    /// Frames per second: the inverse of the median time between two frames.
     pub rate_hz: Option<f64>,
-    /// Amount by which the instants are off the uniform grid that they were interpolated to, at most, milliseconds.
+    /// Maximum distance of the frames' times from the uniform grid to which they were interpolated, milliseconds.
     pub resampled_ms: Option<f64>,
-    /// [`crate::VERSION`].
+    /// Version of the file, [`crate::VERSION`].
     pub schema_version: u64,
 }
 
-/// One person over the run.
+/// Smoothing of one person over the run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmoothedPerson {
     /// Lengths of bones that were kept constant, by the names of both joints, metres.
     pub bones: BTreeMap<String, f64>,
-    /// Frames in which another person begins: nothing was smoothed across.
+    /// Frames at which another person begins. Nothing was smoothed across them.
     pub frames_of_breaks: Vec<u64>,
-    /// Identities within the run: more than one if no frame had two people and the followed person had several, one
-    /// after the other.
+    /// Identities within the run. There are several if no frame had two people and the followed person had several
+    /// identities, one after the other.
     pub ids: Vec<u64>,
-    /// Every joint and keypoint, by name.
+    /// Smoothing of every joint and keypoint, by name.
     pub joints: BTreeMap<String, SmoothedJoint>,
-    /// Frames whose sides were not certain.
+    /// Counts of frames whose left and right were not certain.
     pub unsure: Unsure,
 }
 
 /// Counts of frames whose left and right were not certain, by their treatment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Unsure {
-    /// Exchanged: that fits what is before and after.
+    /// Number of frames that were exchanged, because this fits the frames before and after.
     pub exchanged: usize,
-    /// Kept as measured.
+    /// Number of frames that were kept as measured.
     pub kept: usize,
-    /// Joints with a side were left out.
+    /// Number of frames whose joints with a side were left out.
     pub left_out: usize,
 }
 
-/// One joint over the run.
+/// Smoothing of one joint over the run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmoothedJoint {
-    /// Frames without a position.
+    /// Number of frames without a position.
     pub absent: usize,
-    /// Factor of its covariances; `None` where the method does not estimate it.
+    /// Factor of the joint's covariances; `None` if the method does not estimate it.
     pub covariance_scale: Option<f64>,
-    /// Frames in which it was measured as the joint of the other side.
+    /// Number of frames in which the joint was measured as the joint of the other side.
     pub exchanged: usize,
-    /// Frames that were filled.
+    /// Number of frames that were filled.
     pub filled: usize,
-    /// Spectral density of its jerk, m²/s⁵; none where the method does not ask.
+    /// Spectral density of the joint's jerk, m²/s⁵; `None` if the method does not use it.
     pub jerk_m2_s5: Option<f64>,
-    /// Frames that were measured.
+    /// Number of frames that were measured.
     pub measured: usize,
-    /// Frames whose measurement was rejected and filled.
+    /// Number of frames whose measurement was rejected and filled.
     pub rejected: usize,
 }
 
@@ -82,20 +82,20 @@ impl SmoothReport {
     /// Name of the file.
     pub const FILE: &'static str = "smooth.json";
 
-    /// Reads the file.
+    /// Parses the text of the file.
     ///
     /// # Errors
     ///
-    /// [`ReadError`].
+    /// Returns a [`ReadError`] on failure.
     pub fn parse(text: &str) -> Result<Self, ReadError> {
         parse(text)
     }
 
-    /// The file.
+    /// Returns the text of the file.
     ///
     /// # Errors
     ///
-    /// None; those of `serde_json`.
+    /// Never fails for this type. The error type is that of `serde_json`.
     pub fn to_text(&self) -> Result<String, serde_json::Error> {
         to_text(self)
     }

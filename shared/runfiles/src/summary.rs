@@ -1,4 +1,4 @@
-//! `summary.json`: what was seen and what was missed, over the whole run.
+//! `summary.json`: counts of detections and losses over the whole run.
 
 use std::collections::BTreeMap;
 
@@ -11,22 +11,22 @@ use crate::{LatencyReport, Missing, ReadError, Trust, VERSION};
 /// The file `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunSummary {
-    /// Frames of the footage per second, where known.
+    /// Frames per second of the footage, if known.
     #[serde(deserialize_with = "nullable")]
     pub frame_rate_hz: Option<f64>,
     /// Name of the set of joints.
     pub joints: String,
-    /// Where the time went.
+    /// Use of the time.
     pub latency: LatencyReport,
     /// [`VERSION`] of all files of the run.
     pub schema_version: u64,
-    /// The run.
+    /// Session of the run.
     pub session: u64,
-    /// Counts of what was seen and what was missed.
+    /// Counts of detections and losses.
     pub summary: Summary,
     /// Meaning of the axes of `pose3d.trc`, in words.
     pub trc_axes: String,
-    /// The views, as they are numbered in messages.
+    /// The views, in the order of their indices in messages.
     pub views: Vec<ViewSummary>,
 }
 
@@ -35,81 +35,81 @@ pub struct RunSummary {
 pub struct ViewSummary {
     /// Width and height of the frames that were searched, pixels.
     pub frame_size: [u32; 2],
-    /// The camera.
+    /// Name of the camera.
     pub name: String,
-    /// From pixels of those frames to pixels of the footage: two rows of an affine map.
+    /// Map from pixels of the searched frames to pixels of the footage: two rows of an affine map.
     pub source_from_frame: [[f64; 3]; 2],
 }
 
-/// Counts of what was seen and what was missed, over the whole run.
+/// Counts of detections and losses over the whole run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Summary {
-    /// How well every camera fits the others, by name; since the process was started last.
+    /// Fit of every camera to the others, by name, since the last start of the process.
     pub calibration: BTreeMap<String, CameraFit>,
-    /// Cameras that do not see one person where the rig says, for another reason or one that is not clear.
+    /// Cameras whose observations of one person contradict the rig, for an unclear reason or one other than an exchange.
     #[serde(deserialize_with = "nullable")]
     pub contradicted: Option<Contradicted>,
-    /// Evidence that a view handed on in shared memory, mean bytes per frame, by name; since the
-    /// process was started last.
+    /// Size of the evidence that a view sent in shared memory, mean bytes per frame, by name, since the
+    /// last start of the process.
     pub evidence_bytes_per_frame: BTreeMap<String, u64>,
-    /// Two cameras that look as if each had the footage of the other.
+    /// Two cameras that seem to have each other's footage.
     #[serde(deserialize_with = "nullable")]
     pub exchanged: Option<Exchanged>,
-    /// The first of the writes that failed.
+    /// Error of the first write that failed.
     #[serde(deserialize_with = "nullable")]
     pub first_failure: Option<String>,
-    /// Results that were received.
+    /// Number of received results.
     pub frames: u64,
-    /// Frames of all views that the cameras' side dropped.
+    /// Number of frames of all views that the capture processes dropped.
     pub frames_dropped_by_capture: u64,
-    /// Frames without a result; each has a line with the reason.
+    /// Number of frames without a result. Each has a line with the reason.
     pub frames_missed: u64,
-    /// Results that came but were not written, because writing was too slow or the disk was full.
+    /// Number of results that were received but not written, because writing was too slow or the disk was full.
     pub frames_not_recorded: u64,
-    /// Results with a skeleton.
+    /// Number of results with a skeleton.
     pub frames_with_pose: u64,
-    /// Results without every view of the rig.
+    /// Number of results that lack at least one view of the rig.
     pub frames_with_views_missing: u64,
-    /// Who is followed, and how many others are in view; since the process was started last.
+    /// The followed person and the other people in view, since the last start of the process.
     pub people: People,
-    /// How high people are in the frames that were searched, pixels, by name: the median over the results that used the view, of
-    /// the longer side of the rectangle around a pose's parts; null without any. Since the process was started last.
+    /// Height of people in the searched frames, pixels, by name of the view. This is the median, over the results that used the view, of
+    /// the longer side of the rectangle around a pose's parts. Null if there are none. Counted since the last start of the process.
     pub person_px: BTreeMap<String, Option<f64>>,
     /// Root mean square reprojection error over all joints, pixels of the frame.
     #[serde(deserialize_with = "nullable")]
     pub reprojection_px: Option<f64>,
-    /// How many frames of every view were searched in full and how many near the last pose only, by
-    /// name; since the process was started last.
+    /// Number of frames of every view that were searched in full, and number searched only near the last pose, by
+    /// name, since the last start of the process.
     pub searches: BTreeMap<String, BTreeMap<String, u64>>,
-    /// How far the results can be trusted; since the process was started last.
+    /// Trust in the results, since the last start of the process.
     pub trust: Trust,
-    /// Number of results from which every view is missing, by name, for every reason.
+    /// Number of results from which each view is missing, by name and reason.
     pub views_missing: BTreeMap<String, BTreeMap<Missing, u64>>,
-    /// How many results every view has a part in, by name.
+    /// Number of results to which each view contributed, by name.
     pub views_present: BTreeMap<String, u64>,
-    /// How often every view was used, by name.
+    /// Number of times that each view was used, by name.
     pub views_used: Vec<(String, u64)>,
-    /// Writes that failed.
+    /// Number of writes that failed.
     pub writes_failed: u64,
 }
 
 /// The people in view.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct People {
-    /// Everybody who had a skeleton, by id.
+    /// All people that had a skeleton, by id.
     pub each: Vec<PersonSummary>,
-    /// Which of several is followed: `last`, `largest` or `clearest`.
+    /// Rule that selects the followed person: `last`, `largest` or `clearest`.
     pub follow: String,
-    /// How many people were followed, one after the other.
+    /// Number of people that were followed, one after the other.
     pub followed: u64,
-    /// Results with more than one.
+    /// Number of results with more than one person.
     pub frames_with_others: u64,
-    /// The most in one result.
+    /// Maximum number of people in one result.
     pub most: u32,
 }
 
 impl People {
-    /// For people, in one line.
+    /// Returns a text for users, in one line.
     pub fn text(&self) -> String {
         let Self {
             each: _,
@@ -135,69 +135,69 @@ impl People {
 /// One person over the whole run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PersonSummary {
-    /// The first frame with a skeleton.
+    /// First frame with a skeleton.
     pub first_frame: u64,
-    /// Frames with a skeleton.
+    /// Number of frames with a skeleton.
     pub frames: u64,
-    /// Identity within the run, from 1.
+    /// Person's identity within the run, counted from 1.
     pub id: u64,
-    /// Share of the joints that have a place, 0 to 1, of the frames with a skeleton.
+    /// Share of the joints that have a position, 0 to 1, over the frames with a skeleton.
     pub joints: f64,
-    /// The last frame with a skeleton.
+    /// Last frame with a skeleton.
     pub last_frame: u64,
     /// Root mean square reprojection error over all joints, pixels of the frame.
     #[serde(deserialize_with = "nullable")]
     pub reprojection_px: Option<f64>,
-    /// Trust in the results of this person, since the process was started last.
+    /// Trust in the results of this person, since the last start of the process.
     pub trust: Trust,
 }
 
-/// How well a camera fits the others, over the last frames.
+/// Fit of a camera to the others, over the last frames.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CameraFit {
     /// Standard error of [`CameraFit::offset_ms`].
     #[serde(default, deserialize_with = "nullable")]
     pub offset_error_ms: Option<f64>,
-    /// How much later its pictures were taken than their times say, against the median of all cameras, milliseconds; negative for
-    /// earlier. Unknown while too little has moved.
+    /// Time by which the camera's pictures were taken later than their times say, against the median of all cameras, milliseconds. Negative
+    /// if they were taken earlier; unknown while there is too little motion.
     #[serde(default, deserialize_with = "nullable")]
     pub offset_ms: Option<f64>,
-    /// True if it was found, at any time of the run, to be out of step with the others.
+    /// True if the camera was found, at any time of the run, to be out of step with the others.
     #[serde(default)]
     pub out_of_step: bool,
-    /// How far apart cameras see the same parts if it is one of them, pixels of its footage; unknown of
-    /// fewer than three cameras, and while too little was seen.
+    /// Distance between the positions at which cameras see the same parts if this camera is one of them, pixels of its footage. Unknown
+    /// with fewer than three cameras, and while too little was seen.
     #[serde(deserialize_with = "nullable")]
     pub residual_px: Option<f64>,
-    /// True if it was found, at any time of the run, not to stand where the calibration says.
+    /// True if the camera was found, at any time of the run, not to be where the calibration says.
     pub suspected: bool,
-    /// [`CameraFit::residual_px`] of the others without it.
+    /// [`CameraFit::residual_px`] of the other cameras without this one.
     #[serde(deserialize_with = "nullable")]
     pub without_px: Option<f64>,
 }
 
-/// Two cameras that look as if each had the footage of the other.
+/// Two cameras that seem to have each other's footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exchanged {
-    /// The two.
+    /// Names of the two cameras.
     pub cameras: [String; 2],
-    /// Amount by which rays to the same part miss each other as it is, degrees: the median.
+    /// Median angle by which rays to the same part miss each other with the present footage, degrees.
     pub degrees: f64,
-    /// The same with the two exchanged.
+    /// Median angle by which the rays miss each other if the two cameras are exchanged, degrees.
     pub exchanged_degrees: f64,
-    /// True if it is certainly these two: of cameras in a ring others may fit almost as well.
+    /// True if these two cameras are certain. In a ring of cameras, other pairs may fit almost as well.
     pub sure: bool,
 }
 
-/// Cameras that do not see one person where the rig says.
+/// Cameras whose observations of one person contradict the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contradicted {
-    /// Amount by which rays to the same part miss each other, degrees: the median.
+    /// Median angle by which rays to the same part miss each other, degrees.
     pub degrees: f64,
-    /// The two cameras whose exchange fits best, if any fits better.
+    /// The two cameras whose exchange fits best, if any exchange fits better.
     #[serde(deserialize_with = "nullable")]
     pub likely: Option<[String; 2]>,
-    /// Largest usual value, degrees.
+    /// Maximum usual angle, degrees.
     pub usual_degrees: f64,
 }
 
@@ -217,11 +217,11 @@ impl RunSummary {
     /// Name of the file.
     pub const FILE: &'static str = "summary.json";
 
-    /// Reads the file.
+    /// Parses the text of the file.
     ///
     /// # Errors
     ///
-    /// [`ReadError`]; a file of another version is one, too.
+    /// Returns a [`ReadError`] if the text is malformed or of another version.
     pub fn parse(text: &str) -> Result<Self, ReadError> {
         let OfVersion { schema_version } = parse(text)?;
         if schema_version != VERSION {
@@ -235,20 +235,20 @@ impl RunSummary {
         parse(text)
     }
 
-    /// The run that the file is of, whatever its version.
+    /// Returns the session of the run that the file belongs to, for any version of the file.
     ///
     /// # Errors
     ///
-    /// [`ReadError`].
+    /// Returns a [`ReadError`] on failure.
     pub fn parse_session(text: &str) -> Result<u64, ReadError> {
         parse::<OfSession>(text).map(|value| value.session)
     }
 
-    /// The file.
+    /// Returns the text of the file.
     ///
     /// # Errors
     ///
-    /// None; those of `serde_json`.
+    /// Never fails for this type. The error type is that of `serde_json`.
     pub fn to_text(&self) -> Result<String, serde_json::Error> {
         to_text(self)
     }

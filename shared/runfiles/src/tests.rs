@@ -1,4 +1,4 @@
-//! Both directions of every file; the samples are of a run in which a camera's process was killed.
+//! Tests of reading and writing every file. The samples are of a run in which a camera's process was killed.
 
 use proptest::prelude::*;
 use serde::Serialize;
@@ -47,7 +47,8 @@ fn a_frame_without_a_result_says_why_and_a_joint_without_a_position_too() {
     assert!(joints(partial).values().any(is_missing));
 }
 
-/// Every field of an object, replaced by a text or left out, is an error that names it, unless it may be missing.
+/// Checks that each field of an object, if it is replaced by a text or left out, gives an error that names it. Fields that may be missing
+/// are excepted.
 fn assert_strict<T: Serialize>(
     text: &str,
     may_be_missing: &[&str],
@@ -116,7 +117,7 @@ fn an_error_says_where_and_what_was_found() {
     assert!(error.contains("missing field `covariance_m2`"), "{error}");
 }
 
-/// A line with people of these identities.
+/// Returns a line with people of these identities.
 fn line_of(ids: &[u64]) -> String {
     let line = read::<FrameLine>(POSE3D).pop().unwrap();
     let person = |id: &u64| PersonLine {

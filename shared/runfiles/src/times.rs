@@ -1,4 +1,4 @@
-//! `times.jsonl`: when every frame was taken, answered and turned into a result.
+//! `times.jsonl`: times at which every frame was taken, answered and turned into a result.
 
 use std::collections::BTreeMap;
 
@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::nullable::nullable;
 
-/// A line of `times.jsonl`. Times are milliseconds since the run was planned (`CLOCK_MONOTONIC`), 0 for what was
-/// before it.
+/// A line of `times.jsonl`. Times are milliseconds since the run was planned (`CLOCK_MONOTONIC`), and 0 for earlier
+/// events.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TimesLine {
-    /// How often the process that sent the result had been restarted.
+    /// Number of restarts of the process that sent the result.
     pub epoch: u32,
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// When the result was sent.
+    /// Time at which the result was sent.
     pub sent_ms: f64,
     /// The views, by camera.
     pub views: BTreeMap<String, ViewTimes>,
@@ -23,10 +23,10 @@ pub struct TimesLine {
 /// Times of one view of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ViewTimes {
-    /// The frame of its camera; none if none came.
+    /// Frame of the view's camera; `None` if none came.
     #[serde(deserialize_with = "nullable")]
     pub camera: Option<CameraTimes>,
-    /// The answer of its pose process; none if none came.
+    /// Answer of the view's pose process; `None` if none came.
     #[serde(deserialize_with = "nullable")]
     pub pose: Option<PoseTimes>,
 }
@@ -34,19 +34,19 @@ pub struct ViewTimes {
 /// A frame that a camera's process sent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CameraTimes {
-    /// When it was taken, milliseconds.
+    /// Time at which the frame was taken, milliseconds.
     pub captured_ms: f64,
-    /// How often the process had been restarted.
+    /// Number of restarts of the process.
     pub epoch: u32,
-    /// When it was sent, milliseconds.
+    /// Time at which the frame was sent, milliseconds.
     pub sent_ms: f64,
 }
 
 /// An answer of a pose process.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseTimes {
-    /// How often the process had been restarted.
+    /// Number of restarts of the process.
     pub epoch: u32,
-    /// When it was sent, milliseconds.
+    /// Time at which the answer was sent, milliseconds.
     pub sent_ms: f64,
 }

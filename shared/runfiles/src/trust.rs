@@ -1,4 +1,4 @@
-//! How far the results of a run can be trusted, as far as they themselves tell.
+//! Measures of how far the results of a run can be trusted, computed from the results alone.
 
 use core::fmt;
 
@@ -6,28 +6,28 @@ use serde::{Deserialize, Serialize};
 
 use crate::nullable::nullable;
 
-/// Statements of the results about their own quality. Shares are from 0 to 1.
+/// Measures of the quality of results, computed from the results alone. Shares are from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trust {
-    /// Median over the skeletons: root mean square deviation of the bones' lengths from those of people, standard deviations.
+    /// Root mean square deviation of the bone lengths from those of real people, standard deviations; the median over the skeletons.
     #[serde(deserialize_with = "nullable")]
     pub body_deviation: Option<f64>,
-    /// Scatter of the bones' lengths over the run, metres: mean over the bones of the median absolute deviation, scaled to a standard
-    /// deviation.
+    /// Scatter of the bone lengths over the run, metres. This is the mean over the bones of the median absolute deviation, scaled to a
+    /// standard deviation.
     #[serde(deserialize_with = "nullable")]
     pub bone_scatter_m: Option<f64>,
-    /// Mean distance of what the views found from the joints in space, metres, each at most 0.3.
+    /// Mean distance of the views' observations from the joints in space, metres, where each distance counts at most 0.3.
     #[serde(deserialize_with = "nullable")]
     pub disagreement_m: Option<f64>,
-    /// Results in which a person was found, whether as a body that people have or not.
+    /// Number of results in which a person was found, with a plausible or an implausible body.
     pub frames: u64,
-    /// Share of these results whose body is not one that people have.
+    /// Share of these results whose body is implausible for a person.
     pub implausible: f64,
-    /// Share of the joints of the skeletons that were left out, since no body has them there.
+    /// Share of the joints of the skeletons that were left out, because no body can have them there.
     pub joints_implausible: f64,
-    /// Share of the results in which the middle of the body is elsewhere than anybody could have moved to since the result before.
+    /// Share of the results in which the middle of the body is too far from that of the previous result for a person to have moved there.
     pub jumps: f64,
-    /// Distance of the joints' reprojections from what the views found, as a share of the person's height in the frames: root
+    /// Distance of the joints' reprojections from the views' observations, as a share of the person's height in the frames: root
     /// mean square over all joints.
     #[serde(deserialize_with = "nullable")]
     pub reprojection: Option<f64>,
@@ -35,7 +35,7 @@ pub struct Trust {
     pub sides_unsure: f64,
 }
 
-/// One reason not to trust the results.
+/// A reason not to trust the results.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Doubt {
     kind: Kind,
@@ -64,8 +64,8 @@ impl Kind {
         Self::Sides,
     ];
 
-    /// Returns the limit of what is tolerated. Chosen so that one person who is seen whole by calibrated cameras stays
-    /// below these limits: balancing and synthetic people reach at most two thirds of each.
+    /// Returns the maximum tolerated value. The limits are chosen so that one person who is completely seen by calibrated cameras stays
+    /// below them: balancing and synthetic people reach at most two thirds of each.
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,
@@ -76,7 +76,7 @@ impl Kind {
         }
     }
 
-    /// Returns the least value that is impossible, however few the results are.
+    /// Returns the minimum value that is impossible, however few results there are.
     fn impossible(self) -> f64 {
         match self {
             Self::Reprojection => 0.25,
@@ -99,18 +99,18 @@ impl Kind {
 }
 
 impl Trust {
-    /// Fewest results that are judged.
+    /// Minimum number of results that are judged.
     pub const MIN_FRAMES: u64 = 12;
 
-    /// A number that orders runs by their error, metres: the geometric mean of [`disagreement_m`](Self::disagreement_m) and
-    /// [`bone_scatter_m`](Self::bone_scatter_m). It is no error itself; 0.02 tells runs with many wrong limbs from the others
-    /// (docs/guide/run.md).
+    /// Returns a number that ranks runs by their error, metres: the geometric mean of [`disagreement_m`](Self::disagreement_m) and
+    /// [`bone_scatter_m`](Self::bone_scatter_m). It is not an error itself. A limit of 0.02 separates runs with many wrong limbs from other
+    /// runs (docs/guide/run.md).
     pub fn expected_error_m(&self) -> Option<f64> {
         Some((self.disagreement_m? * self.bone_scatter_m?).sqrt())
     }
 
-    /// Why the results should not be trusted; empty where nothing speaks against them. Where too few are there to judge, only what is
-    /// impossible is a reason.
+    /// Returns the reasons not to trust the results; empty if there are none. If there are too few results to judge, only impossible
+    /// values are a reason.
     pub fn doubts(&self) -> Vec<Doubt> {
         let is_few = self.frames < Self::MIN_FRAMES;
         let doubt = |kind: Kind| {
@@ -125,7 +125,7 @@ impl Trust {
         Kind::ALL.into_iter().filter_map(doubt).collect()
     }
 
-    /// The numbers for people, in one line.
+    /// Returns the numbers for users, in one line.
     pub fn text(&self) -> String {
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
         let reprojection = self.reprojection.map_or_else(String::new, |reprojection| {
@@ -150,7 +150,7 @@ impl Trust {
 }
 
 impl Doubt {
-    /// Returns true if it is the same reason, whatever the numbers.
+    /// Returns true if it is the same reason, regardless of the numbers.
     pub fn is_like(&self, other: &Self) -> bool {
         self.kind == other.kind
     }
@@ -162,26 +162,26 @@ impl fmt::Display for Doubt {
         match self.kind {
             Kind::Reprojection => write!(
                 f,
-                "joints are {value:.0} % of the person's height from where the views see them (more than {limit:.0} %): see `parallax \
-                 calib check`, and whether the footage is of one moment"
+                "joints are {value:.0} % of the person's height away from the views' own joints (more than {limit:.0} %): run `parallax \
+                 calib check`, and check that all footage is of the same moment"
             ),
             Kind::Limbs => write!(
                 f,
-                "bones change their lengths and views disagree, by {value:.1} cm together (more than {limit:.0} cm): limbs are wrong in some frames, \
+                "bone lengths vary and views disagree, by {value:.1} cm together (more than {limit:.0} cm): limbs are wrong in some frames, \
                  or the cameras do not fit"
             ),
             Kind::Jumps => write!(
                 f,
-                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the one who is followed changes; `person.follow` \
-                 and the space that the cameras see say whom to follow"
+                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the followed person changes; `person.follow` \
+                 and the space that the cameras see decide who is followed"
             ),
             Kind::Implausible => write!(
                 f,
-                "{value:.0} % of what was found is not a body that people have (more than {limit:.0} %): is one person seen whole, in the right size?"
+                "{value:.0} % of the bodies that were found are impossible (more than {limit:.0} %): is one person completely visible, at the right scale?"
             ),
             Kind::Joints => write!(
                 f,
-                "{value:.0} % of the joints are where no body has them (more than {limit:.0} %): is one person seen whole by every camera?"
+                "{value:.0} % of the joints are in impossible positions (more than {limit:.0} %): is one person completely visible to every camera?"
             ),
             Kind::Bones => write!(
                 f,
@@ -227,7 +227,7 @@ mod tests {
                 "by 2.6 cm together",
             ),
             (|trust| trust.jumps = 0.087, "jumps in 8.7 %"),
-            (|trust| trust.implausible = 0.4, "40 % of what was found"),
+            (|trust| trust.implausible = 0.4, "40 % of the bodies that were found"),
             (|trust| trust.joints_implausible = 0.3, "30 % of the joints"),
             (|trust| trust.body_deviation = Some(3.0), "bones are 3.0"),
             (|trust| trust.sides_unsure = 0.5, "unsure in 50 %"),

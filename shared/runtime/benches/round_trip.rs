@@ -1,6 +1,7 @@
-//! Round trip between two processes that sleep until they are woken: one message of 64 bytes, one image of
-//! 172 x 224 (115 584 bytes) and the response maps of all levels of an image (40 megabytes), in place; and
-//! the same maps copied once each way, as with a socket at best.
+//! Round trip between two processes that sleep until they are woken.
+//!
+//! The messages are 64 bytes, an image of 172 x 224 (115 584 bytes), and the response maps of all levels of an image (40 megabytes),
+//! all sent in place. For comparison, the same maps are copied once in each direction, which is the best case of a socket.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
@@ -16,7 +17,7 @@ use runtime::{
     Waiter,
 };
 
-/// Values of f32.
+/// Name, number of f32 values, and rounds of each workload.
 const WORKLOADS: [(&str, usize, usize); 4] = [
     ("64 bytes", 16, 2000),
     ("115 584 bytes", 115_584 / 4, 2000),
@@ -54,7 +55,7 @@ fn ends(bus: &Bus, to: &str, from: &str) -> Ends {
     (bus.slice_publisher(to).unwrap(), subscriber, waiter)
 }
 
-/// Writes one value in every page, or all of them.
+/// Writes one value in every page, or all values of `source`.
 fn write(publisher: &SlicePublisher<f32, EvidenceHeader>, len: usize, source: Option<&[f32]>) {
     let mut loan = publisher.loan(len).unwrap();
     match source {
@@ -114,7 +115,7 @@ fn measure(name: &str, len: usize, rounds: usize, copies: bool) {
     publisher.wait_for_subscribers(1, Duration::from_mins(1));
     let mut own = vec![0.0; len];
     let mut micros: Vec<f64> = Vec::new();
-    // The first ones wait for the other process to start.
+    // The first messages wait for the other process to start.
     while micros.len() < rounds + 50 {
         let begin = Instant::now();
         write(&publisher, len, copies.then_some(&own));

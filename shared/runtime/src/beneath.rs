@@ -1,5 +1,7 @@
-//! Access to files and directories relative to the descriptor of their parent directory. Between two uses of
-//! a path another file may be put there; a descriptor stays the same. Nothing here follows a symbolic link.
+//! Access to files and directories relative to the descriptor of their parent directory.
+//!
+//! Between two uses of a path, another process may put another file there, but a descriptor stays the same. No function of this
+//! module follows a symbolic link.
 
 use std::ffi::{CStr, CString};
 use std::fs::File;
@@ -11,10 +13,10 @@ use std::path::Path;
 use rustix::fs::{AtFlags, CWD, Dir, FileType, Mode, OFlags, Stat, openat, statat, unlinkat};
 use rustix::io::Errno;
 
-/// How deep directories are removed: iceoryx2 nests two levels.
+/// Maximum depth to which directories are removed: iceoryx2 nests two levels.
 const DEEPEST: usize = 8;
 
-/// Opens a directory by its path. Its last component must not be a symbolic link.
+/// Opens a directory by its path, whose last component must not be a symbolic link.
 pub(crate) fn open_directory(path: &Path) -> Result<OwnedFd, Errno> {
     directory_in(CWD, path.as_os_str().as_bytes())
 }
@@ -25,7 +27,7 @@ pub(crate) fn directory_in(directory: impl AsFd, name: &[u8]) -> Result<OwnedFd,
     openat(directory, name, flags, Mode::empty())
 }
 
-/// Opens a file in a directory for reading and writing; creates it, for its owner only, if it does not exist.
+/// Opens a file in a directory for reading and writing. Creates it, for its owner only, if it does not exist.
 pub(crate) fn file_in(directory: impl AsFd, name: &str) -> Result<File, Errno> {
     let flags = OFlags::RDWR | OFlags::CREATE | OFlags::NOFOLLOW | OFlags::CLOEXEC;
     openat(directory, name, flags, Mode::RUSR | Mode::WUSR).map(File::from)
@@ -41,12 +43,12 @@ pub(crate) fn read_in(directory: impl AsFd, name: &str, most: u64) -> io::Result
     Ok(bytes)
 }
 
-/// The metadata of a name in a directory; for a symbolic link its own.
+/// Returns the metadata of a name in a directory. For a symbolic link, this is the metadata of the link.
 pub(crate) fn stat_in(directory: impl AsFd, name: &CStr) -> Result<Stat, Errno> {
     statat(directory, name, AtFlags::SYMLINK_NOFOLLOW)
 }
 
-/// The names in a directory.
+/// Returns the names in a directory.
 pub(crate) fn names(directory: impl AsFd) -> Result<Vec<CString>, Errno> {
     let mut names = Vec::new();
     for entry in Dir::read_from(directory)? {

@@ -17,10 +17,10 @@ use crate::topic::{Topic, TopicPlan};
 use crate::{Copies, Namespace, Progress, free_shared_memory, private};
 use failure::Stop;
 
-/// How long a sender waits for a receiver without room, unless set otherwise.
+/// Default time that a sender waits for a receiver without room.
 const PATIENCE: Duration = Duration::from_mins(2);
 
-/// A process's connection to the shared memory of its deployment. It creates ports.
+/// A process's connection to the shared memory of its deployment. It creates the ports of the process.
 #[derive(Debug)]
 pub struct Bus {
     node: Arc<Node<ipc::Service>>,
@@ -38,11 +38,11 @@ impl Bus {
     /// Registers this process in the deployment.
     ///
     /// * `process`: its unique name in the deployment, for example `pose-2`.
-    /// * `stop`: ends every wait.
+    /// * `stop`: the stop request, which ends every wait.
     ///
     /// # Errors
     ///
-    /// [`BusError::Full`], [`BusError::Privacy`], [`BusError::Directory`], [`BusError::Namespace`], [`BusError::Node`],
+    /// Returns [`BusError::Full`], [`BusError::Privacy`], [`BusError::Directory`], [`BusError::Namespace`], [`BusError::Node`] or
     /// [`BusError::Name`].
     pub fn open(namespace: &Namespace, process: &str, stop: &Stop) -> Result<Self, BusError> {
         check_room(process, free_shared_memory().unwrap_or(u64::MAX))?;
@@ -75,16 +75,16 @@ impl Bus {
         })
     }
 
-    /// Sets how long a sender waits for a receiver without room before it fails; two minutes if it
-    /// is not set.
+    /// Sets the time that a sender waits for a receiver without room before it fails. The default is two minutes.
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
         self
     }
 
-    /// Sets whether waiters of this bus poll without pause instead of sleeping until a message arrives. The
-    /// receiver then occupies a core, and a message arrives in a microsecond or two. The default is to sleep.
+    /// Sets whether waiters of this bus poll without pause instead of sleeping until a message arrives.
+    ///
+    /// A receiver that polls occupies a core, and a message arrives in one or two microseconds. The default is to sleep.
     #[must_use]
     pub fn with_spin(mut self, spins: bool) -> Self {
         self.spins = spins;
@@ -92,7 +92,8 @@ impl Bus {
     }
 
     /// Makes this process an onlooker: no sender wakes it, waits for room in its queues, or counts it among its receivers.
-    /// It polls, and with lossless delivery it misses what does not fit into its queues.
+    ///
+    /// An onlooker polls. With lossless delivery, it misses messages that do not fit into its queues.
     #[must_use]
     pub fn as_onlooker(mut self) -> Self {
         self.looks_on = true;
@@ -103,12 +104,12 @@ impl Bus {
         self.looks_on
     }
 
-    /// The deployment.
+    /// Returns the namespace of the deployment.
     pub fn namespace(&self) -> &Namespace {
         &self.namespace
     }
 
-    /// The name of this process in the deployment.
+    /// Returns the name of this process in the deployment.
     pub fn process(&self) -> &str {
         &self.process
     }
@@ -128,12 +129,12 @@ impl Bus {
         &self.stop
     }
 
-    /// The counter of the process's main loop.
+    /// Returns the counter of the process's main loop.
     pub fn progress(&self) -> &Progress {
         &self.progress
     }
 
-    /// Bytes that the ports of this bus have copied, without the heartbeats.
+    /// Returns the count of bytes that the ports of this bus have copied, without the heartbeats.
     pub fn copies(&self) -> &Copies {
         &self.copies
     }
@@ -146,14 +147,14 @@ impl Bus {
         self.patience
     }
 
-    /// Creates topics, which exist as long as the returned handles are kept or a port is open on them.
+    /// Creates topics, which exist as long as the returned handles are kept or a port of the topic is open.
     ///
-    /// The supervisor does this once, before it starts processes; ports only open existing topics. So the
-    /// quality of service is defined in one place, and topics outlive the processes that use them.
+    /// The supervisor calls this once, before it starts processes. Ports can only open existing topics. The
+    /// quality of service is therefore defined in one place, and topics outlive the processes that use them.
     ///
     /// # Errors
     ///
-    /// [`BusError::Create`], [`BusError::CreateWakeUp`], [`BusError::Name`].
+    /// Returns [`BusError::Create`], [`BusError::CreateWakeUp`] or [`BusError::Name`].
     pub fn create_topics(&self, plans: &[TopicPlan]) -> Result<Vec<Topic>, BusError> {
         plans.iter().map(|plan| plan.create(&self.node)).collect()
     }
@@ -183,7 +184,7 @@ pub(crate) struct BusParts {
 }
 
 impl BusParts {
-    /// The bus, with its own counters: work of the other thread is no progress of the main loop.
+    /// Returns a bus with separate counters, because work of the other thread is not progress of the main loop.
     pub(crate) fn into_bus(self) -> Bus {
         Bus {
             node: self.node,
@@ -224,11 +225,11 @@ pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
         std::fs::create_dir_all(parent).map_err(directory)?;
     }
     if !path.exists() {
-        // In one step, so that no process ever reads half of it.
+        // The file is replaced in one step, so that no process ever reads half of it.
         files::replace(&path, namespace.config_text().as_bytes()).map_err(directory)?;
     }
-    // The clean-up of dead nodes falls back to the process's global configuration where a node died
-    // before it had written its own (iceoryx2 0.10, node/mod.rs), so that one must be the same.
+    // If a node died before it had written its configuration, its clean-up uses the global configuration of the cleaning process
+    // (iceoryx2 0.10, node/mod.rs). The global configuration must therefore be the same.
     if let Ok(file) = FilePath::new(path.as_os_str().as_encoded_bytes())
         && let Err(error) = Config::setup_global_config_from_file(&file)
     {

@@ -1,4 +1,4 @@
-//! Why the shared memory of a deployment cannot be reached, or a topic not be created.
+//! Reasons why the shared memory of a deployment cannot be reached, or a topic cannot be created.
 
 use std::io;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use crate::room::{ROOM, short_of_room};
 use crate::{NamespaceError, PrivacyError};
 use failure::Fault;
 
-/// The deployment's shared memory cannot be reached, or a topic not be created.
+/// Reason why the deployment's shared memory cannot be reached, or a topic cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
     /// The working directory cannot be created or written to.
@@ -19,7 +19,7 @@ pub enum BusError {
     Directory {
         /// The directory or a file below it.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: io::Error,
     },
@@ -29,7 +29,7 @@ pub enum BusError {
     /// iceoryx2 does not accept the namespace.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
-    /// There is no room for the queues of a process. The system would kill it when it first wrote to them.
+    /// There is no room for the queues of a process. The system would kill the process at its first write to them.
     #[error(
         "process {process:?} needs {} KB of shared memory for its queues, {} KB are free in /dev/shm",
         .needed_bytes / 1000, .free_bytes / 1000
@@ -37,9 +37,9 @@ pub enum BusError {
     Full {
         /// Name of the process.
         process: String,
-        /// Memory that is needed.
+        /// Size of the memory that is needed, bytes.
         needed_bytes: u64,
-        /// Memory that is free.
+        /// Size of the memory that is free, bytes.
         free_bytes: u64,
     },
     /// The process cannot be registered.
@@ -47,9 +47,9 @@ pub enum BusError {
     Node {
         /// Name of the process.
         process: String,
-        /// Where.
+        /// Directory of the deployment.
         root: PathBuf,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: NodeCreationFailure,
     },
@@ -58,7 +58,7 @@ pub enum BusError {
     Create {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: PublishSubscribeCreateError,
     },
@@ -70,13 +70,13 @@ pub enum BusError {
     CreateWakeUp {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         source: EventCreateError,
     },
-    /// The name of a topic or a process is not one that iceoryx2 accepts.
+    /// iceoryx2 does not accept the name of a topic or a process.
     #[error("name {name:?} is empty, too long, or not plain text")]
     Name {
-        /// The name.
+        /// Name that was refused.
         name: String,
     },
 }

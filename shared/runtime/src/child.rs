@@ -18,37 +18,38 @@ use failure::Stop;
 
 const READ_BYTES: usize = 4096;
 
-/// A process that this one has started. Dropping it kills it.
+/// A process that this process has started. Dropping this value kills the process.
 ///
-/// The kernel ends it when the *thread* that started it ends (see
-/// [`Launch::supervisor`](crate::Launch)), so that thread must be the one which supervises.
+/// The kernel ends the process when the *thread* that started it ends (see [`Launch::supervisor`](crate::Launch)).
+/// The thread that starts it must therefore be the one that supervises it.
 #[derive(Debug)]
 pub struct Child {
     process: std::process::Child,
     pidfd: OwnedFd,
     output: Option<PipeReader>,
-    /// Output since the last end of a line.
+    /// Output after the last complete line.
     partial: Vec<u8>,
     /// True if the output has ended.
     ended: bool,
 }
 
 impl Child {
-    /// Starts a process with its output in a pipe and without input, in a process group of its own, which the
-    /// terminal does not signal.
+    /// Starts a process without input and with its output in a pipe. The process has its own process group, so that the
+    /// terminal does not signal it.
     ///
     /// # Errors
     ///
-    /// The executable cannot be run, or the system has no room for another process.
+    /// Fails if the executable cannot be run, or if the system has no room for another process.
     pub fn start(executable: &Path, args: &[OsString]) -> io::Result<Self> {
         Self::with_input(executable, args, Stdio::null())
     }
 
-    /// The same with data on its standard input: a file without a name, which cannot be removed.
+    /// Starts a process like [`start`](Self::start), with data on its standard input. The data are in a file without a name, which
+    /// cannot be removed.
     ///
     /// # Errors
     ///
-    /// As those of [`start`](Self::start), or the system has no room for the file.
+    /// Fails in the same cases as [`start`](Self::start). It also fails if the system has no room for the file.
     pub fn start_given(executable: &Path, args: &[OsString], given: &[u8]) -> io::Result<Self> {
         let mut file = File::from(memfd_create("given", MemfdFlags::CLOEXEC)?);
         file.write_all(given)?;
@@ -76,16 +77,16 @@ impl Child {
         })
     }
 
-    /// Its process id.
+    /// Returns the process id.
     pub fn pid(&self) -> u32 {
         self.process.id()
     }
 
-    /// The lines it has written since the last call; after its end the rest as well.
+    /// Returns the lines that the process has written since the last call. After its end, returns the unfinished last line as well.
     ///
     /// # Errors
     ///
-    /// The pipe cannot be read.
+    /// Fails if the pipe cannot be read.
     pub fn read_lines(&mut self) -> io::Result<Vec<String>> {
         let mut closed = false;
         if let Some(output) = &mut self.output {
@@ -119,16 +120,16 @@ impl Child {
         Ok(String::from_utf8_lossy(&text).lines().map(str::to_owned).collect())
     }
 
-    /// How it ended, if it has. Its remaining children are killed then.
+    /// Returns the exit status of the process if it has ended. In this case, its remaining children are killed.
     ///
     /// # Errors
     ///
-    /// The process does not exist any more.
+    /// Fails if the process does not exist any more.
     pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
         let mut fds = [PollFd::from_borrowed_fd(self.pidfd.as_fd(), PollFlags::IN)];
         let ended = poll(&mut fds, Some(&Timespec::default()))? > 0;
         if ended {
-            // Before it is reaped, while its id cannot belong to another process.
+            // Kill the children before the process is reaped: until then, its id cannot belong to another process.
             self.kill();
         }
         let status = self.process.try_wait()?;
@@ -136,21 +137,21 @@ impl Child {
         Ok(status)
     }
 
-    /// Returns true if a signal has stopped it (SIGSTOP, SIGTSTP), as opposed to it waiting for a processor; `false` where the
-    /// system does not report it (`/proc` is Linux's).
+    /// Returns true if a signal has stopped the process (SIGSTOP, SIGTSTP). Returns false if the process only waits for a processor, or
+    /// if the system does not report its state (`/proc` exists only on Linux).
     pub fn is_stopped(&self) -> bool {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.pid()));
         stat.is_ok_and(|stat| state_in(&stat) == Some('T'))
     }
 
-    /// Sends it a stop request (SIGTERM).
+    /// Sends the process a stop request (SIGTERM).
     pub fn terminate(&self) {
         if let Err(error) = kill_process(Pid::from_child(&self.process), Signal::TERM) {
             tracing::debug!(%error, pid = self.pid(), "cannot signal");
         }
     }
 
-    /// Kills it and its children.
+    /// Kills the process and its children.
     pub fn kill(&self) {
         if let Err(error) = kill_process_group(Pid::from_child(&self.process), Signal::KILL) {
             tracing::debug!(%error, pid = self.pid(), "cannot kill");
@@ -158,42 +159,42 @@ impl Child {
     }
 }
 
-/// The state of a process in `/proc/<pid>/stat`, which follows its name in parentheses (proc(5)).
+/// Returns the state of a process from `/proc/<pid>/stat`, where it follows the name in parentheses (proc(5)).
 fn state_in(stat: &str) -> Option<char> {
     let (_, rest) = stat.rsplit_once(')')?;
     rest.trim_start().chars().next()
 }
 
-/// Kills a process (SIGKILL), as a crash would: for fault injection.
+/// Kills a process (SIGKILL), as a crash would do. Used for fault injection.
 ///
-/// Call it while the process cannot have been reaped yet, for example between the supervisor's events
-/// `Started` and `Died`: a released process id may belong to another process.
+/// Call this only while the process cannot have been reaped, for example between the supervisor's events
+/// `Started` and `Died`. A released process id may belong to another process.
 ///
 /// # Errors
 ///
-/// There is no such process, or it belongs to another user.
+/// Fails if there is no such process, or if it belongs to another user.
 pub fn kill(pid: u32) -> io::Result<()> {
     signal(pid, Signal::KILL)
 }
 
-/// Stops a process (SIGSTOP), as a hang would: for fault injection.
+/// Stops a process (SIGSTOP), as a hang would do. Used for fault injection.
 ///
-/// Call it where [`kill`] may be called.
+/// Call it only when [`kill`] may be called.
 ///
 /// # Errors
 ///
-/// As those of [`kill`].
+/// Fails in the same cases as [`kill`].
 pub fn freeze(pid: u32) -> io::Result<()> {
     signal(pid, Signal::STOP)
 }
 
 /// Continues a process that [`freeze`] stopped (SIGCONT).
 ///
-/// Call it where [`kill`] may be called.
+/// Call it only when [`kill`] may be called.
 ///
 /// # Errors
 ///
-/// As those of [`kill`].
+/// Fails in the same cases as [`kill`].
 pub fn thaw(pid: u32) -> io::Result<()> {
     signal(pid, Signal::CONT)
 }
@@ -219,7 +220,7 @@ impl Drop for Child {
 ///
 /// # Errors
 ///
-/// The system call fails.
+/// Fails if the system call fails.
 pub fn wait_for_any(children: &[&Child], stop: Option<&Stop>, timeout: Duration) -> io::Result<()> {
     let mut fds = Vec::new();
     for child in children {
@@ -251,7 +252,7 @@ mod tests {
 
     use super::{Child, freeze, kill, state_in, thaw, wait_for_any};
 
-    /// Time after which something counts as never happening.
+    /// Time after which an event counts as never happening.
     const WATCHDOG: Duration = Duration::from_mins(1);
 
     fn shell(script: &str) -> Child {
@@ -324,7 +325,7 @@ mod tests {
         let (lines, status) = run(&mut child);
         assert!(!status.success());
         let orphan = format!("/proc/{}/stat", lines[0]);
-        // The state stands behind the name, which is in brackets. A process that begins another program has no command line for
+        // The state follows the name, which is in parentheses. A process that begins another program has no command line for
         // a moment, but it has a state.
         let is_alive = || {
             let stat = std::fs::read_to_string(&orphan).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Cleaning up after processes that died.
+//! Clean-up after processes that died.
 
 use core::time::Duration;
 use std::collections::BTreeSet;
@@ -9,17 +9,17 @@ use iceoryx2::prelude::{CallbackProgression, Node, NodeState, ipc};
 
 use crate::Bus;
 
-/// How long to wait for another supervisor that cleans up the same: that of a run which is ending.
+/// Time to wait for another supervisor that does the same clean-up, because its run is ending.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// The mode of a file that its owner may write.
+/// Mode bit of a file that its owner may write.
 const OWNER_WRITES: u32 = 0o200;
 
-/// Releases what dead processes hold in shared memory: their slots in topics, their queues, and the buffer of
+/// Releases the shared memory that dead processes hold: their slots in topics, their queues, and the buffer of
 /// a dead subscriber that blocks a sender.
 ///
-/// Only the supervisor cleans up: at every death, and from time to time. iceoryx2 0.10 removes a port's tag
-/// before it frees the port's slot in its topic, and never frees the slot if the tag is missing. That happens
+/// Only the supervisor cleans up: after every death, and from time to time. iceoryx2 0.10 removes a port's tag
+/// before it frees the port's slot in its topic, and never frees the slot if the tag is missing. The tag is missing
 /// if a cleaning process is killed between the two steps, or if two processes clean up at once. The process
 /// that needs the slot could then never start.
 #[derive(Debug, Default)]
@@ -29,13 +29,13 @@ pub struct Cleaner {
 }
 
 impl Cleaner {
-    /// Cleans up, and returns how many dead processes were removed.
+    /// Cleans up. Returns the number of dead processes that were removed.
     ///
-    /// A process killed while it registers a port leaves a file that iceoryx2 0.10 overlooks, so that its
-    /// node cannot be removed. Where clean-up has failed twice such files are removed first. Complete files
-    /// stay, since they record what the process held.
+    /// If a process is killed while it registers a port, it leaves a file that iceoryx2 0.10 overlooks, and its
+    /// node cannot be removed. If clean-up has failed twice, such files are therefore removed first. Complete files
+    /// stay, because they record the slots of the process.
     pub fn clean(&mut self, bus: &Bus) -> usize {
-        // iceoryx2 may count a node as cleaned that is still there: check again.
+        // iceoryx2 may report a node as cleaned although it is still there, so check again.
         let before = dead(bus);
         bus.node().blocking_cleanup_dead_nodes(PATIENCE);
         let mut after = dead(bus);
@@ -67,9 +67,10 @@ fn dead(bus: &Bus) -> BTreeSet<u128> {
     dead
 }
 
-/// Removes the files that a dead node has not finished writing. iceoryx2 keeps a file writable for its owner
-/// until it is complete, and registers the node or port of a tag only then: an incomplete tag holds no slot.
-/// A complete one is the only record of a slot; without it the slot is lost for good.
+/// Removes the files that a dead node has not finished writing.
+///
+/// iceoryx2 keeps a file writable for its owner until the file is complete, and registers the node or port of a tag only then.
+/// An incomplete tag therefore holds no slot. A complete tag is the only record of its slot: without it, the slot is lost for good.
 fn remove_unfinished(bus: &Bus, node: u128) {
     let directory = bus.namespace().root().join("nodes").join(node.to_string());
     let Ok(entries) = fs::read_dir(&directory) else {

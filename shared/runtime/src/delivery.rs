@@ -1,42 +1,42 @@
-//! Behaviour of a topic for a slow receiver, its number of ports and their buffers.
+//! Behaviour of a topic with a slow receiver, its number of ports, and their buffers.
 
 /// Behaviour when a receiver is slower than its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Delivery {
-    /// The sender never waits: a full buffer drops its oldest message, so the latest frame wins.
+    /// The sender never waits. A full buffer drops its oldest message, so that the latest frame wins.
     #[default]
     Realtime,
-    /// Nothing is lost: a full buffer makes the sender wait.
+    /// Nothing is lost. A full buffer makes the sender wait.
     Lossless,
 }
 
-/// The number of ports of a topic and their buffers.
+/// The number of ports of a topic, and their buffers.
 ///
-/// Memory is reserved for the worst case, so that a sender always has some:
-/// `subscribers * (buffer + borrowed) + onlookers * (buffer + 1) + loaned` chunks for each publisher, unless
+/// Memory is reserved for the worst case, so that a sender always has some. Each publisher has
+/// `subscribers * (buffer + borrowed) + onlookers * (buffer + 1) + loaned` chunks, unless
 /// [`TopicPlan::with_few_chunks`](crate::TopicPlan::with_few_chunks) is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Largest number of publishers.
+    /// Maximum number of publishers.
     pub publishers: usize,
-    /// Largest number of subscribers.
+    /// Maximum number of subscribers.
     pub subscribers: usize,
-    /// Largest number of subscribers that no publisher waits for ([`Bus::as_onlooker`](crate::Bus::as_onlooker)); one may
+    /// Maximum number of subscribers that no publisher waits for ([`Bus::as_onlooker`](crate::Bus::as_onlooker)). Each may
     /// borrow one message at a time.
     pub onlookers: usize,
     /// Queue length of a subscriber, messages.
     pub buffer: usize,
-    /// Messages that one subscriber may borrow at the same time.
+    /// Number of messages that one subscriber may borrow at the same time.
     pub borrowed: usize,
-    /// Messages that one publisher may have on loan at the same time.
+    /// Number of messages that one publisher may have on loan at the same time.
     pub loaned: usize,
 }
 
 impl Limits {
-    /// One publisher that writes one message at a time.
+    /// Returns the limits for one publisher that writes one message at a time.
     ///
     /// * `buffer`: queue length of a subscriber, messages.
-    /// * `borrowed`: messages that one subscriber may borrow at the same time.
+    /// * `borrowed`: number of messages that one subscriber may borrow at the same time.
     pub fn new(subscribers: usize, buffer: usize, borrowed: usize) -> Self {
         Self {
             publishers: 1,
@@ -48,7 +48,7 @@ impl Limits {
         }
     }
 
-    /// The same, with this many onlookers in addition.
+    /// Adds onlookers to the limits.
     #[must_use]
     pub fn with_onlookers(self, onlookers: usize) -> Self {
         Self { onlookers, ..self }

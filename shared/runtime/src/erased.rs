@@ -1,8 +1,10 @@
-//! Ports of bytes. The types of a topic are values here, so that iceoryx2 is compiled once, in this crate, and not in every
-//! crate for every message that it sends.
+//! Ports of bytes, whose message types are known only at run time.
 //!
-//! iceoryx2 offers this to its bindings for other languages: a topic is opened with the names, sizes and alignments of types, and
-//! is refused where they differ from those it was made with, as it is with types that the compiler knows.
+//! The types of a topic are values here. iceoryx2 is therefore compiled once, in this crate, and not in every crate for every message
+//! that it sends.
+//!
+//! iceoryx2 offers this interface to its bindings for other languages. A topic is opened with the names, sizes and alignments of
+//! its types. As with types known to the compiler, it is refused if they differ from the types with which it was created.
 #![expect(
     unsafe_code,
     reason = "iceoryx2 hands out bytes, and takes the types of a topic on trust"
@@ -26,13 +28,13 @@ use crate::payload::{Element, Header, Message};
 
 /// The payload of every topic, as bytes.
 pub(crate) type Bytes = [CustomPayloadMarker];
-/// The header of every topic, as a place.
+/// The header of every topic, without its type.
 pub(crate) type Head = CustomHeaderMarker;
 
 /// The messages of a topic in one process.
 pub(crate) type Messages<S = ipc::Service> = PortFactory<S, Bytes, Head>;
 
-/// The types of a topic: its elements, and the header in front of them.
+/// The types of a topic: its elements, and the header before them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Types {
     element: TypeDetail,
@@ -41,7 +43,7 @@ pub(crate) struct Types {
     name: &'static str,
 }
 
-/// The same in this process.
+/// The types of a topic, as type ids of this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Ids {
     element: TypeId,
@@ -62,19 +64,19 @@ impl Types {
         }
     }
 
-    /// Names of both, for people.
+    /// Returns the names of both types, for users.
     pub(crate) fn name(&self) -> &'static str {
         self.name
     }
 
-    /// Begins to make or open a topic of these types.
+    /// Returns a builder that creates or opens a topic of these types.
     pub(crate) fn builder<S: Service>(
         &self,
         node: &Node<S>,
         name: &ServiceName,
     ) -> Builder<Bytes, Head, S> {
         let builder = node.service_builder(name).publish_subscribe::<Bytes>().user_header::<Head>();
-        // SAFETY: chunks of the topic are read and written as these types only: every port below keeps them, and checks.
+        // SAFETY: chunks of the topic are read and written only as these types. Every port below keeps the types and checks them.
         let builder = unsafe { builder.__internal_set_payload_type_details(&self.element) };
         // SAFETY: as above.
         unsafe { builder.__internal_set_user_header_type_details(&self.header) }
@@ -89,7 +91,9 @@ pub(crate) struct Writer {
 }
 
 impl Writer {
-    /// * `port`: made of a topic that was opened with `types`.
+    /// Creates a writer.
+    ///
+    /// * `port`: publisher of a topic that was opened with `types`.
     pub(crate) fn new(port: Publisher<ipc::Service, Bytes, Head>, types: &Types) -> Self {
         Self {
             port,
@@ -101,12 +105,12 @@ impl Writer {
         &self.port
     }
 
-    /// Loans a chunk of `len` elements. It holds what an earlier message left there; so does its header.
+    /// Loans a chunk of `len` elements. The chunk and its header contain the values of an earlier message.
     pub(crate) fn loan(&self, len: usize) -> Result<Chunk, LoanError> {
-        // SAFETY: all topics here are of arrays, of any length.
+        // SAFETY: all topics of this module are of arrays, which may have any length.
         let sample = unsafe { self.port.loan_custom_payload(len) }?;
-        // SAFETY: the bytes are those of a mapped file, which the kernel zeroed and senders wrote since, so they are
-        // initialised; and every bit pattern is a value of a byte.
+        // SAFETY: the bytes belong to a mapped file. The kernel zeroed them and senders have written to them since, so they are
+        // initialised. Every bit pattern is a value of a byte.
         let sample = unsafe { sample.assume_init() };
         Ok(Chunk {
             sample,
@@ -127,17 +131,17 @@ impl Chunk {
     pub(crate) fn write<T: Message>(&mut self, message: &T) {
         self.check::<T, ()>();
         let to = self.sample.payload_mut().as_mut_ptr().cast::<T>();
-        // SAFETY: the chunk is of one `T`, aligned as it asks.
+        // SAFETY: the chunk is one `T`, with the alignment of `T`.
         unsafe { to.write(*message) };
     }
 
-    /// Gives the header a first value.
+    /// Sets the header to its default value.
     pub(crate) fn write_header<E: Message, H: Header>(&mut self) {
         self.check::<E, H>();
         let to = core::ptr::from_mut(self.sample.user_header_mut());
         let to = core::ptr::with_exposed_provenance_mut::<H>(to.expose_provenance());
-        // SAFETY: the header is of the type `H`. iceoryx2 computes its address as a number from that of the segment, whose
-        // provenance is exposed by that.
+        // SAFETY: the header is of the type `H`. iceoryx2 computes its address as a number from that of the segment. This
+        // exposes the provenance of the segment.
         unsafe { to.write(H::default()) };
     }
 
@@ -145,12 +149,12 @@ impl Chunk {
         self.check::<E, H>();
         let bytes = self.sample.payload_mut();
         let len = bytes.len() / size_of::<E>();
-        // SAFETY: these are `len` elements of the type `E`, aligned as it asks; every bit pattern is a value of it (its trait is
+        // SAFETY: these are `len` elements of the type `E`, with its alignment. Every bit pattern is a value of `E` (its trait is
         // sealed).
         unsafe { core::slice::from_raw_parts_mut(bytes.as_mut_ptr().cast(), len) }
     }
 
-    /// The header of a chunk for which [`Self::write_header`] was called.
+    /// Returns the header of a chunk for which [`Self::write_header`] was called.
     pub(crate) fn header_mut<E: Message, H: Header>(&mut self) -> &mut H {
         self.check::<E, H>();
         let at = core::ptr::from_mut(self.sample.user_header_mut());
@@ -176,7 +180,9 @@ pub(crate) struct Reader<S: Service = ipc::Service> {
 }
 
 impl<S: Service> Reader<S> {
-    /// * `port`: made of a topic that was opened with `types`.
+    /// Creates a reader.
+    ///
+    /// * `port`: subscriber of a topic that was opened with `types`.
     pub(crate) fn new(port: Subscriber<S, Bytes, Head>, types: &Types) -> Self {
         Self {
             port,
@@ -209,7 +215,7 @@ impl<S: Service> Received<S> {
         check::<E, H>(self.ids);
         let bytes = self.sample.payload();
         let len = bytes.len() / size_of::<E>();
-        // SAFETY: these are `len` elements of the type `E`, aligned as it asks, that a sender of the same type has written.
+        // SAFETY: these are `len` elements of the type `E`, with its alignment, that a sender of the same type has written.
         unsafe { core::slice::from_raw_parts(bytes.as_ptr().cast(), len) }
     }
 
@@ -218,12 +224,12 @@ impl<S: Service> Received<S> {
         let at = core::ptr::from_ref(self.sample.user_header());
         let at = core::ptr::with_exposed_provenance::<H>(at.expose_provenance());
         // SAFETY: the header is of the type `H`, and its sender has given it a value. iceoryx2 computes its address as a number
-        // from that of the segment, whose provenance is exposed by that.
+        // from that of the segment. This exposes the provenance of the segment.
         unsafe { &*at }
     }
 }
 
-/// Checks that a chunk is read or written as what it is; only a mistake in this crate could fail it.
+/// Checks that a chunk is read or written as its own type. Only a mistake in this crate can make the check fail.
 fn check<E: Message, H: Header>(ids: Ids) {
     const { assert!(size_of::<E>() > 0) };
     let asked = Ids {

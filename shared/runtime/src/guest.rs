@@ -1,4 +1,4 @@
-//! A program that is no part of a deployment and reads its topics: it can be moved between threads, and cannot send.
+//! A program that reads the topics of a deployment without being part of it. It can be moved between threads, and cannot send.
 
 #[cfg(test)]
 mod tests;
@@ -28,38 +28,38 @@ use crate::subscriber::onlooker;
 use crate::{LockError, Namespace, NamespaceError, ReceiveError, deployments};
 use failure::{ExitKind, Fault};
 
-/// Guests of one deployment at the same time.
+/// Maximum number of guests of one deployment at the same time.
 pub const MOST_GUESTS: usize = 4;
-/// The directory of the files that guests lock, one each.
+/// Directory of the files that guests lock, one file for each guest.
 const SEATS: &str = "guests";
 
 type Transport = ipc_threadsafe::Service;
 
-/// A deployment cannot be looked at.
+/// Reason why a deployment cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum GuestError {
-    /// It does not run, or is about to end.
+    /// The deployment does not run, or is about to end.
     #[error("deployment {name:?} does not run; {}", running_ones(.running))]
     NotRunning {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
-        /// The names of those that run.
+        /// Names of the deployments that run.
         running: Vec<String>,
     },
-    /// As many programs as may be there at the same time are there.
+    /// The maximum number of programs already read the deployment.
     #[error("{most} programs already read deployment {name:?}, which is the limit: {}", .guests.join(", "))]
     Full {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
-        /// How many may be there.
+        /// Maximum number of programs.
         most: usize,
-        /// The process ids of those that are there.
+        /// Process ids of the programs that read the deployment.
         guests: Vec<String>,
     },
-    /// It has no such topic.
+    /// The deployment has no such topic.
     #[error("deployment {name:?} has no topic {topic:?}")]
     NoSuchTopic {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
         /// Name of the topic.
         topic: String,
@@ -69,44 +69,44 @@ pub enum GuestError {
         "deployment {name:?} sends {topic:?} version {theirs}, this program reads version {ours}"
     )]
     Version {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
-        /// Topic without the version.
+        /// Name of the topic without the version.
         topic: String,
-        /// The version of the deployment.
+        /// Version of the deployment.
         theirs: String,
-        /// The version of this program.
+        /// Version of this program.
         ours: String,
     },
-    /// The topic carries another type of message, under the same version.
+    /// The topic carries another type of message with the same version.
     #[error("topic {topic:?} of deployment {name:?} does not carry {expected}")]
     WrongType {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
         /// Name of the topic.
         topic: String,
         /// The type that was expected.
         expected: &'static str,
     },
-    /// The name cannot be that of a deployment.
+    /// The text is not a valid name of a deployment.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
     /// The other deployments cannot be listed.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// A file in its directory cannot be used.
+    /// A file in the directory of the deployment cannot be used.
     #[error("cannot use the directory of deployment {name:?}")]
     Directory {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: io::Error,
     },
     /// The transport failed.
     #[error("cannot read deployment {name:?}: {what}")]
     Transport {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
         /// Action that failed, and the reason.
         what: String,
@@ -124,10 +124,10 @@ impl Fault for GuestError {
     fn hint(&self) -> Option<String> {
         match self {
             Self::Version { .. } | Self::WrongType { .. } => Some(
-                "build this program and the deployment of the same version of Parallax".to_owned(),
+                "build this program and the deployment from the same version of Parallax".to_owned(),
             ),
             Self::Full { .. } => {
-                Some("end one of them; a program that was killed leaves its place".to_owned())
+                Some("end one of them; a program that was killed no longer counts".to_owned())
             }
             _ => None,
         }
@@ -144,9 +144,9 @@ fn running_ones(running: &[String]) -> String {
 
 /// A program that reads the topics of a running deployment.
 ///
-/// It has no way to send. No sender waits for it, wakes it, or counts it among its receivers. The deployment ends without
-/// asking it: drop the guest, its ports and what they gave within a second after [`Self::is_over`]. As long as it exists, the
-/// next run of the deployment cannot start.
+/// A guest cannot send. No sender waits for it, wakes it, or counts it among its receivers. The deployment does not wait for guests
+/// when it ends: drop the guest, its ports and their messages within a second after [`Self::is_over`] returns true. As long as the
+/// guest exists, the next run of the deployment cannot start.
 #[derive(Debug)]
 pub struct Guest {
     node: Arc<Node<Transport>>,
@@ -160,10 +160,10 @@ impl Guest {
     ///
     /// # Errors
     ///
-    /// [`GuestError::NotRunning`], [`GuestError::Full`], [`GuestError::Directory`], [`GuestError::Transport`].
+    /// Returns [`GuestError::NotRunning`], [`GuestError::Full`], [`GuestError::Directory`] or [`GuestError::Transport`].
     pub fn open(namespace: &Namespace) -> Result<Self, GuestError> {
         let name = namespace.name();
-        // Checked before anything is opened, since opening creates files.
+        // Checked before anything is opened, because opening creates files.
         let Some(supervisor) = running_supervisor(namespace) else {
             return Err(not_running(name));
         };
@@ -196,22 +196,22 @@ impl Guest {
         })
     }
 
-    /// The deployment.
+    /// Returns the namespace of the deployment.
     pub fn namespace(&self) -> &Namespace {
         &self.namespace
     }
 
-    /// Returns true if the deployment is ending: everything that came of this guest has to be dropped.
+    /// Returns true if the deployment is ending. Then drop this guest, its ports and their messages.
     pub fn is_over(&self) -> bool {
         running_supervisor(&self.namespace) != Some(self.supervisor)
     }
 
-    /// Subscribes to a topic of messages, `[E]` of one, with the header `()`; or of arrays with a header.
+    /// Subscribes to a topic. A topic of messages has arrays `[E]` of one element and the header `()`.
     ///
     /// # Errors
     ///
-    /// [`GuestError::NoSuchTopic`], [`GuestError::Version`], [`GuestError::WrongType`], [`GuestError::Full`],
-    /// [`GuestError::Transport`]; [`GuestError::NotRunning`] if the deployment has ended.
+    /// Returns [`GuestError::NoSuchTopic`], [`GuestError::Version`], [`GuestError::WrongType`], [`GuestError::Full`] or
+    /// [`GuestError::Transport`]. Returns [`GuestError::NotRunning`] if the deployment has ended.
     pub fn port<E: Message, H: Header>(&self, topic: &str) -> Result<GuestPort<E, H>, GuestError> {
         let run = (&self.namespace, self.supervisor);
         let reader = self
@@ -261,13 +261,13 @@ impl Guest {
         Ok(Reader::new(subscriber, types))
     }
 
-    /// Why a topic is not there: the deployment has another version of it, or has not made it yet.
+    /// Returns the reason why a topic is missing: the deployment has another version of it, or has not created it yet.
     fn absent(&self, topic: &str) -> GuestError {
         let name = self.namespace.name();
         let (ours, all) = (parts_of(topic), self.topics());
         let theirs = all.iter().filter_map(|other| parts_of(other));
         let other = ours.and_then(|ours| {
-            // One of the same version was made since this one was not there.
+            // A topic of the same version has been created since the check.
             let mut others = theirs
                 .filter(|theirs| (theirs.0, theirs.2) == (ours.0, ours.2) && theirs.1 != ours.1);
             Some((ours, others.next()?))
@@ -286,7 +286,7 @@ impl Guest {
         }
     }
 
-    /// The names of all topics; empty if they cannot be listed.
+    /// Returns the names of all topics; empty if they cannot be listed.
     fn topics(&self) -> Vec<String> {
         let mut topics = Vec::new();
         let Ok(config) = self.namespace.config() else {
@@ -312,11 +312,11 @@ pub struct GuestPort<E: Message, H: Header> {
 }
 
 impl<E: Message, H: Header> GuestPort<E, H> {
-    /// Takes the oldest waiting message, if there is one. Its memory is held until it is dropped.
+    /// Takes the oldest waiting message, if there is one. The message's memory is held until the message is dropped.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError::TooManyHeld`], [`ReceiveError::Transport`].
+    /// Returns [`ReceiveError::TooManyHeld`] or [`ReceiveError::Transport`].
     pub fn receive(&self) -> Result<Option<Seen<E, H>>, ReceiveError> {
         let topic = || Arc::clone(&self.topic);
         match self.reader.receive() {
@@ -335,7 +335,7 @@ impl<E: Message, H: Header> GuestPort<E, H> {
     }
 }
 
-/// A message in shared memory, which its sender will not overwrite while this is held.
+/// A message in shared memory. Its sender does not overwrite it while this value is held.
 #[derive(Debug)]
 pub struct Seen<E: Message, H: Header> {
     received: Received<Transport>,
@@ -343,22 +343,22 @@ pub struct Seen<E: Message, H: Header> {
 }
 
 impl<E: Message, H: Header> Seen<E, H> {
-    /// The array, or one message.
+    /// Returns the array, or an array of one message.
     pub fn payload(&self) -> &[E] {
         self.received.payload::<E, H>()
     }
 
-    /// The header. Check it against the array before use: it comes from another process.
+    /// Returns the header. Check it against the array before use, because it comes from another process.
     pub fn header(&self) -> &H {
         self.received.header::<E, H>()
     }
 }
 
-/// The names of the deployments of this user that run.
+/// Returns the names of this user's deployments that run.
 ///
 /// # Errors
 ///
-/// [`LockError`].
+/// Returns a [`LockError`] on failure.
 pub fn running_deployments() -> Result<Vec<String>, LockError> {
     let all = deployments(&Namespace::usual_base())?.into_iter();
     let running = all.filter(|deployment| deployment.supervisor.is_some());
@@ -372,14 +372,14 @@ fn not_running(name: &str) -> GuestError {
     }
 }
 
-/// A topic as what it is about, its version, and whose it is: `frame/v1/0`.
+/// Splits the name of a topic such as `frame/v1/0` into its subject, its version, and the view or process.
 fn parts_of(topic: &str) -> Option<(&str, &str, &str)> {
     let (about, rest) = topic.split_once("/v")?;
     let (version, whose) = rest.split_once('/').unwrap_or((rest, ""));
     Some((about, version, whose))
 }
 
-/// Takes a free place among the guests: a locked file, which the system unlocks however this process ends.
+/// Takes a free place among the guests. The place is a locked file, which the system unlocks when this process ends for any reason.
 fn seat(namespace: &Namespace) -> Result<File, GuestError> {
     let name = || namespace.name().to_owned();
     let failed = |source| GuestError::Directory {

@@ -1,4 +1,4 @@
-//! Heartbeats and metrics, sent by a thread of their own.
+//! Heartbeats and metrics, sent by a separate thread.
 
 use core::time::Duration;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
@@ -12,12 +12,12 @@ use rustix::time::{ClockId, clock_gettime};
 use crate::{Bus, Launch, PortError, Progress, Publisher, memory};
 use failure::now_nanos;
 
-/// Period of the heartbeats.
+/// Interval between heartbeats.
 pub const HEARTBEAT: Duration = Duration::from_millis(150);
-/// Heartbeats from one metrics message to the next: about a second.
+/// Number of heartbeats from one metrics message to the next, which takes about a second.
 const HEARTBEATS_PER_METRICS: u32 = 7;
 
-/// Heartbeats cannot be sent.
+/// Reason why heartbeats cannot be sent.
 #[derive(Debug, thiserror::Error)]
 pub enum HealthError {
     /// The topic cannot be opened.
@@ -30,9 +30,9 @@ pub enum HealthError {
 
 impl failure::Fault for HealthError {}
 
-/// The counters and times of a process, published several times a second until this is dropped.
+/// The counters and times of a process, published several times a second until this value is dropped.
 ///
-/// A separate thread sends them. So a process that is stopped (SIGSTOP) sends nothing, while one whose main
+/// A separate thread sends them. A process that is stopped (SIGSTOP) therefore sends nothing. A process whose main
 /// loop hangs continues to send, with a [`Progress`] that does not change.
 #[derive(Debug)]
 pub struct Health {
@@ -53,18 +53,18 @@ struct Counts {
     finished: AtomicU32,
     refused: [AtomicU64; Refusal::N],
     ended: AtomicBool,
-    /// The first message beyond this frame is the last.
+    /// Frame after which the main loop hangs on purpose, once the message of a later frame has been sent.
     spins_after: AtomicU64,
     began_at_nanos: u64,
     meter: Mutex<Meter>,
 }
 
 impl Health {
-    /// Starts to send.
+    /// Starts sending heartbeats and metrics.
     ///
     /// # Errors
     ///
-    /// [`HealthError`].
+    /// Returns a [`HealthError`] on failure.
     pub fn start(bus: &Bus, launch: &Launch) -> Result<Self, HealthError> {
         let counts = Arc::new(Counts {
             session: launch.session,
@@ -82,7 +82,7 @@ impl Health {
             began_at_nanos: now_nanos(),
             meter: Mutex::default(),
         });
-        // Ports cannot move to another thread, so the thread creates its own.
+        // Ports cannot move to another thread, so the thread creates its own ports.
         let (result_sender, result_receiver) = mpsc::sync_channel(1);
         let parts = bus.parts();
         let process = launch.process.clone();
@@ -99,7 +99,7 @@ impl Health {
                     }
                     Err(error) => {
                         if result_sender.send(Err(error)).is_err() {
-                            tracing::debug!("the start of the heartbeats is not awaited any more");
+                            tracing::debug!("the caller no longer waits for the start of the heartbeats");
                         }
                     }
                 }
@@ -123,8 +123,9 @@ impl Health {
         self.counts.n_received.fetch_add(n, Ordering::Relaxed);
     }
 
-    /// Counts a sent message, and an iteration of the main loop: a process that is always busy never waits.
-    /// The first one triggers a heartbeat at once, so that the supervisor soon knows that the process works.
+    /// Counts a sent message and an iteration of the main loop, because a process that is always busy never waits.
+    ///
+    /// The first message triggers a heartbeat at once, so that the supervisor soon knows that the process works.
     pub fn sent(&self, frame: u64) {
         self.counts.last_frame.store(frame, Ordering::Relaxed);
         self.counts.progress.tick();
@@ -149,8 +150,7 @@ impl Health {
         }
     }
 
-    /// Counts a message that was refused, and logs why: the first of every cause, and then each time the
-    /// count has doubled.
+    /// Counts a refused message. Logs the reason for the first message of every cause, and then each time the count has doubled.
     pub fn refuse(&self, cause: Refusal, topic: &str, why: &dyn core::fmt::Display) {
         self.dropped(Cause::Malformed, 1);
         let n = 1 + self.counts.refused[cause as usize].fetch_add(1, Ordering::Relaxed);
@@ -166,41 +166,41 @@ impl Health {
 
     /// Records a duration, nanoseconds.
     ///
-    /// * `view`: of which view, if of one.
+    /// * `view`: view that the duration belongs to, if there is one.
     pub fn spent(&self, span: Span, view: Option<usize>, nanos: u64) {
         self.counts.meter(|meter| meter.spent(span, view, nanos));
     }
 
-    /// Records how many frames or results wait in the process.
+    /// Records the number of frames or results that wait in the process.
     pub fn queued(&self, n: usize) {
         self.counts.meter(|meter| meter.queued(n));
     }
 
-    /// Records how many people there are in a result.
+    /// Records the number of people in a result.
     pub fn counted_people(&self, n: u32) {
         self.counts.meter(|meter| meter.counted_people(n));
     }
 
-    /// Notes what became of the pictures of a live camera so far.
+    /// Records the counts of the pictures of a live camera.
     pub fn camera(&self, counts: CameraCounts) {
         self.counts.meter(|meter| meter.camera(counts));
     }
 
-    /// Counts a frame that the processor computed because the GPU was lost; logs the first one.
+    /// Counts a frame that the processor computed because the GPU was lost. Logs the first one.
     pub fn without_gpu(&self) {
         if self.counts.n_without_gpu.fetch_add(1, Ordering::Relaxed) == 0 {
-            tracing::warn!("the GPU was lost: the processor computes from here on");
+            tracing::warn!("the GPU was lost: the processor computes from now on");
         }
     }
 
-    /// Counts evidence that was sent.
+    /// Counts bytes of evidence that was sent.
     pub fn sent_evidence(&self, bytes: u64) {
         self.counts.meter(|meter| meter.sent_evidence(bytes));
     }
 
     /// Sets the view that the process works for.
     ///
-    /// * `name`: the camera's.
+    /// * `name`: name of the camera.
     pub fn belongs_to(&self, view: usize, name: &str) {
         self.counts.meter(|meter| meter.belongs_to(view, name));
     }
@@ -244,8 +244,8 @@ impl<'a> Sender<'a> {
         })
     }
 
-    /// The last messages are sent after the end, so that the final counts are reported. A new observer gets
-    /// metrics at once.
+    /// Sends until this process ends. The last messages are sent after the end, so that the final counts are reported. A new
+    /// observer gets metrics at once.
     fn send_until_ended(&self) {
         let mut rates = Rates::new(self.counts.began_at_nanos);
         let (mut n_heartbeats, mut n_observers) = (0_u32, 0);
@@ -300,8 +300,7 @@ impl Counts {
         }
     }
 
-    /// The metrics without the rates. The meter is locked row by row, so that the main loop waits for one row
-    /// at most.
+    /// Returns the metrics without the rates. The meter is locked row by row, so that the main loop waits for at most one row.
     fn metrics(&self) -> Metrics {
         let [memory_bytes, peak_memory_bytes] = memory::memory_now().unwrap_or_default();
         let mut message = Metrics {
@@ -333,13 +332,13 @@ impl Counts {
 }
 
 fn spin() -> ! {
-    tracing::warn!("computing for ever, on purpose");
+    tracing::warn!("looping forever, on purpose");
     loop {
         core::hint::spin_loop();
     }
 }
 
-/// Processor time that this process has used, milliseconds, modulo 2^32.
+/// Returns the processor time that this process has used, milliseconds, modulo 2^32.
 fn cpu_millis() -> u32 {
     let used = clock_gettime(ClockId::ProcessCPUTime);
     let millis = used.tv_sec * 1000 + used.tv_nsec / 1_000_000;

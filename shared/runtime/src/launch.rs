@@ -8,26 +8,26 @@ use tracing::Level;
 use crate::{Delivery, Namespace, NamespaceError, Scheduling};
 use failure::{ExitKind, Fault};
 
-/// The arguments of a service are not those of a supervisor.
+/// Reason why the arguments of a service are not those of a supervisor.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LaunchError {
-    /// A flag is missing.
+    /// A required flag is missing.
     #[error("service needs {flag}; services are started by `parallax run`")]
     Missing {
-        /// The flag.
+        /// Name of the flag.
         flag: &'static str,
     },
-    /// A value cannot be understood.
+    /// The value of a flag is malformed.
     #[error("{flag} {value:?} is not {expected}")]
     Value {
-        /// The flag.
+        /// Name of the flag.
         flag: &'static str,
         /// The given value.
         value: String,
         /// The expected kind of value.
         expected: &'static str,
     },
-    /// The namespace is wrong.
+    /// The namespace is not valid.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
 }
@@ -38,24 +38,24 @@ impl Fault for LaunchError {
     }
 }
 
-/// Facts about a deployment that its process needs.
+/// Data about a deployment that its process needs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
-    /// The location of its shared memory.
+    /// Location of the deployment's shared memory.
     pub namespace: Namespace,
-    /// Its unique name in the deployment, for example `pose-2`.
+    /// Unique name of the process in the deployment, for example `pose-2`.
     pub process: String,
-    /// The session, which goes into the stamp of every message.
+    /// Session of the run, which goes into the stamp of every message.
     pub session: u64,
-    /// How often the process has been restarted; goes into the stamp of every message.
+    /// Number of restarts of the process, which goes into the stamp of every message.
     pub epoch: u32,
     /// Behaviour when a receiver is slower than its sender.
     pub delivery: Delivery,
-    /// The process id of the supervisor; the process ends when that one ends.
+    /// Process id of the supervisor. This process ends when the supervisor ends.
     pub supervisor: Option<u32>,
-    /// The least important events that are logged.
+    /// The least severe events that are logged.
     pub log: Level,
-    /// Its requests to the system's scheduler.
+    /// Requests of the process to the system's scheduler.
     pub scheduling: Scheduling,
 }
 
@@ -73,7 +73,7 @@ const FLAGS: [&str; 9] = [
 ];
 
 impl Launch {
-    /// The arguments that [`from_args`](Self::from_args) understands.
+    /// Returns the arguments that [`from_args`](Self::from_args) parses.
     pub fn to_args(&self) -> Vec<OsString> {
         let delivery = match self.delivery {
             Delivery::Realtime => "realtime",
@@ -104,11 +104,11 @@ impl Launch {
         args
     }
 
-    /// Takes its own arguments out of a command line and returns the rest, in order.
+    /// Takes the arguments of the launch out of a command line and returns the remaining arguments, in order.
     ///
     /// # Errors
     ///
-    /// [`LaunchError`].
+    /// Returns a [`LaunchError`] on failure.
     pub fn from_args(
         args: impl IntoIterator<Item = OsString>,
     ) -> Result<(Self, Vec<OsString>), LaunchError> {

@@ -1,4 +1,4 @@
-//! Ports, wake-ups, stop requests, heartbeats and logging: the only crate that calls iceoryx2 and the
+//! Ports, wake-ups, stop requests, heartbeats and logging. This is the only crate that calls iceoryx2 and the
 //! operating system.
 
 mod delivery;

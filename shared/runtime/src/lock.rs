@@ -1,4 +1,4 @@
-//! The lock of a deployment: one run at a time, which starts and ends with no files left behind.
+//! The lock of a deployment. Only one run is possible at a time, and it starts and ends without leftover files.
 
 use core::time::Duration;
 use std::fs::{self, File};
@@ -20,35 +20,35 @@ use crate::private::{self, LOCK_FILE, Root};
 use crate::{BusError, Namespace, beneath};
 use failure::{ExitKind, Fault};
 
-/// The process of a deployment that holds its lock: the name with which it opens its [`Bus`](crate::Bus).
+/// Name of the process that holds the lock of a deployment. The process opens its [`Bus`](crate::Bus) with this name.
 pub const SUPERVISOR: &str = "supervisor";
-/// Shows observers that the deployment is ending.
+/// File that tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
-/// The description until all of it is written.
+/// Name of the description while it is being written.
 const UNFINISHED_FILE: &str = "deployment.json.new";
-/// How long observers are given to leave.
+/// Time that observers have to leave.
 const OBSERVER_LIMIT: Duration = Duration::from_secs(1);
-/// How long the processes of a killed supervisor are given to end.
+/// Time that the processes of a killed supervisor have to end.
 const DYING_LIMIT: Duration = Duration::from_secs(3);
 const DYING_PAUSE: Duration = Duration::from_millis(20);
 
-/// The deployment cannot be locked.
+/// Reason why the deployment cannot be locked.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
-    /// Another supervisor runs it.
+    /// Another supervisor runs the deployment.
     #[error("deployment {name:?} is already running (process {pid})")]
     AlreadyRunning {
         /// Name of the deployment.
         name: String,
-        /// Its supervisor.
+        /// Process id of the supervisor.
         pid: String,
     },
-    /// Its supervisor is gone, but not all of its processes.
+    /// The supervisor of the deployment is gone, but some of its processes are still alive.
     #[error("processes of an earlier run of deployment {name:?} are still there: {processes}")]
     StillAlive {
         /// Name of the deployment.
         name: String,
-        /// Names and process ids.
+        /// Names and process ids of the living processes.
         processes: String,
     },
     /// A file cannot be created, locked or removed.
@@ -56,7 +56,7 @@ pub enum LockError {
     File {
         /// The file or directory.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: io::Error,
     },
@@ -97,7 +97,7 @@ impl Namespace {
     ///
     /// # Errors
     ///
-    /// [`LockError`].
+    /// Returns a [`LockError`] on failure.
     pub fn acquire(&self) -> Result<DeploymentLock, LockError> {
         let (root, file) = lock_file(self)?;
         // The previous run may have removed its marker file in the meantime.
@@ -130,17 +130,17 @@ impl Namespace {
 }
 
 impl DeploymentLock {
-    /// The deployment.
+    /// Returns the namespace of the deployment.
     pub fn namespace(&self) -> &Namespace {
         &self.namespace
     }
 
-    /// Writes the description of the deployment, which others of this user can read while it runs
-    /// ([`Namespace::description`]). Whoever reads it finds all of it, and all topics if they were made before.
+    /// Writes the description of the deployment, which other programs of this user can read while it runs
+    /// ([`Namespace::description`]). A reader always finds the complete description, and all topics if they were created before it.
     ///
     /// # Errors
     ///
-    /// [`LockError::File`].
+    /// Returns [`LockError::File`] on failure.
     pub fn describe(&self, text: &[u8]) -> Result<(), LockError> {
         let failed = |source: io::Error| LockError::File {
             path: self.namespace.root().join(DESCRIPTION_FILE),
@@ -154,7 +154,7 @@ impl DeploymentLock {
             .map_err(|error| failed(error.into()))
     }
 
-    /// Returns at once if there is no observer.
+    /// Waits until the observers have left. Returns at once if there is no observer.
     fn wait_for_observers_to_leave(&self) {
         if alive(&self.config).is_empty() {
             return;
@@ -186,8 +186,8 @@ impl Drop for DeploymentLock {
     }
 }
 
-/// A locked file. It is unlocked when it is dropped: to close it is not enough, as a child process that another thread has just
-/// forked holds the same lock until it runs its program.
+/// A locked file, which is unlocked when this value is dropped. Closing the file is not enough: a child process that another thread
+/// has just forked holds the same lock until it runs its program.
 #[derive(Debug)]
 struct Locked(File);
 
@@ -235,7 +235,7 @@ fn lock_file(namespace: &Namespace) -> Result<(Root, Locked), LockError> {
     }
 }
 
-/// Names and process ids of the processes that are registered and alive.
+/// Returns the names and process ids of the processes that are registered and alive.
 pub(crate) fn alive(config: &Config) -> Vec<String> {
     let text = |node: Option<(String, u32)>| match node {
         Some((name, pid)) => format!("{name} ({pid})"),
@@ -244,7 +244,7 @@ pub(crate) fn alive(config: &Config) -> Vec<String> {
     living(config).into_iter().map(text).collect()
 }
 
-/// The same as name and process id; none for a process that has not written its name yet.
+/// Returns the name and process id of each living process; `None` for a process that has not written its name yet.
 pub(crate) fn living(config: &Config) -> Vec<Option<(String, u32)>> {
     let mut living = Vec::new();
     let listed = Node::<ipc::Service>::list(config, |state| {
@@ -264,7 +264,7 @@ pub(crate) fn living(config: &Config) -> Vec<Option<(String, u32)>> {
     living
 }
 
-/// Removes everything but the lock file and the marker file. No process may be alive.
+/// Removes everything except the lock file and the marker file. No process of the deployment may be alive.
 fn wipe(namespace: &Namespace, root: &Root) -> Result<(), LockError> {
     root.empty().map_err(unusable(namespace))?;
     private::remove_shared_memory(namespace).map_err(BusError::from)?;

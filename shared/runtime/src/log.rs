@@ -1,13 +1,13 @@
-//! The log of iceoryx2, through `tracing`.
+//! Passes the log of iceoryx2 to `tracing`.
 
 use core::fmt;
 
 use iceoryx2::prelude::{LogLevel, set_log_level, set_logger};
 use tracing::level_filters::LevelFilter;
 
-/// Makes iceoryx2 log through `tracing` instead of to standard error, as detailed as this process logs.
+/// Makes iceoryx2 log through `tracing` instead of to standard error, at the log level of this process.
 pub(crate) fn adopt_transport_log() {
-    // False if it is set already.
+    // The result is false if a logger is already set.
     set_logger(&FromTransport);
     set_log_level(match LevelFilter::current() {
         LevelFilter::TRACE => LogLevel::Trace,
@@ -16,7 +16,7 @@ pub(crate) fn adopt_transport_log() {
     });
 }
 
-/// The log of iceoryx2. This crate reports its errors as well, so they are logged as details only.
+/// The log of iceoryx2. This crate reports the errors of iceoryx2 as well, so they are logged only as details.
 struct FromTransport;
 
 impl iceoryx2_log::Log for FromTransport {

@@ -1,4 +1,4 @@
-//! Processes that were given up, marked in files beside the deployment's sockets: others need not wait for them.
+//! Processes that were given up. Files beside the deployment's sockets mark them, so that other processes need not wait for them.
 
 use core::time::Duration;
 use std::fs::{self, File};
@@ -10,12 +10,12 @@ use crate::Namespace;
 /// Ending of the file that marks a process.
 const MARK: &str = "lost";
 
-/// How long a sender waits for its receivers.
+/// Time that a sender waits for its receivers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience {
-    /// At most.
+    /// Longest wait.
     pub limit: Duration,
-    /// If as many processes were given up as receivers are missing.
+    /// Longest wait if at least as many processes were given up as receivers are missing.
     pub after_losses: Duration,
 }
 
@@ -35,23 +35,23 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// Those of a deployment.
+    /// Returns the processes of a deployment that were given up.
     pub fn of(namespace: &Namespace) -> Self {
         Self {
             folder: namespace.root().to_owned(),
         }
     }
 
-    /// Marks a process. The file is empty, which a full `/dev/shm` has room for.
+    /// Marks a process as given up. The file is empty, so that it fits even into a full `/dev/shm`.
     ///
     /// # Errors
     ///
-    /// The file cannot be created; senders then wait for the process as long as for any other.
+    /// Fails if the file cannot be created. Senders then wait for this process as long as for any other.
     pub fn note(&self, process: &str) -> io::Result<()> {
         File::create(self.folder.join(process).with_added_extension(MARK)).map(drop)
     }
 
-    /// How many processes are marked.
+    /// Returns the number of marked processes.
     pub(crate) fn count(&self) -> usize {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
         let is_mark = |path: PathBuf| path.extension().is_some_and(|extension| extension == MARK);

@@ -1,4 +1,4 @@
-//! The location of data in shared memory, which is the same for all processes that map it.
+//! Location of data in shared memory, which is the same for all processes that map the data.
 
 use std::io;
 use std::path::PathBuf;
@@ -12,18 +12,18 @@ pub struct Mapped {
     pub inode: u64,
     /// Offset in the file, bytes.
     pub offset: u64,
-    /// True if this process may write to it.
+    /// True if this process may write to the location.
     pub is_writable: bool,
 }
 
-/// The location of an array in shared memory; none if it is in the process's own memory.
+/// Returns the location of an array in shared memory; `None` if the array is in the process's own memory.
 ///
-/// It reads the memory map of the process (`/proc/self/maps`): meant for tests and diagnosis, too slow for
+/// The function reads the memory map of the process (`/proc/self/maps`). It is meant for tests and diagnosis, and is too slow for
 /// every message.
 ///
 /// # Errors
 ///
-/// The memory map cannot be read.
+/// Fails if the memory map cannot be read.
 pub fn mapped_at<T>(array: &[T]) -> io::Result<Option<Mapped>> {
     let maps = std::fs::read_to_string("/proc/self/maps")?;
     let range = array.as_ptr_range();
@@ -43,12 +43,12 @@ fn find(maps: &str, begin: usize, end: usize) -> Option<Mapped> {
     })
 }
 
-/// One line of `/proc/self/maps`, of a file.
+/// One line of `/proc/self/maps` that is about a file.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Mapping<'a> {
     pub(crate) address: usize,
     pub(crate) len: usize,
-    /// True if it is shared with the file.
+    /// True if the memory is shared with the file.
     pub(crate) shared: bool,
     pub(crate) writable: bool,
     pub(crate) offset: u64,
@@ -57,7 +57,7 @@ pub(crate) struct Mapping<'a> {
 }
 
 impl<'a> Mapping<'a> {
-    /// `7f0000000000-7f0000001000 rw-s 00000000 00:1a 42    /dev/shm/name`.
+    /// Parses a line such as `7f0000000000-7f0000001000 rw-s 00000000 00:1a 42    /dev/shm/name`.
     pub(crate) fn parse(line: &'a str) -> Option<Self> {
         let mut words = line.split_ascii_whitespace();
         let (begin, end) = words.next()?.split_once('-')?;

@@ -1,4 +1,4 @@
-//! Allocating shared memory before it is written to.
+//! Allocation of shared memory before it is written to.
 #![expect(unsafe_code, reason = "madvise has no safe binding")]
 
 use std::io;
@@ -15,7 +15,7 @@ use crate::reserve::{self, Refused};
 /// The file system of shared memory.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// The memory of a pool cannot be allocated.
+/// Reason why the memory of a pool cannot be allocated.
 #[derive(Debug, thiserror::Error)]
 pub enum MemoryError {
     /// The file system of shared memory is full.
@@ -23,19 +23,19 @@ pub enum MemoryError {
         "{path:?} needs {needed_bytes} bytes of shared memory, {free_bytes} are free in /dev/shm"
     )]
     Full {
-        /// The pool.
+        /// File of the pool.
         path: PathBuf,
-        /// Its size.
+        /// Size of the pool.
         needed_bytes: u64,
-        /// Free bytes.
+        /// Number of free bytes.
         free_bytes: u64,
     },
-    /// It exceeds the limit on the size of a file.
+    /// The pool exceeds the limit on the size of a file.
     #[error("{path:?} needs {needed_bytes} bytes of shared memory, a file may have {limit_bytes}")]
     Limited {
-        /// The pool.
+        /// File of the pool.
         path: PathBuf,
-        /// Its size.
+        /// Size of the pool.
         needed_bytes: u64,
         /// The limit of this process (`ulimit -f`).
         limit_bytes: u64,
@@ -43,9 +43,9 @@ pub enum MemoryError {
     /// The pool cannot be opened or extended.
     #[error("cannot reserve pool {path:?}")]
     Reserve {
-        /// The pool.
+        /// File of the pool.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: io::Error,
     },
@@ -54,31 +54,31 @@ pub enum MemoryError {
     Maps(#[source] io::Error),
 }
 
-/// Bytes that are free in the file system of shared memory.
+/// Returns the number of free bytes in the file system of shared memory.
 ///
 /// # Errors
 ///
-/// The file system cannot be queried.
+/// Fails if the file system cannot be queried.
 pub fn free_shared_memory() -> io::Result<u64> {
     free_space(Path::new(SHARED_MEMORY))
 }
 
-/// Bytes that are free in the file system of an existing file or folder.
+/// Returns the number of free bytes in the file system of an existing file or folder.
 ///
 /// # Errors
 ///
-/// The path does not exist.
+/// Fails if the path does not exist.
 pub fn free_space(path: &Path) -> io::Result<u64> {
     let status = statvfs(path)?;
     Ok(status.f_bavail * status.f_frsize)
 }
 
-/// Peak physical memory of this process, bytes (`VmHWM`); `None` where the system does not report it.
+/// Returns the peak physical memory of this process, bytes (`VmHWM`); `None` if the system does not report it.
 pub fn peak_memory() -> Option<u64> {
     memory_now().map(|[_, peak]| peak)
 }
 
-/// Current (`VmRSS`) and peak (`VmHWM`) physical memory of this process, bytes; `None` where the system does
+/// Returns the current (`VmRSS`) and peak (`VmHWM`) physical memory of this process, bytes; `None` if the system does
 /// not report it.
 pub(crate) fn memory_now() -> Option<[u64; 2]> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -90,15 +90,15 @@ pub(crate) fn memory_now() -> Option<[u64; 2]> {
     Some([bytes("VmRSS:")?, bytes("VmHWM:")?])
 }
 
-/// Allocates every page of a publisher's pool, and maps those of its first chunks, which it reuses as long as
+/// Allocates every page of a publisher's pool, and maps the pages of its first chunks. The publisher reuses these chunks as long as
 /// they suffice.
 ///
-/// The first write to a page costs a page fault and its zeroing (20 ms instead of 0.4 ms for a frame of 6
-/// megabytes), and if the file system is full by then the kernel kills the process with SIGBUS. Here the cost
-/// is paid in advance and the failure is reported.
+/// The first write to a page costs a page fault and the zeroing of the page (20 ms instead of 0.4 ms for a frame of 6
+/// megabytes). If the file system is full at that time, the kernel kills the process with SIGBUS. This function pays the cost
+/// in advance and reports the failure.
 ///
-/// * `port`: the number of the publisher in iceoryx2, which is part of its pool's file name.
-/// * `mapped`: how many chunks of how many are mapped.
+/// * `port`: number of the publisher in iceoryx2, which is part of its pool's file name.
+/// * `mapped`: number of mapped chunks, and number of all chunks.
 pub(crate) fn populate(
     (prefix, port): (&str, u128),
     mapped: [usize; 2],
@@ -120,9 +120,9 @@ pub(crate) fn populate(
     Ok(())
 }
 
-/// Why the pool of a publisher was not created, if memory was the reason.
+/// Returns the reason why the pool of a publisher was not created, if memory was the reason.
 ///
-/// * `prefix`: of the files of the deployment.
+/// * `prefix`: prefix of the files of the deployment.
 pub(crate) fn refused(prefix: &str) -> Option<MemoryError> {
     let path = Path::new(SHARED_MEMORY).join(prefix);
     Some(match reserve::refused()? {
@@ -140,7 +140,7 @@ pub(crate) fn refused(prefix: &str) -> Option<MemoryError> {
 }
 
 impl Mapping<'_> {
-    /// Maps the first pages, a share of all. A kernel before 5.14 does not support this, which does no harm.
+    /// Maps the given share of the pages, from the first one. A kernel before 5.14 does not support this, which does no harm.
     fn touch(&self, [share, of]: [usize; 2]) {
         let len = if share < of {
             self.len / of * share
@@ -149,11 +149,11 @@ impl Mapping<'_> {
         };
         let address = core::ptr::with_exposed_provenance_mut(self.address);
         // SAFETY: the range is the start of a shared mapping that iceoryx2 made in this process a moment
-        // ago and keeps for the life of the publisher that the caller holds; MADV_POPULATE_WRITE changes no
+        // ago. iceoryx2 keeps the mapping for the life of the publisher, which the caller holds. `MADV_POPULATE_WRITE` changes no
         // byte of it.
         let result = unsafe { madvise(address, len, Advice::LinuxPopulateWrite) };
         if let Err(error) = result {
-            tracing::debug!(%error, path = self.path, "pool is not mapped ahead of use");
+            tracing::debug!(%error, path = self.path, "the pool is not mapped before use");
         }
     }
 }

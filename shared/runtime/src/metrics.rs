@@ -1,7 +1,7 @@
 //! Times and counts of a process: measured in the process, sent as a message, and checked when read.
 //!
 //! A [`Meter`] collects durations and counts, [`Rates`] computes recent rates, and a [`Reading`] is the
-//! checked content of another process's message. Nothing here reads a clock.
+//! checked content of another process's message. This module does not read a clock.
 
 mod meter;
 mod rates;

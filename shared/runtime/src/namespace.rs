@@ -1,4 +1,4 @@
-//! The location of a deployment's shared memory and files, which keeps deployments apart.
+//! Location of a deployment's shared memory and files, which separates deployments from each other.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,19 +8,19 @@ use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
 
 use failure::{ExitKind, Fault};
 
-/// The longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
+/// Length of the longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
 const SOCKET_NAME_LEN: usize = 1 + 39 + 6;
-/// Bytes of `sun_path`, less the closing NUL (unix(7)).
+/// Bytes of `sun_path` without the closing NUL (unix(7)).
 const SOCKET_PATH_MAX: usize = 107;
 /// Characters of a prefix: `px`, eight hexadecimal digits, `_`.
 const PREFIX_LEN: usize = 11;
-/// Longest root directory, bytes.
+/// Maximum length of the root directory's path, bytes.
 pub(crate) const ROOT_LEN_MAX: usize = SOCKET_PATH_MAX - SOCKET_NAME_LEN - PREFIX_LEN;
 const NAME_LEN_MAX: usize = 32;
-/// The description of a running deployment.
+/// File with the description of a running deployment.
 pub(crate) const DESCRIPTION_FILE: &str = "deployment.json";
 
-/// A deployment name or a directory that cannot be used.
+/// Reason why a deployment name or a directory cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NamespaceError {
     /// The name is not usable as a directory name.
@@ -36,12 +36,12 @@ pub enum NamespaceError {
     RootTooLong {
         /// The directory.
         root: PathBuf,
-        /// Its length in bytes.
+        /// Length of its path, bytes.
         len: usize,
-        /// The limit in bytes.
+        /// Maximum length, bytes.
         max: usize,
     },
-    /// The path is not absolute, or not text that iceoryx2 accepts as a path.
+    /// The path is not absolute, or contains characters that iceoryx2 does not accept in a path.
     #[error("working directory {root:?} must be an absolute path of plain characters")]
     Root {
         /// The directory.
@@ -55,11 +55,11 @@ impl Fault for NamespaceError {
     }
 }
 
-/// The name of a deployment, with the directory and the prefix that keep it apart from others.
+/// The name of a deployment, with the directory and the prefix that separate it from other deployments.
 ///
-/// Files are in `root`, shared memory is under `/dev/shm/<prefix>*`. Both depend only on the user, the name
-/// and the directory, so every process of a deployment computes the same, and the files of a killed run are
-/// found again. Creating a `Namespace` creates no file.
+/// Files are in `root`, and shared memory is under `/dev/shm/<prefix>*`. Both depend only on the user, the name
+/// and the directory. Every process of a deployment therefore computes the same locations, and the next run finds the files of a
+/// killed one. Creating a `Namespace` creates no file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Namespace {
     name: String,
@@ -69,30 +69,30 @@ pub struct Namespace {
 }
 
 impl Namespace {
-    /// The namespace of `deployment` in `/dev/shm/px-<user id>`.
+    /// Returns the namespace of `deployment` in `/dev/shm/px-<user id>`.
     ///
-    /// A port creates several small files, which takes 10 ms on a disk and very little in memory.
+    /// A port creates several small files, which takes 10 ms on a disk and very little time in memory.
     ///
     /// # Errors
     ///
-    /// [`NamespaceError`].
+    /// Returns a [`NamespaceError`] on failure.
     pub fn new(deployment: &str) -> Result<Self, NamespaceError> {
         Self::below(deployment, &Self::usual_base())
     }
 
-    /// The directory below which [`Self::new`] puts the deployments of this user.
+    /// Returns the directory below which [`Self::new`] puts the deployments of this user.
     pub fn usual_base() -> PathBuf {
         let user = rustix::process::getuid().as_raw();
         Path::new("/dev/shm").join(format!("px-{user}"))
     }
 
-    /// The namespace of `deployment` below a directory of the caller's choice.
+    /// Returns the namespace of `deployment` below a directory of the caller's choice.
     ///
-    /// * `base`: absolute and short; the root is `base/deployment` and has at most 50 bytes.
+    /// * `base`: an absolute and short path. The root is `base/deployment` and has at most 50 bytes.
     ///
     /// # Errors
     ///
-    /// [`NamespaceError`].
+    /// Returns a [`NamespaceError`] on failure.
     pub fn below(deployment: &str, base: &Path) -> Result<Self, NamespaceError> {
         let fits = (1..=NAME_LEN_MAX).contains(&deployment.len())
             && !deployment.starts_with('.')
@@ -130,42 +130,42 @@ impl Namespace {
         })
     }
 
-    /// The name of the deployment.
+    /// Returns the name of the deployment.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The prefix of all its files in `/dev/shm`.
+    /// Returns the prefix of all files of the deployment in `/dev/shm`.
     pub fn prefix(&self) -> &str {
         &self.prefix
     }
 
-    /// The directory of its sockets, service descriptions and lock.
+    /// Returns the directory of the deployment's sockets, service descriptions and lock.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The parent directory of the root.
+    /// Returns the parent directory of the root.
     pub fn base(&self) -> &Path {
         &self.base
     }
 
-    /// The configuration file for iceoryx2, and for its command line tools when run in the root.
+    /// Returns the configuration file for iceoryx2, which its command line tools also use when run in the root.
     pub fn config_file(&self) -> PathBuf {
         self.root.join("config").join("iceoryx2.toml")
     }
 
-    /// Returns the description of the deployment by itself while it runs ([`crate::DeploymentLock::describe`]); for one that is
-    /// starting use [`wait_for_description`](crate::wait_for_description).
+    /// Returns the description that the deployment writes of itself while it runs ([`crate::DeploymentLock::describe`]). If the
+    /// deployment is starting, use [`wait_for_description`](crate::wait_for_description).
     ///
     /// # Errors
     ///
-    /// It does not run, or the file cannot be read.
+    /// Fails if the deployment does not run, or if the file cannot be read.
     pub fn description(&self) -> io::Result<String> {
         std::fs::read_to_string(self.root.join(DESCRIPTION_FILE))
     }
 
-    /// The content of [`config_file`](Self::config_file).
+    /// Returns the content of [`config_file`](Self::config_file).
     pub(crate) fn config_text(&self) -> String {
         format!(
             "[global]\nroot-path = \"{}\"\nprefix = \"{}\"\n",
@@ -174,11 +174,11 @@ impl Namespace {
         )
     }
 
-    /// The configuration of iceoryx2.
+    /// Returns the configuration of iceoryx2.
     ///
     /// # Errors
     ///
-    /// [`NamespaceError::Root`] if iceoryx2 refuses the path.
+    /// Returns [`NamespaceError::Root`] if iceoryx2 refuses the path.
     pub(crate) fn config(&self) -> Result<Config, NamespaceError> {
         let refused = || NamespaceError::Root {
             root: self.root.clone(),
@@ -197,7 +197,7 @@ impl Namespace {
     }
 }
 
-/// FNV-1a over the user and the root, folded to 32 bits.
+/// Returns the FNV-1a hash of the user and the root, folded to 32 bits.
 fn fingerprint(user: u32, root: &str) -> u32 {
     let hash = formats::checksum::fnv1a_of(user.to_le_bytes().into_iter().chain(root.bytes()));
     (hash ^ (hash >> 32)) as u32

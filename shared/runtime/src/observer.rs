@@ -1,4 +1,4 @@
-//! Observing a running deployment from a process that is not part of it.
+//! Observation of a running deployment from a process that is not part of it.
 
 use core::time::Duration;
 use std::io;
@@ -13,33 +13,33 @@ use crate::remains::{all_locks, supervisor};
 use crate::{Bus, BusError, Namespace, PortError, ReceiveError, Subscriber};
 use failure::{ExitKind, Fault, Stop};
 
-/// Pause between two looks at a deployment that is starting.
+/// Pause between two checks of a deployment that is starting.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// A deployment cannot be observed.
+/// Reason why a deployment cannot be observed.
 #[derive(Debug, thiserror::Error)]
 pub enum ObserverError {
-    /// It does not run, or is about to end.
+    /// The deployment does not run, or is about to end.
     #[error("deployment {name:?} does not run")]
     NotRunning {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
     },
-    /// Its shared memory cannot be reached.
+    /// The deployment's shared memory cannot be reached.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// Its processes cannot be listed.
+    /// The processes of the deployment cannot be listed.
     #[error(
         "cannot list the topics of deployment {name:?}: {}",
         failure::wording::spaced(source)
     )]
     List {
-        /// Its name.
+        /// Name of the deployment.
         name: String,
-        /// Why.
+        /// Cause of the error.
         source: ServiceListError,
     },
-    /// A metrics topic cannot be subscribed to; usually because there are too many observers already.
+    /// A metrics topic cannot be subscribed to, usually because there are too many observers already.
     #[error(transparent)]
     Port(#[from] PortError),
     /// Metrics cannot be received.
@@ -70,22 +70,23 @@ impl Fault for ObserverError {
 /// The state of one process.
 #[derive(Debug, Clone, Copy)]
 pub struct ObservedProcess<'a> {
-    /// Its name.
+    /// Name of the process.
     pub process: &'a str,
-    /// Its process id, while it lives.
+    /// Process id, while the process is alive.
     pub pid: Option<u32>,
-    /// Its last metrics message, possibly from before a restart. It comes from another process: check it.
+    /// Last metrics message of the process, possibly from before a restart. Check it, because it comes from another process.
     pub metrics: Option<&'a Metrics>,
 }
 
-/// Observes a running deployment: which processes it has, which of them are alive, and their metrics. The
-/// deployment does not wait for an observer: it ends without it. The observer has to leave within a second
-/// after that ([`Self::is_over`]).
+/// Observes a running deployment: its processes, which of them are alive, and their metrics.
+///
+/// The deployment ends without waiting for observers. The observer has to leave within a second after the end
+/// ([`Self::is_over`]).
 #[derive(Debug)]
 pub struct Observer {
     processes: Vec<Watched>,
     supervisor: u32,
-    // Dropped last: the subscribers use its ports.
+    // Dropped last, because the subscribers use its ports.
     bus: Bus,
 }
 
@@ -98,16 +99,16 @@ struct Watched {
 }
 
 impl Observer {
-    /// Starts to observe.
+    /// Starts the observation.
     ///
     /// # Errors
     ///
-    /// [`ObserverError`].
+    /// Returns an [`ObserverError`] on failure.
     pub fn open(namespace: &Namespace) -> Result<Self, ObserverError> {
         let not_running = || ObserverError::NotRunning {
             name: namespace.name().to_owned(),
         };
-        // Checked before anything is opened, since opening creates the files.
+        // Checked before anything is opened, because opening creates files.
         let supervisor = running_supervisor(namespace).ok_or_else(not_running)?;
         Self::open_of(namespace, supervisor)
             .map_err(|error| unless_over((namespace, supervisor), error, not_running))
@@ -139,16 +140,16 @@ impl Observer {
         })
     }
 
-    /// The process that runs the deployment.
+    /// Returns the id of the process that runs the deployment.
     pub fn supervisor(&self) -> u32 {
         self.supervisor
     }
 
-    /// Reads the current state.
+    /// Returns the current state of every process.
     ///
     /// # Errors
     ///
-    /// [`ObserverError::Bus`], [`ObserverError::Receive`].
+    /// Returns [`ObserverError::Bus`] or [`ObserverError::Receive`].
     pub fn observe(&mut self) -> Result<Vec<ObservedProcess<'_>>, ObserverError> {
         let config = self.bus.namespace().config().map_err(BusError::from)?;
         let living = living(&config);
@@ -173,9 +174,10 @@ impl Observer {
     }
 }
 
-/// Waits until a deployment that is starting says what it is ([`Namespace::description`]): before, its topics are not all there.
+/// Waits until a starting deployment has written its description ([`Namespace::description`]). Before that, some of its topics may
+/// be missing.
 ///
-/// * Returns whether it does. One that does not run is not waited for.
+/// Returns true if there is a description. Returns at once if the deployment does not run.
 pub fn wait_for_description(namespace: &Namespace, patience: Duration) -> bool {
     let begin = Instant::now();
     loop {
@@ -192,9 +194,10 @@ pub fn wait_for_description(namespace: &Namespace, patience: Duration) -> bool {
     }
 }
 
-/// An error; but that the deployment does not run if it is ending or has ended, since what fails then fails because of that.
+/// Returns `error` if the deployment still runs. Otherwise returns `not_running`, because the end of the deployment caused the
+/// error.
 ///
-/// * The deployment and the supervisor that it had.
+/// * The first argument is the deployment and the supervisor that it had.
 pub(crate) fn unless_over<E>(
     (namespace, supervisor): (&Namespace, u32),
     error: E,
@@ -207,7 +210,7 @@ pub(crate) fn unless_over<E>(
     }
 }
 
-/// The supervisor of a deployment, unless it is ending.
+/// Returns the supervisor of a deployment, unless the deployment is ending.
 pub(crate) fn running_supervisor(namespace: &Namespace) -> Option<u32> {
     if namespace.root().join(ENDING_FILE).exists() {
         return None;
@@ -215,7 +218,7 @@ pub(crate) fn running_supervisor(namespace: &Namespace) -> Option<u32> {
     supervisor(namespace, &all_locks())
 }
 
-/// The names of all processes of a deployment, read off its metrics topics.
+/// Returns the names of all processes of a deployment, taken from its metrics topics.
 fn processes(namespace: &Namespace) -> Result<Vec<String>, ObserverError> {
     let config = namespace.config().map_err(BusError::from)?;
     let mut processes = Vec::new();

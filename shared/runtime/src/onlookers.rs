@@ -7,14 +7,14 @@ use iceoryx2::prelude::{CallbackProgression, PortFactory as _};
 use crate::erased::Messages;
 use crate::subscriber::onlooker;
 
-/// The onlookers of a topic, shared with the handler that decides what happens when a receiver has no room.
+/// The onlookers of a topic, shared with the handler that decides the action if a receiver has no room.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Onlookers {
     ids: Arc<Mutex<Vec<u128>>>,
 }
 
 impl Onlookers {
-    /// Lists them again. One that comes after this has an empty queue, so that the next message fits.
+    /// Updates the list of onlookers. An onlooker that connects later has an empty queue, so that the next message fits.
     pub(crate) fn update(&self, messages: &Messages) {
         let name = onlooker();
         let mut ids = self.ids.lock().unwrap_or_else(PoisonError::into_inner);
@@ -27,14 +27,14 @@ impl Onlookers {
         });
     }
 
-    /// Returns true if a subscriber is one of them.
+    /// Returns true if a subscriber is an onlooker.
     pub(crate) fn contain(&self, subscriber: u128) -> bool {
         let ids = self.ids.lock().unwrap_or_else(PoisonError::into_inner);
         ids.contains(&subscriber)
     }
 }
 
-/// Number of subscribers that are no onlookers.
+/// Returns the number of subscribers that are not onlookers.
 pub(crate) fn n_waited_for(messages: &Messages) -> usize {
     let name = onlooker();
     let mut n = 0;

@@ -9,14 +9,14 @@ pub trait Message: Copy + Debug + ZeroCopySend + 'static {}
 
 impl<T: Copy + Debug + ZeroCopySend + 'static> Message for T {}
 
-/// A [`Message`] that is sent in front of an array.
+/// A [`Message`] that is sent before an array.
 pub trait Header: Message + Default {}
 
 impl<T: Message + Default> Header for T {}
 
 /// An element of an array that is sent in place.
 ///
-/// Sealed: every bit pattern must be valid, because a reused chunk contains old data.
+/// The trait is sealed, because every bit pattern must be valid: a reused chunk contains old data.
 pub trait Element: Message + sealed::EveryBitPattern {}
 
 impl Element for u8 {}

@@ -1,4 +1,4 @@
-//! Notes of a process in a file beside the deployment's sockets, so that it survives the process.
+//! Notes of a process in a file beside the deployment's sockets, so that they survive the process.
 
 use std::fs::File;
 use std::io;
@@ -9,9 +9,10 @@ use formats::checksum::fnv1a;
 
 use crate::Bus;
 
-/// Two notes have room in the file, and are written in turn: of a process that is killed while it writes one, the other is left.
+/// Size of the room for one note. The file has room for two notes, which are written alternately. If a process is killed while it
+/// writes one note, the other note is still complete.
 const SLOT_BYTES: u64 = 1 << 18;
-/// Before each note: its number, its length, its checksum.
+/// Size of the header before each note: its number, its length and its checksum.
 const HEADER_BYTES: usize = 3 * size_of::<u64>();
 
 /// Notes of a process, which it reads back after a restart.
@@ -23,7 +24,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// Keeps notes in a file, which is created by the first one.
+    /// Creates notes in a file. The first note creates the file.
     pub fn new(path: PathBuf) -> Self {
         Self {
             path,
@@ -32,13 +33,13 @@ impl Place {
         }
     }
 
-    /// The place of the process that a bus belongs to.
+    /// Returns the notes of the process that a bus belongs to.
     pub fn of(bus: &Bus) -> Self {
         let file = format!("{}.place", bus.process());
         Self::new(bus.namespace().root().join(file))
     }
 
-    /// The bytes that were noted last, possibly before a restart; `None` if there are none. What is noted next follows them.
+    /// Returns the bytes of the last note, possibly from before a restart; `None` if there is no note. The next note follows this one.
     pub fn last(&mut self) -> Option<Vec<u8>> {
         let file = File::open(&self.path).ok()?;
         let notes = [0, 1].into_iter().filter_map(|slot| read(&file, slot));
@@ -47,7 +48,7 @@ impl Place {
         Some(bytes)
     }
 
-    /// The numbers that were noted last; `None` if there are none, or another number of them.
+    /// Returns the numbers of the last note; `None` if there is no note, or if it has another number of them.
     pub fn noted<const N: usize>(&mut self) -> Option<[u64; N]> {
         let bytes = self.last()?;
         let (numbers, []) = bytes.as_chunks() else {
@@ -57,11 +58,11 @@ impl Place {
         numbers.try_into().ok()
     }
 
-    /// Notes bytes in place of those before.
+    /// Replaces the last note by other bytes.
     ///
     /// # Errors
     ///
-    /// The file cannot be written, or the bytes are more than 262 120; after a restart those noted before are read.
+    /// Fails if the file cannot be written, or if there are more than 262 120 bytes. After a restart, the previous note is then read.
     pub fn note_bytes(&mut self, bytes: &[u8]) -> io::Result<()> {
         if bytes.len() > SLOT_BYTES as usize - HEADER_BYTES {
             return Err(io::ErrorKind::FileTooLarge.into());
@@ -83,17 +84,17 @@ impl Place {
         Ok(())
     }
 
-    /// Notes numbers in place of those before.
+    /// Replaces the last note by other numbers.
     ///
     /// # Errors
     ///
-    /// As those of [`note_bytes`](Self::note_bytes).
+    /// Fails in the same cases as [`note_bytes`](Self::note_bytes).
     pub fn note<const N: usize>(&mut self, numbers: [u64; N]) -> io::Result<()> {
         self.note_bytes(numbers.map(u64::to_le_bytes).as_flattened())
     }
 }
 
-/// The number and the bytes of a note; `None` if there is none, or not a whole one.
+/// Returns the number and the bytes of a note; `None` if there is no note, or if it is not complete.
 fn read(file: &File, slot: u64) -> Option<(u64, Vec<u8>)> {
     let begin = slot * SLOT_BYTES;
     let mut header = [[0; size_of::<u64>()]; 3];

@@ -1,4 +1,4 @@
-//! Check that there is room for the topics of a deployment; the topics of every process.
+//! Check that there is room for the topics of a deployment, and the topics of every process.
 
 use std::io;
 
@@ -9,44 +9,44 @@ use crate::room::OVERHEAD_BYTES;
 use crate::{Delivery, Limits, TopicPlan, free_shared_memory};
 use failure::{ExitKind, Fault};
 
-/// Onlookers at the same time.
+/// Maximum number of onlookers at the same time.
 const ONLOOKERS: usize = 4;
-/// Open files of every process, besides those of its topics.
+/// Number of open files of every process, without those of its topics.
 const DESCRIPTORS: u64 = 40;
-/// Open files per topic in the process that keeps it alive: 6.6 were measured.
+/// Number of open files per topic in the process that keeps the topic alive; 6.6 were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;
 
 /// Smallest stack of the main thread, bytes.
 const STACK: u64 = 1 << 20;
 
-/// There is not enough shared memory for a deployment.
+/// Reason why the system has no room for a deployment.
 #[derive(Debug, thiserror::Error)]
 pub enum PreflightError {
-    /// The pools do not fit.
+    /// The pools do not fit into shared memory.
     #[error(
         "deployment needs {} MB of shared memory, {} MB are free in /dev/shm; largest: {largest}",
         .needed_bytes.div_ceil(1_000_000), .free_bytes / 1_000_000
     )]
     TooLarge {
-        /// Memory of all pools.
+        /// Size of all pools, bytes.
         needed_bytes: u64,
-        /// Free memory.
+        /// Size of the free memory, bytes.
         free_bytes: u64,
         /// The largest topic, with its size.
         largest: String,
     },
-    /// A process needs more open files than its limit.
+    /// A process needs more open files than its limit allows.
     #[error("deployment needs {needed} open files in one process, the limit is {limit} open files")]
     Descriptors {
-        /// Open files of the process that needs most.
+        /// Number of open files of the process that needs most.
         needed: u64,
-        /// The limit.
+        /// Maximum number of open files.
         limit: u64,
     },
-    /// The stack of a process is too small.
+    /// The limit for the stack of a process is too small.
     #[error("the limit for the stack of a process is {} KB, but it needs {} KB", .limit / 1024, STACK / 1024)]
     Stack {
-        /// The limit, bytes.
+        /// Maximum size of the stack, bytes.
         limit: u64,
     },
     /// The file system of shared memory cannot be queried.
@@ -78,7 +78,7 @@ impl Fault for PreflightError {
     }
 }
 
-/// The topics of a process's heartbeats and metrics: realtime delivery, without wake-up.
+/// Returns the topics of a process's heartbeats and metrics: realtime delivery, without wake-up.
 pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     let health = TopicPlan::messages::<Health>(
         topic::health(process),
@@ -93,12 +93,12 @@ pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     [health.without_wake_up(), metrics.without_wake_up()]
 }
 
-/// Checks that the pools of all topics fit into the free part of `/dev/shm`, and that the supervisor, which has all
+/// Checks that the pools of all topics fit into the free part of `/dev/shm`. Also checks that the supervisor, which has all
 /// topics open, may open enough files.
 ///
 /// # Errors
 ///
-/// [`PreflightError`].
+/// Returns a [`PreflightError`] on failure.
 pub fn preflight(topics: &[TopicPlan]) -> Result<(), PreflightError> {
     if let Some(limit) = getrlimit(Resource::Nofile).current {
         check_descriptors(topics.len() as u64, limit)?;
@@ -120,7 +120,7 @@ fn check_descriptors(n_topics: u64, limit: u64) -> Result<(), PreflightError> {
     Err(PreflightError::Descriptors { needed, limit })
 }
 
-/// Shared memory that a deployment with these topics needs, bytes.
+/// Returns the size of the shared memory that a deployment with these topics needs, bytes.
 pub fn needed_bytes(topics: &[TopicPlan]) -> u64 {
     let pools = topics.iter().map(TopicPlan::pool_bytes);
     let pools = pools.fold(0, u64::saturating_add);
@@ -150,7 +150,7 @@ mod tests {
 
     use super::*;
 
-    /// Response maps of 40 MB that two processes read, and borrow two of.
+    /// Returns the topic of response maps of 40 MB that two processes read, each of which borrows two of them.
     fn evidence(view: usize, delivery: Delivery) -> TopicPlan {
         let limits = Limits::new(2, 1, 2);
         let name = topic::evidence(view);

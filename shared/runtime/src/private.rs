@@ -1,4 +1,4 @@
-//! A deployment belongs to one user: its directory is owned by the user, closed to others, and carries a
+//! A deployment belongs to one user: its directory is owned by the user, closed to others, and contains a
 //! marker file.
 
 use std::ffi::CString;
@@ -23,68 +23,68 @@ const FILE: Mode = Mode::RUSR.union(Mode::WUSR);
 const OTHERS: u32 = 0o077;
 /// The write bits of group and others.
 const OTHERS_WRITE: u32 = 0o022;
-/// The sticky bit: only its owner may remove a file of the directory.
+/// The sticky bit: only the owner of a file may remove it from the directory.
 const STICKY: u32 = 0o1000;
 /// The file that the supervisor of a deployment locks.
 pub(crate) const LOCK_FILE: &str = "lock";
 /// The marker file, which names the deployment that a directory belongs to.
 const MARK_FILE: &str = "parallax-deployment";
 
-/// A file or directory of a deployment belongs to another user, or cannot be closed to others.
+/// Reason why the files of a deployment are not private: they belong to another user, or cannot be closed to others.
 #[derive(Debug, thiserror::Error)]
 pub enum PrivacyError {
-    /// It belongs to another user.
+    /// The file or directory belongs to another user.
     #[error("{path:?} belongs to {owner}, this process runs as {user}")]
     Foreign {
         /// The file or directory.
         path: PathBuf,
-        /// Whose it is, with the number.
+        /// Name and number of the owner.
         owner: String,
-        /// The user that this process runs as.
+        /// User that this process runs as.
         user: String,
     },
-    /// It is a symbolic link, which is never followed.
+    /// The path is a symbolic link, which is never followed.
     #[error("{path:?} is a symbolic link of {owner} to {target:?}, and not a directory")]
     Link {
         /// Path of the link.
         path: PathBuf,
-        /// Whose it is, with the number.
+        /// Name and number of the owner.
         owner: String,
-        /// Its target.
+        /// Target of the link.
         target: PathBuf,
     },
-    /// It is not a directory.
+    /// The path is not a directory.
     #[error("{path:?} is not a directory")]
     NoDirectory {
         /// Path that is not a directory.
         path: PathBuf,
     },
-    /// Others may replace its entries.
-    #[error("{path:?} of {owner} may be written by anybody (mode {mode:o})")]
+    /// Other users may replace the entries of the directory.
+    #[error("{path:?} of {owner} can be written to by any user (mode {mode:o})")]
     Open {
         /// The directory.
         path: PathBuf,
-        /// Whose it is, with the number.
+        /// Name and number of the owner.
         owner: String,
-        /// Its mode.
+        /// Mode of the directory.
         mode: u32,
     },
-    /// It holds files, but not the marker file of a deployment.
+    /// The directory contains files, but not the marker file of a deployment.
     #[error(
         "{path:?} is not the directory of a deployment (files in it: {n_files}; none is named {MARK_FILE:?})"
     )]
     Unmarked {
         /// The directory.
         path: PathBuf,
-        /// Files and directories in it.
+        /// Number of files and directories in it.
         n_files: usize,
     },
-    /// It cannot be read, created, or closed to others.
+    /// The file or directory cannot be read, created, or closed to others.
     #[error("cannot reserve {path:?} for this user alone")]
     File {
         /// The file or directory.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: io::Error,
     },
@@ -95,7 +95,7 @@ impl PrivacyError {
     pub(crate) fn hint(&self) -> Option<String> {
         match self {
             Self::Foreign { path, owner, .. } => Some(format!(
-                "run as {owner}, or have it removed: `sudo rm -r {}`; a deployment and its processes are one user's",
+                "run as {owner}, or have it removed: `sudo rm -r {}`; a deployment and its processes must belong to one user",
                 failure::wording::shell(path.display())
             )),
             Self::Link { path, .. } | Self::NoDirectory { path } => Some(format!(
@@ -103,11 +103,11 @@ impl PrivacyError {
                 failure::wording::shell(path.display())
             )),
             Self::Open { path, .. } => Some(format!(
-                "have it shut: `sudo chmod go-w {}`",
+                "close it to other users: `sudo chmod go-w {}`",
                 failure::wording::shell(path.display())
             )),
             Self::Unmarked { path, .. } => Some(format!(
-                "nothing in it was touched: see what it is, and move or remove {} yourself",
+                "nothing in it was changed: check its content, and move or remove {} yourself",
                 path.display()
             )),
             Self::File { .. } => None,
@@ -115,8 +115,8 @@ impl PrivacyError {
     }
 }
 
-/// The open directory of a deployment: owned by this user, closed to others, and with a marker file. Files
-/// are removed by its descriptor, so that replacing its path has no effect.
+/// The open directory of a deployment. It is owned by this user, closed to others, and contains a marker file. Files
+/// are removed through its descriptor, so that replacing its path has no effect.
 #[derive(Debug)]
 pub(crate) struct Root {
     base: OwnedFd,
@@ -131,16 +131,16 @@ impl AsFd for Root {
 
 impl Root {
     /// Creates the directory of a deployment if it does not exist, and checks that it belongs to this user.
-    /// Its mode is 0700 afterwards, whatever the umask.
+    /// Its mode is 0700 afterwards, regardless of the umask.
     ///
-    /// The parent directory must belong to this user or root, and others must not be able to replace its
+    /// The parent directory must belong to this user or root, and other users must not be able to replace its
     /// entries.
     pub(crate) fn open(namespace: &Namespace) -> Result<Self, PrivacyError> {
         let path = namespace.root();
         loop {
             let base = make_base(namespace.base())?;
             let root = match open_or_make(&base, namespace.name()) {
-                // Another run has ended in between.
+                // Another run has ended in the meantime.
                 Err(Errno::NOENT) => continue,
                 opened => opened.map_err(|error| unopened(path, error))?,
             };
@@ -161,7 +161,7 @@ impl Root {
         }
     }
 
-    /// Writes the marker file, if it is there already or the directory is empty.
+    /// Writes the marker file if the directory is empty or already has one.
     fn claim(&self, namespace: &Namespace) -> Result<(), PrivacyError> {
         if is_marked(&self.root, namespace) {
             return Ok(());
@@ -170,7 +170,7 @@ impl Root {
         let is_known =
             |name: &&CString| [LOCK_FILE, MARK_FILE].map(str::as_bytes).contains(&name.as_bytes());
         let n_files = names.len() - names.iter().filter(is_known).count();
-        // Another run may have written the marker file in the meantime: it does so first.
+        // Another run may have written the marker file in the meantime, because a run writes it first.
         if n_files > 0 && !is_marked(&self.root, namespace) {
             return Err(PrivacyError::Unmarked {
                 path: namespace.root().to_owned(),
@@ -190,7 +190,7 @@ impl Root {
         written.map_err(|source| PrivacyError::File { path, source })
     }
 
-    /// Removes everything in the directory but the lock file and the marker file.
+    /// Removes everything in the directory except the lock file and the marker file.
     pub(crate) fn empty(&self) -> io::Result<()> {
         for name in beneath::names(&self.root)? {
             if ![LOCK_FILE, MARK_FILE].map(str::as_bytes).contains(&name.as_bytes()) {
@@ -200,10 +200,10 @@ impl Root {
         Ok(())
     }
 
-    /// Removes the marker file, the lock file (which is held) and the directory, unless the next run has
+    /// Removes the marker file, the lock file (which this process holds) and the directory, unless the next run has
     /// started in it.
     ///
-    /// The lock file is removed last, so that no other run can start before that.
+    /// The lock file is removed last, so that no other run can start earlier.
     pub(crate) fn remove(&self, namespace: &Namespace) -> io::Result<()> {
         for name in [MARK_FILE, LOCK_FILE] {
             match unlinkat(&self.root, name, AtFlags::empty()) {
@@ -218,7 +218,7 @@ impl Root {
     }
 }
 
-/// Opens a directory of the base.
+/// Opens a directory of the base. Creates it if it does not exist.
 fn open_or_make(base: &OwnedFd, name: &str) -> Result<OwnedFd, Errno> {
     let opened = beneath::directory_in(base, name.as_bytes());
     if opened.as_ref().err() != Some(&Errno::NOENT) {
@@ -245,7 +245,7 @@ fn mark_of(namespace: &Namespace) -> String {
     format!("This directory is that of the deployment {name} of parallax, which removes it.\n")
 }
 
-/// Opens the parent directory of all deployments; none if it does not exist.
+/// Opens the parent directory of all deployments; `None` if it does not exist.
 pub(crate) fn open_base(path: &Path) -> Result<Option<OwnedFd>, PrivacyError> {
     let base = match beneath::open_directory(path) {
         Err(Errno::NOENT) => return Ok(None),
@@ -272,7 +272,7 @@ pub(crate) fn open_base(path: &Path) -> Result<Option<OwnedFd>, PrivacyError> {
     Ok(Some(base))
 }
 
-/// The same, but creates it if it does not exist.
+/// Opens the parent directory of all deployments. Creates it if it does not exist.
 fn make_base(path: &Path) -> Result<OwnedFd, PrivacyError> {
     loop {
         if let Some(base) = open_base(path)? {
@@ -284,12 +284,12 @@ fn make_base(path: &Path) -> Result<OwnedFd, PrivacyError> {
             path: path.to_owned(),
             source,
         })?;
-        // As above.
+        // As above, the umask may have removed owner permissions.
         chmodat(rustix::fs::CWD, path, DIRECTORY, AtFlags::empty()).map_err(failed(path))?;
     }
 }
 
-/// The error for a directory that could not be opened: what is there instead, or its owner.
+/// Returns the error for a directory that could not be opened. It names what the path is instead, or the owner.
 fn unopened(path: &Path, error: Errno) -> PrivacyError {
     let owner = fs::symlink_metadata(path).map(|data| std::os::unix::fs::MetadataExt::uid(&data));
     match (owner, error) {
@@ -308,20 +308,20 @@ fn unopened(path: &Path, error: Errno) -> PrivacyError {
     }
 }
 
-/// Checks that no shared memory file with the prefix of a deployment belongs to another user, and closes them
-/// to others: iceoryx2 leaves its management file writable for everybody.
+/// Checks that no shared memory file with the prefix of a deployment belongs to another user, and closes these files
+/// to others. iceoryx2 leaves its management file writable for all users.
 pub(crate) fn shared_memory(namespace: &Namespace) -> Result<(), PrivacyError> {
     each_segment(namespace, |memory, name, found| {
         let is_file = FileType::from_raw_mode(found.st_mode) == FileType::RegularFile;
         if is_file && found.st_mode & OTHERS != 0 {
-            // The file belongs to this user, and only this user may replace it there.
+            // The file belongs to this user, and only this user may replace it in `/dev/shm`.
             return chmodat(memory, name, FILE, AtFlags::empty());
         }
         Ok(())
     })
 }
 
-/// Removes the shared memory files with the prefix of a deployment; other kinds of entries are kept.
+/// Removes the shared memory files with the prefix of a deployment. Other kinds of entries are kept.
 pub(crate) fn remove_shared_memory(namespace: &Namespace) -> Result<(), PrivacyError> {
     each_segment(namespace, |memory, name, found| {
         if FileType::from_raw_mode(found.st_mode) == FileType::RegularFile {
@@ -357,7 +357,7 @@ fn each_segment(
             Err(error) => Err(error),
         };
         match done {
-            // Removed by another process that has ended.
+            // `NOENT` means that another process, which has ended, removed the file.
             Ok(()) | Err(Errno::NOENT) => {}
             Err(error) => return Err(failed(&path)(error)),
         }

@@ -21,37 +21,37 @@ pub struct Service {
 }
 
 impl Service {
-    /// Makes ports.
+    /// Returns the bus, which creates ports.
     pub fn bus(&self) -> &Bus {
         &self.bus
     }
 
-    /// The stop request.
+    /// Returns the stop request.
     pub fn stop(&self) -> &Stop {
         self.bus.stop()
     }
 
-    /// The counters and times that the heartbeats report.
+    /// Returns the counters and times that the heartbeats report.
     pub fn health(&self) -> &Health {
         &self.health
     }
 
-    /// The counter to advance during computations that may take seconds.
+    /// Returns the counter to advance during computations that may take seconds.
     pub fn progress(&self) -> &Progress {
         self.bus.progress()
     }
 
-    /// The session, which goes into the stamp of every message.
+    /// Returns the session, which goes into the stamp of every message.
     pub fn session(&self) -> u64 {
         self.launch.session
     }
 
-    /// How often this process has been restarted; goes into the stamp of every message.
+    /// Returns the number of restarts of this process, which goes into the stamp of every message.
     pub fn epoch(&self) -> u32 {
         self.launch.epoch
     }
 
-    /// The unique name of the process in the deployment.
+    /// Returns the unique name of the process in the deployment.
     pub fn name(&self) -> &str {
         &self.launch.process
     }
@@ -61,11 +61,13 @@ impl Service {
         self.launch.delivery
     }
 
-    /// How long to wait for receivers before the first message. All processes of a deployment start at the
-    /// same time but take different times; a restarted process finds the others running. With lossless
-    /// delivery a late receiver would miss earlier messages, so receivers are waited for as long as for room.
+    /// Returns the time to wait for receivers before the first message.
     ///
-    /// * `deadline`: the patience later on, and for receivers that were given up.
+    /// All processes of a deployment start at the same time, but some take longer than others. A restarted process finds the others
+    /// running. With lossless delivery, a late receiver would miss earlier messages. A sender therefore waits for receivers to start as
+    /// long as it waits for room.
+    ///
+    /// * `deadline`: the patience after the start, and for receivers that were given up.
     pub fn patience_at_start(&self, deadline: Duration) -> Patience {
         let limit = match (self.launch.epoch, self.launch.delivery) {
             (0, Delivery::Lossless) => deadline.max(self.bus.patience()),
@@ -79,17 +81,17 @@ impl Service {
     }
 }
 
-/// How long the processes of a deployment may take to find each other at start-up.
+/// Time that the processes of a deployment may take to find each other at start-up.
 const BEGINNING: Duration = Duration::from_secs(10);
 
 /// Runs a service in this process and returns its exit status.
 ///
-/// The process ends when its supervisor ends. A panic is logged and ends the process. Call it from the main
-/// thread, once.
+/// The process ends when its supervisor ends. A panic is logged and ends the process. Call this function once, from the main
+/// thread.
 ///
-/// The regular end of a service: after it has sent the end of stream it calls [`Health::finished`]. Then it
-/// sends the end of stream again for every new receiver until the stop request, so that a restarted receiver
-/// gets it as well. The supervisor stops all processes once all have finished.
+/// A service ends in three steps. After it has sent the end of stream, it calls [`Health::finished`]. Then it
+/// sends the end of stream again for every new receiver, so that a restarted receiver gets it as well. Once all processes have
+/// finished, the supervisor requests them to stop.
 ///
 /// * `body`: the service. It returns soon after [`Service::stop`] is requested. The kind of its [`Failure`]
 ///   tells the supervisor whether to try again ([`ExitKind::is_permanent`]).
@@ -115,7 +117,7 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
         end_with(supervisor)?;
     }
     raise_file_limit();
-    // Before other threads start, since they inherit the scheduling of this one.
+    // Called before other threads start, because they inherit the scheduling of this one.
     for denied in launch.scheduling.apply() {
         tracing::warn!(hint = denied.hint(), "{denied}; going on without");
     }
@@ -141,7 +143,7 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
 fn end_with(supervisor: u32) -> Result<(), Failure> {
     let set = set_parent_process_death_signal(Some(Signal::KILL));
     set.map_err(|error| Failure::new(ExitKind::Run, error))?;
-    // The supervisor may have died before the call above.
+    // The supervisor may have died before the previous call.
     let parent = getppid().map_or(0, |pid| Pid::as_raw(Some(pid)));
     if parent == supervisor as i32 {
         Ok(())
@@ -153,7 +155,7 @@ fn end_with(supervisor: u32) -> Result<(), Failure> {
     }
 }
 
-/// Raises the limit on open files as far as the system allows: a topic takes up to 16 (iceoryx2 0.10).
+/// Raises the limit on open files to the maximum that the system allows. A topic takes up to 16 files (iceoryx2 0.10).
 pub fn raise_file_limit() {
     let limit = getrlimit(Resource::Nofile);
     let raised = Rlimit {

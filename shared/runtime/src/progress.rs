@@ -1,14 +1,14 @@
-//! A counter that increases as long as a process makes progress.
+//! Counter that increases as long as a process makes progress.
 
 use core::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Counts iterations of a process's main loop; clones share the count.
+/// Counts iterations of a process's main loop. Clones share the count.
 ///
 /// Waiting for messages, waiting for a slow receiver and sending are counted automatically. A computation
-/// that may take seconds calls [`tick`](Self::tick) in between, or is [followed](Self::follow) if it counts
-/// its own steps; otherwise the supervisor takes it for hanging.
+/// that may take seconds must call [`tick`](Self::tick) repeatedly. If it counts its own steps, it can be
+/// [followed](Self::follow) instead. Otherwise, the supervisor assumes that the process hangs.
 #[derive(Clone, Default)]
 pub struct Progress {
     count: Arc<AtomicU64>,
@@ -25,13 +25,14 @@ impl Progress {
 
     /// Counts every step of a computation as an iteration.
     ///
-    /// * `n_steps`: the steps so far; called from another thread, once per heartbeat.
-    /// * Returns whether it will be called: only the first computation is followed.
+    /// Returns false if a computation is already followed: then `n_steps` will not be called.
+    ///
+    /// * `n_steps`: number of steps so far. Called from another thread, once per heartbeat.
     pub fn follow(&self, n_steps: impl Fn() -> u64 + Send + Sync + 'static) -> bool {
         self.steps.set(Box::new(n_steps)).is_ok()
     }
 
-    /// Iterations and steps so far.
+    /// Returns the number of iterations and steps so far.
     pub fn count(&self) -> u64 {
         let n_steps = self.steps.get().map_or(0, |n_steps| n_steps());
         self.count.load(Ordering::Relaxed).wrapping_add(n_steps)

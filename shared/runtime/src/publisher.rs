@@ -29,7 +29,7 @@ const CONNECT_PAUSE: Duration = Duration::from_millis(20);
 /// Pause between two checks for memory that receivers have released.
 const CHUNK_PAUSE: Duration = Duration::from_micros(500);
 
-/// A message could not be delivered.
+/// Reason why a message could not be delivered.
 #[derive(Debug, thiserror::Error)]
 pub enum SendError {
     /// There is no memory to write the message into.
@@ -37,7 +37,7 @@ pub enum SendError {
     Loan {
         /// Name of the topic.
         topic: Arc<str>,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: IoxLoanError,
     },
@@ -48,7 +48,7 @@ pub enum SendError {
         topic: Arc<str>,
         /// Requested length, elements.
         len: usize,
-        /// Largest length, elements.
+        /// Maximum length, elements.
         max_len: usize,
     },
     /// Stop was requested while the sender waited for a slow receiver.
@@ -57,20 +57,20 @@ pub enum SendError {
         /// Name of the topic.
         topic: Arc<str>,
     },
-    /// A receiver had no room for too long.
+    /// A receiver had no room for longer than the sender waits.
     #[error("a receiver of topic {topic:?} had no room for {} s", .waited.as_secs())]
     Stuck {
         /// Name of the topic.
         topic: Arc<str>,
-        /// For how long.
+        /// Time for which the sender waited.
         waited: Duration,
     },
-    /// It cannot connect to a receiver.
+    /// The publisher cannot connect to a receiver.
     #[error("cannot connect to a receiver of topic {topic:?}")]
     Connection {
         /// Name of the topic.
         topic: Arc<str>,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: ConnectionFailure,
     },
@@ -79,7 +79,7 @@ pub enum SendError {
     Transport {
         /// Name of the topic.
         topic: Arc<str>,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: IoxSendError,
     },
@@ -109,7 +109,7 @@ impl SendError {
     }
 }
 
-/// Sends messages that are copied into shared memory.
+/// Sends messages, which are copied into shared memory.
 #[derive(Debug)]
 pub struct Publisher<T: Message> {
     port: Port,
@@ -117,13 +117,13 @@ pub struct Publisher<T: Message> {
 }
 
 impl<T: Message> Publisher<T> {
-    /// Sends a copy and notifies the receivers. With [`Delivery::Lossless`] it waits for room.
+    /// Sends a copy and notifies the receivers. With [`Delivery::Lossless`], it waits for room.
     ///
-    /// Returns how many subscribers got it.
+    /// Returns the number of subscribers that received the message.
     ///
     /// # Errors
     ///
-    /// [`SendError`].
+    /// Returns a [`SendError`] on failure.
     pub fn send(&self, message: &T) -> Result<usize, SendError> {
         let mut chunk = self.port.chunk(1)?;
         self.port.copies.add(size_of::<T>());
@@ -131,12 +131,12 @@ impl<T: Message> Publisher<T> {
         self.port.deliver(chunk)
     }
 
-    /// Processes that are subscribed.
+    /// Returns the number of subscribed processes.
     pub fn n_connected(&self) -> usize {
         self.port.n_connected()
     }
 
-    /// See [`SlicePublisher::wait_for_subscribers`].
+    /// Waits for subscribers, see [`SlicePublisher::wait_for_subscribers`].
     pub fn wait_for_subscribers(&self, n: usize, patience: impl Into<Patience>) -> usize {
         self.port.wait_for_subscribers(n, patience.into())
     }
@@ -150,15 +150,15 @@ pub struct SlicePublisher<E: Element, H: Header> {
 }
 
 impl<E: Element, H: Header> SlicePublisher<E, H> {
-    /// Loans memory for an array of `len` elements. With [`Delivery::Lossless`] it waits for a receiver to
-    /// release some, if necessary.
+    /// Loans memory for an array of `len` elements. With [`Delivery::Lossless`], it waits for a receiver to
+    /// release memory if necessary.
     ///
-    /// Its content is what an earlier message left there: write every element before sending.
+    /// The memory contains the values of an earlier message: write every element before sending.
     ///
     /// # Errors
     ///
-    /// [`SendError::TooLong`]; [`SendError::Loan`] if an earlier loan is still held;
-    /// [`SendError::Stopped`], [`SendError::Stuck`] if no memory was released.
+    /// Returns [`SendError::TooLong`] if the array is too long, and [`SendError::Loan`] if an earlier loan is still held.
+    /// Returns [`SendError::Stopped`] or [`SendError::Stuck`] if no memory was released.
     pub fn loan(&self, len: usize) -> Result<Loan<'_, E, H>, SendError> {
         let mut chunk = self.port.chunk_in_time(len)?;
         chunk.write_header::<E, H>();
@@ -169,20 +169,20 @@ impl<E: Element, H: Header> SlicePublisher<E, H> {
         })
     }
 
-    /// Longest array, elements.
+    /// Returns the maximum length of an array, elements.
     pub fn max_len(&self) -> usize {
         self.port.max_len
     }
 
-    /// Processes that are subscribed.
+    /// Returns the number of subscribed processes.
     pub fn n_connected(&self) -> usize {
         self.port.n_connected()
     }
 
-    /// Waits for `n` subscribers, and with [`Delivery::Lossless`] until they have acknowledged this
-    /// publisher: before that, messages that do not fit into their buffers are lost.
+    /// Waits for `n` subscribers. With [`Delivery::Lossless`], also waits until they have acknowledged this
+    /// publisher, because messages that do not fit into their buffers are lost before that.
     ///
-    /// Returns how many there are; fewer than `n` if the patience is over, or after a stop request.
+    /// Returns the number of subscribers, which is less than `n` if the patience is over or stop is requested.
     pub fn wait_for_subscribers(&self, n: usize, patience: impl Into<Patience>) -> usize {
         self.port.wait_for_subscribers(n, patience.into())
     }
@@ -197,23 +197,23 @@ pub struct Loan<'a, E: Element, H: Header> {
 }
 
 impl<E: Element, H: Header> Loan<'_, E, H> {
-    /// The array. It begins on a multiple of 64 bytes.
+    /// Returns the array, which begins on a multiple of 64 bytes.
     pub fn payload_mut(&mut self) -> &mut [E] {
         self.chunk.payload_mut::<E, H>()
     }
 
-    /// The header; initially its default.
+    /// Returns the header, which initially has its default value.
     pub fn header_mut(&mut self) -> &mut H {
         self.chunk.header_mut::<E, H>()
     }
 
-    /// Sends the array and notifies the receivers. With [`Delivery::Lossless`] it waits for room.
+    /// Sends the array and notifies the receivers. With [`Delivery::Lossless`], it waits for room.
     ///
-    /// Returns how many subscribers got it.
+    /// Returns the number of subscribers that received the array.
     ///
     /// # Errors
     ///
-    /// [`SendError::Stopped`], [`SendError::Stuck`], [`SendError::Transport`].
+    /// Returns [`SendError::Stopped`], [`SendError::Stuck`] or [`SendError::Transport`].
     pub fn send(self) -> Result<usize, SendError> {
         self.port.deliver(self.chunk)
     }
@@ -235,7 +235,7 @@ struct Port {
     stop: Stop,
     progress: Progress,
     copies: Copies,
-    /// How long to wait for a slow receiver.
+    /// Time to wait for a slow receiver.
     patience: Duration,
     losses: Losses,
 }
@@ -245,7 +245,7 @@ impl Bus {
     ///
     /// # Errors
     ///
-    /// [`PortError`].
+    /// Returns a [`PortError`] on failure.
     pub fn publisher<T: Message>(&self, topic: &str) -> Result<Publisher<T>, PortError> {
         Ok(Publisher {
             port: Port::open(self, topic, &Types::new::<T, ()>())?,
@@ -257,7 +257,7 @@ impl Bus {
     ///
     /// # Errors
     ///
-    /// [`PortError`].
+    /// Returns a [`PortError`] on failure.
     pub fn slice_publisher<E: Element, H: Header>(
         &self,
         topic: &str,
@@ -273,7 +273,7 @@ impl Port {
     fn open(bus: &Bus, topic: &str, types: &Types) -> Result<Self, PortError> {
         let messages = service::open_messages(bus.node(), topic, types)?;
         let extras = service::extras(&messages);
-        // The listener is created first: subscribers that see the publisher must find it.
+        // The listener is created first, because subscribers that see the publisher must find it.
         let ready = match extras.delivery {
             Delivery::Realtime => None,
             Delivery::Lossless => Some(bus.listener(&service::ready_name(topic))?),
@@ -334,7 +334,7 @@ impl Port {
         chunk.map_err(|source| self.loan_failed(len, source))
     }
 
-    /// The same; with lossless delivery it waits for a receiver to release one.
+    /// Loans a chunk. With lossless delivery, it waits for a receiver to release one.
     fn chunk_in_time(&self, len: usize) -> Result<Chunk, SendError> {
         let begin = Instant::now();
         loop {
@@ -347,7 +347,7 @@ impl Port {
         }
     }
 
-    /// Pauses, or fails if the wait has been too long.
+    /// Pauses, or fails if the wait has lasted too long.
     fn wait_for_a_chunk(&self, begin: Instant) -> Result<(), SendError> {
         let (topic, waited) = (Arc::clone(&self.topic), begin.elapsed());
         if self.stop.is_requested() {
@@ -357,7 +357,7 @@ impl Port {
             return Err(SendError::Stuck { topic, waited });
         }
         self.progress.tick();
-        // Chunks held by a dead receiver are released when the connections are updated.
+        // Updating the connections releases chunks that a dead receiver holds.
         let updated = self.writer.port().update_connections();
         let updated = updated.inspect_err(note_room);
         updated.map_err(|source| SendError::Connection { topic, source })?;
@@ -386,7 +386,7 @@ impl Port {
         if let Some(notifier) = &self.notifier
             && let Err(error) = notifier.notify()
         {
-            // Receivers check their buffers from time to time in any case.
+            // Receivers that are not woken check their buffers from time to time.
             tracing::debug!(topic = %self.topic, ?error, "cannot wake the receivers");
         }
         if let Err(error) = &sent {
@@ -395,7 +395,7 @@ impl Port {
         }
         let topic = || Arc::clone(&self.topic);
         sent.map_err(|source| match source {
-            // A signal also interrupts a wait inside iceoryx2, which reports an internal error.
+            // A signal also interrupts a wait inside iceoryx2, which then reports an internal error.
             _ if self.stop.is_requested() => SendError::Stopped { topic: topic() },
             IoxSendError::UnableToDeliver => SendError::Stuck {
                 topic: topic(),
@@ -449,12 +449,13 @@ impl Port {
     }
 }
 
-/// How long a sender sleeps before it looks again whether a receiver has room: a quarter of what it has waited, within these.
+/// Limits of a sender's sleep before it checks again whether a receiver has room. Within the limits, it sleeps for a quarter of the
+/// time that it has already waited.
 const LEAST_PAUSE: Duration = Duration::from_micros(50);
 const MOST_PAUSE: Duration = Duration::from_millis(1);
 
-/// Returns the action while a receiver has no room: wait, until the patience is over or stop is requested. An onlooker misses the
-/// message.
+/// Returns the action if a receiver has no room: wait until the patience is over or stop is requested. If the receiver is an
+/// onlooker, it misses the message.
 fn patience(
     bus: &Bus,
     onlookers: &Onlookers,
@@ -471,7 +472,8 @@ fn patience(
         if stop.is_requested() || info.elapsed_time >= limit {
             return BackpressureAction::DiscardDataAndFail;
         }
-        // iceoryx2 itself tries ten thousand times, one right after the other, before it sleeps: a core that the receiver may need.
+        // iceoryx2 itself retries ten thousand times without a pause before it sleeps. This would occupy a core that the receiver may
+        // need.
         std::thread::sleep((info.elapsed_time / 4).clamp(LEAST_PAUSE, MOST_PAUSE));
         BackpressureAction::Retry
     }

@@ -1,4 +1,4 @@
-//! Finding deployments: those that run, and the files that dead ones left behind.
+//! Lists deployments: those that run, and those of which only files are left.
 
 use std::fs::{self, Metadata};
 use std::io;
@@ -16,17 +16,17 @@ use crate::{BusError, LockError, Namespace, beneath, private};
 /// A deployment that runs, or that has left files behind.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remains {
-    /// Its location.
+    /// Location of the deployment.
     pub namespace: Namespace,
-    /// True if its directory has the marker file. Other directories are never removed.
+    /// True if the deployment's directory has the marker file. Other directories are never removed.
     pub is_marked: bool,
-    /// The process id of its supervisor; none if it does not run.
+    /// Process id of the supervisor; `None` if the deployment does not run.
     pub supervisor: Option<u32>,
-    /// Names and process ids of its processes.
+    /// Names and process ids of the deployment's processes.
     pub processes: Vec<String>,
-    /// Number of its files, including shared memory.
+    /// Number of files of the deployment, including shared memory.
     pub n_files: u64,
-    /// The memory they take, bytes.
+    /// Memory that the files take, bytes.
     pub bytes: u64,
 }
 
@@ -35,20 +35,20 @@ impl Remains {
     ///
     /// # Errors
     ///
-    /// [`LockError::AlreadyRunning`] if it runs, [`LockError::StillAlive`] if only its supervisor is dead.
+    /// Returns [`LockError::AlreadyRunning`] if the deployment runs, or [`LockError::StillAlive`] if only its supervisor is dead.
     pub fn remove(&self) -> Result<(), LockError> {
         self.namespace.acquire().map(drop)
     }
 }
 
-/// The deployments below a directory, by name. Nothing is changed.
+/// Returns the deployments below a directory, by name. Changes nothing.
 ///
-/// * `base`: as given to [`Namespace::below`]; that of [`Namespace::new`] is
+/// * `base`: the directory, as for [`Namespace::below`]. The directory of [`Namespace::new`] is
 ///   [`Namespace::usual_base`].
 ///
 /// # Errors
 ///
-/// [`LockError::File`], [`LockError::Bus`].
+/// Returns [`LockError::File`] or [`LockError::Bus`].
 pub fn deployments(base: &Path) -> Result<Vec<Remains>, LockError> {
     let Some(opened) = private::open_base(base).map_err(BusError::from)? else {
         return Ok(Vec::new());
@@ -60,10 +60,10 @@ pub fn deployments(base: &Path) -> Result<Vec<Remains>, LockError> {
         source: error.into(),
     };
     for name in beneath::names(&opened).map_err(unreadable)? {
-        // Other names cannot be those of a deployment.
+        // Entries with other names cannot be deployments.
         let namespace = name.to_str().ok();
         let namespace = namespace.and_then(|name| Namespace::below(name, base).ok());
-        // A link to a directory is no deployment either.
+        // A link to a directory is not a deployment either.
         let directory = beneath::directory_in(&opened, name.as_bytes());
         if let Some((namespace, directory)) = namespace.zip(directory.ok()) {
             let is_marked = private::is_marked(&directory, &namespace);
@@ -98,16 +98,18 @@ fn inspect(namespace: Namespace, is_marked: bool, locks: &str) -> Result<Remains
     })
 }
 
-/// The kernel's list of locks, three readings one after the other: it comes page by page, and where others lock and unlock meanwhile, a
-/// line may be passed over.
+/// Returns three consecutive readings of the kernel's list of locks. The kernel delivers the list page by page. If other processes
+/// lock and unlock files in the meantime, a reading may omit a line.
 pub(crate) fn all_locks() -> String {
     let reading = |_| fs::read_to_string("/proc/locks").unwrap_or_default();
     (0..3).map(reading).collect()
 }
 
-/// The process that runs a deployment: the holder of its lock file, from the kernel's list of locks, as trying to lock it could disturb a
-/// deployment that is starting. The list leaves out holders in other pid namespaces (containers): there it is the living process with the
-/// supervisor's name, with the process id that it has in its own.
+/// Returns the process that runs a deployment: the holder of its lock file, according to the kernel's list of locks. Trying to lock
+/// the file instead could disturb a deployment that is starting.
+///
+/// The list omits holders in other pid namespaces (containers). There, the function returns the living process with the
+/// supervisor's name, with the process id that it has in its own namespace.
 pub(crate) fn supervisor(namespace: &Namespace, locks: &str) -> Option<u32> {
     let metadata = fs::metadata(namespace.root().join(LOCK_FILE)).ok()?;
     let holder = locks.lines().find_map(|line| holder(line, &metadata));
@@ -120,7 +122,7 @@ fn elsewhere(namespace: &Namespace) -> Option<u32> {
     living.find_map(|(name, pid)| (name == SUPERVISOR).then_some(pid))
 }
 
-/// `1: FLOCK  ADVISORY  WRITE 1234 00:1a:42 0 EOF`.
+/// Parses a line such as `1: FLOCK  ADVISORY  WRITE 1234 00:1a:42 0 EOF`.
 fn holder(line: &str, file: &Metadata) -> Option<u32> {
     let mut words = line.split_ascii_whitespace().skip(1);
     let kind = words.next()?;
@@ -134,7 +136,7 @@ fn holder(line: &str, file: &Metadata) -> Option<u32> {
     is_this.then(|| pid.parse().ok())?
 }
 
-/// Adds up files and bytes. Files that vanish in the meantime are not counted.
+/// Adds up the number and the bytes of files. Files that vanish in the meantime are not counted.
 fn measure(path: &Path, size: &mut (u64, u64)) {
     let metadata: io::Result<Metadata> = fs::symlink_metadata(path);
     let Ok(metadata) = metadata else { return };

@@ -1,11 +1,12 @@
-//! Shared memory is allocated when its size is set.
+//! Allocates shared memory when its size is set.
 //!
-//! iceoryx2 0.10 creates a segment, sets its size with `ftruncate`, and writes to it. On tmpfs setting the
-//! size allocates nothing: pages are allocated when first written, and if no memory is left then the kernel
+//! iceoryx2 0.10 creates a segment, sets its size with `ftruncate`, and writes to it. On tmpfs, setting the
+//! size allocates nothing: pages are allocated when they are first written. If no memory is left at that time, the kernel
 //! kills the process (SIGBUS). This cannot be fixed after the segment has been created, because iceoryx2 has
-//! written to it by then. So this module replaces the C library's `ftruncate` in the program: it does the
-//! same, and then has the file system allocate the memory at once. If that fails, the call fails, and
-//! iceoryx2 reports it as any other failure.
+//! already written to it.
+//!
+//! This module therefore replaces the C library's `ftruncate` in the program. The replacement sets the size, and then makes the file
+//! system allocate the memory at once. If the allocation fails, the call fails, and iceoryx2 reports it like any other failure.
 #![expect(
     unsafe_code,
     reason = "it takes the place of a function of the C library"
@@ -21,23 +22,23 @@ use rustix::io::Errno;
 /// The magic number of tmpfs (statfs(2)).
 const TMPFS_MAGIC: u64 = 0x0102_1994;
 
-/// The last size that was refused, bytes; 0 if none was.
+/// Last size that was refused, bytes; 0 if none was refused.
 static REFUSED: AtomicU64 = AtomicU64::new(0);
-/// How often one was refused.
+/// Number of refused sizes.
 static N_REFUSED: AtomicU64 = AtomicU64::new(0);
 /// True if a segment exceeded the limit on the size of a file.
 static IS_LIMITED: AtomicBool = AtomicBool::new(false);
 
-/// Why a segment could not be given its size.
+/// Reason why the size of a segment could not be set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refused {
-    /// Its file system is full.
+    /// The file system is full.
     NoRoom { wanted_bytes: u64 },
-    /// It exceeds the limit on the size of a file.
+    /// The segment exceeds the limit on the size of a file.
     TooLarge { wanted_bytes: u64 },
 }
 
-/// The reason for the last refusal; none if there was none.
+/// Returns the reason for the last refusal; `None` if there was none.
 pub(crate) fn refused() -> Option<Refused> {
     let wanted_bytes = REFUSED.load(Ordering::Relaxed);
     if wanted_bytes == 0 {
@@ -49,18 +50,18 @@ pub(crate) fn refused() -> Option<Refused> {
     }
 }
 
-/// How often a size was refused in this process.
+/// Returns the number of refused sizes in this process.
 pub(crate) fn n_refused() -> u64 {
     N_REFUSED.load(Ordering::Relaxed)
 }
 
-/// ftruncate(2), which also allocates the memory of a file on tmpfs.
+/// Implements ftruncate(2), and also allocates the memory of a file on tmpfs.
 #[unsafe(no_mangle)]
 extern "C" fn ftruncate(fd: RawFd, len: libc::off_t) -> c_int {
     if fd < 0 {
         return failed(Errno::BADF);
     }
-    // SAFETY: the caller keeps the descriptor open during the call, as the contract of `ftruncate` asks.
+    // SAFETY: the caller keeps the descriptor open during the call, as the contract of `ftruncate` requires.
     let fd = unsafe { BorrowedFd::borrow_raw(fd) };
     let Ok(len) = u64::try_from(len) else {
         return failed(Errno::INVAL);
@@ -84,7 +85,7 @@ fn take(fd: BorrowedFd<'_>, len: u64) -> Result<(), Errno> {
         return Ok(());
     }
     match fallocate(fd, FallocateFlags::KEEP_SIZE, 0, len) {
-        // Not every kernel supports this; then pages are allocated when first used.
+        // Not every kernel supports this. Without support, pages are allocated when first used.
         Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(()),
         taken => taken,
     }

@@ -1,4 +1,4 @@
-//! Room in the shared memory: what a process needs besides its topics, and what to try where there is none.
+//! Room in shared memory: the memory that a process needs in addition to its topics, and a remedy if there is not enough.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -8,24 +8,24 @@ use rustix::process::{Resource, getrlimit};
 use crate::memory::free_shared_memory;
 use crate::reserve::{Refused, n_refused, refused};
 
-/// Queues and management of one process, bytes: ten times the measured size.
+/// Memory for queues and management of one process, bytes: ten times the measured size.
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
-/// Remedy where there is no room.
+/// Remedy if there is no room.
 pub(crate) const ROOM: &str =
-    "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)";
+    "make room in /dev/shm: end other programs that use it, or make it larger (in Docker --shm-size)";
 
-/// If there was no room for a segment: the wanted size, the free size, and what to try.
+/// If there was no room for a segment, returns a text with the requested size, the free size, and a remedy.
 pub(crate) fn no_room() -> Option<String> {
     let kilobytes = |bytes: u64| bytes.div_ceil(1000);
     Some(match refused()? {
         Refused::NoRoom { wanted_bytes } => format!(
-            "{} KB of shared memory were wanted, {} KB are free in /dev/shm: {ROOM}",
+            "{} KB of shared memory were needed, {} KB are free in /dev/shm: {ROOM}",
             kilobytes(wanted_bytes),
             free_shared_memory().unwrap_or(0) / 1000
         ),
         Refused::TooLarge { wanted_bytes } => format!(
-            "{} KB of shared memory were wanted in one piece, and no file may have more than {} KB: \
+            "{} KB of shared memory were needed in one piece, and no file may have more than {} KB: \
              allow more (`ulimit -f unlimited`)",
             kilobytes(wanted_bytes),
             getrlimit(Resource::Fsize).current.unwrap_or(0) / 1000
@@ -33,17 +33,17 @@ pub(crate) fn no_room() -> Option<String> {
     })
 }
 
-/// Free memory when something of the transport failed last, bytes; more than there is if nothing has failed.
+/// Free memory at the last failure of the transport, bytes; the maximum value if nothing has failed.
 static FREE_AT_FAILURE: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// Notes how much room there is at a failure of the transport, which need not tell its reason. To be called at once: what failed
-/// gives back what it had, and the next moment there may be room again.
+/// Records the free memory at a failure of the transport, which need not state its reason. Call this at once: the failed operation
+/// releases its memory, and a moment later there may be room again.
 pub(crate) fn note_room<E>(_: &E) {
     let free_bytes = free_shared_memory().unwrap_or(u64::MAX);
     FREE_AT_FAILURE.store(free_bytes, Ordering::Relaxed);
 }
 
-/// The same, or that hardly any room was left at the last failure, or is now.
+/// Returns the text of [`no_room`], or a text saying that hardly any room was left at the last failure, or is left now.
 pub(crate) fn short_of_room() -> Option<String> {
     let short = |words: &str, free_bytes: u64| {
         let is_short = free_bytes < OVERHEAD_BYTES;
@@ -54,8 +54,10 @@ pub(crate) fn short_of_room() -> Option<String> {
         .or_else(|| short("are", free_shared_memory().ok()?))
 }
 
-/// Returns the action of a port that cannot connect to another one, which iceoryx2 tries once: without room it fails, since
-/// sender and receiver would wait for one another for ever. Any other reason is that the other one has just ended.
+/// Returns the action of a port that cannot connect to another port.
+///
+/// iceoryx2 tries to connect only once. If there is no room, the port fails, because sender and receiver would otherwise wait for
+/// each other forever. Any other reason means that the other port has just ended.
 pub(crate) fn connections()
 -> impl Fn(DegradationCause, &DegradationInfo) -> DegradationAction + Send + 'static {
     let known = AtomicU64::new(n_refused());

@@ -20,9 +20,9 @@ pub use text::SchedulingError;
 /// Requests of a process to the system's scheduler. The default requests nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Scheduling {
-    /// Cores that it may run on, numbered from 0 as Linux does; if empty those that it was started on.
+    /// Cores that the process may run on, numbered from 0 as in Linux. If empty, the cores on which it was started.
     pub cores: Vec<usize>,
-    /// Run before all processes without real-time priority.
+    /// Priority above all processes without real-time priority.
     pub real_time: Option<RealTime>,
     /// Keep used pages in memory (`mlockall`).
     pub lock_memory: bool,
@@ -35,28 +35,28 @@ pub struct Scheduling {
 pub struct RealTime {
     /// The order among threads of the same priority.
     pub policy: Policy,
-    /// 1 to 99; the highest runs.
+    /// Priority from 1 to 99; the process with the highest one runs.
     pub priority: u8,
 }
 
 /// The order among threads of the same real-time priority.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Policy {
-    /// The first one, until it sleeps (`SCHED_FIFO`).
+    /// The first thread runs until it sleeps (`SCHED_FIFO`).
     #[default]
     Fifo,
-    /// All in turn (`SCHED_RR`).
+    /// All threads run in turn (`SCHED_RR`).
     RoundRobin,
 }
 
-/// Cores that Linux can number here.
+/// Maximum number of cores that a set of cores can contain.
 pub const MAX_CORES: usize = CpuSet::MAX_CPU;
 
 /// The capability to lock any amount of memory (capabilities(7)).
 const CAP_IPC_LOCK: u32 = 14;
 
 impl Scheduling {
-    /// Applies the requests to the calling thread and those it will start: call it first in a process. Denied
+    /// Applies the requests to the calling thread and the threads that it will start. Call this first in a process. Denied
     /// requests change nothing and are returned.
     pub fn apply(&self) -> Vec<Denied> {
         let memory = if self.lock_memory {
@@ -67,8 +67,8 @@ impl Scheduling {
         [self.apply_to_thread(), memory.into_iter().collect()].concat()
     }
 
-    /// Returns the result that [`apply`](Self::apply) would have in a process that this one starts. It is tried on a short-lived
-    /// thread, so that this process does not change.
+    /// Returns the result that [`apply`](Self::apply) would have in a process that this process starts. A short-lived
+    /// thread tries the requests, so that this process does not change.
     pub fn rehearse(&self) -> Vec<Denied> {
         let wanted = self.clone();
         let thread = thread::Builder::new().name("rehearsal".to_owned());
@@ -82,7 +82,7 @@ impl Scheduling {
         [tried.unwrap_or_default(), memory.into_iter().collect()].concat()
     }
 
-    /// The same without what was denied.
+    /// Returns the requests without the denied ones.
     #[must_use]
     pub fn without(mut self, denied: &[Denied]) -> Self {
         for denial in denied {
@@ -121,7 +121,7 @@ impl RealTime {
     }
 }
 
-/// Restricts the calling thread to the requested cores, as far as it may use them.
+/// Restricts the calling thread to the requested cores that it may use.
 fn keep_to(asked: &[usize]) -> Option<Denied> {
     if asked.is_empty() {
         return None;
@@ -130,7 +130,7 @@ fn keep_to(asked: &[usize]) -> Option<Denied> {
     for &core in asked.iter().filter(|core| **core < MAX_CORES) {
         wanted.set(core);
     }
-    // The system uses the cores that exist and that the process's group may use, if there are any.
+    // The system uses only cores that exist and that the process's group may use, if there are any.
     let refusal = sched_setaffinity(None, &wanted).err();
     let allowed = own_cores().unwrap_or_default();
     let are_all = asked.iter().all(|core| allowed.contains(core));
@@ -141,26 +141,26 @@ fn keep_to(asked: &[usize]) -> Option<Denied> {
     })
 }
 
-/// The cores that the calling thread may run on, ascending.
+/// Returns the cores that the calling thread may run on, ascending.
 ///
 /// # Errors
 ///
-/// The system call fails.
+/// Fails if the system call fails.
 pub fn own_cores() -> io::Result<Vec<usize>> {
     let set = sched_getaffinity(None)?;
     Ok((0..MAX_CORES).filter(|core| set.is_set(*core)).collect())
 }
 
-/// Locks every page that is or will be used into memory.
+/// Locks all pages, present and future, into memory.
 fn lock_memory() -> Option<Denied> {
     if let Some(limit_bytes) = memory_limit() {
-        // With a limit it would succeed now, and a later allocation would fail.
+        // With a limit, the call would succeed now, but a later allocation would fail.
         return Some(Denied::Memory {
             limit_bytes: Some(limit_bytes),
             source: io::ErrorKind::PermissionDenied.into(),
         });
     }
-    // On fault: locks only the used chunks of a pool.
+    // `ONFAULT` locks only the used chunks of a pool.
     let flags = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
     mlockall(flags).err().map(|error| Denied::Memory {
         limit_bytes: None,
@@ -168,7 +168,7 @@ fn lock_memory() -> Option<Denied> {
     })
 }
 
-/// How much memory this process may lock, bytes; none if there is no limit.
+/// Returns the amount of memory that this process may lock, bytes; `None` if there is no limit.
 fn memory_limit() -> Option<u64> {
     let limit = getrlimit(Resource::Memlock).current?;
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -182,12 +182,12 @@ fn has_capability(status: &str, capability: u32) -> bool {
     mask.is_some_and(|mask| mask >> capability & 1 == 1)
 }
 
-/// How much an onlooker gives way: two fifths of the share of a process that does not. With less it would see nothing of a
-/// run that takes all processors.
+/// Nice value of an onlooker, which gives it two fifths of the share of an ordinary process. With a smaller share, it would see
+/// nothing of a run that takes all processors.
 const WAY: i32 = 4;
 
-/// Makes this thread, and those that it starts, give way to other processes where processors are scarce. Call it before threads
-/// are started; it cannot be taken back.
+/// Lowers the priority of this thread, and of the threads that it starts, so that other processes go first if processors are scarce.
+/// Call this before threads are started; it cannot be undone.
 pub fn give_way() {
     if let Err(error) = nice(WAY) {
         tracing::debug!(%error, "cannot give way to other processes");

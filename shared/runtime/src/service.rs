@@ -23,17 +23,17 @@ use crate::memory::MemoryError;
 use crate::room::{ROOM, note_room, short_of_room};
 use failure::Fault;
 
-/// How long to wait for a service that another process is creating or removing.
+/// Time to wait for a service that another process is creating or removing.
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);
 const IN_FLUX_PAUSE: Duration = Duration::from_millis(10);
 
-/// Attribute of a service: longest array, elements.
+/// Attribute of a service: maximum length of an array, elements.
 const MAX_LEN: &str = "parallax.max-len";
-/// Attribute of a service: arrays that a publisher may write at the same time.
+/// Attribute of a service: number of arrays that a publisher may write at the same time.
 const LOANED: &str = "parallax.loaned";
-/// Attribute of a service: chunks of a publisher.
+/// Attribute of a service: number of chunks of a publisher.
 const CHUNKS: &str = "parallax.chunks";
-/// Attribute of a service: chunks that a publisher maps ahead of use.
+/// Attribute of a service: number of chunks that a publisher maps before use.
 const MAPPED: &str = "parallax.mapped";
 /// Attribute of a service: 1 if senders wake receivers.
 const WAKES: &str = "parallax.wakes";
@@ -41,7 +41,7 @@ const WAKES: &str = "parallax.wakes";
 /// The wake-up of a topic in one process.
 pub(crate) type WakeUp = EventFactory<ipc::Service>;
 
-/// A port of a topic cannot be created.
+/// Reason why a port of a topic cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum PortError {
     /// The topic does not exist.
@@ -67,7 +67,7 @@ pub enum PortError {
     Open {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: PublishSubscribeOpenError,
     },
@@ -76,7 +76,7 @@ pub enum PortError {
     OpenWakeUp {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: EventOpenError,
     },
@@ -85,7 +85,7 @@ pub enum PortError {
     Publisher {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: PublisherCreateError,
     },
@@ -94,7 +94,7 @@ pub enum PortError {
     Subscriber {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: SubscriberCreateError,
     },
@@ -103,7 +103,7 @@ pub enum PortError {
     Notifier {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: NotifierCreateError,
     },
@@ -112,7 +112,7 @@ pub enum PortError {
     Listener {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: ListenerCreateError,
     },
@@ -121,7 +121,7 @@ pub enum PortError {
     Connection {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: ConnectionFailure,
     },
@@ -130,7 +130,7 @@ pub enum PortError {
     Memory {
         /// Name of the topic.
         topic: String,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: MemoryError,
     },
@@ -149,7 +149,7 @@ impl Fault for PortError {
     }
 }
 
-/// The event by which subscribers acknowledge a publisher.
+/// Returns the name of the event by which subscribers acknowledge a publisher.
 pub(crate) fn ready_name(topic: &str) -> String {
     format!("{topic}/ready")
 }
@@ -204,15 +204,15 @@ pub(crate) fn open_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<Wake
     })
 }
 
-/// The parts of a topic's plan that iceoryx2 has no field for.
+/// The parts of a topic's plan for which iceoryx2 has no field.
 pub(crate) struct Extras {
-    /// Longest array, elements.
+    /// Maximum length of an array, elements.
     pub(crate) max_len: usize,
-    /// Arrays that a publisher may write at the same time.
+    /// Number of arrays that a publisher may write at the same time.
     pub(crate) loaned: usize,
-    /// Chunks of a publisher.
+    /// Number of chunks of a publisher.
     pub(crate) chunks: usize,
-    /// Chunks among them that are mapped ahead of use.
+    /// Number of chunks that are mapped before use.
     pub(crate) mapped: usize,
     /// True if senders wake receivers.
     pub(crate) wakes: bool,
@@ -221,7 +221,7 @@ pub(crate) struct Extras {
 }
 
 impl Extras {
-    /// Returns the attributes that [`extras`] reads; the delivery is a setting of the service itself.
+    /// Returns the attributes that [`extras`] reads. The delivery is a setting of the service itself.
     pub(crate) fn attributes(&self) -> Option<AttributeSpecifier> {
         let mut attributes = AttributeSpecifier::new();
         for (key, value) in [
@@ -267,7 +267,7 @@ fn service_name(topic: &str) -> Result<ServiceName, PortError> {
     })
 }
 
-/// Retries what fails only because another process is creating, removing or cleaning up the same service.
+/// Retries an action that fails only because another process is creating, removing or cleaning up the same service.
 pub(crate) fn patiently<T, E>(
     mut attempt: impl FnMut() -> Result<T, E>,
     in_flux: impl Fn(&E) -> bool,

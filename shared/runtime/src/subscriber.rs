@@ -20,10 +20,10 @@ use crate::service::{self, PortError};
 use crate::{Copies, Waiter};
 use failure::Fault;
 
-/// A message could not be received.
+/// Reason why a message could not be received.
 #[derive(Debug, thiserror::Error)]
 pub enum ReceiveError {
-    /// The process holds as many messages of the topic as it may.
+    /// The process already holds the maximum number of messages of the topic.
     #[error("too many messages of topic {topic:?} are held at the same time")]
     TooManyHeld {
         /// Name of the topic.
@@ -34,16 +34,16 @@ pub enum ReceiveError {
     Transport {
         /// Name of the topic.
         topic: Arc<str>,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: IoxReceiveError,
     },
-    /// The end of the stream was refused, so that it would never come.
+    /// The end of the stream was refused. It will not be sent again.
     #[error("the end of a stream of {name} is not accepted: {why}")]
     End {
         /// Name of the message type.
         name: &'static str,
-        /// Why.
+        /// Reason for the refusal.
         why: String,
     },
 }
@@ -69,17 +69,17 @@ impl<T: Message> Subscriber<T> {
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn receive(&self) -> Result<Option<T>, ReceiveError> {
         self.receive_by(|message| *message)
     }
 
-    /// Takes the oldest waiting message, if there is one, and reads it where its sender wrote it: for messages that are large for a
-    /// stack.
+    /// Takes the oldest waiting message, if there is one, and reads it in the memory of its sender. Meant for messages that are too large
+    /// for a stack.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn receive_by<R>(&self, read: impl FnOnce(&T) -> R) -> Result<Option<R>, ReceiveError> {
         while let Some(received) = self.port.receive()? {
             if let Some(message) = received.payload::<T, ()>().first() {
@@ -94,7 +94,7 @@ impl<T: Message> Subscriber<T> {
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn latest(&self) -> Result<Option<T>, ReceiveError> {
         let mut latest = None;
         while let Some(message) = self.receive()? {
@@ -103,11 +103,11 @@ impl<T: Message> Subscriber<T> {
         Ok(latest)
     }
 
-    /// As [`Self::latest`], for messages that are large for a stack.
+    /// Works like [`Self::latest`], for messages that are too large for a stack.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn latest_boxed(&self) -> Result<Option<Box<T>>, ReceiveError> {
         let mut latest = None;
         while let Some(message) = self.receive_by(|message| Box::new(*message))? {
@@ -116,12 +116,12 @@ impl<T: Message> Subscriber<T> {
         Ok(latest)
     }
 
-    /// Number of publishers, including those of dead processes until they are cleaned up.
+    /// Returns the number of publishers, including those of dead processes until they are cleaned up.
     pub fn n_publishers(&self) -> usize {
         self.port.n_publishers()
     }
 
-    /// The ids of the publishers, including those of dead processes until they are cleaned up. A
+    /// Returns the ids of the publishers, including those of dead processes until they are cleaned up. A
     /// restarted process has a new id.
     pub fn publishers(&self) -> Vec<u128> {
         self.port.publishers()
@@ -136,11 +136,11 @@ pub struct SliceSubscriber<E: Element, H: Header> {
 }
 
 impl<E: Element, H: Header> SliceSubscriber<E, H> {
-    /// Takes the oldest waiting array, if there is one. Its memory is held until it is dropped.
+    /// Takes the oldest waiting array, if there is one. The array's memory is held until the sample is dropped.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn receive(&self) -> Result<Option<Sample<E, H>>, ReceiveError> {
         let received = self.port.receive()?;
         Ok(received.map(|received| Sample {
@@ -153,35 +153,35 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn latest(&self) -> Result<Option<Sample<E, H>>, ReceiveError> {
         let mut latest = None;
         loop {
             match self.receive() {
                 Ok(Some(sample)) => latest = Some(sample),
                 Ok(None) => return Ok(latest),
-                // A newer one was sent since the last check.
+                // A newer array was sent since the last check.
                 Err(ReceiveError::TooManyHeld { .. }) if latest.is_some() => latest = None,
                 Err(error) => return Err(error),
             }
         }
     }
 
-    /// Copies an array, for use beyond the time its sender can spare the memory. The copy is counted
+    /// Copies an array, for use after its sender needs the memory again. The copy is counted
     /// ([`Bus::copies`]).
     pub fn copy_of(&self, sample: &Sample<E, H>) -> Vec<E> {
         self.port.copies.add(size_of_val(sample.payload()));
         sample.payload().to_vec()
     }
 
-    /// The ids of the publishers, including those of dead processes until they are cleaned up. A
+    /// Returns the ids of the publishers, including those of dead processes until they are cleaned up. A
     /// restarted process has a new id.
     pub fn publishers(&self) -> Vec<u128> {
         self.port.publishers()
     }
 }
 
-/// An array in shared memory, which its sender will not overwrite while this is held.
+/// An array in shared memory. Its sender does not overwrite it while this value is held.
 #[derive(Debug)]
 pub struct Sample<E: Element, H: Header> {
     received: Received,
@@ -189,18 +189,18 @@ pub struct Sample<E: Element, H: Header> {
 }
 
 impl<E: Element, H: Header> Sample<E, H> {
-    /// The array. It begins on a multiple of 64 bytes.
+    /// Returns the array, which begins on a multiple of 64 bytes.
     pub fn payload(&self) -> &[E] {
         self.received.payload::<E, H>()
     }
 
-    /// The header. Check it against the array before use: it comes from another process.
+    /// Returns the header. Check it against the array before use, because it comes from another process.
     pub fn header(&self) -> &H {
         self.received.header::<E, H>()
     }
 }
 
-/// The name of every subscriber that senders do not wait for ([`Bus::as_onlooker`]).
+/// Returns the name of every subscriber that senders do not wait for ([`Bus::as_onlooker`]).
 pub(crate) fn onlooker() -> PortName {
     // The name is short and plain, so it cannot be refused.
     PortName::new("onlooker").unwrap_or_else(|_| PortName::new_empty())
@@ -211,18 +211,18 @@ struct Port {
     topic: Arc<str>,
     reader: Reader,
     messages: Messages,
-    /// Tells publishers that this subscriber is connected; only with lossless delivery.
+    /// Tells publishers that this subscriber is connected. Used only with lossless delivery.
     ready: Option<Notifier<ipc::Service>>,
     known_publishers: RefCell<Vec<u128>>,
     copies: Copies,
 }
 
 impl Bus {
-    /// Creates a subscriber of a topic of messages; new messages wake `waiter`.
+    /// Creates a subscriber of a topic of messages. New messages wake `waiter`.
     ///
     /// # Errors
     ///
-    /// [`PortError`].
+    /// Returns a [`PortError`] on failure.
     pub fn subscriber<T: Message>(
         &self,
         topic: &str,
@@ -234,11 +234,11 @@ impl Bus {
         })
     }
 
-    /// Creates a subscriber of a topic of arrays; new arrays wake `waiter`.
+    /// Creates a subscriber of a topic of arrays. New arrays wake `waiter`.
     ///
     /// # Errors
     ///
-    /// [`PortError`].
+    /// Returns a [`PortError`] on failure.
     pub fn slice_subscriber<E: Element, H: Header>(
         &self,
         topic: &str,
@@ -262,7 +262,7 @@ impl Port {
             Delivery::Realtime | Delivery::Lossless => None,
         };
         if bus.looks_on() {
-            // It polls, so that no sender has to wake it.
+            // The subscriber polls, so that no sender has to wake it.
         } else if waiter.spins() {
             // A spinning waiter needs no wake-up.
             waiter.poll_without_pause();
@@ -295,8 +295,8 @@ impl Port {
 
     /// Connects to the existing publishers.
     fn connect(&self) -> Result<(), PortError> {
-        // Listed before connecting, so that only connected publishers are acknowledged: a new one may
-        // appear in between.
+        // The publishers are listed before connecting, so that only connected ones are acknowledged. A new one may
+        // appear in the meantime.
         let publishers = self.publishers();
         let connected = self.reader.port().update_connections();
         connected.inspect_err(note_room).map_err(|source| PortError::Connection {
@@ -308,7 +308,7 @@ impl Port {
     }
 
     fn receive(&self) -> Result<Option<Received>, ReceiveError> {
-        // Listed before connecting, as in `connect`.
+        // The publishers are listed before connecting, as in `connect`.
         let publishers = self.ready.as_ref().map(|_| self.publishers());
         let topic = || Arc::clone(&self.topic);
         let sample =

@@ -10,10 +10,10 @@ use crate::erased::{Messages, Types};
 use crate::payload::{Element, Header, Message};
 use crate::service::{Extras, WakeUp, patiently, ready_name};
 
-/// Processes that may open one topic: more than a deployment has, since dead ones count until they are
-/// cleaned up.
+/// Maximum number of processes that may open one topic. It is larger than the number of processes of a deployment, because dead
+/// processes count until they are cleaned up.
 const MAX_NODES: usize = 96;
-/// Ports of one wake-up: as many as a process may have views, with spare slots for dead ones.
+/// Maximum number of ports of one wake-up: the maximum number of views of a process, with spare slots for dead ports.
 const MAX_WAKE_UP_PORTS: usize = 64;
 
 /// One topic of a deployment: its name, message type and quality of service.
@@ -24,14 +24,14 @@ pub struct TopicPlan {
     limits: Limits,
     max_len: usize,
     chunk_bytes: usize,
-    /// See [`Self::with_few_chunks`].
+    /// Number of chunks after a call of [`Self::with_few_chunks`].
     usual_chunks: Option<usize>,
     wakes: bool,
     types: Types,
 }
 
 impl TopicPlan {
-    /// A topic of messages that are copied when sent and received: [`Bus::publisher`](crate::Bus::publisher),
+    /// Creates the plan of a topic of messages that are copied when sent and received: [`Bus::publisher`](crate::Bus::publisher),
     /// [`Bus::subscriber`](crate::Bus::subscriber).
     pub fn messages<T: Message>(topic: String, delivery: Delivery, limits: Limits) -> Self {
         Self {
@@ -46,19 +46,19 @@ impl TopicPlan {
         }
     }
 
-    /// A topic of arrays with a header, written and read in place:
+    /// Creates the plan of a topic of arrays with a header, which are written and read in place:
     /// [`Bus::slice_publisher`](crate::Bus::slice_publisher), [`Bus::slice_subscriber`](crate::Bus::slice_subscriber).
     ///
-    /// The array starts on a cache line, because its header's size is a multiple of one.
+    /// The array starts on a cache line, because the size of the header is a multiple of a cache line.
     ///
-    /// * `max_len`: longest array, elements.
+    /// * `max_len`: maximum length of an array, elements.
     pub fn slices<E: Element, H: Header>(
         topic: String,
         delivery: Delivery,
         limits: Limits,
         max_len: usize,
     ) -> Self {
-        // iceoryx2's `payload_alignment` would align every element.
+        // The header has the alignment, because iceoryx2's `payload_alignment` would align every element.
         const { assert!(align_of::<H>() == CACHE_LINE && size_of::<H>().is_multiple_of(CACHE_LINE)) };
         Self {
             topic,
@@ -72,26 +72,26 @@ impl TopicPlan {
         }
     }
 
-    /// Leaves out the wake-up: receivers of this topic poll it.
+    /// Omits the wake-up: receivers of this topic poll it.
     #[must_use]
     pub fn without_wake_up(mut self) -> Self {
         self.wakes = false;
         self
     }
 
-    /// Limits the chunks of a publisher of large arrays, at least 1.
+    /// Limits the number of chunks of a publisher of large arrays, to at least 1.
     ///
-    /// With [`Delivery::Lossless`] a publisher has only these, and
-    /// [`SlicePublisher::loan`](crate::SlicePublisher::loan) waits until one is free: one more than all
-    /// receivers borrow is enough. With [`Delivery::Realtime`], where a sender never waits, there are as many
-    /// as before, but only these are mapped ahead of use; the others cost no memory unless receivers lag.
+    /// With [`Delivery::Lossless`], a publisher has only these chunks, and
+    /// [`SlicePublisher::loan`](crate::SlicePublisher::loan) waits until one is free. One more chunk than all
+    /// receivers borrow is enough. With [`Delivery::Realtime`], a sender never waits, so the number of chunks does not change.
+    /// Only the given number is mapped before use; the other chunks cost no memory unless receivers lag.
     #[must_use]
     pub fn with_few_chunks(mut self, chunks: usize) -> Self {
         self.usual_chunks = Some(chunks.max(1));
         self
     }
 
-    /// The name of the topic.
+    /// Returns the name of the topic.
     pub fn topic(&self) -> &str {
         &self.topic
     }
@@ -101,12 +101,12 @@ impl TopicPlan {
         self.delivery
     }
 
-    /// The number of ports and their buffers.
+    /// Returns the number of ports and their buffers.
     pub fn limits(&self) -> Limits {
         self.limits
     }
 
-    /// Longest array, elements; 1 for messages.
+    /// Returns the maximum length of an array, elements; 1 for messages.
     pub fn max_len(&self) -> usize {
         self.max_len
     }
@@ -116,7 +116,7 @@ impl TopicPlan {
         self.wakes
     }
 
-    /// Chunks of one publisher.
+    /// Returns the number of chunks of one publisher.
     pub(crate) fn chunks(&self) -> usize {
         let limits = self.limits;
         let most = limits.subscribers * (limits.buffer + limits.borrowed) + limits.loaned;
@@ -127,23 +127,23 @@ impl TopicPlan {
         needed + self.onlooked_chunks()
     }
 
-    /// Returns the number of chunks that onlookers may keep from their publisher.
+    /// Returns the number of chunks that onlookers may hold back from their publisher.
     fn onlooked_chunks(&self) -> usize {
         self.limits.onlookers * (self.limits.buffer + 1)
     }
 
-    /// Returns the number of chunks that are mapped ahead of use.
+    /// Returns the number of chunks that are mapped before use.
     pub(crate) fn mapped_chunks(&self) -> usize {
         let chunks = self.chunks() - self.onlooked_chunks();
         self.usual_chunks.map_or(chunks, |usual_chunk| usual_chunk.min(chunks))
     }
 
-    /// Largest size of one message, bytes.
+    /// Returns the maximum size of one message, bytes.
     pub fn message_bytes(&self) -> u64 {
         self.chunk_bytes as u64
     }
 
-    /// Shared memory of all publishers of the topic together, bytes; saturates.
+    /// Returns the size of the shared memory of all publishers of the topic, bytes. The result saturates.
     pub fn pool_bytes(&self) -> u64 {
         let chunks = (self.limits.publishers as u64).saturating_mul(self.chunks() as u64);
         chunks.saturating_mul(self.chunk_bytes as u64)
@@ -174,14 +174,14 @@ impl TopicPlan {
     }
 }
 
-/// Keeps a topic alive while no process uses it.
+/// Handle that keeps a topic alive while no process uses it.
 #[derive(Debug)]
 pub struct Topic {
     _messages: Messages,
     _wake_ups: Vec<WakeUp>,
 }
 
-/// The events of a topic: its wake-up if it has one, and with lossless delivery the acknowledgement of
+/// Returns the names of the events of a topic: its wake-up if it has one, and with lossless delivery the acknowledgement of
 /// connections.
 fn wake_up_names(plan: &TopicPlan) -> Vec<String> {
     let mut names = Vec::new();
@@ -252,12 +252,12 @@ fn create_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<WakeUp, BusEr
     })
 }
 
-/// Bytes of a cache line, and of the widest vector register.
+/// Size of a cache line, and of the widest vector register, bytes.
 const CACHE_LINE: usize = 64;
-/// The header of iceoryx2 before the user header, with its alignment.
+/// Size of iceoryx2's own header before the user header, with its alignment, bytes.
 const TRANSPORT_HEADER_BYTES: usize = 64;
 
-/// Bytes of one chunk.
+/// Returns the size of one chunk, bytes.
 fn chunk_bytes(header: usize, payload: usize) -> usize {
     (TRANSPORT_HEADER_BYTES + header + payload).next_multiple_of(CACHE_LINE)
 }

@@ -1,6 +1,6 @@
-//! Video devices of Linux (V4L2): what they offer, and their pictures with the kernel's own times and numbers.
+//! Video devices of Linux (V4L2): their capabilities, and their pictures with the times and numbers of the kernel.
 //!
-//! Reading order: [`VideoDevice`] (open, ask, set), [`VideoStream`] (its pictures).
+//! Reading order: [`VideoDevice`] (open, query, set), [`VideoStream`] (its pictures).
 
 mod device;
 mod error;
@@ -16,12 +16,12 @@ pub use error::VideoError;
 pub use list::{VideoControl, VideoFormat, VideoSize};
 pub use stream::{VideoPicture, VideoStream};
 
-/// The four letters of a format of pixels: `YUYV`, `MJPG`.
+/// The four letters of a pixel format, such as `YUYV` or `MJPG`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FourCc(pub [u8; 4]);
 
 impl FourCc {
-    /// The four letters in upper case; `mjpeg` and `jpeg` are `MJPG`. None for other texts.
+    /// Parses the four letters and converts them to upper case; `mjpeg` and `jpeg` become `MJPG`. Returns `None` for other texts.
     pub fn parse(text: &str) -> Option<Self> {
         let upper = text.to_ascii_uppercase();
         let letters = match upper.as_str() {

@@ -20,20 +20,20 @@ use crate::room::note_room;
 use crate::service::{self, PortError};
 use failure::{Fault, Stop};
 
-/// Longest sleep. A sender may die between sending and notifying, so receivers have to check on their own;
-/// and a process that sleeps for long would seem to hang.
+/// Longest sleep. A sender may die between sending and notifying, so receivers have to check on their own.
+/// A process that sleeps for longer would also seem to hang.
 const LONGEST_SLEEP: Duration = Duration::from_millis(100);
 
-/// Iterations after which a spinning waiter yields its core: rarely enough to cost a message less than a
+/// Number of iterations after which a spinning waiter yields its core. It is large enough to cost a message less than a
 /// tenth of a microsecond on average.
 const ITERATIONS_BETWEEN_YIELDS: u32 = 64;
 
-/// Why [`Waiter::wait`] returned.
+/// Reason why [`Waiter::wait`] returned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Woken {
     /// A message was sent.
     Message,
-    /// Time passed. There may still be messages.
+    /// The time is over. There may still be messages.
     Time,
     /// Stop was requested.
     Stop,
@@ -52,7 +52,7 @@ pub struct Waiter {
     listeners: Vec<Listener<ipc::Service>>,
     stop: Stop,
     progress: Progress,
-    /// True if it spins instead of sleeping while there are subscribers.
+    /// True if the waiter spins instead of sleeping while there are subscribers.
     spins: bool,
     /// True if there are subscribers.
     has_ports: bool,
@@ -87,14 +87,14 @@ impl Bus {
 impl Waiter {
     /// Sleeps until a message arrives, `timeout` or 100 ms pass, or stop is requested.
     ///
-    /// Whatever is returned, receive from every subscriber until nothing is left before waiting again:
+    /// Before waiting again, receive all messages of every subscriber, whatever the result is:
     /// several messages may cause only one wake-up.
     ///
-    /// With a bus that [spins](Bus::with_spin), and with subscribers, it returns at once instead of sleeping.
+    /// If the bus [spins](Bus::with_spin) and there are subscribers, the function returns at once instead of sleeping.
     ///
     /// # Errors
     ///
-    /// [`WaitError`].
+    /// Returns a [`WaitError`] on failure.
     pub fn wait(&self, timeout: Duration) -> Result<Woken, WaitError> {
         if self.spins && self.has_ports {
             return Ok(self.turn());
@@ -142,14 +142,14 @@ impl Waiter {
         }
     }
 
-    /// Sleeps until stop is requested, and calls `resend` for every new receiver: one that was restarted has
+    /// Sleeps until stop is requested, and calls `resend` for every new receiver. A restarted receiver has
     /// not received the last message.
     ///
-    /// * `n_connected`: how many receivers there are.
+    /// * `n_connected`: returns the number of receivers.
     ///
     /// # Errors
     ///
-    /// [`WaitError`], and the errors of `resend`.
+    /// Returns a [`WaitError`], or an error of `resend`.
     pub fn linger<E: From<WaitError>>(
         &self,
         n_connected: impl Fn() -> usize,
@@ -170,7 +170,7 @@ impl Waiter {
         self.spins
     }
 
-    /// Notes that there is a subscriber without wake-up.
+    /// Records that there is a subscriber without wake-up.
     pub(crate) fn poll_without_pause(&mut self) {
         self.has_ports = true;
     }
@@ -179,7 +179,7 @@ impl Waiter {
         self.listeners.push(listener);
     }
 
-    /// The listeners with pending events.
+    /// Returns the indices of the listeners with pending events.
     fn poll(&self, timeout: Duration) -> Result<Vec<usize>, WaitError> {
         let mut fds: Vec<PollFd<'_>> = self
             .listeners

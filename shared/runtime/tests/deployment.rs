@@ -58,7 +58,7 @@ fn topics(delivery: Delivery) -> Vec<TopicPlan> {
     topics
 }
 
-/// The ports of all processes, each with a bus of its own.
+/// The ports of all processes, each with its own bus.
 #[derive(Default)]
 struct Ports {
     frames_out: Vec<SlicePublisher<u8, FrameHeader>>,
@@ -115,7 +115,7 @@ impl Ports {
         self.pairs_out.push(bus.publisher(&topic::pair_pose(worker)).unwrap());
     }
 
-    /// Triangulate, which publishes the result, and record, which receives everything.
+    /// Opens the ports of `triangulate`, which publishes the result, and of `record`, which receives everything.
     fn open_last(&mut self, bus: &Bus, waiter: &mut Waiter, records: bool) {
         for view in 0..N_VIEWS {
             self.poses_in.push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
@@ -147,7 +147,7 @@ fn a_deployment_of_eight_views_opens_all_ports_within_its_memory_plan() {
         for process in &processes {
             ports.open(&deployment, process);
         }
-        // One of everything, so that all queues exist.
+        // Send one message of each kind, so that all queues exist.
         for publisher in &ports.frames_out {
             assert_eq!(publisher.loan(30_000).unwrap().send().unwrap(), 2);
         }

@@ -11,10 +11,10 @@ use messages::FrameHeader;
 use runtime::{Bus, Delivery, Limits, SendError, SlicePublisher, SliceSubscriber, TopicPlan};
 
 const SOON: Duration = Duration::from_secs(20);
-/// Elements of every array: enough bytes to distinguish chunks by their pages.
+/// Number of elements of every array, with enough bytes to distinguish chunks by their pages.
 const LEN: usize = 1 << 20;
 
-/// One chunk to write and one to borrow, where the worst case needs nine.
+/// Returns a plan with one chunk to write and one to borrow. The worst case would need nine.
 fn plan(delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(2, 2, 2);
     TopicPlan::slices::<u8, FrameHeader>("large".to_owned(), delivery, limits, LEN)
@@ -27,7 +27,7 @@ fn send(publisher: &SlicePublisher<u8, FrameHeader>, value: u8) -> Result<usize,
     loan.send()
 }
 
-/// Publisher and subscriber of a topic with both chunks in use.
+/// Returns the publisher and the subscriber of a topic with both chunks in use.
 fn full(
     deployment: &Deployment,
     patience: Duration,
@@ -45,8 +45,8 @@ fn full(
     (publisher, subscriber)
 }
 
-/// Memory of the pool of the deployment's only publisher that is mapped, bytes: that of its mapping
-/// in the sender or in the receiver, whichever has more.
+/// Returns the mapped memory in the pool of the deployment's only publisher, bytes. This is its mapping
+/// in the sender or in the receiver, whichever is larger.
 fn mapped(deployment: &Deployment) -> usize {
     let files = shared_memory(deployment.namespace()).into_iter();
     let is_pool = |text: &String| std::path::Path::new(text).extension() == Some("data".as_ref());
@@ -83,7 +83,7 @@ fn a_sender_waits_until_a_chunk_is_released() {
     let begin = Instant::now();
     while got.len() < usize::from(N) && begin.elapsed() < Duration::from_mins(1) {
         waiter.wait(SOON).unwrap();
-        // The last one is held until the next one is there, as fusion may do.
+        // A sample is held until the next one has arrived, as fusion may do.
         while let Some(sample) = subscriber.receive().unwrap() {
             let value = sample.payload()[0];
             assert!(
@@ -149,7 +149,7 @@ fn with_realtime_delivery_a_sender_never_waits_and_unused_chunks_are_not_mapped(
         held = subscriber.latest().unwrap();
         assert_eq!(held.as_ref().unwrap().payload()[LEN - 1], value);
     }
-    // Of the nine chunks the last released ones are used again.
+    // The nine chunks are reused, the last released ones first.
     let in_use = mapped(&deployment);
     assert!(
         in_use < 4 * LEN,

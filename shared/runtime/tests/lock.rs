@@ -1,4 +1,4 @@
-//! A deployment runs once at a time, and leaves nothing behind.
+//! Only one run of a deployment is possible at a time, and it leaves no files behind.
 
 use crate::common;
 
@@ -41,7 +41,7 @@ fn files_of_a_killed_run_are_removed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let leftover = format!("/dev/shm/{}123.data", namespace.prefix());
-    // Files that a killed run leaves: its directory has the marker file.
+    // Leave the files of a killed run: its directory has the marker file.
     std::mem::forget(namespace.acquire().unwrap());
     fs::remove_file(namespace.root().join("lock")).unwrap();
     fs::write(&leftover, "x").unwrap();

@@ -1,4 +1,4 @@
-//! An onlooker takes nothing from senders and receivers, however slow it is.
+//! An onlooker does not slow down senders and receivers, however slow it is itself.
 
 use core::time::Duration;
 use std::time::Instant;
@@ -47,7 +47,7 @@ fn a_sender_without_loss_does_not_wait_for_onlookers_and_its_receiver_gets_every
         receiving.slice_subscriber::<u8, FrameHeader>("frames", &mut waiter).unwrap();
     assert_eq!(publisher.wait_for_subscribers(1, NOT_STUCK), 1);
     let begin = Instant::now();
-    // Every onlooker holds an array, and lets the others lie.
+    // Every onlooker holds one array and does not take the others.
     let mut held = Vec::new();
     for frame in 0..20 {
         publisher.send(&quality(frame)).unwrap();
@@ -63,7 +63,7 @@ fn a_sender_without_loss_does_not_wait_for_onlookers_and_its_receiver_gets_every
     }
     assert!(begin.elapsed() < NOT_STUCK, "the sender waited");
     assert!(held.iter().all(Option::is_some));
-    // The first messages fit into its queue; the others it has missed.
+    // The first messages fit into the onlooker's queue; it missed the later ones.
     let first = onlookers[0].0.receive().unwrap();
     assert_eq!(first, Some(quality(0)));
 }

@@ -1,4 +1,4 @@
-//! Publishers and subscribers within one process; faults need real processes, see `supervise`.
+//! Publishers and subscribers within one process. Tests of faults need real processes, see `supervise`.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -197,7 +197,7 @@ fn a_receiver_that_was_given_up_is_waited_for_no_longer_than_later_on() {
         limit: Duration::from_millis(300),
         after_losses: Duration::from_millis(1),
     };
-    // Two are missing, one was given up: the other is waited for.
+    // Two receivers are missing, and one was given up. The publisher waits for the other one.
     assert_eq!(publisher.wait_for_subscribers(2, patience), 0);
     assert!(begin.elapsed() >= patience.limit);
     patience.limit = Duration::from_hours(1);
@@ -230,7 +230,7 @@ fn a_sender_gives_up_on_a_receiver_that_never_makes_room() {
     drop((subscriber, waiter));
 }
 
-/// A publisher whose next message has no room.
+/// Returns a publisher whose next message has no room.
 fn blocked(
     deployment: &Deployment,
     patience: Duration,
@@ -313,7 +313,7 @@ fn a_pool_has_its_planned_size_and_is_allocated() {
             })
             .unwrap();
         let file = std::fs::metadata(format!("/dev/shm/{pool}")).unwrap();
-        // Besides the chunks, iceoryx2 keeps a list of them in the same file.
+        // In addition to the chunks, iceoryx2 keeps a list of them in the same file.
         let (planned, actual) = (plan.pool_bytes(), file.len());
         assert!(
             planned <= actual + actual / 8 && actual <= planned + 4096,

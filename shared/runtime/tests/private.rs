@@ -1,4 +1,4 @@
-//! A deployment belongs to one user, whatever the umask and whatever files other users have left.
+//! A deployment belongs to one user, regardless of the umask and of files that other users have left.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test reports what it skips")]
 
@@ -16,14 +16,14 @@ use runtime::{Bus, BusError, Delivery, Limits, LockError, Namespace, PrivacyErro
 use rustix::fs::Mode;
 use rustix::process::{getuid, umask};
 
-/// A user that is neither root nor the one who runs the tests.
+/// A user that is neither root nor the user who runs the tests.
 const OTHER: u32 = 65_534;
 
 fn is_root() -> bool {
     getuid().is_root()
 }
 
-/// All files and directories below, and it itself.
+/// Finds a path, and all files and directories below it.
 fn below(path: &Path, found: &mut Vec<PathBuf>) {
     found.push(path.to_owned());
     for entry in fs::read_dir(path).into_iter().flatten() {
@@ -31,7 +31,7 @@ fn below(path: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The files of a running deployment, including shared memory.
+/// Returns the files of a running deployment, including shared memory.
 fn all_files(deployment: &Deployment) -> Vec<PathBuf> {
     let mut files = Vec::new();
     below(deployment.namespace().root(), &mut files);
@@ -40,7 +40,7 @@ fn all_files(deployment: &Deployment) -> Vec<PathBuf> {
     files
 }
 
-/// A deployment with ports open on a topic of each kind; `use_it` looks at it.
+/// Creates a deployment with ports open on a topic of each kind, and calls `use_it` with it.
 fn with_ports(use_it: impl FnOnce(&Deployment)) {
     let limits = Limits::new(1, 1, 1);
     let deployment = Deployment::new(&[
@@ -154,14 +154,14 @@ fn files_of_another_user_at_the_paths_of_a_deployment_are_named() {
         return;
     }
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
-    // At the parent directory of a user's deployments.
+    // Another user owns the parent directory of this user's deployments.
     chown(base.path(), Some(OTHER), None).unwrap();
     let own = namespace(base.path());
     let Err(LockError::Bus(error)) = own.acquire() else {
         panic!("it is below another user's");
     };
     assert_foreign(&error, base.path(), OTHER);
-    // With a name of the deployment's shared memory.
+    // Another user owns a file with the name of the deployment's shared memory.
     chown(base.path(), Some(0), None).unwrap();
     let leftover = PathBuf::from(format!("/dev/shm/{}7.data", own.prefix()));
     fs::write(&leftover, "x").unwrap();
@@ -189,7 +189,7 @@ fn a_file_instead_of_the_directory_is_named() {
     assert!(error.to_string().contains("and not a directory"), "{error}");
 }
 
-/// A home with folders, one of which has the name of a deployment and looks like the leftovers of one.
+/// Creates a home directory with folders. One of them has the name of a deployment and looks like its leftover files.
 fn home(base: &Path, name: &str) -> PathBuf {
     let home = base.join("home");
     for file in ["lock", "nodes/17/node.details", "letters.txt"] {
@@ -199,12 +199,12 @@ fn home(base: &Path, name: &str) -> PathBuf {
     }
     fs::create_dir(home.join("photos")).unwrap();
     fs::write(home.join("photos/one.jpg"), "x").unwrap();
-    // Whatever umask another test of this process has set: a base that others may write is closed.
+    // The mode is set explicitly, because another test may have changed the umask, and a base that others may write to would be closed.
     fs::set_permissions(&home, Permissions::from_mode(0o755)).unwrap();
     home
 }
 
-/// All that is there, with its mode.
+/// Returns all entries below a path with their modes.
 fn census(path: &Path) -> Vec<(PathBuf, u32)> {
     let mut found = Vec::new();
     below(path, &mut found);
@@ -217,7 +217,7 @@ fn census(path: &Path) -> Vec<(PathBuf, u32)> {
 fn a_link_instead_of_the_base_is_never_followed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let home = home(base.path(), "t");
-    // At the parent directory of a user's deployments; created by another user, if this test runs as root.
+    // A link replaces the parent directory of a user's deployments. If this test runs as root, another user creates the link.
     let link = base.path().join("px");
     symlink(&home, &link).unwrap();
     let owner = if is_root() {
@@ -254,7 +254,7 @@ fn a_directory_without_marker_is_named_and_not_changed() {
     };
     assert_eq!(*path, home.join("t"));
     assert_eq!(census(&home), before);
-    assert!(error.hint().unwrap().contains("nothing in it was touched"));
+    assert!(error.hint().unwrap().contains("nothing in it was changed"));
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn a_base_that_others_may_write_is_closed() {
     let own = namespace(base.path());
     drop(own.acquire().unwrap());
     assert_eq!(mode(), 0o755);
-    // With the sticky bit, as in /tmp, it is safe.
+    // With the sticky bit, as in /tmp, the directory is safe.
     fs::set_permissions(base.path(), Permissions::from_mode(0o1777)).unwrap();
     drop(own.acquire().unwrap());
     assert_eq!(mode(), 0o1777);

@@ -1,5 +1,5 @@
-//! The slots of a killed process are released, also if several processes clean up at once or are killed while
-//! they do.
+//! The slots of a killed process are released, even if several processes clean up at once or are killed during
+//! the clean-up.
 //!
 //! This executable also runs as the processes that are killed, so it has no test harness.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -30,7 +30,7 @@ fn main() {
         Some("role:unfinished") => {
             a_slot_is_released_if_its_owner_left_incomplete_files();
         }
-        // One process cleans up in one deployment only, as a supervisor does.
+        // A process cleans up in only one deployment, as a supervisor does.
         _ => ["role:in-vain", "role:unfinished"].into_iter().for_each(passes),
     }
 }
@@ -75,7 +75,7 @@ fn a_slot_is_released_if_its_owner_left_incomplete_files() {
     assert_eq!(shared_memory(&namespace), Vec::<String>::new());
 }
 
-/// A deployment with one topic, which allows one publisher.
+/// Returns a deployment with one topic, which allows one publisher.
 fn deployment() -> (Deployment, Bus) {
     let limits = Limits::new(1, 1, 1);
     let plan = TopicPlan::messages::<ViewQuality>(TOPIC.to_owned(), Delivery::Realtime, limits);
@@ -84,7 +84,7 @@ fn deployment() -> (Deployment, Bus) {
     (deployment, bus)
 }
 
-/// The folder of iceoryx2 with the tags of a killed process.
+/// Returns the folder of iceoryx2 with the tags of a killed process.
 fn killed_sender(deployment: &Deployment) -> PathBuf {
     let namespace = deployment.namespace();
     let nodes = namespace.root().join("nodes");
@@ -147,6 +147,6 @@ fn cleaner() {
 #[expect(clippy::print_stdout, reason = "the parent process reads it")]
 fn wait_to_be_killed() {
     println!("ready");
-    // Longer than the test takes; the process ends even if the test fails.
+    // The sleep is longer than the test takes; the process ends even if the test fails.
     sleep(Duration::from_mins(1));
 }

@@ -11,7 +11,7 @@ use messages::FrameHeader;
 use runtime::{Bus, Delivery, Limits, TopicPlan, Woken};
 
 const TOPIC: &str = "pixels";
-/// Time after which something counts as never happening.
+/// Time after which an event counts as never happening.
 const WATCHDOG: Duration = Duration::from_mins(1);
 
 fn deployment(delivery: Delivery) -> Deployment {
@@ -50,7 +50,7 @@ fn a_spinning_receiver_gets_all_messages() {
             let port = bus.slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter).unwrap();
             let (mut received, begin) = (Vec::new(), Instant::now());
             while received.len() < 100 && begin.elapsed() < WATCHDOG {
-                // It does not sleep, so the reason for returning is always time.
+                // The waiter does not sleep, so the reason for returning is always time.
                 assert_eq!(waiter.wait(WATCHDOG).unwrap(), Woken::Time);
                 if let Some(sample) = port.receive().unwrap() {
                     received.push(sample.payload()[0]);

@@ -19,7 +19,7 @@ fn deployment() -> Deployment {
     ])
 }
 
-/// File and offset, the same in all processes.
+/// Returns the file and the offset, which are the same in all processes.
 fn file(place: &Mapped) -> (u64, u64) {
     (place.inode, place.offset)
 }

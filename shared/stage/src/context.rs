@@ -13,7 +13,7 @@ pub trait Account {
     fn received(&self);
     /// Counts messages or frames that were lost.
     fn dropped(&self, cause: Cause, n: u64);
-    /// Counts a message that was refused, and logs why.
+    /// Counts a refused message, and logs the reason.
     fn refused(&self, cause: Refusal, topic: &str, error: &WireError);
 }
 
@@ -48,7 +48,9 @@ impl core::fmt::Debug for Context<'_> {
 }
 
 impl<'a> Context<'a> {
-    /// * `now`: nanoseconds of a monotonic clock.
+    /// Creates a context.
+    ///
+    /// * `now`: returns the time, nanoseconds of a monotonic clock.
     pub fn new(session: u64, now: &'a dyn Fn() -> u64, account: &'a dyn Account) -> Self {
         Self {
             session,
@@ -57,22 +59,22 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The context of a process.
+    /// Returns the context of a process.
     pub fn of(service: &'a Service) -> Self {
         Self::new(service.session(), &now_nanos, service.health())
     }
 
-    /// Nanoseconds of the clock.
+    /// Returns the time of the clock, nanoseconds.
     pub fn now(&self) -> u64 {
         (self.now)()
     }
 
-    /// The counters.
+    /// Returns the counters.
     pub fn account(&self) -> &'a dyn Account {
         self.account
     }
 
-    /// The expected values of a message.
+    /// Returns the expected values of a message.
     ///
     /// * `view`: the view of the topic, or the worker's number for a topic of pairs.
     pub fn expected(&self, view: usize) -> Expected {
@@ -83,7 +85,7 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Counts and logs a refused message that ends no stream.
+    /// Counts and logs a refused message that does not end a stream.
     pub fn count_refused(&self, topic: &str, error: &WireError) {
         self.account.refused(error.refusal(), topic, error);
     }
@@ -92,16 +94,16 @@ impl<'a> Context<'a> {
     ///
     /// # Errors
     ///
-    /// [`ReceiveError::End`] if it is the end of a stream of this session: nobody would send another one.
+    /// Returns [`ReceiveError::End`] if the message is the end of a stream of this session, because no other end would follow.
     pub fn refuse<M: Stamped>(&self, message: &M, error: &WireError) -> Result<(), ReceiveError> {
         self.refuse_end(M::NAME, message.stamp(), message.status(), error)
     }
 
-    /// As [`refuse`](Self::refuse), for the header of a bulk message.
+    /// Works like [`refuse`](Self::refuse), for the header of a bulk message.
     ///
     /// # Errors
     ///
-    /// As for [`refuse`](Self::refuse).
+    /// Fails in the same cases as [`refuse`](Self::refuse).
     pub fn refuse_end(
         &self,
         name: &'static str,

@@ -12,7 +12,7 @@ pub struct Item<T> {
     pub stamp: Stamp,
     /// Timing of the message.
     pub timing: Timing,
-    /// The decoded content.
+    /// Decoded content of the message.
     pub value: T,
 }
 
@@ -21,7 +21,7 @@ pub struct Item<T> {
 pub struct Turn {
     stamp: Stamp,
     received_at: Cell<u64>,
-    /// When the last input message of the frame was sent.
+    /// Time at which the last input message of the frame was sent.
     last_sent_at: Option<u64>,
 }
 
@@ -34,22 +34,22 @@ impl Turn {
         }
     }
 
-    /// The stamp of the messages to be sent; [`crate::Output::send`] sets the view.
+    /// Returns the stamp of the messages to send. [`crate::Output::send`] sets the view.
     pub fn stamp(&self) -> &Stamp {
         &self.stamp
     }
 
-    /// When work on the next message began, nanoseconds.
+    /// Returns the time at which work on the next message began, nanoseconds.
     pub fn received_at(&self) -> u64 {
         self.received_at.get()
     }
 
-    /// Notes that work on the next message begins: a stage may send several for a frame.
+    /// Records that work on the next message begins, because a stage may send several messages for a frame.
     pub fn restart(&self, now: u64) {
         self.received_at.set(now);
     }
 
-    /// How long the frame waited in this process, nanoseconds.
+    /// Returns the time that the frame waited in this process, nanoseconds.
     pub fn waited(&self) -> Option<u64> {
         let sent_at = self.last_sent_at?;
         Some(self.received_at.get().saturating_sub(sent_at))
@@ -66,27 +66,28 @@ pub struct Frame<'a, T> {
 }
 
 impl<T> Frame<'_, T> {
-    /// Number of the frame.
+    /// Returns the number of the frame.
     pub fn number(&self) -> u64 {
         self.number
     }
 
-    /// Stamp and times for the messages to be sent.
+    /// Returns the stamp and the times for the messages to send.
     pub fn turn(&self) -> &Turn {
         &self.turn
     }
 
-    /// The message of a slot, if it was received in time.
+    /// Returns the message of a slot, if it was received in time.
     pub fn item(&self, slot: usize) -> Option<&Item<T>> {
         self.items.get(slot)?.as_ref()
     }
 
-    /// The same, by value.
+    /// Takes the message of a slot, if it was received in time.
     pub fn take(&mut self, slot: usize) -> Option<Item<T>> {
         self.items.get_mut(slot)?.take()
     }
 
-    /// The message of an optional input, or the input's last one while that is fresh; and its age in frames.
+    /// Returns the message of an optional input, with its age in frames. If there is none for this frame, returns the input's last message
+    /// while it is fresh.
     ///
     /// * `captured_at`: capture time of the view's frame, nanoseconds.
     pub fn latest(&self, slot: usize, captured_at: u64) -> Option<(u64, &T)> {

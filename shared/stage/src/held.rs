@@ -1,4 +1,4 @@
-//! Bulk data that a stage reads where it lies in shared memory.
+//! Bulk data that a stage reads in shared memory.
 
 use core::fmt;
 use std::cell::{Ref, RefCell};
@@ -11,10 +11,10 @@ use crate::Context;
 use crate::message::BulkHeader;
 use crate::shelf::Shelf;
 
-/// Checks a sample against what is expected of its topic.
+/// Checks a sample against the expected values of its topic.
 pub(crate) type CheckSample<E, H> = fn(&Sample<E, H>, &Expected) -> Result<(), WireError>;
 
-/// The samples of one view, each held until its frame has been processed.
+/// The samples of one view. Each is held until its frame has been processed.
 pub struct Held<E: Element, H: BulkHeader> {
     inner: Rc<Inner<E, H>>,
 }
@@ -39,7 +39,7 @@ type Received<E, H> = Result<Option<(u64, Sample<E, H>)>, ReceiveError>;
 pub(crate) trait Bulk {
     fn fill(&self, context: &Context<'_>) -> Result<(), ReceiveError>;
     fn advance(&self, frame: u64, context: &Context<'_>) -> Result<(), ReceiveError>;
-    /// Releases and discards all.
+    /// Releases and discards all samples.
     fn drain(&self) -> Result<(), ReceiveError>;
 }
 
@@ -68,14 +68,14 @@ impl<E: Element, H: BulkHeader> Held<E, H> {
         Rc::clone(&self.inner) as Rc<dyn Bulk>
     }
 
-    /// The sample of a frame, if it is there.
+    /// Returns the sample of a frame, if it is held.
     pub fn of(&self, frame: u64) -> Option<Ref<'_, Sample<E, H>>> {
         Ref::filter_map(self.inner.shelf.borrow(), |shelf| shelf.of(frame)).ok()
     }
 }
 
 impl<E: Element, H: BulkHeader> Inner<E, H> {
-    /// The oldest waiting sample of this view and session; others are counted.
+    /// Returns the oldest waiting sample of this view and session. Other samples are counted.
     fn receive(&self, context: &Context<'_>) -> Received<E, H> {
         while let Some(sample) = self.subscriber.receive()? {
             match (self.check)(&sample, &context.expected(self.view)) {

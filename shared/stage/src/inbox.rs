@@ -1,4 +1,4 @@
-//! The inputs of a stage, joined frame by frame. Pure: messages, clock and counts are given.
+//! The inputs of a stage, joined frame by frame. This module is pure: messages, clock and counters are passed in.
 
 use core::time::Duration;
 
@@ -10,17 +10,17 @@ use crate::input::Input;
 use crate::joins::{Copier, Joins};
 use crate::{Context, Item};
 
-/// How frames are joined.
+/// Rules for joining frames.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rules {
     pub(crate) delivery: Delivery,
-    /// How long an input may be silent while others wait for it.
+    /// Maximum time for which an input may be silent while others wait for it.
     pub(crate) patience: Duration,
-    /// Distance between the frames used, where frames may be skipped: the stage then follows a [`Cadence`].
+    /// Distance between the used frames, if frames may be skipped. The stage then follows a [`Cadence`].
     pub(crate) skips: Option<u64>,
 }
 
-/// An optional input: frames wait for it until `deadline` at most.
+/// An optional input. Frames wait for it no longer than `deadline`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Optional {
     pub(crate) slot: usize,
@@ -36,7 +36,9 @@ pub(crate) struct Inbox<'a, T> {
 }
 
 impl<'a, T> Inbox<'a, T> {
-    /// * `remember`: by slot, how a value is copied if it may be used for later frames, for at most `max_age`.
+    /// Creates an inbox.
+    ///
+    /// * `remember`: by slot, the function that copies a value for use in later frames (up to `max_age`), if this is allowed.
     pub(crate) fn new(
         inputs: Vec<Box<dyn Input<T> + 'a>>,
         rules: Rules,
@@ -81,7 +83,7 @@ impl<'a, T> Inbox<'a, T> {
         self.inputs.iter().try_for_each(|input| input.drain())
     }
 
-    /// The next complete frame; the latest one of the cadence where frames may be skipped.
+    /// Returns the next complete frame. If frames may be skipped, returns the latest one of the cadence.
     pub(crate) fn next(&mut self, context: &Context<'_>) -> Option<Joined<Item<T>>> {
         let now = context.now();
         let Some(step) = self.skip_step() else {
@@ -94,7 +96,7 @@ impl<'a, T> Inbox<'a, T> {
         joined
     }
 
-    /// Notes that a frame was processed.
+    /// Records that a frame was processed.
     pub(crate) fn processed(&mut self, stamp: &Stamp, busy_nanos: u64) {
         if let Some(step) = self.skip_step() {
             let nth = stamp.frame / step;
@@ -107,12 +109,12 @@ impl<'a, T> Inbox<'a, T> {
         self.rules.skips.filter(|_| is_realtime).map(|step| step.max(1))
     }
 
-    /// The last messages of every slot.
+    /// Returns the last messages of every slot.
     pub(crate) fn last(&self) -> &Last<T> {
         &self.joins.last
     }
 
-    /// Frames that wait for a message.
+    /// Returns the number of frames that wait for a message.
     pub(crate) fn n_pending(&self) -> usize {
         self.joins.joiner.n_pending()
     }
@@ -122,7 +124,7 @@ impl<'a, T> Inbox<'a, T> {
         self.joins.joiner.is_over(now)
     }
 
-    /// The stamp of the last end of a stream that was received.
+    /// Returns the stamp of the last end of a stream that was received.
     pub(crate) fn end_stamp(&self) -> Option<Stamp> {
         self.joins.end
     }

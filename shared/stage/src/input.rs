@@ -1,4 +1,4 @@
-//! An input of a stage: receive, check, decode once, hand to the joiner.
+//! An input of a stage: receives messages, checks them, decodes each once, and passes them to the joiner.
 
 use messages::Status;
 use runtime::ReceiveError;
@@ -10,9 +10,9 @@ use crate::{Context, Item, Port, Receive, Stamped};
 
 /// An input of any message type.
 pub(crate) trait Input<T> {
-    /// Receives all that waits.
+    /// Receives all waiting messages.
     fn poll(&mut self, context: &Context<'_>, joins: &mut Joins<T>) -> Result<(), ReceiveError>;
-    /// Discards all that waits.
+    /// Discards all waiting messages.
     fn drain(&self) -> Result<(), ReceiveError>;
 }
 
@@ -20,7 +20,7 @@ pub(crate) struct Typed<M, R, D> {
     pub(crate) port: Port<R>,
     pub(crate) slots: Slots,
     pub(crate) decode: D,
-    /// The ports that could send when it was last looked.
+    /// Ports that could send at the last check.
     pub(crate) senders: Vec<u128>,
     pub(crate) message: core::marker::PhantomData<fn() -> M>,
 }

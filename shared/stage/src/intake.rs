@@ -1,13 +1,13 @@
-//! Which frames of a stream are processed, and how many were lost.
+//! Selects the frames of a stream that are processed, and counts the lost ones.
 
 use crate::join::Cadence;
 use messages::{FrameHeader, Status};
 use runtime::Delivery;
 
-/// Largest gap that counts as lost frames; a larger one is a wrong frame number.
+/// Maximum gap that counts as lost frames. A larger gap means a wrong frame number.
 const MAX_GAP: u64 = 1 << 16;
 
-/// Chooses and counts the frames of one view as they come.
+/// Chooses and counts the frames of one view as they arrive.
 #[derive(Debug)]
 pub(crate) struct Intake {
     delivery: Delivery,
@@ -18,24 +18,24 @@ pub(crate) struct Intake {
     last_frame: Option<u64>,
 }
 
-/// The progress of a view; kept in a file for the next epoch of the process.
+/// The progress of a view, kept in a file for the next epoch of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Past {
     /// Number of the frame that is expected next.
     next: u64,
-    /// Frames that the camera has dropped.
+    /// Number of frames that the camera has dropped.
     n_dropped: u64,
-    /// The epoch of the capture process; its count begins at 0 in every epoch.
+    /// Epoch of the capture process, whose count begins at 0 in every epoch.
     camera_epoch: u32,
 }
 
 impl Past {
-    /// As three numbers.
+    /// Returns the progress as three numbers.
     pub(crate) fn numbers(self) -> [u64; 3] {
         [self.next, self.n_dropped, self.camera_epoch.into()]
     }
 
-    /// From three numbers.
+    /// Creates the progress from three numbers.
     pub(crate) fn from_numbers([next, n_dropped, camera_epoch]: [u64; 3]) -> Self {
         Self {
             next,
@@ -46,7 +46,9 @@ impl Past {
 }
 
 impl Intake {
-    /// * `past`: what earlier epochs of this process have processed or counted.
+    /// Creates an intake.
+    ///
+    /// * `past`: progress of earlier epochs of this process.
     pub(crate) fn new(delivery: Delivery, [start_frame, frame_step]: [u64; 2], past: Past) -> Self {
         Self {
             delivery,
@@ -58,12 +60,13 @@ impl Intake {
         }
     }
 
-    /// The progress so far.
+    /// Returns the progress so far.
     pub(crate) fn past(&self) -> Past {
         self.past
     }
 
-    /// Returns true if a frame is to be processed: neither sent again for another receiver, nor skipped by the cadence.
+    /// Returns true if a frame has to be processed. A frame is not processed if it was only sent again for another receiver, or if the
+    /// cadence skips it.
     pub(crate) fn takes(&self, header: &FrameHeader) -> bool {
         let frame = header.stamp.frame;
         self.last_frame != Some(frame)
@@ -72,7 +75,7 @@ impl Intake {
                 || self.cadence.takes(self.nth(frame)))
     }
 
-    /// Frames before this one (or before the end of stream) that were not received and that capture did not drop.
+    /// Returns the number of frames before this one (or before the end of stream) that were not received and that capture did not drop.
     pub(crate) fn n_lost_before(&mut self, header: &FrameHeader) -> u64 {
         let nth = self.nth(header.stamp.frame);
         let skipped = nth.saturating_sub(self.past.next);
@@ -94,7 +97,7 @@ impl Intake {
         skipped.saturating_sub(dropped)
     }
 
-    /// Notes that a frame was processed, and how long that took.
+    /// Records that a frame was processed, and the time that this took.
     pub(crate) fn processed(&mut self, header: &FrameHeader, busy_nanos: u64) {
         let frame = header.stamp.frame;
         self.last_frame = Some(frame);
@@ -102,11 +105,11 @@ impl Intake {
         self.cadence
             .processed(self.nth(frame), header.stamp.captured_at_nanos, busy_nanos);
         if self.delivery == Delivery::Realtime && self.cadence.stride() != stride {
-            tracing::info!(frame, every = self.cadence.stride(), "another cadence");
+            tracing::info!(frame, every = self.cadence.stride(), "the cadence has changed");
         }
     }
 
-    /// Position of a frame among the frames that are used.
+    /// Returns the position of a frame among the used frames.
     pub(crate) fn nth(&self, frame: u64) -> u64 {
         frame.saturating_sub(self.start_frame) / self.frame_step
     }
@@ -118,7 +121,7 @@ mod tests {
 
     use super::*;
 
-    /// Frame `nth` of footage of which every third from 6 on is used, at 10 Hz.
+    /// Returns frame `nth` of footage of which every third frame from 6 on is used, at 10 Hz.
     fn header(nth: u64, n_dropped: u64) -> FrameHeader {
         FrameHeader {
             stamp: Stamp {
@@ -138,7 +141,7 @@ mod tests {
     #[test]
     fn every_frame_is_processed_dropped_by_the_camera_or_lost() {
         let mut intake = intake(Delivery::Realtime);
-        // 0 and 1 are lost, the camera drops 3 and 4, 5 is lost, 7 and 8 are lost before the end.
+        // Frames 0, 1 and 5 are lost, the camera drops 3 and 4, and 7 and 8 are lost before the end.
         assert_eq!(intake.n_lost_before(&header(2, 0)), 2);
         assert_eq!(intake.n_lost_before(&header(6, 2)), 1);
         assert_eq!(intake.n_lost_before(&header(9, 2)), 2);
@@ -150,7 +153,7 @@ mod tests {
         assert_eq!(first.n_lost_before(&header(20, 18)), 2);
         let past = Past::from_numbers(first.past().numbers());
         let mut second = Intake::new(Delivery::Realtime, [6, 3], past);
-        // 21 was held by the first process when it was killed; the camera dropped 22; 23 and 24 were not received.
+        // The first process held frame 21 when it was killed. The camera dropped 22, and 23 and 24 were not received.
         assert_eq!(second.n_lost_before(&header(25, 19)), 3);
         assert_eq!(second.n_lost_before(&header(26, 19)), 0);
     }
@@ -164,7 +167,7 @@ mod tests {
             header
         };
         assert_eq!(intake.n_lost_before(&header(4, 4)), 0);
-        // The new epoch has dropped five: 5 to 9.
+        // The new epoch has dropped five frames: 5 to 9.
         assert_eq!(intake.n_lost_before(&restarted(10, 5)), 0);
         assert_eq!(intake.n_lost_before(&restarted(12, 5)), 1);
         assert_eq!(intake.n_lost_before(&restarted(14, 6)), 0);

@@ -1,8 +1,8 @@
-//! Joins the messages of several inputs about one frame, and never waits for ever.
+//! Joins the messages of several inputs about one frame, without ever waiting forever.
 //!
-//! A frame is complete once every input has sent its message about it, or is not expected to any more: it has sent one
-//! about a later frame, its stream has ended, or it has been silent for too long and counts as down. Nothing here reads
-//! a clock: the caller passes the time, so every rule is tested without waiting.
+//! A frame is complete once every input has sent its message about it, or no such message is expected any more. This is the
+//! case if the input has sent a message about a later frame, if its stream has ended, or if it has been silent for too long and counts
+//! as down. This module does not read a clock: the caller passes the time, so that every rule can be tested without waiting.
 
 mod cadence;
 mod last;
@@ -17,24 +17,24 @@ pub use last::Last;
 pub struct Joined<T> {
     /// Number of the frame.
     pub frame: u64,
-    /// One entry per input; `None` where no message came in time.
+    /// One entry per input; `None` if no message came in time.
     pub items: Vec<Option<T>>,
 }
 
 /// Outcome of pushing a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Push {
-    /// It was accepted and waits for the other inputs.
+    /// The message was accepted and waits for the other inputs.
     Taken,
-    /// Its frame has been returned already, or the input has already sent a message about it.
+    /// The frame of the message has already been returned, or the input has already sent a message about it.
     Late,
     /// Too many frames are pending.
     Full,
 }
 
-/// Most pending frames: more would be hours of frames, or a sender with wrong frame numbers.
+/// Maximum number of pending frames. A larger number would be hours of frames, or a sender with wrong frame numbers.
 const MAX_PENDING: usize = 1 << 16;
-/// A restarted sender that forgets has sent by then what it will send of the frames that had begun.
+/// Time after which a restarted sender, which has forgotten its frames, has sent all its messages about frames that had begun.
 const TAKEN_UP_NANOS: u64 = 1_000_000_000;
 
 /// Collects messages by frame, and returns frames in order.
@@ -44,7 +44,7 @@ pub struct Joiner<T> {
     pending: BTreeMap<u64, Slot<T>>,
     patience_nanos: u64,
     alive_patience_nanos: u64,
-    /// Frames below this have been returned.
+    /// Number below which all frames have been returned.
     next_frame: u64,
 }
 
@@ -55,14 +55,14 @@ struct Input {
     alive_at: Option<u64>,
     ended: bool,
     down: bool,
-    /// How long a frame waits for it at most.
+    /// Maximum time for which a frame waits for the input.
     deadline: Option<u64>,
-    /// When its sender was restarted.
+    /// Time at which the sender of the input was restarted.
     restarted_at: Option<u64>,
 }
 
 impl Input {
-    /// Returns true if its sender was restarted after a frame began, and had time to send what it still knows of the frame.
+    /// Returns true if the input's sender was restarted after a frame began, and has had time to send what it still knows of the frame.
     fn has_forgotten(&self, began_at: u64, now: u64) -> bool {
         self.restarted_at
             .is_some_and(|at| began_at < at && now.saturating_sub(at) >= TAKEN_UP_NANOS)
@@ -70,7 +70,7 @@ impl Input {
 
     /// Returns true if the input has been silent for too long.
     ///
-    /// * `patience`: without a living sender, and with one.
+    /// * `patience`: limit without a living sender, and limit with one.
     fn silent_since(&self, began_at: u64, now: u64, patience: [u64; 2]) -> bool {
         let elapsed = |at: u64| now.saturating_sub(at);
         let silence = elapsed(began_at.max(self.received_at.unwrap_or(0)));
@@ -87,9 +87,9 @@ struct Slot<T> {
 }
 
 impl<T> Joiner<T> {
-    /// A joiner of `n_inputs` inputs.
+    /// Creates a joiner of `n_inputs` inputs.
     ///
-    /// * `patience_nanos`: how long an input may be silent while others wait for it.
+    /// * `patience_nanos`: maximum time for which an input may be silent while others wait for it.
     pub fn new(n_inputs: usize, patience_nanos: u64) -> Self {
         Self {
             inputs: vec![Input::default(); n_inputs],
@@ -100,7 +100,7 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// As [`Self::new`], for lossless delivery: an input whose sender is known to be alive may take ten times as long,
+    /// Works like [`Self::new`], for lossless delivery. An input whose sender is known to be alive may take ten times as long,
     /// because the sender is still computing.
     pub fn lossless(n_inputs: usize, patience_nanos: u64) -> Self {
         Self {
@@ -116,15 +116,15 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// Notes that the sender of an input was restarted, and has forgotten what it had received: frames that have begun wait for it for a
-    /// second more.
+    /// Records that the sender of an input was restarted, and has forgotten its received messages. Frames that have begun wait for the
+    /// input for one more second.
     pub fn restarted(&mut self, input: usize, now: u64) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.restarted_at = Some(now);
         }
     }
 
-    /// Notes that the sender of an input is alive, though it has sent no message.
+    /// Records that the sender of an input is alive, although it has sent no message.
     pub fn alive(&mut self, input: usize, now: u64) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.alive_at = Some(now);
@@ -133,7 +133,7 @@ impl<T> Joiner<T> {
 
     /// Takes a message.
     ///
-    /// * `input`: below the number of inputs; a message of any other is [`Push::Late`].
+    /// * `input`: index below the number of inputs. A message of any other input is [`Push::Late`].
     /// * `now`: nanoseconds of a clock that never goes back.
     pub fn push(&mut self, input: usize, frame: u64, item: T, now: u64) -> Push {
         let n = self.inputs.len();
@@ -142,7 +142,7 @@ impl<T> Joiner<T> {
         };
         state.received_at = Some(now);
         state.down = false;
-        // Not the largest: after one wrong frame number far ahead, later frames wait for this input again.
+        // The number is not the maximum: after one wrong frame number far ahead, later frames wait for this input again.
         state.last_frame = Some(frame);
         if frame < self.next_frame {
             return Push::Late;
@@ -161,16 +161,16 @@ impl<T> Joiner<T> {
         Push::Taken
     }
 
-    /// Notes the end of an input's stream.
+    /// Records the end of an input's stream.
     pub fn end(&mut self, input: usize) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.ended = true;
         }
     }
 
-    /// The earliest pending frame, if it is complete.
+    /// Returns the earliest pending frame, if it is complete.
     ///
-    /// Call it until it returns `None`: several frames may have become complete at once. Frames do not wait for an input
+    /// Call this until it returns `None`, because several frames may have become complete at once. Frames do not wait for an input
     /// that is down until it sends again.
     pub fn next(&mut self, now: u64) -> Option<Joined<T>> {
         let (&frame, slot) = self.pending.first_key_value()?;
@@ -195,9 +195,9 @@ impl<T> Joiner<T> {
         })
     }
 
-    /// The latest complete frame that is wanted, and how many others were skipped.
+    /// Returns the latest complete frame that is wanted, and the number of skipped frames.
     ///
-    /// * `wants`: whether a frame is to be processed.
+    /// * `wants`: returns true if a frame has to be processed.
     pub fn latest(
         &mut self,
         now: u64,
@@ -221,13 +221,13 @@ impl<T> Joiner<T> {
         self.inputs.get(input).is_some_and(|input| input.down)
     }
 
-    /// Frames that wait for a message.
+    /// Returns the number of frames that wait for a message.
     pub fn n_pending(&self) -> usize {
         self.pending.len()
     }
 
-    /// Returns true if no frame will follow: every frame was returned, and all inputs have ended, or at least one has and the
-    /// others have been silent for too long.
+    /// Returns true if no frame will follow. All frames were returned, at least one input has ended, and all other inputs have ended or
+    /// been silent for too long.
     pub fn is_over(&self, now: u64) -> bool {
         let patience = [self.patience_nanos, self.alive_patience_nanos];
         let is_silent = |input: &Input| {
@@ -348,7 +348,7 @@ mod tests {
         assert_eq!(frames(&mut joiner, 29), []);
         joiner.alive(1, 30);
         assert_eq!(frames(&mut joiner, 30), [(0, vec![true, false])]);
-        // No frame waits for it until it sends again; a late message is enough.
+        // No frame waits for the input until it sends again; a late message is enough.
         joiner.push(0, 1, 'b', 40);
         assert_eq!(frames(&mut joiner, 40), [(1, vec![true, false])]);
         assert_eq!(joiner.push(1, 0, 'c', 45), Push::Late);

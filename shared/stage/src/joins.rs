@@ -6,14 +6,14 @@ use messages::{Cause, Stamp, Status};
 use crate::slots::Slots;
 use crate::{Context, Item};
 
-/// How a value of a slot is copied if it may be used for later frames; none if it may not.
+/// Function that copies a value of a slot for use in later frames; `None` if this is not allowed.
 pub(crate) type Copier<T> = Option<fn(&T) -> T>;
 
 /// The joiner, and the last messages of each slot.
 pub(crate) struct Joins<T> {
     pub(crate) joiner: Joiner<Item<T>>,
     pub(crate) last: Last<T>,
-    /// By slot: how a value is copied into `last`.
+    /// By slot, the function that copies a value into `last`.
     pub(crate) remember: Vec<Copier<T>>,
     pub(crate) end: Option<Stamp>,
 }
@@ -45,7 +45,7 @@ impl<T> Joins<T> {
         if let Some(Some(copy)) = self.remember.get(slot)
             && status == Status::OK
         {
-            // It may be too late for its own frame and in time for the next one.
+            // The message may be too late for its own frame but in time for the next one.
             let value = copy(&item.value);
             self.last.keep(slot, stamp.frame, stamp.captured_at_nanos, value);
         }

@@ -1,6 +1,6 @@
-//! The loop of every service: wait, receive, check, join, compute, send, account, end.
+//! The main loop of every service: wait, receive, check, join, compute, send, record latencies, end.
 //!
-//! A service declares its inputs and outputs on a [`Stage`] and gives the step that turns one frame into messages. The
+//! A service declares its inputs and outputs on a [`Stage`] and provides the step that turns one frame into messages. The
 //! stage decides when a frame is complete, handles late messages and the end of streams, and ends the process. Every
 //! message is checked and decoded once, when it is received.
 //!
@@ -9,10 +9,10 @@
 //! | one sender for each view | [`Stage::view_input`] | yes |
 //! | one sender for several slots: a worker and its pairs | [`Stage::pair_inputs`] | yes |
 //! | optional: expected errors | [`Stage::optional_input`] | up to a deadline; then the last value is used while it is fresh |
-//! | bulk data, read where it lies in shared memory | [`Stage::hold_evidence`], [`Stage::hold_frames`] | no |
+//! | bulk data, read in shared memory | [`Stage::hold_evidence`], [`Stage::hold_frames`] | no |
 //! | a stream of bulk data, one sample a frame | [`Stage::run_stream`] | - |
 //!
-//! A service that makes its frames itself has no input and uses [`Stage::wait_for_receivers`] and [`Stage::end_with`]. A
+//! A service that creates its own frames has no input and uses [`Stage::wait_for_receivers`] and [`Stage::end_with`]. A
 //! service that handles messages as they are received uses a [`Port`] for each topic, or an [`any::Receiver`] for messages as
 //! bytes.
 #![forbid(unsafe_code)]

@@ -7,19 +7,19 @@ use messages::{
 
 /// A message with a stamp, a timing and a status.
 pub trait Stamped: Copy {
-    /// Its name in log messages about refused messages.
+    /// Name of the type in log messages about refused messages.
     const NAME: &'static str;
 
-    /// Session, frame, capture time, view, epoch.
+    /// Returns the stamp: session, frame, capture time, view, epoch.
     fn stamp(&self) -> &Stamp;
-    /// When its sender received its input and sent it.
+    /// Returns the times at which the sender received its input and sent the message.
     fn timing(&self) -> &Timing;
-    /// Returns the status: the message carries a result, or is the end of the stream, or the reason why it has none.
+    /// Returns the status. The message carries a result, is the end of the stream, or has the reason why there is no result.
     fn status(&self) -> Status;
-    /// The same message with another stamp and timing.
+    /// Returns the same message with another stamp and timing.
     #[must_use]
     fn with(self, stamp: Stamp, timing: Timing) -> Self;
-    /// The message that ends a stream.
+    /// Returns the message that ends a stream.
     #[must_use]
     fn end(stamp: Stamp) -> Self;
 }
@@ -62,10 +62,10 @@ stamped! {
 
 /// The header of bulk data.
 pub trait BulkHeader: runtime::Header {
-    /// Its name in log messages about refused messages.
+    /// Name of the type in log messages about refused messages.
     const NAME: &'static str;
 
-    /// Session, frame, capture time, view, epoch.
+    /// Returns the stamp: session, frame, capture time, view, epoch.
     fn stamp(&self) -> &Stamp;
 }
 

@@ -28,13 +28,13 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
         Self { service, publisher }
     }
 
-    /// Sends a message about a frame; returns the send time, nanoseconds.
+    /// Sends a message about a frame. Returns the send time, nanoseconds.
     ///
-    /// * `view`: for its stamp: the view or the pair; 0 for a message about all views.
+    /// * `view`: view or pair for the stamp of the message; 0 for a message about all views.
     ///
     /// # Errors
     ///
-    /// [`SendError`].
+    /// Returns a [`SendError`] on failure.
     pub fn send(&self, turn: &Turn, view: usize, message: M) -> Result<u64, Failure> {
         let sent_at_nanos = now_nanos();
         let stamp = Stamp {
@@ -50,11 +50,11 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
         Ok(sent_at_nanos)
     }
 
-    /// As [`Self::send`], and records the latencies of the frame.
+    /// Works like [`Self::send`], and records the latencies of the frame.
     ///
     /// # Errors
     ///
-    /// [`SendError`].
+    /// Returns a [`SendError`] on failure.
     pub fn send_and_account(&self, turn: &Turn, view: usize, message: M) -> Result<(), Failure> {
         let sent_at = self.send(turn, view, message)?;
         self.account(turn, sent_at, turn.waited());
@@ -63,7 +63,7 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
 
     /// Records the latencies of a message that has just been sent.
     ///
-    /// * `waited`: how long the frame waited in this process, if that is not recorded elsewhere, nanoseconds.
+    /// * `waited`: time that the frame waited in this process, nanoseconds, if it is not recorded elsewhere.
     pub fn account(&self, turn: &Turn, sent_at: u64, waited: Option<u64>) {
         self.service.health().passed(&Passage {
             waiting: waited,
@@ -74,23 +74,23 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
     }
 }
 
-/// Which stamp the end of a stream carries.
+/// Stamp at the end of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum EndStamp {
-    /// The session alone.
+    /// A stamp with only the session.
     Session,
-    /// That of the input's end of stream, which gives the number of frames of the view.
+    /// The stamp of the input's end of stream, which gives the number of frames of the view.
     Input,
 }
 
-/// Sends the end of a stream: with the stamp of the input's end, if there is one, or of the session.
+/// Sends the end of a stream, with the stamp of the input's end if there is one, otherwise with that of the session.
 type SendEnd = dyn Fn(Option<Stamp>, u64) -> Result<(), SendError>;
 
 /// An output of any message type.
 pub(crate) struct Outgoing {
     receivers: Rc<dyn Receivers>,
     n_receivers: usize,
-    /// Arrays have none.
+    /// Sends the end of the stream; `None` for arrays.
     send_end: Option<Box<SendEnd>>,
 }
 
@@ -120,7 +120,7 @@ impl Outgoing {
         }
     }
 
-    /// Arrays have no end of stream of their own: they belong to messages that have one.
+    /// Creates an output of arrays. It has no end of stream, because arrays belong to messages that have one.
     pub(crate) fn arrays<E: Element, H: Header>(
         publisher: &Rc<SlicePublisher<E, H>>,
         n_receivers: usize,
@@ -133,13 +133,13 @@ impl Outgoing {
         }
     }
 
-    /// Waits for the receivers; returns how many are connected, and how many are expected.
+    /// Waits for the receivers. Returns the numbers of connected and of expected receivers.
     pub(crate) fn wait(&self, patience: Patience) -> [usize; 2] {
         let n = self.receivers.wait_for(self.n_receivers, patience);
         [n, self.n_receivers]
     }
 
-    /// How many processes are connected that the end of the stream is for.
+    /// Returns the number of connected processes that need the end of the stream.
     pub(crate) fn n_connected(&self) -> usize {
         let send = self.send_end.as_ref();
         send.map_or(0, |_| self.receivers.n_connected())

@@ -7,16 +7,16 @@ use wire::WireError;
 
 use crate::{Context, Stamped};
 
-/// Where messages come from: a subscriber, or a list in tests.
+/// Source of messages: a subscriber, or a list in tests.
 pub trait Receive<M> {
-    /// The oldest waiting message.
+    /// Returns the oldest waiting message.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     fn receive(&self) -> Result<Option<M>, ReceiveError>;
 
-    /// The identifiers of the ports that may send; a restarted sender has a new one.
+    /// Returns the identifiers of the ports that may send. A restarted sender has a new one.
     fn senders(&self) -> Vec<u128>;
 }
 
@@ -35,9 +35,9 @@ impl<M: Message> Receive<M> for Subscriber<M> {
 pub enum Sender {
     /// A process of one view.
     View(usize),
-    /// A fusion worker; pairs are assigned to workers in turn.
+    /// A fusion worker. Pairs are assigned to workers in turn.
     Worker {
-        /// Its number.
+        /// Number of the worker.
         worker: usize,
         /// Number of workers.
         n_workers: usize,
@@ -48,7 +48,7 @@ pub enum Sender {
 
 impl Sender {
     /// Checks the session, the sender and the times of a message. The end of a worker's stream
-    /// names no pair, so its number is not checked.
+    /// names no pair, so the number of the pair is not checked.
     pub(crate) fn check<M: Stamped>(
         self,
         message: &M,
@@ -69,7 +69,7 @@ impl Sender {
     }
 }
 
-/// The receiving end of a topic. Returns the messages of this session and sender; others are counted and logged.
+/// The receiving end of a topic. Returns the messages of this session and sender. Other messages are counted and logged.
 #[derive(Debug)]
 pub struct Port<R> {
     receiver: R,
@@ -81,7 +81,7 @@ impl<M: Message + Stamped> Port<Subscriber<M>> {
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn open(
         service: &Service,
         waiter: &mut Waiter,
@@ -91,11 +91,11 @@ impl<M: Message + Stamped> Port<Subscriber<M>> {
         Ok(Self::new(service.bus().subscriber(topic, waiter)?, sender))
     }
 
-    /// As [`Self::receive`], for messages that are large for a stack.
+    /// Works like [`Self::receive`], for messages that are too large for a stack.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn receive_boxed(&self, context: &Context<'_>) -> Result<Option<Box<M>>, ReceiveError> {
         while let Some(message) = self.receiver.receive_by(|message| Box::new(*message))? {
             match self.sender.check(&*message, context) {
@@ -108,16 +108,18 @@ impl<M: Message + Stamped> Port<Subscriber<M>> {
 }
 
 impl<R> Port<R> {
-    /// * `receiver`: where messages come from.
+    /// Creates a port.
+    ///
+    /// * `receiver`: source of the messages.
     pub fn new(receiver: R, sender: Sender) -> Self {
         Self { receiver, sender }
     }
 
-    /// The oldest waiting message that is accepted, including the end of the stream.
+    /// Returns the oldest waiting message that is accepted, including the end of the stream.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn receive<M: Stamped>(&self, context: &Context<'_>) -> Result<Option<M>, ReceiveError>
     where
         R: Receive<M>,
@@ -131,13 +133,14 @@ impl<R> Port<R> {
         Ok(None)
     }
 
-    /// Returns true if the sender, once it is restarted, has forgotten frames that others have received: it answers what
-    /// views send. A process of a view is given the frame again, and a fusion worker holds what the others wait for.
+    /// Returns true if the sender, after a restart, has forgotten frames that others have received. This is the case for a sender that
+    /// answers messages of views. By contrast, a process of a view receives the frame again, and a fusion worker holds the messages that
+    /// the others wait for.
     pub(crate) fn forgets(&self) -> bool {
         self.sender == Sender::All
     }
 
-    /// The identifiers of the ports that may send; a restarted sender has a new one.
+    /// Returns the identifiers of the ports that may send. A restarted sender has a new one.
     pub fn senders<M>(&self) -> Vec<u128>
     where
         R: Receive<M>,
@@ -149,7 +152,7 @@ impl<R> Port<R> {
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn drain<M>(&self) -> Result<(), ReceiveError>
     where
         R: Receive<M>,

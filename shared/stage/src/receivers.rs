@@ -1,12 +1,12 @@
-//! The receivers of a topic, as its sender knows them, whatever it sends.
+//! The receivers of a topic, as its sender sees them, for any message type.
 
 use runtime::{Element, Header, Message, Patience, Publisher, SlicePublisher};
 
 /// The receivers of one topic.
 pub(crate) trait Receivers {
-    /// Waits until `n` of them are connected; see [`SlicePublisher::wait_for_subscribers`].
+    /// Waits until `n` receivers are connected; see [`SlicePublisher::wait_for_subscribers`].
     fn wait_for(&self, n: usize, patience: Patience) -> usize;
-    /// How many are connected.
+    /// Returns the number of connected receivers.
     fn n_connected(&self) -> usize;
 }
 

@@ -1,9 +1,9 @@
-//! Bulk samples that are held until the frame comes that needs them.
+//! Bulk samples that are held until the frame that needs them arrives.
 
-/// Frames that are held at the same time where the latest frame wins: three that wait, and one that is being received.
+/// Number of frames held at the same time with realtime delivery: three that wait, and one that is being received.
 pub const HELD_REALTIME: usize = 4;
 
-/// A frame number this far ahead of the current frame is a sender's error; in frames that are used.
+/// Maximum distance of a frame number from the current frame, in used frames. A larger distance is a sender's error.
 const MAX_AHEAD: u64 = 4096;
 
 /// Samples of one topic with their frame numbers.
@@ -15,9 +15,11 @@ pub(crate) struct Shelf<S> {
 }
 
 impl<S> Shelf<S> {
-    /// * `capacity`: with 1, a sample is received only when the previous one has been released, because its sender waits
-    ///   for that; with more, all samples are received, and those most likely to be needed are kept.
-    /// * `frame_step`: distance between the frames used.
+    /// Creates a shelf.
+    ///
+    /// * `capacity`: number of samples that are held. With 1, a sample is received only when the previous one has been released, because
+    ///   its sender waits for that. With more, all samples are received, and those most likely to be needed are kept.
+    /// * `frame_step`: distance between the used frames.
     pub(crate) fn new(capacity: usize, frame_step: u64) -> Self {
         Self {
             held: Vec::with_capacity(capacity),
@@ -47,7 +49,7 @@ impl<S> Shelf<S> {
         Ok(())
     }
 
-    /// Releases the samples before `frame`, and receives those up to it.
+    /// Releases the samples before `frame`, and receives the samples up to it.
     pub(crate) fn advance<E>(
         &mut self,
         frame: u64,
@@ -65,7 +67,7 @@ impl<S> Shelf<S> {
         Ok(())
     }
 
-    /// The sample of a frame, if it is held.
+    /// Returns the sample of a frame, if it is held.
     pub(crate) fn of(&self, frame: u64) -> Option<&S> {
         let found = self.held.iter().find(|(held, _)| *held == frame);
         found.map(|(_, sample)| sample)
@@ -77,8 +79,8 @@ impl<S> Shelf<S> {
     }
 }
 
-/// Index of the frame that is released first. A slow stage processes every n-th frame, n a power of two: so it is the
-/// frame divisible by the smallest power of two, and the oldest of several.
+/// Returns the index of the frame that is released first. A slow stage processes every n-th frame, where n is a power of two. The frame
+/// that is released is therefore the one divisible by the smallest power of two, and the oldest of several.
 fn least_needed(steps: &[u64]) -> usize {
     let keys = steps.iter().enumerate();
     let least = keys.min_by_key(|(_, step)| (step.trailing_zeros(), **step));
@@ -92,7 +94,7 @@ mod tests {
 
     use super::*;
 
-    /// A topic with these waiting frames.
+    /// Returns a topic in which these frames wait.
     fn topic(
         frames: impl IntoIterator<Item = u64>,
     ) -> impl FnMut() -> Result<Option<(u64, char)>, Infallible> {

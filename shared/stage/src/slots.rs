@@ -1,4 +1,4 @@
-//! Which slots of the joiner an input fills.
+//! Slots of the joiner that an input fills.
 
 /// The slots of the joiner that an input fills: `first`, and every `step`-th after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -6,7 +6,7 @@ pub(crate) struct Slots {
     pub(crate) first: usize,
     pub(crate) end: usize,
     pub(crate) step: usize,
-    /// The slot of message 0 of a worker's topic; none if all messages go to `first`.
+    /// Slot of message 0 of a worker's topic; `None` if all messages go to `first`.
     pub(crate) base: Option<usize>,
 }
 
@@ -24,7 +24,7 @@ impl Slots {
         (self.first..self.end).step_by(self.step.max(1))
     }
 
-    /// The slot of a message.
+    /// Returns the slot of a message.
     pub(crate) fn of(self, stamp_view: usize) -> usize {
         self.base.map_or(self.first, |base| base + stamp_view)
     }

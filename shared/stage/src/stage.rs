@@ -23,12 +23,12 @@ use crate::shelf::{HELD_REALTIME, Shelf};
 use crate::slots::Slots;
 use crate::{Context, Frame, Held, Item, Output, Port, Sender, Stamped, Turn};
 
-/// How often deadlines are checked while no message comes.
+/// Interval at which deadlines are checked while no message comes.
 const TICK: Duration = Duration::from_millis(20);
 
 /// The inputs and outputs of a process, and its loop.
 ///
-/// * `T`: what a message means to the service; an enum where inputs differ.
+/// * `T`: content of a message for the service; an enum if inputs differ.
 pub struct Stage<'a, T> {
     pub(crate) service: &'a Service,
     pub(crate) waiter: Waiter,
@@ -52,9 +52,9 @@ impl<T> fmt::Debug for Stage<'_, T> {
 }
 
 impl<'a, T: 'a> Stage<'a, T> {
-    /// A stage without inputs and outputs.
+    /// Creates a stage without inputs and outputs.
     ///
-    /// * `patience`: how long an input may be silent while others wait for it, and how long the stage waits for receivers.
+    /// * `patience`: maximum time for which an input may be silent while others wait for it, and for which the stage waits for receivers.
     pub fn new(service: &'a Service, patience: Duration) -> Self {
         Self {
             service,
@@ -70,20 +70,20 @@ impl<'a, T: 'a> Stage<'a, T> {
         }
     }
 
-    /// Allows the stage to skip frames where the latest frame wins and it cannot keep up.
+    /// Allows the stage to skip frames if it cannot keep up with realtime delivery.
     ///
-    /// * `frame_step`: distance between the frames used.
+    /// * `frame_step`: distance between the used frames.
     pub fn skip_when_behind(&mut self, frame_step: u64) {
         self.skips = Some(frame_step.max(1));
     }
 
-    /// Adds the topic of a view; every frame waits for it. Returns its slot.
+    /// Adds the topic of a view, for which every frame waits. Returns its slot.
     ///
-    /// * `decode`: decodes a message; a message with an error is dropped, counted and logged.
+    /// * `decode`: decodes a message. A message with an error is dropped, counted and logged.
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn view_input<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -95,14 +95,14 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(slot)
     }
 
-    /// Adds the topic of a view whose messages are optional. Where the latest frame wins, no frame waits for them longer
-    /// than `deadline`; the last value is then used while it is fresh ([`Frame::latest`]).
+    /// Adds the topic of a view whose messages are optional. With realtime delivery, no frame waits for them longer
+    /// than `deadline`. After that, the last value is used while it is fresh ([`Frame::latest`]).
     ///
-    /// * `max_age`: largest difference of capture times at which a value is used; the same for all optional inputs.
+    /// * `max_age`: maximum difference of capture times at which a value is used; the same for all optional inputs.
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn optional_input<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -120,12 +120,12 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(slot)
     }
 
-    /// Adds the topics of all fusion workers: one slot for each pair, in the order of pairs. A worker sends for its pairs,
+    /// Adds the topics of all fusion workers, with one slot for each pair, in the order of pairs. A worker sends messages for its pairs,
     /// which are assigned in turn. Returns the slot of the first pair.
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn pair_inputs(
         &mut self,
         n_workers: usize,
@@ -146,11 +146,11 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(base)
     }
 
-    /// Adds the topic of who is in a frame; every frame waits for it. Returns its slot.
+    /// Adds the topic of the people in every frame, for which every frame waits. Returns its slot.
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn people_input(
         &mut self,
         decode: impl FnMut(&People) -> Result<T, WireError> + 'a,
@@ -184,13 +184,13 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(())
     }
 
-    /// Holds the evidence of a view in shared memory: one frame, released when that frame has been processed.
+    /// Holds the evidence of a view in shared memory. It holds one frame, which is released when that frame has been processed.
     ///
-    /// * `frame_step`: distance between the frames used.
+    /// * `frame_step`: distance between the used frames.
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn hold_evidence(
         &mut self,
         view: usize,
@@ -206,11 +206,11 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(held)
     }
 
-    /// Holds the frames of a view in shared memory: one with lossless delivery, else up to [`HELD_REALTIME`].
+    /// Holds the frames of a view in shared memory: one with lossless delivery, otherwise up to [`HELD_REALTIME`].
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn hold_frames(
         &mut self,
         view: usize,
@@ -232,11 +232,11 @@ impl<'a, T: 'a> Stage<'a, T> {
 
     /// Adds a topic about all views that the stage publishes.
     ///
-    /// * `n_receivers`: processes that subscribe to it.
+    /// * `n_receivers`: number of processes that subscribe to it.
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn output<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -245,11 +245,11 @@ impl<'a, T: 'a> Stage<'a, T> {
         self.publish(topic, n_receivers, EndStamp::Session)
     }
 
-    /// Adds a topic about one view: the end of its stream has the stamp of the input's end.
+    /// Adds a topic about one view. The end of its stream has the stamp of the input's end.
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn view_output<M: Message + Stamped>(
         &mut self,
         topic: &str,
@@ -273,7 +273,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ///
     /// # Errors
     ///
-    /// Errors of the transport.
+    /// Returns errors of the transport.
     pub fn bulk_output<E: Element, H: BulkHeader>(
         &mut self,
         topic: &str,
@@ -296,13 +296,13 @@ impl<'a, T: 'a> Stage<'a, T> {
         tracing::info!("begins");
     }
 
-    /// Processes every frame until all inputs have ended, or a stop is requested; then sends the end of the stream.
+    /// Processes every frame until all inputs have ended or a stop is requested. Then sends the end of the stream.
     ///
     /// * `step`: processes the messages of one frame, and sends its results.
     ///
     /// # Errors
     ///
-    /// Errors of the transport, and those of `step`.
+    /// Returns errors of the transport and of `step`.
     pub fn run(
         mut self,
         mut step: impl FnMut(&mut Frame<'_, T>) -> Result<(), Failure>,
@@ -371,7 +371,7 @@ impl<'a, T: 'a> Stage<'a, T> {
             items,
             last: inbox.last(),
         })?;
-        // Room for the next sample, even if its sender has died before it sent the matching message.
+        // Makes room for the next sample, even if its sender died before it sent the matching message.
         for held in &self.held {
             held.advance(frame.saturating_add(1), context)?;
         }
@@ -389,20 +389,20 @@ impl<'a, T: 'a> Stage<'a, T> {
                 Ok(())
             },
             || {
-                // An input that counted as down may send again; its sender must not wait for room here.
+                // An input that counts as down may send again, and its sender must not wait for room here.
                 let drained = self.held.iter().try_for_each(|held| held.drain());
                 drained.and_then(|()| inbox.drain())
             },
         )
     }
 
-    /// Sends the end of the stream, and again to every receiver that was restarted, until a stop is requested.
+    /// Sends the end of the stream, and sends it again to every restarted receiver, until a stop is requested.
     ///
-    /// * `send_end`: sends it on all outputs.
+    /// * `send_end`: sends the end of the stream on all outputs.
     ///
     /// # Errors
     ///
-    /// Errors of the transport, and those of `send_end`.
+    /// Returns errors of the transport and of `send_end`.
     pub fn end_with(
         &self,
         n_connected: impl Fn() -> usize,
@@ -420,7 +420,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     ) -> Result<(), Failure> {
         let n_connected = || {
             if let Err(error) = drain() {
-                tracing::debug!(%error, "cannot discard what comes after the end");
+                tracing::debug!(%error, "cannot discard messages after the end");
             }
             let outputs = self.outgoing.iter();
             outputs.map(Outgoing::n_connected).sum()
@@ -428,11 +428,11 @@ impl<'a, T: 'a> Stage<'a, T> {
         self.end_with(n_connected, send_end)
     }
 
-    /// Waits for messages or for time to pass.
+    /// Waits until a message comes or some time has passed.
     ///
     /// # Errors
     ///
-    /// [`WaitError`].
+    /// Returns a [`WaitError`] on failure.
     pub fn wait(&self, limit: Duration) -> Result<Woken, WaitError> {
         self.waiter.wait(limit)
     }

@@ -1,4 +1,4 @@
-//! The loop of a stage with one stream of frames, each processed as it comes.
+//! The loop of a stage with one stream of frames, each of which is processed when it arrives.
 
 use failure::{Failure, now_nanos};
 use messages::{Cause, FrameHeader, Stamp, Status, topic};
@@ -8,35 +8,35 @@ use crate::intake::{Intake, Past};
 use crate::stage::Stage;
 use crate::{Context, Turn};
 
-/// The frames of a view that are used.
+/// The used frames of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Range {
-    /// The first.
+    /// Number of the first used frame.
     pub start: u64,
-    /// Distance between them.
+    /// Distance between used frames.
     pub step: u64,
 }
 
 /// A frame of a stream.
 #[derive(Debug)]
 pub struct StreamFrame {
-    /// Its position among the frames that are used, from 0.
+    /// Position of the frame among the used frames, counted from 0.
     pub nth: u64,
     /// Pixels and header, in shared memory.
     pub sample: Sample<u8, FrameHeader>,
-    /// Stamp and times for the messages to be sent.
+    /// Stamp and times for the messages to send.
     pub turn: Turn,
 }
 
 impl Stage<'_, ()> {
-    /// Processes the frames of a view until the footage ends or a stop is requested; then sends the end of the stream.
+    /// Processes the frames of a view until the footage ends or a stop is requested. Then sends the end of the stream.
     ///
-    /// Where the latest frame wins, frames are skipped and counted if there is no time for them. A restarted process
+    /// With realtime delivery, frames for which there is no time are skipped and counted. A restarted process
     /// counts the frames that were lost since its previous epoch.
     ///
     /// # Errors
     ///
-    /// Errors of the transport, and those of `step`.
+    /// Returns errors of the transport and of `step`.
     pub fn run_stream(
         mut self,
         view: usize,
@@ -83,7 +83,7 @@ impl Stage<'_, ()> {
                 })?;
                 intake.processed(&header, now_nanos() - begin);
                 if let Err(error) = place.note(intake.past().numbers()) {
-                    tracing::debug!(%error, "cannot note how far this view has come");
+                    tracing::debug!(%error, "cannot save the progress of this view");
                 }
                 if service.stop().is_requested() {
                     return Ok(());

@@ -13,22 +13,22 @@ pub struct WriterThread {
 }
 
 impl WriterThread {
-    /// Starts it.
+    /// Starts the thread.
     ///
     /// # Errors
     ///
-    /// [`ExitKind::Run`] if the thread cannot be started.
+    /// Returns [`ExitKind::Run`] if the thread cannot be started.
     pub fn start(write: impl FnOnce() + Send + 'static) -> Result<Self, Failure> {
         let builder = Builder::new().name("writer".to_owned());
         let handle = builder.spawn(write).or_fail(ExitKind::Run)?;
         Ok(Self { handle })
     }
 
-    /// Waits until everything is written; heartbeats continue. The sending end of the queue must have been dropped.
+    /// Waits until everything is written, while heartbeats continue. The sending end of the queue must have been dropped.
     ///
     /// # Errors
     ///
-    /// [`ExitKind::Run`] if the thread panicked.
+    /// Returns [`ExitKind::Run`] if the thread panicked.
     pub fn finish(self, service: &Service) -> Result<(), Failure> {
         while !self.handle.is_finished() {
             service.progress().tick();

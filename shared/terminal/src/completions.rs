@@ -1,4 +1,4 @@
-//! `parallax completions` and `parallax man`: what shells and `man` need, from the tree of commands.
+//! `parallax completions` and `parallax man`: writes the files that shells and `man` need, from the tree of commands.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -21,13 +21,13 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the script of a shell.
+/// Prints the completion script for a shell.
 ///
 /// * `command`: the tree of commands.
 ///
 /// # Errors
 ///
-/// Standard output cannot be written to.
+/// Fails if standard output cannot be written to.
 pub fn run(arguments: &Arguments, mut command: Command) -> Result<ExitCode, Failure> {
     let mut script = Vec::new();
     let name = command.get_name().to_owned();
@@ -52,7 +52,7 @@ pub struct ManArguments {
 ///
 /// # Errors
 ///
-/// The folder or a page cannot be written.
+/// Fails if the folder or a page cannot be written.
 pub fn man(arguments: &ManArguments, mut command: Command) -> Result<ExitCode, Failure> {
     let folder = &arguments.folder;
     std::fs::create_dir_all(folder).map_err(|error| in_file(folder, &error))?;
@@ -62,11 +62,11 @@ pub fn man(arguments: &ManArguments, mut command: Command) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes the page of a command and those below it; returns how many.
+/// Writes the pages of a command and its subcommands. Returns the number of pages.
 ///
 /// # Errors
 ///
-/// A page cannot be written.
+/// Fails if a page cannot be written.
 pub fn write_pages(command: Command, folder: &Path) -> Result<usize, Failure> {
     let below: Vec<Command> = command.get_subcommands().cloned().collect();
     let name = command.get_display_name().unwrap_or_else(|| command.get_name());

@@ -10,7 +10,7 @@ Exit codes:
     4  an input is missing or unreadable (footage, model, calibration file, table, data set)
     5  the calibration cannot be used
     6  a limit was missed (`demo`, `chaos`, a latency budget)
-    7  done, but degraded: views, frames or processes were lost on the way
+    7  done, but degraded: views, frames or processes were lost during the run
   130  stopped by Ctrl-C
 
 Data goes to standard output, messages and progress to standard error.";

@@ -24,7 +24,7 @@ impl Globals {
         }
     }
 
-    /// The log level.
+    /// Returns the log level.
     pub fn level(self) -> Level {
         match (self.quiet, self.verbose) {
             (true, _) => Level::ERROR,

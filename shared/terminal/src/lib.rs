@@ -1,5 +1,7 @@
-//! How the programs speak with who runs them: data on standard output, messages and progress on standard error, the options of
-//! all commands, exit codes in `--help`, completions and manual pages.
+//! Input and output of the programs on the command line.
+//!
+//! Data are written to standard output, messages and progress to standard error. This crate also has the options of all commands,
+//! the exit codes in `--help`, completions, and manual pages.
 #![forbid(unsafe_code)]
 
 pub mod completions;

@@ -8,7 +8,7 @@ use indicatif::{HumanDuration, ProgressState, ProgressStyle};
 use serde::Serialize;
 use tracing::Level;
 
-/// How much a command prints and logs.
+/// Amount of output and log of a command.
 #[derive(Debug, Clone, Copy)]
 pub struct Verbosity {
     /// Print errors only.
@@ -21,7 +21,7 @@ pub struct Verbosity {
 ///
 /// # Errors
 ///
-/// Standard output cannot be written to.
+/// Fails if standard output cannot be written to.
 pub fn line(text: impl Display) -> Result<(), Failure> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -35,25 +35,25 @@ pub fn line(text: impl Display) -> Result<(), Failure> {
 ///
 /// # Errors
 ///
-/// Standard output cannot be written to, or the value cannot be represented in JSON.
+/// Fails if standard output cannot be written to, or if the value cannot be represented in JSON.
 pub fn json(value: &impl Serialize) -> Result<(), Failure> {
     line(serde_json::to_string(value).or_fail(ExitKind::Run)?)
 }
 
-/// Writes a message to the user. An error of standard error is ignored.
+/// Writes a message to the user. If standard error cannot be written to, nothing happens.
 pub fn message(text: impl Display) {
     drop(writeln!(io::stderr().lock(), "{text}"));
 }
 
 /// Reports a failure that does not end the program.
 pub fn failure(failure: &Failure) {
-    // An error of standard error cannot be reported.
+    // If standard error fails, the failure cannot be reported.
     drop(failure.report(&mut io::stderr().lock()));
 }
 
-/// The style of a progress bar; `None` if the template is not one of `indicatif`.
+/// Returns the style of a progress bar; `None` if `indicatif` does not accept the template.
 ///
-/// * `template`: `{left}` is a comma and the time that is left, nothing while that is not known.
+/// * `template`: template of `indicatif`. `{left}` becomes a comma and the remaining time, or nothing while that is not known.
 pub fn bar_style(template: &str) -> Option<ProgressStyle> {
     let style = ProgressStyle::with_template(template).ok()?;
     Some(

@@ -10,10 +10,10 @@ use serde_json::Value;
 
 use crate::output;
 
-/// A line of progress is printed this often where there is no bar.
+/// Interval between lines of progress if there is no bar.
 const PERIOD: Duration = Duration::from_secs(5);
 
-/// Shows progress as a bar on a terminal, and messages unless quiet; writes events as JSON if requested.
+/// Console that shows progress as a bar on a terminal, and messages unless quiet. Writes events as JSON if requested.
 #[derive(Debug)]
 pub struct Terminal {
     bar: ProgressBar,
@@ -22,7 +22,7 @@ pub struct Terminal {
     lines: Option<Lines>,
 }
 
-/// Progress in lines.
+/// State of progress in lines.
 #[derive(Debug)]
 struct Lines {
     /// Name of the things that are counted, such as `pictures`.
@@ -31,7 +31,7 @@ struct Lines {
 }
 
 impl Terminal {
-    /// Without a progress bar.
+    /// Creates a console without a progress bar.
     pub fn without_bar(quiet: bool, json: bool) -> Self {
         Self {
             bar: ProgressBar::hidden(),
@@ -41,9 +41,9 @@ impl Terminal {
         }
     }
 
-    /// With a progress bar, if standard error is a terminal.
+    /// Creates a console with a progress bar, if standard error is a terminal.
     ///
-    /// * `template`: as for [`output::bar_style`].
+    /// * `template`: template of the bar, as for [`output::bar_style`].
     pub fn with_bar(quiet: bool, json: bool, template: &str) -> Self {
         let bar = if quiet || !output::is_terminal() {
             ProgressBar::hidden()
@@ -61,14 +61,14 @@ impl Terminal {
         }
     }
 
-    /// Redraws the bar twice a second, also without progress.
+    /// Redraws the bar twice a second, even without progress.
     #[must_use]
     pub fn ticking(self) -> Self {
         self.bar.enable_steady_tick(Duration::from_millis(500));
         self
     }
 
-    /// Prints a line of progress every few seconds where standard error is no terminal: in a log, or beside a job in the background.
+    /// Prints a line of progress every few seconds if standard error is not a terminal, for example in a log or in a background job.
     ///
     /// * `counted`: name of the things that are counted, such as `pictures`.
     #[must_use]

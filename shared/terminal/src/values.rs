@@ -11,7 +11,7 @@ pub struct Outline(
 ///
 /// # Errors
 ///
-/// It is not four numbers, or has no extent.
+/// Fails if the text is not four numbers, or if the box has no extent.
 pub fn outline(text: &str) -> Result<Outline, String> {
     let numbers: Result<Vec<f64>, _> =
         text.split(',').map(|number| number.trim().parse()).collect();
@@ -33,7 +33,7 @@ pub fn outline(text: &str) -> Result<Outline, String> {
 ///
 /// # Errors
 ///
-/// It is no number from 0.1 to 1000.
+/// Fails if the text is not a number from 0.1 to 1000.
 pub fn rate(text: &str) -> Result<f64, String> {
     let rate: Option<f64> = text.parse().ok();
     let rate = rate.filter(|rate| (0.1..=1000.0).contains(rate));

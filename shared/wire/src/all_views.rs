@@ -7,18 +7,17 @@ use pipeline::{AllViewsHypothesis, AllViewsResult, PairResult};
 use crate::error::{equal, index};
 use crate::{WireError, pair_to_message};
 
-/// Writes the result of all views, or that there is none: message `v - 1` is about view `v` and the first
-/// view of the result; the caller fills in stamps and timing.
+/// Writes the result of all views, or that there is none. The caller fills in stamps and timing.
 ///
-/// Each contains the energy of all views. The message of a view that was not solved, or is the first itself,
-/// has no result.
+/// Message `v - 1` is about view `v` and the first view of the result. Each message contains the energy of all views.
+/// It has no result if view `v` was not solved, or is the first view itself.
 ///
-/// * `n_views`: of the rig.
+/// * `n_views`: number of views of the rig.
 /// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
 ///
 /// # Errors
 ///
-/// [`WireError`] if something does not fit into a message.
+/// Returns a [`WireError`] if something does not fit into a message.
 pub fn all_views_to_messages(
     n_views: usize,
     answer: Option<&AllViewsResult>,
@@ -43,13 +42,13 @@ pub fn all_views_to_messages(
     (1..n_views).map(message).collect()
 }
 
-/// Checks that a message is about the view of its number and an earlier one.
+/// Checks that a message is about view `v + 1` and an earlier view, where `v` is `view` of its stamp.
 ///
-/// * `n_views`: of the rig.
+/// * `n_views`: number of views of the rig.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there is no such view, or the message is about others.
+/// Returns a [`WireError`] if there is no such view, or the message is about other views.
 pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireError> {
     let nth = index(
         "answer",
@@ -74,7 +73,7 @@ pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireErr
     Ok(())
 }
 
-/// The pair of the first view of a result and the one at `place`.
+/// Returns the pair of the first view of a result and the view at `place`.
 fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
     let hypothesis = |all_views_hypothesis: &AllViewsHypothesis| PairEstimate {
         start: PairStart {
@@ -95,15 +94,15 @@ fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
 
 /// Combines the messages to the result of all views; `None` if there is none.
 ///
-/// The iterations are not sent: they are empty, and the share of active terms is 0.
+/// The messages do not contain the iterations. In the result, they are empty, and the share of active terms is 0.
 ///
-/// * `pairs`: of one frame, as [`pair_from_message`](crate::pair_from_message) reads them, in ascending order of
+/// * `pairs`: pairs of one frame, as [`pair_from_message`](crate::pair_from_message) reads them, in ascending order of
 ///   their second view.
 ///
 /// # Errors
 ///
-/// [`WireError`] if they are not of one result: another first view, order or number of hypotheses, or another
-/// energy.
+/// Returns a [`WireError`] if the pairs are not of one result: they differ in the first view, the energy or the number of
+/// hypotheses, or are out of order.
 pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResult>, WireError> {
     let Some(first) = pairs.first() else {
         return Ok(None);
@@ -139,7 +138,7 @@ pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResul
     Ok(Some(answer))
 }
 
-/// A hypothesis with the first view only.
+/// Returns a hypothesis with the first view only.
 fn alone(it: &PairEstimate) -> AllViewsHypothesis {
     AllViewsHypothesis {
         exchanged: vec![false],

@@ -1,26 +1,26 @@
-//! Why a message was refused.
+//! Reasons why a message was refused.
 
 use messages::Refusal;
 
-/// A message is malformed, or a value does not fit into its message.
+/// Reason why a message is malformed, or why a value does not fit into its message.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum WireError {
     /// A count is larger than the array that it counts.
     #[error("{field} is {got}, the limit is {limit}")]
     TooMany {
-        /// The count.
+        /// Name of the count.
         field: &'static str,
-        /// Its value.
+        /// Value of the count.
         got: usize,
-        /// Largest value allowed.
+        /// Maximum value allowed.
         limit: usize,
     },
     /// Sender and receiver have different models, rigs or layouts.
     #[error("{field} is {got}, expected {expected}")]
     Mismatch {
-        /// The number.
+        /// Name of the number.
         field: &'static str,
-        /// Its value.
+        /// Value of the number.
         got: usize,
         /// The value that the receiver has.
         expected: usize,
@@ -28,23 +28,23 @@ pub enum WireError {
     /// An index is out of range.
     #[error("{field} of entry {entry} is {got}, the limit is {limit}")]
     OutOfRange {
-        /// The index.
+        /// Name of the index.
         field: &'static str,
-        /// Which entry of its array, from 0.
+        /// Index of the entry in its array, counted from 0.
         entry: usize,
-        /// Its value.
+        /// Value of the index.
         got: usize,
         /// Smallest value that is not allowed.
         limit: usize,
     },
-    /// A number is not finite, or is negative where it may not be.
+    /// A number is not finite, or is negative where it must not be.
     #[error("{field} of entry {entry} is {got}, expected {expected}")]
     Value {
-        /// The number.
+        /// Name of the number.
         field: &'static str,
-        /// Which entry of its array, from 0.
+        /// Index of the entry in its array, counted from 0.
         entry: usize,
-        /// Its value.
+        /// Value of the number.
         got: f64,
         /// Description of the values that are accepted.
         expected: &'static str,
@@ -52,43 +52,43 @@ pub enum WireError {
     /// The message is from another run.
     #[error("session is {got}, expected {expected}")]
     Session {
-        /// Its session.
+        /// Session of the message.
         got: u64,
-        /// The receiver's session.
+        /// Session of the receiver.
         expected: u64,
     },
     /// The message does not come from the sender of the topic.
     #[error("{field} is {got}, but this is the topic of {expected}")]
     Sender {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// Its value.
+        /// Value of the field.
         got: usize,
-        /// The sender of the topic.
+        /// Sender that the topic belongs to.
         expected: usize,
     },
     /// The message has a time in the future.
-    #[error("{field} lies {} ms ahead of the clock", .ahead_nanos / 1_000_000)]
+    #[error("{field} is {} ms ahead of the clock", .ahead_nanos / 1_000_000)]
     Future {
-        /// The time stamp.
+        /// Name of the time stamp.
         field: &'static str,
-        /// How far ahead it is.
+        /// Time by which the time stamp is ahead of the clock, nanoseconds.
         ahead_nanos: u64,
     },
     /// The frame number is too large.
     #[error("{field} is {got}, the limit is {limit}")]
     Frame {
-        /// The number.
+        /// Name of the number.
         field: &'static str,
-        /// Its value.
+        /// Value of the number.
         got: u64,
-        /// Largest value allowed.
+        /// Maximum value allowed.
         limit: u64,
     },
 }
 
 impl WireError {
-    /// The cause under which the receiver counts it.
+    /// Returns the cause under which the receiver counts the message.
     pub fn refusal(&self) -> Refusal {
         match self {
             Self::TooMany { .. } | Self::Mismatch { .. } => Refusal::Size,

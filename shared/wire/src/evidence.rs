@@ -6,7 +6,7 @@ use messages::{EvidenceHeader, MAX_LEVELS, Stamp, Status, Timing};
 use crate::WireError;
 use crate::error::{count, equal, index};
 
-/// Received evidence: the responses in place, and the bounds of their levels.
+/// Received evidence: the responses, which stay in place, and the bounds of their levels.
 #[derive(Debug, Clone)]
 pub struct EvidenceView<'a> {
     responses: Responses<'a>,
@@ -14,22 +14,22 @@ pub struct EvidenceView<'a> {
 }
 
 impl EvidenceView<'_> {
-    /// The responses, with their bounds.
+    /// Returns the responses with their bounds.
     pub fn responses(&self) -> Responses<'_> {
         self.responses.with_bounds(&self.bounds)
     }
 }
 
-/// Writes the scope of the responses, the valid levels and their bounds; the caller fills in stamp and
+/// Writes the scope of the responses, the valid levels and their bounds. The caller fills in stamp and
 /// timing.
 ///
-/// * `levels`: ascending.
-/// * `bounds`: of the same responses; an invalid bound is sent as unknown.
+/// * `levels`: the valid levels, ascending.
+/// * `bounds`: bounds of the same responses. An invalid bound is sent as unknown.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_LEVELS`], or they are not ascending levels of
-/// `scope`, or the bounds are another layout's.
+/// Returns a [`WireError`] if there are more than [`MAX_LEVELS`] levels, if they are not ascending levels of
+/// `scope`, or if the bounds belong to another layout.
 pub fn evidence_to_message(
     levels: &[u16],
     bounds: &Bounds,
@@ -63,13 +63,15 @@ pub fn evidence_to_message(
     Ok(message)
 }
 
-/// Reads the values sent with `message` as responses of `layout`, in place.
+/// Reads the values sent with `message` as responses of `layout`, without copying them.
 ///
 /// # Errors
 ///
-/// [`WireError`] if the image size is not that of `layout`, the scope exceeds it, there are fewer values than
-/// the scope has cells, the levels are not ascending levels of it, or a bound is invalid: not a number, minus
-/// infinity, or with a negative or infinite size.
+/// Returns a [`WireError`] in these cases:
+///
+/// * The image size is not that of `layout`, or the scope exceeds the layout.
+/// * There are fewer values than the scope has cells, or the levels are not ascending levels of the scope.
+/// * A bound is invalid: it is not a number or minus infinity, or its size is negative or infinite.
 pub fn evidence_from_message<'a>(
     message: &'a EvidenceHeader,
     values: &'a [f32],
@@ -105,7 +107,7 @@ pub fn evidence_from_message<'a>(
     })
 }
 
-/// The error of an invalid bound.
+/// Returns the error of an invalid bound.
 fn refusal(entry: usize, bound: Bound) -> Option<WireError> {
     let refused = |field, got: f32, expected| {
         Some(WireError::Value {
@@ -175,7 +177,7 @@ mod tests {
         Bounds::new(vec![Bound::UNKNOWN; layout().levels.len()])
     }
 
-    /// Any scope of the layout, by shares of its levels, columns and rows.
+    /// Returns any scope of the layout, as shares of its levels, columns and rows.
     fn scope() -> impl Strategy<Value = Scope> {
         let layout = layout();
         let range = |n: usize| {

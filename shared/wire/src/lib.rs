@@ -1,7 +1,7 @@
 //! Converts messages to domain types and back, with checks in both directions.
 //!
-//! A received message was written by another process, so every count, index and number is compared with its
-//! limit before it is used; the [`Model`](fmp::Model) and the [`Layout`](fmp::Layout) define the limits.
+//! A received message was written by another process. Every count, index and number is therefore compared with its
+//! limit before it is used. The [`Model`](fmp::Model) and the [`Layout`](fmp::Layout) define the limits.
 //! Entries past a count are ignored when read and zero when written.
 #![forbid(unsafe_code)]
 

@@ -8,15 +8,15 @@ use pipeline::PairResult;
 use crate::error::{count, equal, finite, index};
 use crate::{WireError, pose_from_message, pose_to_message};
 
-/// Writes the result of a pair, or that there is none; the caller fills in stamp and timing.
+/// Writes the result of a pair, or that there is none. The caller fills in stamp and timing.
 ///
-/// Sends only the length of [`PairEstimate::iterations`].
+/// The message contains only the length of [`PairEstimate::iterations`].
 ///
 /// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
 ///
 /// # Errors
 ///
-/// [`WireError`] if something does not fit into the message.
+/// Returns a [`WireError`] if something does not fit into the message.
 pub fn pair_to_message(
     views: [usize; 2],
     answer: Option<&PairResult>,
@@ -61,13 +61,13 @@ fn hypothesis(estimate: &PairEstimate) -> Result<PairHypothesis, WireError> {
 
 /// Reads the result of a pair; `None` unless the status is [`Status::OK`].
 ///
-/// Its iterations are empty.
+/// The iterations of the result are empty.
 ///
-/// * `plans`: the views of the rig.
+/// * `plans`: plans of the views of the rig.
 ///
 /// # Errors
 ///
-/// [`WireError`] if the pair is not two ascending views of the rig, or a pose is malformed.
+/// Returns a [`WireError`] if the pair is not two ascending views of the rig, or if a pose is malformed.
 pub fn pair_from_message(
     message: &PairPose,
     plans: &[impl AsRef<ViewPlan>],
@@ -93,11 +93,11 @@ pub fn pair_from_message(
 
 /// Checks that a result is about the views of its pair.
 ///
-/// * `pairs`: those of the deployment.
+/// * `pairs`: all pairs of the deployment.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there is no such pair, or it has other views.
+/// Returns a [`WireError`] if there is no such pair, or if it has other views.
 pub fn check_views(message: &PairPose, pairs: &[[usize; 2]]) -> Result<(), WireError> {
     let pair = index("pair", 0, message.stamp.view as usize, pairs.len())?;
     for (got, expected) in message.views.iter().zip(pairs[pair]) {

@@ -1,4 +1,4 @@
-//! Who is in a frame.
+//! The people in a frame.
 
 use messages::{MAX_PEOPLE, NO_CANDIDATE, People, PersonMessage, Status};
 use pipeline::{FramePeople, KnownPerson};
@@ -6,13 +6,13 @@ use pipeline::{FramePeople, KnownPerson};
 use crate::WireError;
 use crate::error::{count, equal, index};
 
-/// Writes who is in a frame; the caller fills in stamp and timing.
+/// Writes the people in a frame. The caller fills in stamp and timing.
 ///
 /// * `views_present`: bit `v` is set if view `v` delivered candidates in time.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are too many people, views or candidates.
+/// Returns a [`WireError`] if there are too many people, views or candidates.
 pub fn people_to_message(frame: &FramePeople, views_present: u32) -> Result<People, WireError> {
     let n_people = count("n_people", frame.people.len(), MAX_PEOPLE)?;
     let mut message = People {
@@ -47,14 +47,16 @@ fn person_to_message(person: &KnownPerson) -> Result<PersonMessage, WireError> {
     Ok(message)
 }
 
-/// Reads who is in a frame.
+/// Reads the people in a frame.
 ///
-/// * `n_views`: of the rig.
+/// * `n_views`: number of views of the rig.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are too many people, one has no identity, a candidate that no view can have or one of a view that is not in the rig, or two
-/// share an identity or a candidate.
+/// Returns a [`WireError`] in these cases:
+///
+/// * There are too many people, a person has no identity, or two people share an identity or a candidate.
+/// * A candidate is one that no view can have, or belongs to a view that is not in the rig.
 pub fn people_from_message(message: &People, n_views: usize) -> Result<FramePeople, WireError> {
     let n = count("n_people", message.n_people as usize, MAX_PEOPLE)?;
     let mut people: Vec<KnownPerson> = Vec::with_capacity(n);

@@ -12,14 +12,14 @@ use crate::WireError;
 use crate::error::{count, equal, finite, index};
 use crate::stamp::at_most;
 
-/// No picture is further from the instant of its frame: more than half a period of one frame in ten seconds.
+/// Maximum time from the instant of a frame to its picture: more than half a frame period at one frame in ten seconds.
 const MOST_SKEW_NANOS: u64 = 10_000_000_000;
 
 /// Writes a pose.
 ///
 /// # Errors
 ///
-/// [`WireError::TooMany`] if the pose has more than [`MAX_PARTS`] parts.
+/// Returns [`WireError::TooMany`] if the pose has more than [`MAX_PARTS`] parts.
 pub fn pose_to_message(pose: &Pose) -> Result<PoseMessage, WireError> {
     let n_parts = count("n_parts", pose.parts.len(), MAX_PARTS)?;
     let mut message = PoseMessage {
@@ -40,7 +40,7 @@ pub fn pose_to_message(pose: &Pose) -> Result<PoseMessage, WireError> {
 ///
 /// # Errors
 ///
-/// [`WireError`] if the number of parts, the level, a cell or a type is not one of the model's, or
+/// Returns a [`WireError`] if the number of parts, the level, a cell or a type is not one of the model's, or if
 /// the score is not finite.
 pub fn pose_from_message(
     message: &PoseMessage,
@@ -69,14 +69,14 @@ pub fn pose_from_message(
     })
 }
 
-/// Writes the candidates of a view, best first, and the image size `[width, height]`; the caller
+/// Writes the candidates of a view, best first, and the image size `[width, height]`. The caller
 /// fills in stamp and timing.
 ///
-/// No candidate is written as [`Status::NO_DETECTION`].
+/// If there are no candidates, the status is [`Status::NO_DETECTION`].
 ///
 /// # Errors
 ///
-/// [`WireError::TooMany`] if there are more than [`MAX_CANDIDATES`], or too many parts.
+/// Returns [`WireError::TooMany`] if there are more than [`MAX_CANDIDATES`] candidates, or too many parts.
 pub fn candidates_to_message(
     candidates: &[Pose],
     image_size: [usize; 2],
@@ -99,11 +99,11 @@ pub fn candidates_to_message(
     Ok(message)
 }
 
-/// Reads the candidates of a view, best first; none unless the status is [`Status::OK`].
+/// Reads the candidates of a view, best first. The list is empty unless the status is [`Status::OK`].
 ///
 /// # Errors
 ///
-/// [`WireError`] if the image size is not that of `layout`, or a candidate is malformed.
+/// Returns a [`WireError`] if the image size is not that of `layout`, or if a candidate is malformed.
 pub fn candidates_from_message(
     message: &ViewPose,
     model: &Model,
@@ -125,11 +125,11 @@ pub fn candidates_from_message(
         .collect()
 }
 
-/// How long after the instant of the frame the picture of a view was taken, seconds.
+/// Returns the time from the instant of the frame until the picture of the view was taken, seconds.
 ///
 /// # Errors
 ///
-/// [`WireError::Frame`] if it is more than ten seconds.
+/// Returns [`WireError::Frame`] if it is more than ten seconds.
 pub fn skew_from_message(message: &ViewPose) -> Result<f64, WireError> {
     at_most(
         "skew_nanos",
@@ -139,11 +139,11 @@ pub fn skew_from_message(message: &ViewPose) -> Result<f64, WireError> {
     Ok(message.skew_nanos as f64 * 1e-9)
 }
 
-/// Adds what the picture says about the direction in which the person of every candidate faces.
+/// Adds the evidence of the picture for the direction in which the person of every candidate faces.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there is more evidence than candidates fit, or a number is not finite.
+/// Returns a [`WireError`] if there is more evidence than there is room for candidates, or if a number is not finite.
 pub fn front_to_message(message: &mut ViewPose, front: &[FrontEvidence]) -> Result<(), WireError> {
     count("front", front.len(), MAX_CANDIDATES)?;
     for (candidate, (slot, evidence)) in message.front.iter_mut().zip(front).enumerate() {
@@ -152,13 +152,13 @@ pub fn front_to_message(message: &mut ViewPose, front: &[FrontEvidence]) -> Resu
     Ok(())
 }
 
-/// Reads what the picture says about the direction in which the person of every candidate faces.
+/// Reads the evidence of the picture for the direction in which the person of every candidate faces.
 ///
-/// * `n_candidates`: of the message.
+/// * `n_candidates`: number of candidates of the message.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_CANDIDATES`], or a number is not finite.
+/// Returns a [`WireError`] if there are more than [`MAX_CANDIDATES`] candidates, or if a number is not finite.
 pub fn front_from_message(
     message: &ViewPose,
     n_candidates: usize,
@@ -175,13 +175,13 @@ fn checked_front(candidate: usize, evidence: FrontEvidence) -> Result<FrontEvide
     Ok(evidence)
 }
 
-/// Adds the extra keypoints of the candidates, as far as there is room for whole candidates.
+/// Adds the extra keypoints of as many whole candidates as fit.
 ///
-/// * `n`: extra keypoints of a candidate.
+/// * `n`: number of extra keypoints of a candidate.
 ///
 /// # Errors
 ///
-/// [`WireError`] if a candidate has more than [`MAX_KEYPOINTS`], or a number is not finite.
+/// Returns a [`WireError`] if a candidate has more than [`MAX_KEYPOINTS`] keypoints, or if a number is not finite.
 pub fn extras_to_message(
     message: &mut ViewPose,
     n: usize,
@@ -198,19 +198,19 @@ pub fn extras_to_message(
     Ok(())
 }
 
-/// How many entries are of whole candidates of `n` extra keypoints.
+/// Returns the number of entries that whole candidates of `n` extra keypoints fill.
 fn room_of(n: usize) -> usize {
     MAX_VIEW_KEYPOINTS - MAX_VIEW_KEYPOINTS % n.max(1)
 }
 
-/// Reads the extra keypoints of the candidates, one candidate after the other; those of the last ones may be missing.
+/// Reads the extra keypoints of the candidates, one candidate after the other. Those of the last candidates may be missing.
 ///
-/// * `n`: extra keypoints of a candidate, as the deployment has them.
-/// * `n_candidates`: of the message.
+/// * `n`: number of extra keypoints of a candidate in the deployment.
+/// * `n_candidates`: number of candidates of the message.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are as many as another deployment has, or a number is not finite.
+/// Returns a [`WireError`] if the number of keypoints is not that of the deployment, or if a number is not finite.
 pub fn extras_from_message(
     message: &ViewPose,
     n: usize,
@@ -238,7 +238,7 @@ fn checked_extra(entry: usize, it: &[f32; 3]) -> Result<ExtraKeypoint, WireError
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_PARTS`], or a number is not finite.
+/// Returns a [`WireError`] if there are more than [`MAX_PARTS`] scores, or if a number is not finite.
 pub fn local_to_message(message: &mut ViewPose, scores: &[LocalScore]) -> Result<(), WireError> {
     count("local", scores.len(), MAX_PARTS)?;
     for (part, (slot, score)) in message.local.iter_mut().zip(scores).enumerate() {
@@ -260,7 +260,7 @@ pub fn local_to_message(message: &mut ViewPose, scores: &[LocalScore]) -> Result
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_PARTS`] parts, or a number is not finite.
+/// Returns a [`WireError`] if there are more than [`MAX_PARTS`] parts, or if a number is not finite.
 pub fn local_from_message(
     message: &ViewPose,
     n_parts: usize,

@@ -5,13 +5,13 @@ use messages::{MAX_PARTS, PairPose, Status, ViewQuality};
 use crate::WireError;
 use crate::error::{count, equal, finite};
 
-/// Writes predicted errors, or that there are none; the caller fills in stamp and timing.
+/// Writes predicted errors, or that there are none. The caller fills in stamp and timing.
 ///
 /// * `sigma_px`: expected error of every part, pixels of the frame.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_PARTS`], or one is negative or not finite.
+/// Returns a [`WireError`] if there are more than [`MAX_PARTS`] errors, or if one is negative or not finite.
 pub fn sigma_to_message(sigma_px: Option<&[f32]>) -> Result<ViewQuality, WireError> {
     let Some(sigma_px) = sigma_px else {
         return Ok(ViewQuality {
@@ -34,7 +34,7 @@ pub fn sigma_to_message(sigma_px: Option<&[f32]>) -> Result<ViewQuality, WireErr
 ///
 /// # Errors
 ///
-/// [`WireError`] if it is not for `n_parts` parts, or a value is negative or not finite.
+/// Returns a [`WireError`] if the prediction is not for `n_parts` parts, or if a value is negative or not finite.
 pub fn sigma_from_message(
     message: &ViewQuality,
     n_parts: usize,
@@ -53,11 +53,11 @@ pub fn sigma_from_message(
 
 /// Adds the thresholds that came with a prediction.
 ///
-/// * `tau_px`: of every part, pixels of the frame; or none.
+/// * `tau_px`: threshold of every part, pixels of the frame; or empty.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_PARTS`], or one is negative or not finite.
+/// Returns a [`WireError`] if there are more than [`MAX_PARTS`] thresholds, or if one is negative or not finite.
 pub fn tau_to_message(message: &mut ViewQuality, tau_px: &[f32]) -> Result<(), WireError> {
     message.n_thresholds = count("n_thresholds", tau_px.len(), MAX_PARTS)? as u32;
     for (part, &tau) in tau_px.iter().enumerate() {
@@ -66,11 +66,11 @@ pub fn tau_to_message(message: &mut ViewQuality, tau_px: &[f32]) -> Result<(), W
     Ok(())
 }
 
-/// Reads the thresholds that came with a prediction; `None` where none came.
+/// Reads the thresholds that came with a prediction; `None` if there are none.
 ///
 /// # Errors
 ///
-/// [`WireError`] if they are not for `n_parts` parts, or a value is negative or not finite.
+/// Returns a [`WireError`] if the thresholds are not for `n_parts` parts, or if a value is negative or not finite.
 pub fn tau_from_message(
     message: &ViewQuality,
     n_parts: usize,
@@ -92,7 +92,7 @@ pub fn tau_from_message(
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_PARTS`], or one is negative or not finite.
+/// Returns a [`WireError`] if there are more than [`MAX_PARTS`] errors, or if one is negative or not finite.
 pub fn sigma_to_pair(
     message: &mut PairPose,
     side: usize,
@@ -113,7 +113,7 @@ pub fn sigma_to_pair(
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more than [`MAX_PARTS`] parts, or a value is negative or not finite.
+/// Returns a [`WireError`] if there are more than [`MAX_PARTS`] parts, or if a value is negative or not finite.
 pub fn sigma_from_pair(
     message: &PairPose,
     side: usize,

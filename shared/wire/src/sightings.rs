@@ -1,4 +1,4 @@
-//! The people that a view sees by the method of networks, and their maps.
+//! The people that a view sees with the method of networks, and their maps.
 
 use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES, Status, ViewPose};
 use pipeline::{ExtraKeypoint, Sighting, Sightings};
@@ -10,20 +10,20 @@ use crate::{
     skew_from_message,
 };
 
-/// No place that is seen lies farther from the first pixel, pixels.
+/// Maximum distance of a position from the first pixel, pixels.
 const MOST_PX: f64 = 1e6;
-/// Most columns or rows of a map.
+/// Maximum number of columns or rows of a map.
 const MOST_CELLS: u32 = 1 << 16;
 
-/// Writes the people that a view sees, and the image size `[width, height]`; the caller fills in stamp and timing.
+/// Writes the people that a view sees, and the image size `[width, height]`. The caller fills in stamp and timing.
 ///
-/// Nobody is written as [`Status::NO_DETECTION`].
+/// If there are no people, the status is [`Status::NO_DETECTION`].
 ///
-/// * `n_extras`: extra keypoints of a person.
+/// * `n_extras`: number of extra keypoints of a person.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people or keypoints than fit, or a number is not finite.
+/// Returns a [`WireError`] if there are more people or keypoints than fit, or if a number is not finite.
 pub fn sightings_to_message(
     people: &[Sighting],
     n_extras: usize,
@@ -58,11 +58,11 @@ pub fn sightings_to_message(
 
 /// Reads the people that a view sees; `None` unless the status is [`Status::OK`] and there is a person.
 ///
-/// * `n_extras`: extra keypoints of a person. The last people may lack them, because the room in a message is limited.
+/// * `n_extras`: number of extra keypoints of a person. The last people may lack them, because the room in a message is limited.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people than fit, or a number or the time of the picture is not one that a view sends.
+/// Returns a [`WireError`] if there are more people than fit, or if a number or the time of the picture is impossible.
 pub fn sightings_from_message(
     message: &ViewPose,
     n_extras: usize,
@@ -104,12 +104,12 @@ pub fn sightings_from_message(
     Ok((n > 0).then_some(Sightings { people, skew_s }))
 }
 
-/// Writes where the maps of the people of a view lie; the caller fills in stamp and timing, and sends the values of one person after
-/// the other.
+/// Writes the grids of the maps of the people of a view. The caller fills in stamp and timing, and sends the values of one person
+/// after the other.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people than fit.
+/// Returns a [`WireError`] if there are more people than fit.
 pub fn maps_to_message(
     people: &[MapGrid],
     image_size: [usize; 2],
@@ -132,12 +132,12 @@ pub fn maps_to_message(
     Ok(message)
 }
 
-/// Reads the maps that were sent with `message`, in place.
+/// Reads the maps that were sent with `message`, without copying them.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people than fit, a grid is not valid, the values are not as many as its cells, or one
-/// of them is not finite.
+/// Returns a [`WireError`] if there are more people than fit, or if a grid is not valid. It also returns one if the number of
+/// values is not that of the cells, or if a value is not finite.
 pub fn maps_from_message<'a>(
     message: &EvidenceHeader,
     values: &'a [f32],
@@ -156,11 +156,11 @@ pub fn maps_from_message<'a>(
     Ok(maps)
 }
 
-/// Reads where the maps of the people of a view lie.
+/// Reads the grids of the maps of the people of a view.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are more people than fit, or a grid is not valid.
+/// Returns a [`WireError`] if there are more people than fit, or if a grid is not valid.
 pub fn grids_from_message(message: &EvidenceHeader) -> Result<Vec<MapGrid>, WireError> {
     let n = count("n_people", message.n_people as usize, MAX_CANDIDATES)?;
     let people = message.people[..n].iter().enumerate();
@@ -184,15 +184,15 @@ pub fn grids_from_message(message: &EvidenceHeader) -> Result<Vec<MapGrid>, Wire
     people.map(grid).collect()
 }
 
-/// Number of values of the maps of several people.
+/// Returns the number of values of the maps of several people.
 pub fn n_values(grids: &[MapGrid]) -> usize {
     let each = grids.iter().map(MapGrid::n_values);
     each.fold(0, usize::saturating_add)
 }
 
-/// Checks that received values are numbers: over the maps of a network one that is not could lie anywhere in a sum.
+/// Checks that received values are finite. A single value that is not finite could end up in any sum over the maps.
 fn check_maps(values: &[f32]) -> Result<(), WireError> {
-    // Without a branch for each: a frame has up to a million.
+    // Avoids a branch for each value, because a frame has up to a million values.
     if values.iter().fold(0.0_f32, |sum, value| sum + value * 0.0) == 0.0 {
         return Ok(());
     }

@@ -10,26 +10,26 @@ use pipeline::{NoJoint, Skeleton};
 use crate::WireError;
 use crate::error::{count, equal, finite};
 
-/// A person with what was solved.
+/// A person with a skeleton and extra keypoints.
 #[derive(Debug, Clone, Copy)]
 pub struct SolvedPerson<'a> {
-    /// Identity within the run, from 1.
+    /// Person's identity within the run, counted from 1.
     pub id: u64,
-    /// The skeleton, with joints or without.
+    /// Skeleton of the person, which may have no joints.
     pub skeleton: &'a Skeleton,
-    /// The extra keypoints.
+    /// Extra keypoints of the person.
     pub keypoints: &'a [Result<Triangulated, NoJoint>],
 }
 
-/// Writes the people of a frame; the caller fills in stamp and timing.
+/// Writes the people of a frame. The caller fills in stamp and timing.
 ///
-/// * `people`: the followed person first.
+/// * `people`: the people, the followed person first.
 /// * `n_seen`: number of people that several views agree on.
-/// * `views_present`: bit `v` is set if view `v` delivered what it found in time.
+/// * `views_present`: bit `v` is set if the result of view `v` arrived in time.
 ///
 /// # Errors
 ///
-/// [`WireError::TooMany`] if there are more people, joints, views, parts or extra keypoints than fit.
+/// Returns [`WireError::TooMany`] if there are more people, joints, views, parts or extra keypoints than fit.
 pub fn skeletons_to_message(
     people: &[SolvedPerson<'_>],
     n_seen: usize,
@@ -98,7 +98,7 @@ fn person_to_message(
     Ok(())
 }
 
-/// The end of stream of the results.
+/// Returns the message that ends the stream of the results.
 pub fn end_of_results(session: u64) -> Skeletons {
     Skeletons {
         stamp: Stamp {
@@ -110,13 +110,16 @@ pub fn end_of_results(session: u64) -> Skeletons {
     }
 }
 
-/// Checks the counts of a result against the receiver's rig and joint set, that every identity is of one person, and that coordinates
+/// Checks the counts of a result against the receiver's rig and joint set. Also checks that identities are unique and coordinates
 /// are finite.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there are too many people, two share an identity, one has none, one is for other views or joints, a count is larger than its array,
-/// or a joint, an extra keypoint or a part that was found has a coordinate that is not finite.
+/// Returns a [`WireError`] in these cases:
+///
+/// * There are too many people, a person has no identity, or two people share one.
+/// * The result is for other views or joints, or a count is larger than its array.
+/// * A joint, an extra keypoint or a part that was found has a coordinate that is not finite.
 pub fn check_skeletons(
     message: &Skeletons,
     n_views: usize,

@@ -5,19 +5,19 @@ use messages::{FrameHeader, Stamp, Status, Timing};
 use crate::WireError;
 use crate::error::equal;
 
-/// How far a time stamp may be ahead. All processes of a machine share the clock, so this is generous.
+/// Maximum time by which a time stamp may be ahead of the clock. All processes of a machine share the clock, so this is generous.
 const SLACK_NANOS: u64 = 1_000_000_000;
-/// More frames than any camera captures.
+/// Limit of the frame number: more frames than any camera captures.
 const MOST_FRAMES: u64 = 1 << 40;
 
 /// The stamp that the receiver of a topic expects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Expected {
-    /// The session.
+    /// Session of the receiver.
     pub session: u64,
-    /// The view of the topic; 0 for messages about all views.
+    /// View of the topic; 0 for messages about all views.
     pub view: usize,
-    /// `CLOCK_MONOTONIC`, nanoseconds.
+    /// Current time, `CLOCK_MONOTONIC`, nanoseconds.
     pub now_nanos: u64,
 }
 
@@ -27,7 +27,7 @@ impl Expected {
     ///
     /// # Errors
     ///
-    /// [`WireError::Session`], [`WireError::Sender`], and as [`Self::check_time`].
+    /// Returns [`WireError::Session`], [`WireError::Sender`], or an error of [`Self::check_time`].
     pub fn check(&self, stamp: &Stamp, timing: &Timing) -> Result<(), WireError> {
         self.check_session(stamp)?;
         if stamp.view as usize != self.view {
@@ -41,13 +41,13 @@ impl Expected {
     }
 
     /// Checks that the result of a pair is from this session and from the worker of the pair, and has no time
-    /// in the future. `view` is the worker.
+    /// in the future. `view` is the index of the worker.
     ///
-    /// * `n_workers`: the pairs are assigned to them in turn.
+    /// * `n_workers`: number of workers. The pairs are assigned to them in turn.
     ///
     /// # Errors
     ///
-    /// [`WireError::Session`], [`WireError::Sender`], and as [`Self::check_time`].
+    /// Returns [`WireError::Session`], [`WireError::Sender`], or an error of [`Self::check_time`].
     pub fn check_pair(
         &self,
         stamp: &Stamp,
@@ -69,7 +69,7 @@ impl Expected {
     ///
     /// # Errors
     ///
-    /// [`WireError::Session`], and as [`Self::check_time`].
+    /// Returns [`WireError::Session`] or an error of [`Self::check_time`].
     pub fn check_end(&self, stamp: &Stamp, timing: &Timing) -> Result<(), WireError> {
         self.check_session(stamp)?;
         self.check_time(stamp, timing)
@@ -89,7 +89,7 @@ impl Expected {
     ///
     /// # Errors
     ///
-    /// [`WireError::Future`] if a time is more than a second ahead, [`WireError::Frame`] if the frame number
+    /// Returns [`WireError::Future`] if a time is more than a second ahead, or [`WireError::Frame`] if the frame number
     /// is too large.
     pub fn check_time(&self, stamp: &Stamp, timing: &Timing) -> Result<(), WireError> {
         for (field, nanos) in [
@@ -106,14 +106,14 @@ impl Expected {
     }
 }
 
-/// Checks a frame against its pixels; one without an image may have any.
+/// Checks a frame against its pixels. A frame without an image may have any number of them.
 ///
-/// * `n_bytes`: of the received pixels.
+/// * `n_bytes`: number of bytes of the received pixels.
 ///
 /// # Errors
 ///
-/// [`WireError`] if the pixels do not fill the image, if the number of dropped frames is too large, and as
-/// [`Expected::check`].
+/// Returns a [`WireError`] if the pixels do not fill the image, if the number of dropped frames is too large, or if
+/// [`Expected::check`] fails.
 pub fn check_frame(
     header: &FrameHeader,
     n_bytes: usize,
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// The error of a changed frame of 36 bytes.
+    /// Returns the error for a changed frame of 36 bytes.
     fn refused(change: impl Fn(&mut FrameHeader)) -> (Refusal, String) {
         let mut header = header();
         check_frame(&header, 36, &EXPECTED).unwrap();
@@ -203,7 +203,7 @@ mod tests {
     fn times_in_the_future_are_refused() {
         let (cause, text) = refused(|header| header.stamp.captured_at_nanos = 6_500_000_000);
         assert_eq!(cause, Refusal::Time);
-        assert_eq!(text, "captured_at lies 1500 ms ahead of the clock");
+        assert_eq!(text, "captured_at is 1500 ms ahead of the clock");
         assert_eq!(
             refused(|header| header.timing.sent_at_nanos = u64::MAX).0,
             Refusal::Time

@@ -123,7 +123,7 @@ const NO_FILES: &[Mistake] = &[
     live(
         "V4L2",
         |case| source(case, "v4l2:/dev/null"),
-        &["/dev/null is no camera"],
+        &["/dev/null is not a camera"],
     ),
     live(
         "device",

@@ -1,4 +1,4 @@
-//! Publishing beside a run, in a process of its own.
+//! Publishes a run in a separate process.
 
 use core::time::Duration;
 use std::ffi::OsString;
@@ -8,25 +8,25 @@ use std::time::Instant;
 use failure::{ExitKind, Failure};
 use runtime::Child;
 
-/// How long it may take to see that the deployment has ended.
+/// Time that the process may take to notice that the deployment has ended.
 const LEAVING: Duration = Duration::from_secs(1);
 
-/// A process that publishes a deployment while it runs. Dropping it ends that.
+/// A process that publishes a deployment while it runs. Dropping this value ends the process.
 #[derive(Debug)]
 pub struct Companion {
     child: Child,
 }
 
 impl Companion {
-    /// Starts `parallax publish` for a deployment that is about to run; it ends with the deployment.
+    /// Starts `parallax publish` for a deployment that is about to run. The process ends with the deployment.
     ///
     /// * `executable`: this program.
     /// * `targets`: as the user wrote them.
-    /// * `beyond`: whether they may be other machines.
+    /// * `beyond`: whether the targets may be other machines.
     ///
     /// # Errors
     ///
-    /// The process cannot be started.
+    /// Fails if the process cannot be started.
     pub fn start(
         executable: &Path,
         deployment: &str,
@@ -46,7 +46,7 @@ impl Companion {
         Ok(Self { child })
     }
 
-    /// Waits for its end, which comes with that of the deployment, and gives what it said.
+    /// Waits until the process ends with the deployment, and returns its messages.
     pub fn finish(mut self) -> Vec<String> {
         let begin = Instant::now();
         let mut said = Vec::new();

@@ -1,47 +1,47 @@
-//! One person of a frame, as it is sent.
+//! One person of a frame, in the form in which it is sent.
 
 use crate::{Joint, Moment};
 use messages::{Sides, Status};
 
-/// One person of a frame, or a frame with nobody.
+/// One person of a frame, or a frame without people.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame<'a> {
     /// Name of the deployment.
     pub deployment: &'a str,
-    /// The session.
+    /// Session of the run.
     pub session: u64,
     /// Number of the frame.
     pub frame: u64,
-    /// When it was captured, nanoseconds of `CLOCK_MONOTONIC`.
+    /// Time at which the frame was captured, nanoseconds of `CLOCK_MONOTONIC`.
     pub captured_at_nanos: u64,
-    /// Identity of the person within the run, from 1; 0 in a frame with nobody.
+    /// Person's identity within the run, counted from 1; 0 in a frame without people.
     pub person: u64,
-    /// People that are sent of this frame.
+    /// Number of people of this frame that are sent.
     pub n_people: u32,
-    /// "ok", or why there is no skeleton.
+    /// "ok", or the reason why there is no skeleton.
     pub status: &'a str,
     /// Decision on left and right, in words.
     pub sides: &'a str,
-    /// Number of people that several views agree on; 0 if it was not counted.
+    /// Number of people that several views agree on; 0 if they were not counted.
     pub n_seen: u32,
-    /// Frames that are missing before this one.
+    /// Number of frames that are missing before this one.
     pub n_missed: u64,
-    /// The joints by name: a place, or why there is none. Empty in a frame with nobody.
+    /// The joints by name, each with its position or the reason why it has none. Empty in a frame without people.
     pub joints: Vec<(&'a str, Result<Place, &'a str>)>,
 }
 
-/// Where a joint is.
+/// Position of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// World frame of the calibration, metres.
+    /// Position in the world frame of the calibration, metres.
     pub in_world: [f64; 3],
     /// Standard deviation along one axis, metres.
     pub deviation_m: f64,
 }
 
 impl<'a> Frame<'a> {
-    /// The people of a moment, the followed person first; one frame with nobody if there is nobody. Empty if skeletons
-    /// were not asked for.
+    /// Returns the people of a moment, the followed person first. If there are no people, returns one frame without people. Empty if
+    /// skeletons were not requested.
     pub fn people(moment: &'a Moment) -> Vec<Self> {
         let Some(skeletons) = &moment.skeletons else {
             return Vec::new();

@@ -7,16 +7,16 @@ use serde_json::Value;
 use crate::publish::MOST_BYTES;
 use crate::publish::frame::{Frame, Place};
 
-/// One line of JSON about a person of a frame; none if it does not even fit without the names of the joints.
+/// Returns one line of JSON about a person of a frame; `None` if it does not fit even without the names of the joints.
 ///
-/// `joints` is an object by name; or where that does not fit into [`MOST_BYTES`] an array in the order of [`json_names`]. A joint is
-/// `[x, y, z, deviation]` in metres, or in its place the reason why it is nowhere, as text: never zeros.
+/// `joints` is an object by name. If this does not fit into [`MOST_BYTES`], it is an array in the order of [`json_names`]. A joint
+/// with a position is `[x, y, z, deviation]` in metres. A joint without a position is the reason as text, never zeros.
 pub fn json_datagram(frame: &Frame<'_>) -> Option<String> {
     let forms = [true, false].map(|with_names| line(frame, with_names));
     forms.into_iter().find(|form| form.len() <= MOST_BYTES)
 }
 
-/// One line of JSON with the names of the joints in their order; none if it does not fit.
+/// Returns one line of JSON with the names of the joints in their order; `None` if it does not fit.
 pub fn json_names(frame: &Frame<'_>) -> Option<String> {
     let names: Vec<&str> = frame.joints.iter().map(|joint| joint.0).collect();
     let names = Value::from(names);
@@ -59,7 +59,7 @@ fn line(frame: &Frame<'_>, with_names: bool) -> String {
     text
 }
 
-/// Metres to a tenth of a millimetre.
+/// Writes a position in metres, to a tenth of a millimetre.
 fn push_place(text: &mut String, place: &Place) {
     let [x, y, z] = place.in_world;
     // Writing into a string cannot fail.

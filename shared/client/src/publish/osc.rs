@@ -3,18 +3,18 @@
 use crate::publish::MOST_BYTES;
 use crate::publish::frame::Frame;
 
-/// The time tag that means at once.
+/// Time tag that means "immediately".
 const AT_ONCE: u64 = 1;
 
-/// Bundles about a person of a frame, each at most [`MOST_BYTES`] long, and each beginning with `/parallax/frame`.
+/// Returns bundles about a person of a frame. Each is at most [`MOST_BYTES`] long and begins with `/parallax/frame`.
 ///
 /// | address | arguments | |
 /// |---|---|---|
 /// | `/parallax/frame` | `s h h i i i s s i` | deployment, session, frame, person, people, seen, status, sides, missed |
 /// | `/parallax/joint/right_wrist` | `f f f f` | x, y, z, standard deviation, metres |
-/// | `/parallax/absent` | `s s` | joint, and why it is nowhere |
+/// | `/parallax/absent` | `s s` | joint, and the reason why it has no position |
 ///
-/// A joint that is nowhere has no position, not zeros.
+/// A joint without a position is never sent as zeros.
 pub fn osc_datagrams(frame: &Frame<'_>) -> Vec<Vec<u8>> {
     let head = head(frame);
     let mut datagrams = Vec::new();
@@ -56,13 +56,13 @@ impl Message {
         message
     }
 
-    /// A number of things; the largest that the format has if it is larger.
+    /// Writes a count, limited to the largest value of the format.
     fn count(&mut self, n: u64) {
         let n = i32::try_from(n).unwrap_or(i32::MAX);
         self.0.extend(n.to_be_bytes());
     }
 
-    /// A text ends with zeros, up to a multiple of four bytes.
+    /// Writes a text, padded with zeros to a multiple of four bytes.
     fn text(&mut self, text: &str) {
         self.0.extend(text.bytes().filter(|byte| *byte != 0));
         self.0.push(0);
@@ -96,7 +96,7 @@ fn push(bundle: &mut Vec<u8>, message: &Message) {
     bundle.extend(&message.0);
 }
 
-/// A name as part of an address: what has a meaning there, and what is not ASCII, is an underscore.
+/// Returns a name as part of an address. Underscores replace characters with a meaning in addresses and characters that are not ASCII.
 fn plain(name: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
     name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect()
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
     use crate::publish::json::tests::frame;
 
-    /// The addresses and bytes of arguments of a bundle, read as the specification says.
+    /// Returns the address and the argument bytes of each message of a bundle, read as the specification says.
     fn messages(bundle: &[u8]) -> Vec<(String, Vec<u8>)> {
         assert_eq!(&bundle[..8], b"#bundle\0");
         let mut rest = &bundle[16..];

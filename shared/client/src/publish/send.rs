@@ -1,4 +1,4 @@
-//! The loop: moments of a deployment in, datagrams out.
+//! The main loop: reads moments of a deployment and sends datagrams.
 
 use core::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use core::time::Duration;
@@ -14,25 +14,25 @@ use crate::publish::json::{json_datagram, json_names};
 use crate::publish::osc::osc_datagrams;
 use crate::publish::target::{Form, Target};
 
-/// Moments that may wait to be sent.
+/// Maximum number of moments that may wait to be sent.
 const MOST_WAITING: usize = 64;
-/// Longest wait for a moment, so that a stop request is seen.
+/// Longest wait for a moment, so that a stop request is noticed.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// Interval at which names that are left out of the lines are sent.
+/// Interval between messages with the names that the lines omit.
 const NAMES: Duration = Duration::from_secs(1);
 
-/// Counts of what was sent.
+/// Counts of sent and unsent frames and datagrams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Frames that were published.
     pub frames: u64,
-    /// Datagrams that the system took.
+    /// Datagrams that the system accepted.
     pub sent: u64,
-    /// Datagrams that it did not take: nobody listens, or there was no room.
+    /// Datagrams that the system did not accept: there was no receiver, or no room.
     pub unsent: u64,
     /// Frames that do not fit into a datagram.
     pub too_large: u64,
-    /// Frames that are missing between those.
+    /// Frames that are missing between the published ones.
     pub missed: u64,
 }
 
@@ -42,7 +42,7 @@ pub struct Counts {
 ///
 /// # Errors
 ///
-/// No socket can be opened; the deployment cannot be read for another reason than that it does not run.
+/// Fails if no socket can be opened, or if the deployment runs but cannot be read.
 pub fn run(
     deployment: &str,
     targets: &[Target],
@@ -86,7 +86,7 @@ pub fn run(
     Ok(counts)
 }
 
-/// A socket, and what is sent through it.
+/// A socket, and the content that is sent through it.
 #[derive(Debug)]
 struct Outlet {
     socket: UdpSocket,
@@ -103,7 +103,7 @@ impl Outlet {
         };
         let socket = UdpSocket::bind(any)?;
         socket.connect(target.address)?;
-        // A full queue loses the datagram.
+        // The datagram is lost if the queue is full.
         socket.set_nonblocking(true)?;
         Ok(Self {
             socket,
@@ -132,7 +132,7 @@ impl Outlet {
                 let n_joints = frame.joints.len();
                 tracing::warn!(
                     n_joints,
-                    "a skeleton does not fit into a datagram: it is not sent"
+                    "a skeleton was not sent because it does not fit into a datagram"
                 );
             }
             return;

@@ -1,4 +1,4 @@
-//! Where datagrams are sent, as the user writes it.
+//! Targets of datagrams, as the user writes them.
 
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 
@@ -11,19 +11,19 @@ pub enum Form {
     Osc,
 }
 
-/// Where datagrams are sent, and in which form.
+/// Receiver of datagrams, and their format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Target {
-    /// The receiver.
+    /// Address of the receiver.
     pub address: SocketAddr,
-    /// The form.
+    /// Format of the datagrams.
     pub form: Form,
 }
 
 /// A target that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
-    /// It is not written as one.
+    /// The text is not a target.
     #[error(
         "{text:?} is not a target: {why}; expected udp://127.0.0.1:9000, udp://127.0.0.1:9000?format=osc or osc://127.0.0.1:9000"
     )]
@@ -33,21 +33,21 @@ pub enum TargetError {
         /// Reason why it is malformed.
         why: &'static str,
     },
-    /// It is another machine.
+    /// The target is another machine.
     #[error("{address} is not this machine: skeletons of people would leave it, unencrypted")]
     Beyond {
-        /// The receiver.
+        /// Address of the receiver.
         address: SocketAddr,
     },
 }
 
 impl Target {
-    /// Reads a target: `udp://HOST:PORT`, with `?format=json` or `?format=osc`, or `osc://HOST:PORT`. A host is a number or
-    /// `localhost`: names are not looked up.
+    /// Parses a target: `udp://HOST:PORT`, with `?format=json` or `?format=osc`, or `osc://HOST:PORT`. A host is an IP address or
+    /// `localhost`: other names are not looked up.
     ///
     /// # Errors
     ///
-    /// [`TargetError::Malformed`].
+    /// Returns [`TargetError::Malformed`] if the text is not a target.
     pub fn parse(text: &str) -> Result<Self, TargetError> {
         let wrong = |why| TargetError::Malformed {
             text: text.to_owned(),
@@ -76,11 +76,11 @@ impl Target {
         Ok(Self { address, form })
     }
 
-    /// Refuses another machine.
+    /// Checks that the target is this machine.
     ///
     /// # Errors
     ///
-    /// [`TargetError::Beyond`].
+    /// Returns [`TargetError::Beyond`] if it is another machine.
     pub fn stays_here(&self) -> Result<(), TargetError> {
         let address = self.address;
         if address.ip().is_loopback() {

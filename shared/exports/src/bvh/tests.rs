@@ -1,4 +1,4 @@
-//! The files read by a reader of these tests, and their forward kinematics.
+//! Tests with a separate reader of the files, and its forward kinematics.
 
 use nalgebra::{Point3, Rotation3};
 
@@ -7,7 +7,7 @@ use crate::Gap;
 use crate::landmarks::Landmarks;
 use crate::testing::walker;
 
-/// A joint of a BVH file as its readers have it.
+/// A joint of a BVH file, as readers of the format see it.
 struct Joint {
     name: String,
     parent: Option<usize>,
@@ -15,7 +15,7 @@ struct Joint {
     n_channels: usize,
 }
 
-/// Reads a file, independently of what wrote it: the joints, and the numbers of every frame.
+/// Reads a file independently of the writer: the joints, and the numbers of every frame.
 fn read(text: &str) -> (Vec<Joint>, Vec<Vec<f64>>) {
     let (mut joints, mut open): (Vec<Joint>, Vec<usize>) = (Vec::new(), Vec::new());
     let mut lines = text.lines().map(str::trim);
@@ -48,7 +48,7 @@ fn read(text: &str) -> (Vec<Joint>, Vec<Vec<f64>>) {
     (joints, frames)
 }
 
-/// Forward kinematics: where every joint is, centimetres.
+/// Returns the positions of all joints by forward kinematics, centimetres.
 fn places(joints: &[Joint], frame: &[f64]) -> Vec<Point3<f64>> {
     let mut values = frame.iter().copied();
     let mut next = || values.next().unwrap();
@@ -79,7 +79,7 @@ fn written(trial: &Trial) -> (String, Notes) {
     (String::from_utf8(bytes).unwrap(), notes)
 }
 
-/// How far a joint may be from where it was seen: the sum of the changes of length on its way from the hips.
+/// Returns the maximum distance of a joint from its measured position: the sum of the changes of length between the hips and the joint.
 fn bound(trial: &Trial, slot: usize, node: usize) -> f64 {
     let (lengths, landmarks) = (lengths(trial), Landmarks::of(trial));
     let place = |node: usize| landmarks.at(trial, slot, NODES[node].landmark.unwrap());
@@ -95,7 +95,7 @@ fn bound(trial: &Trial, slot: usize, node: usize) -> f64 {
 #[test]
 fn forward_kinematics_gives_the_joints_back_within_the_change_of_bone_length() {
     let mut trial = walker(60);
-    // Bones that change: every joint is moved by up to 3 cm.
+    // The bones change their lengths: every joint is moved by up to 3 cm.
     for (slot, content) in trial.slots.iter_mut().enumerate() {
         for (nth, point) in content.points.iter_mut().flatten().enumerate() {
             let phase = (slot * 7 + nth * 13) as f64;
@@ -107,7 +107,7 @@ fn forward_kinematics_gives_the_joints_back_within_the_change_of_bone_length() {
     assert_eq!(frames.len(), 60);
     let landmarks = Landmarks::of(&trial);
     let world = trial.y_up_from_world();
-    // Ends have no name of their own; joints are in the order of the tree.
+    // Ends have no names; the joints are in the order of the tree.
     assert_eq!(joints.len(), N_NODES);
     let mut worst: f64 = 0.0;
     for (slot, frame) in frames.iter().enumerate() {

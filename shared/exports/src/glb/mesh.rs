@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::store::Store;
 
-/// A triangle, counter-clockwise from outside.
+/// A triangle, counter-clockwise when seen from outside.
 type Face = [[f64; 3]; 3];
 
 const FROM: [f64; 3] = [0.0, 0.0, 0.0];
@@ -16,7 +16,7 @@ const SOUTH: [f64; 3] = [0.0, 0.2, 0.5];
 const WEST: [f64; 3] = [-0.5, 0.2, 0.0];
 const NORTH: [f64; 3] = [0.0, 0.2, -0.5];
 
-/// A bone from the origin to y = 1, widest near its beginning, as animation programs draw them.
+/// A bone from the origin to y = 1, widest near its beginning, as animation programs draw bones.
 pub(super) const BONE: [Face; 8] = [
     [TO, SOUTH, EAST],
     [TO, WEST, SOUTH],
@@ -28,7 +28,7 @@ pub(super) const BONE: [Face; 8] = [
     [FROM, NORTH, EAST],
 ];
 
-/// An octahedron around the origin.
+/// Returns an octahedron around the origin.
 pub(super) fn mark(radius: f64) -> Vec<Face> {
     let place = |[x, y, z]: [f64; 3]| match () {
         () if y == 0.0 => [0.0, -radius, 0.0],
@@ -38,7 +38,7 @@ pub(super) fn mark(radius: f64) -> Vec<Face> {
     BONE.iter().map(|face| face.map(place)).collect()
 }
 
-/// Vertices, three for each face, and what they carry.
+/// Vertices, three for each face, and their attributes.
 #[derive(Default)]
 pub(super) struct Mesh {
     places: Vec<[f32; 3]>,
@@ -50,7 +50,7 @@ pub(super) struct Mesh {
 impl Mesh {
     /// Adds a piece.
     ///
-    /// * `joint`: the joint of the skin that moves it.
+    /// * `joint`: the joint of the skin that moves the piece.
     pub(super) fn add(
         &mut self,
         shape: &[Face],
@@ -76,7 +76,7 @@ impl Mesh {
         }
     }
 
-    /// Puts it into the store.
+    /// Adds the mesh to the store.
     pub(super) fn store(&self, store: &mut Store) -> Value {
         let n = u16::try_from(self.places.len()).unwrap_or(u16::MAX);
         let weights = vec![[1.0, 0.0, 0.0, 0.0]; self.places.len()];
@@ -97,7 +97,7 @@ impl Mesh {
     }
 }
 
-/// A channel of sRGB as glTF wants colours of vertices: linear, 0 to 1.
+/// Converts a channel of sRGB to a vertex colour of glTF: linear, 0 to 1.
 fn linear(channel: u8) -> f32 {
     let value = f32::from(channel) / 255.0;
     if value <= 0.04045 {

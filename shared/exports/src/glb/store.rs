@@ -1,8 +1,8 @@
-//! The binary part, and what lies where in it.
+//! The binary part of the file, and the positions of the data in it.
 
 use serde_json::{Value, json};
 
-/// A component type of glTF.
+/// Component types of glTF.
 const REAL: u32 = 5126;
 const WORD: u32 = 5123;
 /// Targets of a view.
@@ -18,9 +18,9 @@ pub(super) struct Store {
 }
 
 impl Store {
-    /// Adds reals, and returns their accessor.
+    /// Adds reals, and returns the index of their accessor.
     ///
-    /// * `each`: numbers of an element.
+    /// * `each`: number of values per element.
     pub(super) fn reals(&mut self, values: &[f32], each: usize, kind: &str) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.add(&bytes, None, REAL, (values.len() / each, kind))

@@ -1,4 +1,4 @@
-//! The files taken apart, and where their nodes and skin are.
+//! Parses the files, and checks the positions of their nodes and skin.
 
 use nalgebra::Vector4;
 
@@ -7,7 +7,7 @@ use crate::Gap;
 use crate::landmarks::Landmarks;
 use crate::testing::walker;
 
-/// A file taken apart by what the specification says of it.
+/// A file that was parsed according to the specification.
 struct Read {
     json: Value,
     binary: Vec<u8>,
@@ -43,7 +43,7 @@ impl Read {
         bytes.iter().map(|byte| f64::from(f32::from_le_bytes(*byte))).collect()
     }
 
-    /// Returns the value of a node in a frame: its animated value, else its own.
+    /// Returns the value of a node in a frame: its animated value, otherwise its own.
     fn value(&self, node: usize, path: &str, frame: usize, default: &[f64]) -> Vec<f64> {
         let animation = &self.json["animations"][0];
         let channels = animation["channels"].as_array().unwrap();
@@ -72,7 +72,7 @@ impl Read {
             * Matrix4::new_nonuniform_scaling(&Vector3::from_vec(scale))
     }
 
-    /// Where every node is in a frame.
+    /// Returns the position and orientation of every node in a frame.
     fn globals(&self, frame: usize) -> Vec<Matrix4<f64>> {
         let nodes = self.json["nodes"].as_array().unwrap();
         let mut globals = vec![Matrix4::identity(); nodes.len()];
@@ -127,7 +127,7 @@ fn the_skin_reaches_from_joint_to_joint_and_is_not_there_in_a_gap() {
     let primitive = &read.json["meshes"][0]["primitives"][0]["attributes"];
     let places = read.reals(&primitive["POSITION"]);
     let joint = joints.iter().position(|joint| *joint == read.node("right_ankle_bone")).unwrap();
-    // Eight faces of three vertices for each piece; the first vertex is the tip.
+    // Each piece has eight faces of three vertices, and the first vertex is the tip.
     let first = (joint - N_NODES) * 24;
     let tip = |frame: usize, vertex: usize| {
         let at = 3 * (first + vertex);

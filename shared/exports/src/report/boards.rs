@@ -1,4 +1,5 @@
-//! A calibration from a board as one HTML page: what is known how well, where in the pictures, the rig in space, the worst pictures.
+//! A calibration from a board as one HTML page: the accuracy of the results, the corners in the pictures, the rig in space, and the worst
+//! pictures.
 
 mod pictures;
 mod space;
@@ -16,19 +17,19 @@ pub struct Page<'a> {
     pub names: &'a [String],
     /// Outcome of the calibration.
     pub outcome: &'a Outcome,
-    /// True if the poses were wanted too.
+    /// True if the poses of the cameras were requested too.
     pub has_rig: bool,
-    /// The corners of the board, metres: its outline in the order around it.
+    /// Corners of the board's outline, in order around the board, metres.
     pub outline: [Point2<f64>; 4],
     /// Description of the input: key and value.
     pub about: &'a [(String, String)],
-    /// Reasons for doubt beside those of the outcome.
+    /// Reasons for doubt in addition to those of the outcome.
     pub more_doubts: &'a [String],
-    /// The worst pictures, as JPEG with a caption.
+    /// The worst pictures, each as JPEG with a caption.
     pub worst: &'a [(String, Vec<u8>)],
 }
 
-/// One self-contained page.
+/// Returns the page, which needs no other file.
 pub fn html(page: &Page<'_>) -> String {
     let mut out = begin("Parallax: cameras by a board");
     let own = page.outcome.doubts.iter().map(|doubt| doubt.text(page.names));

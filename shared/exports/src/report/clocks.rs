@@ -1,4 +1,4 @@
-//! The clocks of cameras as one HTML page: what was found, why it is to be trusted or not, the cost of every pair over its offset.
+//! The clocks of cameras as one HTML page: the result, the reasons for or against trusting it, and the cost of every pair over its offset.
 
 use core::fmt::Write as _;
 
@@ -20,13 +20,13 @@ pub struct Page<'a> {
     pub names: &'a [&'a str],
     /// Outcome of the synchronisation.
     pub outcome: &'a Outcome,
-    /// True if sounds were compared, and not joints.
+    /// True if sounds were compared instead of joints.
     pub is_heard: bool,
     /// Description of the input: key and value.
     pub about: &'a [(String, String)],
 }
 
-/// One self-contained page.
+/// Returns the page, which needs no other file.
 pub fn html(page: &Page<'_>) -> String {
     let mut out = begin("Parallax: clocks of cameras");
     let doubts = page.outcome.doubts.iter().map(|doubt| doubt.text(page.names));
@@ -123,7 +123,7 @@ fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {
     put!(out, "</svg>\n");
 }
 
-/// The offsets of a pair: of all cameras together, its best and its second best.
+/// Draws the offsets of a pair: that of all cameras together, its best and its second best.
 fn marks(out: &mut Html, pair: &PairReport, x: impl Fn(f64) -> f64) {
     let bottom = TOP + HEIGHT;
     for (offset_s, style) in [
@@ -180,7 +180,7 @@ fn path(curve: &Curve, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> String
         if cost.is_finite() {
             let to = if is_down { 'L' } else { 'M' };
             let at = [x(curve.offset_s(nth)), y(*cost)];
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             write!(path, "{to}{:.1} {:.1}", at[0], at[1]).unwrap_or_default();
         }
         is_down = cost.is_finite();

@@ -1,4 +1,4 @@
-//! Learning curves of a training as SVG.
+//! Draws the learning curves of a training run as SVG.
 
 use std::fmt::Write as _;
 
@@ -6,29 +6,29 @@ const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 240.0;
 const MARGIN: f64 = 48.0;
 
-/// A line of a diagram: one value for every pass; those that are not finite are left out.
+/// A line of a diagram, with one value for every pass. Values that are not finite are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line<'a> {
     /// Name of the line.
     pub name: &'a str,
-    /// The values.
+    /// Values of the line.
     pub values: Vec<f64>,
 }
 
 /// A diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel<'a> {
-    /// Quantity that its lines show.
+    /// Quantity that the lines show.
     pub what: &'a str,
-    /// The lines: at most as many as there are colours, 3.
+    /// Lines of the diagram, at most as many as there are colours (3).
     pub lines: Vec<Line<'a>>,
 }
 
 const COLOURS: [&str; 3] = ["#1f6fb4", "#c0392b", "#2e8b57"];
 
-/// Draws diagrams one below the other; names are constants of the program.
+/// Draws diagrams one below the other. Names must be constants of the program.
 ///
-/// * `best`: the pass that was kept, from 0.
+/// * `best`: the pass that was kept, counted from 0.
 pub fn svg(panels: &[Panel<'_>], best: Option<usize>) -> String {
     let (width, height) = (
         WIDTH + 2.0 * MARGIN,
@@ -45,7 +45,7 @@ pub fn svg(panels: &[Panel<'_>], best: Option<usize>) -> String {
     svg
 }
 
-/// One diagram.
+/// Draws one diagram.
 fn panel(Panel { what, lines }: &Panel<'_>, best: Option<usize>, top: f64) -> String {
     let all = lines.iter().flat_map(|line| &line.values);
     let all = all.filter(|value| value.is_finite());
@@ -90,7 +90,7 @@ fn panel(Panel { what, lines }: &Panel<'_>, best: Option<usize>, top: f64) -> St
         let mut path = String::new();
         for (at, value) in values.iter().enumerate().filter(|sample| sample.1.is_finite()) {
             let to = if path.is_empty() { 'M' } else { 'L' };
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             write!(path, "{to}{:.1} {:.1}", x(at), y(*value)).unwrap_or_default();
         }
         put(format!(

@@ -1,36 +1,36 @@
 //! Basis of all pages: the style sheet, markup as a type, data in a script.
 //!
-//! Markup is [`Html`], and only this file makes one from characters. The pages write with [`put!`] and [`html!`]: a
-//! literal of the program as it is, and in its braces values, each of which its type [writes](Value): markup as it is,
-//! text escaped. So no text gets into a page in another way.
+//! Markup is [`Html`], and only this file creates it from characters. The pages write with [`put!`] and [`html!`]. A
+//! literal of the program is written unchanged. Each value in its braces is [written](Value) by its type: markup
+//! unchanged, text escaped. No text can get into a page unescaped.
 
 use core::fmt;
 
 use serde_json::Value as Json;
 
-/// How all pages look: light or dark as the reader has it, and no wider than a telephone.
+/// Style of all pages: light or dark according to the reader's settings, and usable at the width of a telephone.
 pub const STYLE: &str = include_str!("style.css");
 
-/// The script that draws skeletons in space, a module: its `Stage` turns, comes nearer, and draws cameras, skeletons and
-/// their uncertainty. The pages of runs contain it; the live page loads it.
+/// The script that draws skeletons in space, a module. Its `Stage` rotates, zooms, and draws cameras, skeletons and
+/// their uncertainty. The pages of runs contain the script; the live page loads it.
 pub const STAGE: &str = include_str!("stage.js");
 
-/// Markup: in it every text from outside is escaped.
+/// Markup, in which every text from outside is escaped.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Html(String);
 
 impl Html {
-    /// Wraps markup that the program has as a constant: a style sheet, a script.
+    /// Wraps markup that is a constant of the program: a style sheet or a script.
     pub fn constant(markup: &'static str) -> Self {
         Self(markup.to_owned())
     }
 
-    /// JSON that cannot end the `<script>` that it stands in.
+    /// Wraps JSON so that it cannot end the `<script>` element that contains it.
     pub fn in_script(value: &Json) -> Self {
         Self(value.to_string().replace('<', "\\u003c"))
     }
 
-    /// For [`put!`] alone, which wraps every value.
+    /// Appends formatted markup. Used only by [`put!`], which wraps every value.
     pub fn put_wrapped(&mut self, markup: fmt::Arguments<'_>) {
         // Writing to a string cannot fail.
         let _infallible = fmt::Write::write_fmt(&mut self.0, markup);
@@ -41,19 +41,19 @@ impl Html {
         self.0.is_empty()
     }
 
-    /// The finished page.
+    /// Returns the finished page.
     pub fn into_page(self) -> String {
         self.0
     }
 }
 
-/// Adds to markup: a literal, in brackets the variables that stand in its braces by name, then the other values.
+/// Adds to markup. The arguments are a literal, in brackets the variables that its braces name, and then the other values.
 ///
 /// `put!(out, "<text x=\"{x:.1}\">{}</text>", [x], name)`
 #[macro_export]
 macro_rules! put {
     ($out:expr, $markup:literal, [$($name:ident),+] $(, $value:expr)* $(,)?) => {
-        // Behind `concat!` braces cannot take variables that are not listed, which would go in unwrapped.
+        // With `concat!`, braces cannot take variables that are not listed, which would otherwise be written unwrapped.
         $out.put_wrapped(format_args!(
             concat!($markup)
             $(, $crate::report::html::Put(&$value))*
@@ -65,7 +65,7 @@ macro_rules! put {
     };
 }
 
-/// New markup; as [`put!`].
+/// Creates new markup, with the arguments of [`put!`].
 #[macro_export]
 macro_rules! html {
     ($($all:tt)+) => {{
@@ -77,19 +77,19 @@ macro_rules! html {
 
 pub(crate) use {html, put};
 
-/// Value that may stand in the braces of [`put!`].
+/// A value that may be used in the braces of [`put!`].
 pub trait Value {
-    /// Writes it as markup.
+    /// Writes the value as markup.
     ///
     /// # Errors
     ///
-    /// The output refuses it.
+    /// Fails if the output refuses the markup.
     fn write(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 
 /// A value in the braces of [`put!`].
 pub struct Put<'a, T: ?Sized>(
-    /// The value.
+    /// Value that is written.
     pub &'a T,
 );
 
@@ -106,7 +106,7 @@ impl Value for Html {
 }
 
 impl Value for str {
-    /// As it may stand in HTML, in XML and in attributes of both. Characters that XML has not become a question mark.
+    /// Escapes the text for HTML, for XML and for attributes of both. Characters that XML does not allow become a question mark.
     fn write(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         use fmt::Write as _;
 

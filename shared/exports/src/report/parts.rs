@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use crate::report::html::{Html, STYLE, html, put};
 
-/// The beginning of a page, up to its heading.
+/// Returns the beginning of a page, up to its heading.
 pub fn begin(title: &str) -> Html {
     let mut out = html!("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
     put!(
@@ -20,7 +20,7 @@ pub fn begin(title: &str) -> Html {
 
 /// Writes the verdict: usable, or not, with the doubts.
 ///
-/// * `good`, `bad`: what is said without and with doubts.
+/// * `good`, `bad`: texts without and with doubts.
 pub fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[String]) {
     if doubts.is_empty() {
         put!(out, "<p class=\"verdict held\">{}</p>\n", good);
@@ -47,9 +47,9 @@ pub fn about_table(out: &mut Html, about: &[(String, String)]) {
     put!(out, "</table></div>\n");
 }
 
-/// The pictures that fit worst, as JPEG with a caption.
+/// Writes the pictures that fit worst, each as JPEG with a caption.
 ///
-/// * `drawn`: what is drawn into them.
+/// * `drawn`: description of the drawings in the pictures.
 pub fn worst(out: &mut Html, drawn: &'static str, pictures: &[(String, Vec<u8>)]) {
     if pictures.is_empty() {
         return;
@@ -70,7 +70,7 @@ pub fn worst(out: &mut Html, drawn: &'static str, pictures: &[(String, Vec<u8>)]
     put!(out, "</div>\n");
 }
 
-/// A number with some decimals; a dash for one that is not finite.
+/// Formats a number with some decimals; a dash if it is not finite.
 pub fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() {
         format!("{value:.decimals$}")

@@ -1,7 +1,7 @@
-//! A run as one HTML page: limits that held or did not, the skeleton in space, who was there when, tables, pictures.
+//! A run as one HTML page: limits and whether they were met, the skeleton in space, the presence of views over time, tables, pictures.
 //!
-//! The page forbids every request by its policy. The view of the skeleton is a canvas that short scripts of ours draw
-//! (`stage.js`, `space.js`): drag to turn, play, pause, step.
+//! The policy of the page forbids every request. Two short scripts (`stage.js`, `space.js`) draw the skeleton on a canvas, which can be
+//! dragged to rotate it, played, paused and stepped.
 
 mod space;
 mod timeline;
@@ -17,11 +17,11 @@ pub use timeline::Mark;
 /// Content of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Page {
-    /// Its title.
+    /// Title of the page.
     pub title: String,
     /// Sentences under the title.
     pub lead: String,
-    /// First line of the page; if not given, a statement whether all limits held.
+    /// First line of the page; if not given, a statement of whether all limits were met.
     pub verdict: Option<Verdict>,
     /// Limits that were set for the run.
     pub limits: Vec<Limit>,
@@ -29,24 +29,24 @@ pub struct Page {
     pub space: Space,
     /// Events and their times.
     pub marks: Vec<Mark>,
-    /// Numbers.
+    /// Tables of numbers.
     pub tables: Vec<Table>,
     /// Sentences about the pictures.
     pub legend: String,
-    /// Pictures.
+    /// Rows of pictures.
     pub strips: Vec<Strip>,
 }
 
 /// Judgement of a run in one line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Verdict {
-    /// The line.
+    /// Text of the line.
     pub text: String,
-    /// True if it is good.
+    /// True if the judgement is good.
     pub is_good: bool,
 }
 
-/// Something that was asked of the run.
+/// A limit that was set for the run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Limit {
     /// Quantity that is measured.
@@ -55,38 +55,38 @@ pub struct Limit {
     pub asked: String,
     /// Measured value.
     pub got: String,
-    /// True if the limit held.
+    /// True if the limit was met.
     pub held: bool,
 }
 
 /// A table of words and numbers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
-    /// Its heading.
+    /// Heading of the table.
     pub heading: String,
-    /// A sentence under it; may be empty.
+    /// A sentence under the heading; may be empty.
     pub note: String,
-    /// The heads of its columns; all empty if there is nothing to say.
+    /// Headings of the columns; all empty if none are needed.
     pub columns: Vec<String>,
-    /// Its rows.
+    /// Rows of the table.
     pub rows: Vec<Vec<String>>,
 }
 
 /// Pictures side by side, one for every view.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Strip {
-    /// Caption that they share.
+    /// Caption that the pictures share.
     pub caption: String,
     /// The pictures.
     pub pictures: Vec<Picture>,
 }
 
-/// One picture, or why there is none.
+/// One picture, or the reason why there is none.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// The view.
+    /// Name of the view.
     pub caption: String,
-    /// A JPEG file, or why there is none.
+    /// A JPEG file, or the reason why there is none.
     pub jpeg: Result<Vec<u8>, String>,
 }
 
@@ -94,7 +94,7 @@ const POLICY: &str =
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 pub(crate) const SCRIPT: &str = concat!(include_str!("stage.js"), include_str!("run/space.js"));
 
-/// One page that needs no other file and asks for none.
+/// Returns the page, which needs no other file and sends no request.
 pub fn html(page: &Page) -> String {
     let mut out = html!("<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n");
     put!(

@@ -1,5 +1,5 @@
-//! A rig calibrated from people, as one HTML page: the verdict, what is known of every camera, where in its picture
-//! people were, and the rig in space.
+//! A rig calibrated from people, as one HTML page: the verdict, the accuracy of every camera, the positions of people in its
+//! picture, and the rig in space.
 
 use calibration::people;
 use calibration::refine;
@@ -10,7 +10,7 @@ use crate::report::html::{Html, put};
 use crate::report::parts::{about_table, begin, number, verdict, worst};
 use crate::report::run::{Eye, Moment, SCRIPT, Space};
 
-/// Cells of a picture along each axis, and the size of its drawing.
+/// Number of cells of a picture along each axis, and the size of its drawing.
 const CELLS: usize = 8;
 const WIDTH: f64 = 160.0;
 /// Words for a rig with doubts.
@@ -20,12 +20,14 @@ const ROUGH: &str = "usable, but not known well";
 /// Legend of the drawings in pictures.
 const DRAWN: &str =
     "Ring: the joint as it was seen; line: to where the rig has it, from what all cameras see.";
-/// The most skeletons that are drawn.
+/// Maximum number of skeletons that are drawn.
 const MOST_MOMENTS: usize = 150;
 
-/// The page of `calibrate people`.
+/// Returns the page of `calibrate people`.
 ///
-/// * `names`: of the cameras. `about`: what was looked at, key and value. `pictures`: those that fit worst, as JPEG with a caption.
+/// * `names`: names of the cameras.
+/// * `about`: description of the input, key and value.
+/// * `pictures`: the pictures that fit worst, each as JPEG with a caption.
 pub fn of_people(
     outcome: &people::Outcome,
     names: &[&str],
@@ -93,7 +95,7 @@ pub fn of_people(
     out.into_page()
 }
 
-/// The verdict, with doubts, or else with cautions.
+/// Writes the verdict, with doubts, otherwise with cautions.
 fn judged(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
     let (bad, reasons) = if outcome.doubts.is_empty() {
         (ROUGH, &outcome.cautions)
@@ -104,7 +106,7 @@ fn judged(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
     verdict(out, ("determined", bad), &reasons);
 }
 
-/// The page of `calibrate refine`.
+/// Returns the page of `calibrate refine`.
 ///
 /// * `names`, `about`, `pictures`: as in [`of_people`].
 pub fn of_refinement(
@@ -165,7 +167,7 @@ pub fn of_refinement(
     out.into_page()
 }
 
-/// Where in the picture of every camera the joints were.
+/// Draws the positions of the joints in the picture of every camera.
 fn coverage(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
     put!(
         out,
@@ -203,7 +205,7 @@ fn coverage(out: &mut Html, outcome: &people::Outcome, names: &[&str]) {
     put!(out, "</div>\n");
 }
 
-/// The rig and the skeletons, by the script of the page of a run.
+/// Draws the rig and the skeletons, with the script of the page of a run.
 fn in_space(
     out: &mut Html,
     (cameras, up): (&[Camera], Option<UnitVector3<f64>>),

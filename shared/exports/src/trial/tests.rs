@@ -1,4 +1,4 @@
-//! Places on the grid, gaps, and what is refused.
+//! Tests of places on the grid, of gaps, and of refused input.
 
 use super::*;
 use crate::testing::{line, walker};
@@ -11,7 +11,7 @@ fn people(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Vec<Trial>, Trial
     all.finish("x", rate_hz)
 }
 
-/// The only person.
+/// Returns the trial of the only person.
 fn gathered(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Trial, TrialError> {
     let [trial] = <[Trial; 1]>::try_from(people(lines, rate_hz)?).unwrap();
     Ok(trial)

@@ -1,15 +1,15 @@
-//! An error with everything that led to it, as text. Errors hold their cause in `source` and never repeat it.
+//! Text of an error with all its causes. Errors have their cause in `source` and never repeat it.
 
 use core::error::Error;
 
-/// An error, its cause, the cause of that, and so on.
+/// Iterates over an error, its cause, the cause of that cause, and so on.
 pub fn chain<'a>(
     error: &'a (dyn Error + 'static),
 ) -> impl Iterator<Item = &'a (dyn Error + 'static)> {
     core::iter::successors(Some(error), |&error| error.source())
 }
 
-/// An error and its causes in one line, separated by `: `.
+/// Returns an error and its causes in one line, separated by `: `.
 ///
 /// ```
 /// let error = std::io::Error::other("the disk is full");

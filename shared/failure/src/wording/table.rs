@@ -12,14 +12,14 @@ use core::fmt;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
     is_left: Vec<bool>,
-    /// The titles come first.
+    /// Rows of the table; the first row has the titles.
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// Begins a table.
+    /// Creates a table without rows.
     ///
-    /// * `titles`: `<` before a title aligns its column to the left.
+    /// * `titles`: titles of the columns. `<` before a title aligns its column to the left.
     #[must_use]
     pub fn new(titles: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
         let (mut is_left, mut row) = (Vec::new(), Vec::new());
@@ -34,7 +34,7 @@ impl Table {
         }
     }
 
-    /// Adds a row; it may end before the last column.
+    /// Adds a row, which may have fewer cells than there are columns.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }

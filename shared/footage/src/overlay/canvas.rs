@@ -11,31 +11,31 @@ use image::{ExtendedColorType, ImageEncoder as _, ImageError};
 use super::Colour;
 use crate::Size;
 
-/// Why a picture cannot be saved.
+/// Reason why a picture cannot be saved.
 #[derive(Debug, thiserror::Error)]
 pub enum OverlayError {
     /// The file cannot be written.
     #[error("cannot write {}", path.display())]
     Io {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         source: io::Error,
     },
-    /// The picture cannot be encoded: it has no pixel.
+    /// The picture cannot be encoded, because it has no pixel.
     #[error("cannot encode {}", path.display())]
     Encode {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         source: ImageError,
     },
 }
 
-/// A picture to draw on. Points are `[x, y]` pixels, the centre of the top-left pixel at `(0, 0)`.
+/// A picture to draw on. Points are `[x, y]` in pixels, with the centre of the top-left pixel at `(0, 0)`.
 ///
-/// Edges are anti-aliased: a pixel is blended by its share that the shape covers. Shapes are clipped to the
-/// picture; a shape with a coordinate that is not finite is left out.
+/// Edges are anti-aliased: a pixel is blended in proportion to the share of it that the shape covers. Shapes are clipped to the
+/// picture. A shape with a coordinate that is not finite is not drawn.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Canvas {
     size: Size,
@@ -43,7 +43,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A picture of one colour.
+    /// Creates a picture of one colour.
     pub fn new(size: Size, colour: Colour) -> Self {
         Self {
             size,
@@ -51,9 +51,10 @@ impl Canvas {
         }
     }
 
-    /// A part of a picture; none if it is empty, or outside.
+    /// Copies a part of a picture; returns `None` if the part is empty, or outside the picture.
     ///
-    /// * `size` and `rgb`: of the picture; `columns` and `rows`: the part.
+    /// * `size` and `rgb`: the picture.
+    /// * `columns` and `rows`: the part.
     pub fn part(size: Size, rgb: &[u8], [columns, rows]: [Range<usize>; 2]) -> Option<Self> {
         let part = Size::new(columns.len(), rows.len());
         let row = |y: usize| {
@@ -65,7 +66,7 @@ impl Canvas {
         is_inside.then(|| Self::from_rgb(part, &pixels.concat()))
     }
 
-    /// The picture as a JPEG file; none where it is too large for one.
+    /// Returns the picture as a JPEG file; `None` if it is too large for one.
     ///
     /// * `quality`: percent.
     pub fn jpeg(&self, quality: u8) -> Option<Vec<u8>> {
@@ -81,11 +82,11 @@ impl Canvas {
         written.ok().map(|()| bytes)
     }
 
-    /// A copy of an image.
+    /// Copies an image.
     ///
     /// # Panics
     ///
-    /// If `rgb` is not `width * height * 3` bytes.
+    /// Panics if `rgb` is not `width * height * 3` bytes.
     pub fn from_rgb(size: Size, rgb: &[u8]) -> Self {
         assert_eq!(rgb.len(), size.rgb_bytes(), "the image is {size}");
         Self {
@@ -94,17 +95,17 @@ impl Canvas {
         }
     }
 
-    /// Its size.
+    /// Returns the size of the picture.
     pub fn size(&self) -> Size {
         self.size
     }
 
-    /// Its pixels, RGB, row major.
+    /// Returns the pixels of the picture, RGB, row major.
     pub fn rgb(&self) -> &[u8] {
         &self.rgb
     }
 
-    /// A line between two points with round ends, `width` pixels wide.
+    /// Draws a line between two points with round ends, `width` pixels wide.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) {
         let ([x1, y1], [x2, y2]) = (from, to);
         let reach = width / 2.0 + 1.0;
@@ -122,14 +123,14 @@ impl Canvas {
         });
     }
 
-    /// Lines from point to point, for curves.
+    /// Draws lines from point to point, for curves.
     pub fn polyline(&mut self, points: &[[f64; 2]], width: f64, colour: Colour) {
         for ends in points.windows(2) {
             self.line(ends[0], ends[1], width, colour);
         }
     }
 
-    /// A filled circle.
+    /// Draws a filled circle.
     pub fn disc(&mut self, [cx, cy]: [f64; 2], radius: f64, colour: Colour) {
         let corners = grown([cx, cy, cx, cy], radius + 1.0);
         self.paint(corners, colour, |x, y| {
@@ -137,7 +138,7 @@ impl Canvas {
         });
     }
 
-    /// The outline of a circle, a line `width` pixels wide along the radius.
+    /// Draws the outline of a circle: a line that is `width` pixels wide along the radius.
     pub fn ring(&mut self, [cx, cy]: [f64; 2], radius: f64, width: f64, colour: Colour) {
         let corners = grown([cx, cy, cx, cy], radius + width / 2.0 + 1.0);
         self.paint(corners, colour, |x, y| {
@@ -145,15 +146,15 @@ impl Canvas {
         });
     }
 
-    /// The outline of a box `[x1, y1, x2, y2]`.
+    /// Draws the outline of a box `[x1, y1, x2, y2]`.
     pub fn frame(&mut self, [x1, y1, x2, y2]: [f64; 4], width: f64, colour: Colour) {
         let corners = [[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]];
         self.polyline(&corners, width, colour);
     }
 
-    /// A filled box `[x1, y1, x2, y2]` from corner to corner.
+    /// Draws a filled box `[x1, y1, x2, y2]` from corner to corner.
     ///
-    /// * `opacity`: from 0, invisible, to 1, opaque.
+    /// * `opacity`: from 0 (invisible) to 1 (opaque).
     pub fn filled_box(&mut self, corners: [f64; 4], opacity: f64, colour: Colour) {
         let [x1, y1, x2, y2] = corners;
         let cover = |at: f64, low: f64, high: f64| {
@@ -164,7 +165,7 @@ impl Canvas {
         });
     }
 
-    /// Copies a picture, with its top-left pixel at column `x`, row `y`; it must fit.
+    /// Copies a picture, which must fit, with its top-left pixel at column `x`, row `y`.
     pub(super) fn put(&mut self, picture: &Self, [x, y]: [usize; 2]) {
         let rows = picture.rgb.chunks_exact(picture.size.width * 3);
         for (row, from) in rows.enumerate() {
@@ -173,7 +174,7 @@ impl Canvas {
         }
     }
 
-    /// Blends a colour into the pixels of a box `[x1, y1, x2, y2]`; `cover` is the share of each.
+    /// Blends a colour into the pixels of a box `[x1, y1, x2, y2]`; `cover` returns the share of each pixel.
     pub(super) fn paint(
         &mut self,
         corners: [f64; 4],
@@ -190,7 +191,7 @@ impl Canvas {
         for y in range(y1, y2, self.size.height) {
             for x in range(x1, x2, self.size.width) {
                 let cover = cover(x as f64, y as f64);
-                // False for NaN, where distances overflow.
+                // The condition is false for NaN, which occurs where distances overflow.
                 if cover > 0.0 {
                     let at = (y * self.size.width + x) * 3;
                     blend(&mut self.rgb[at..at + 3], colour, cover.min(1.0));
@@ -199,11 +200,11 @@ impl Canvas {
         }
     }
 
-    /// The bytes of a PNG.
+    /// Returns the bytes of a PNG.
     ///
     /// # Errors
     ///
-    /// A PNG cannot have this size.
+    /// Fails if a PNG cannot have this size.
     pub fn png(&self) -> Result<Vec<u8>, ImageError> {
         let mut png = Vec::new();
         PngEncoder::new(&mut png).write_image(
@@ -219,7 +220,7 @@ impl Canvas {
     ///
     /// # Errors
     ///
-    /// [`OverlayError`]; no partial file remains.
+    /// Returns an [`OverlayError`] on failure. No partial file remains.
     pub fn save_png(&self, path: &Path) -> Result<(), OverlayError> {
         let png = self.png().map_err(|source| OverlayError::Encode {
             path: path.to_path_buf(),

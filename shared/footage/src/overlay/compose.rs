@@ -19,11 +19,11 @@ pub struct Tile<'a> {
 
 /// Puts pictures side by side in reading order, `n_columns` in a row, each below its caption.
 ///
-/// All cells are as large as the largest picture; a smaller one lies in the middle of its cell's width.
+/// All cells are as large as the largest picture. A smaller picture is centred in the width of its cell.
 ///
 /// # Panics
 ///
-/// Without a tile or a column.
+/// Panics without a tile or a column.
 pub fn compose(tiles: &[Tile<'_>], n_columns: usize) -> Canvas {
     assert!(!tiles.is_empty() && n_columns > 0, "tiles in columns");
     let largest = |side: fn(Size) -> usize| {
@@ -55,7 +55,7 @@ pub fn compose(tiles: &[Tile<'_>], n_columns: usize) -> Canvas {
     sheet
 }
 
-/// A line, truncated to a width.
+/// Truncates a line to a width.
 fn fitting(line: &str, width: usize) -> &str {
     let n_fitting = width / text_width("m");
     line.char_indices().nth(n_fitting).map_or(line, |(end, _)| &line[..end])

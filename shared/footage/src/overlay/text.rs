@@ -10,19 +10,19 @@ const WEIGHT: FontWeight = FontWeight::Regular;
 /// Height of a line of text, pixels.
 pub const TEXT_HEIGHT: usize = 16;
 
-/// Width of a line of text, pixels.
+/// Returns the width of a line of text, pixels.
 pub fn text_width(text: &str) -> usize {
     text.chars().count() * get_raster_width(WEIGHT, SIZE)
 }
 
 impl Canvas {
-    /// One line of text with a dark edge, its top-left corner at `at`; characters that are not ASCII become
+    /// Draws one line of text with a dark edge, with its top-left corner at `at`. Characters that are not ASCII become
     /// question marks.
     pub fn text(&mut self, at: [f64; 2], text: &str, colour: Colour) {
         self.enlarged(at, text, colour, 1.0);
     }
 
-    /// The same, scaled with the picture: by its rows / 480, rounded, and at least 1.
+    /// Draws text that is scaled with the picture: by the number of its rows / 480, rounded, and at least 1.
     pub fn label(&mut self, at: [f64; 2], text: &str, colour: Colour) {
         let times = (self.size().height as f64 / 480.0).round().max(1.0);
         self.enlarged(at, text, colour, times);
@@ -50,7 +50,7 @@ impl Canvas {
                 top + times * TEXT_HEIGHT as f64 - 1.0,
             ];
             self.paint(corners, colour, |x, y| {
-                // The glyph has no pixel at a column or row below 0, which wraps to a large one.
+                // An index below 0 wraps to a large one, where the glyph has no pixel.
                 let of_glyph = |at: f64| (at / times).floor() as i64 as usize;
                 let (column, row) = (of_glyph(x - left), of_glyph(y - top));
                 let pixel = glyph.and_then(|glyph| glyph.pixel(column, row));

@@ -1,4 +1,4 @@
-//! Questions to `ffprobe`, each asked once, also by the processes of a run together.
+//! Caches the answers of `ffprobe`. Each question is asked only once, even by several processes of a run.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -13,7 +13,8 @@ use serde_json::{Value, json};
 use super::program::{input_name, input_options, missing};
 use crate::{FootageError, SourceSpec};
 
-/// Asks `ffprobe` about a stream of a file; once, as long as the file stays as it is: a start of it takes longer than its answer.
+/// Runs `ffprobe` on a stream of a file, but only once as long as the file does not change. Starting the program takes longer than its
+/// answer.
 pub(super) fn run_ffprobe(
     path: &Path,
     spec: &SourceSpec,
@@ -36,11 +37,11 @@ pub(super) fn run_ffprobe(
     Ok(answer)
 }
 
-/// Most answers that are kept.
+/// Maximum number of answers that are kept.
 const MOST_ANSWERS: usize = 64;
 static ANSWERS: Mutex<BTreeMap<Question, Value>> = Mutex::new(BTreeMap::new());
 
-/// A question to `ffprobe` about a file as it is.
+/// A question to `ffprobe` about the current version of a file.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Question {
     program: PathBuf,
@@ -51,7 +52,7 @@ struct Question {
 }
 
 impl Question {
-    /// None about what is no regular file.
+    /// Returns the question about a file; `None` if the path is not a regular file.
     fn about(path: &Path, spec: &SourceSpec, stream: &str, wanted: &[&str]) -> Option<Self> {
         let metadata = path.metadata().ok().filter(Metadata::is_file)?;
         let words = [stream].into_iter().chain(wanted.iter().copied());
@@ -65,7 +66,7 @@ impl Question {
     }
 }
 
-/// All that `ffprobe` was asked so far, for other processes ([`remember_answers`]): a list of
+/// Returns all answers of `ffprobe` so far, for other processes ([`remember_answers`]). The result is a list of
 /// `[program, path, bytes, nanoseconds since 1970 of its last change, words, answer]`.
 pub fn answers_so_far() -> Value {
     let answers = ANSWERS.lock().unwrap_or_else(PoisonError::into_inner);
@@ -86,8 +87,8 @@ pub fn answers_so_far() -> Value {
     each.collect()
 }
 
-/// Takes what another process was told by `ffprobe` ([`answers_so_far`]), so that it need not be asked again about files that are as they
-/// were. What is no such list is passed over.
+/// Stores the answers that another process received from `ffprobe` ([`answers_so_far`]). Files that have not changed since then need
+/// no further run of `ffprobe`. A value that is not such a list is ignored.
 pub fn remember_answers(told: &Value) {
     let mut answers = ANSWERS.lock().unwrap_or_else(PoisonError::into_inner);
     for it in told.as_array().into_iter().flatten().take(MOST_ANSWERS) {

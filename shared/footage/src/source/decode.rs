@@ -11,28 +11,28 @@ use super::exif;
 use crate::turn::{Rotation, Turn};
 use crate::{FootageError, Size};
 
-/// The largest image decoded, bytes: a header of 30 bytes may claim any size.
+/// Maximum size of a decoded image, bytes. Without a limit, a header of 30 bytes may claim any size.
 const MAX_BYTES: u64 = 1 << 29;
 
-/// How images are read.
+/// Options for reading images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Reading {
     pub(super) rotation: Rotation,
-    /// Depth of images with 16 bits that use fewer.
+    /// Depth of 16-bit images that use fewer bits.
     pub(super) depth: Option<Depth>,
 }
 
-/// How many bits images with 16 bits a colour use, and the largest value that was found.
+/// Number of bits that images with 16 bits per colour use, and the largest value that was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Depth {
-    /// The largest value.
+    /// Largest value that was found.
     pub brightest: u16,
-    /// Bits that hold it, as cameras have them: 8, 10, 12 or 14.
+    /// Number of bits for this value, as used by cameras: 8, 10, 12 or 14.
     pub bits: u32,
 }
 
 impl Depth {
-    /// The depth of images whose largest value is this; none where all 16 bits are used, or nothing is in the images.
+    /// Returns the depth of images with this largest value; `None` if they use all 16 bits, or if all values are 0.
     pub(super) fn of(brightest: u16) -> Option<Self> {
         let bits = [8, 10, 12, 14].into_iter().find(|i| brightest < 1 << i)?;
         (brightest > 0).then_some(Self { brightest, bits })
@@ -71,18 +71,18 @@ impl<'a> Encoded<'a> {
         Ok(Self { path, bytes })
     }
 
-    /// Width and height, from the header.
+    /// Returns the width and height, from the header.
     pub(super) fn size(&self) -> Result<Size, FootageError> {
         let decoder = self.decoder()?;
         Ok(size_of(&decoder))
     }
 
-    /// The orientation tag (EXIF); a tag that cannot be read counts as none.
+    /// Returns the orientation tag (EXIF). A tag that cannot be read counts as none.
     pub(super) fn tag(&self) -> Turn {
         Turn(exif::orientation(&self.bytes).unwrap_or(Orientation::NoTransforms))
     }
 
-    /// The pixels, turned, row major: grey is replicated, alpha dropped, 16 bits rounded to 8. Returns the size.
+    /// Returns the size and the turned pixels, row major. Grey is replicated, alpha is dropped, and 16 bits are rounded to 8.
     pub(super) fn decode(&self, reading: Reading) -> Result<(Size, Vec<u8>), FootageError> {
         let stored = self.size()?;
         let mut rgb = vec![0; stored.rgb_bytes()];
@@ -90,12 +90,12 @@ impl<'a> Encoded<'a> {
         Ok(reading.rotation.turn(self.tag()).apply(stored, rgb))
     }
 
-    /// The size of the turned picture, from the header.
+    /// Returns the size of the turned picture, from the header.
     pub(super) fn turned_size(&self, rotation: Rotation) -> Result<Size, FootageError> {
         Ok(rotation.turn(self.tag()).size(self.size()?))
     }
 
-    /// The largest value of an image with 16 bits a colour; none for other images.
+    /// Returns the largest value of an image with 16 bits per colour; `None` for other images.
     pub(super) fn brightest(&self) -> Result<Option<u16>, FootageError> {
         let decoder = self.decoder()?;
         if !has_16_bits(decoder.color_type()) {
@@ -156,11 +156,11 @@ impl<'a> Encoded<'a> {
     }
 }
 
-/// Decodes a JPEG file with libjpeg, whose rounding the reference programs used; `false` if it cannot.
+/// Decodes a JPEG file with libjpeg, whose rounding the reference programs used. Returns `false` if it cannot be decoded.
 ///
-/// Other decoders differ by a few grey levels in every seventh sample, which is enough to break ties of
+/// Other decoders differ by a few grey levels in every seventh sample. This is enough to break ties of
 /// gradient orientations differently: only 22 of 100 PARSE images then keep their detection to the cell.
-/// The library reports errors by unwinding, which is caught here; the caller tries another decoder.
+/// The library reports errors by unwinding. This function catches them, and the caller tries another decoder.
 pub(crate) fn jpeg_into(bytes: &[u8], rgb: &mut [u8]) -> bool {
     let decode = || -> std::io::Result<Vec<u8>> {
         let mut lines = mozjpeg::Decompress::new_mem(bytes)?.rgb()?;
@@ -182,10 +182,10 @@ fn size_of(decoder: &impl ImageDecoder) -> Size {
     Size::new(width as usize, height as usize)
 }
 
-/// Returns true if the data of a JPEG file reaches its end-of-image marker (ITU-T T.81, B.1.1).
+/// Returns true if the data of a JPEG file reach its end-of-image marker (ITU-T T.81, B.1.1).
 ///
-/// Decoders fill missing data with grey without an error. The segments in front of the data are
-/// skipped, because a thumbnail in them has an end marker of its own.
+/// Decoders fill missing data with grey without an error. The segments before the data are
+/// skipped, because a thumbnail in them has its own end marker.
 pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     const START_OF_SCAN: u8 = 0xda;
     let mut at = 2;
@@ -203,15 +203,15 @@ pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     false
 }
 
-/// Returns true if JPEG pictures of one size stand one behind the other, as cameras write Motion JPEG without a container.
+/// Returns true if the file is a sequence of JPEG pictures of one size, as cameras write Motion JPEG without a container.
 ///
-/// Photographs may have pictures behind them as well (smaller ones, depth, what makes them brighter): these are smaller, or are
-/// named in a segment of the first (`MPF`, CIPA DC-007).
+/// Photographs may also be followed by other pictures (smaller ones, depth maps, gain maps). These are smaller, or a segment of the
+/// first picture names them (`MPF`, CIPA DC-007).
 pub(super) fn is_jpeg_stream(bytes: &[u8]) -> bool {
     let Some(first) = JpegHead::read(bytes) else {
         return false;
     };
-    // Within the data no byte of this value is followed by another than 0 or a mark of restart.
+    // Within the data, a byte of this value is followed only by 0 or by a restart marker.
     let data = bytes.get(first.data..).unwrap_or_default();
     let next = data.windows(3).position(|window| window == [0xff, 0xd8, 0xff]);
     let second = next.and_then(|at| JpegHead::read(&data[at..]));
@@ -221,9 +221,9 @@ pub(super) fn is_jpeg_stream(bytes: &[u8]) -> bool {
 /// Content of the segments of a JPEG picture before its data.
 struct JpegHead {
     sides: [u8; 4],
-    /// True if a segment names more pictures.
+    /// True if a segment names further pictures.
     has_others: bool,
-    /// Where the data begins.
+    /// Index at which the data begin.
     data: usize,
 }
 
@@ -245,7 +245,7 @@ impl JpegHead {
                         data: at + length,
                     });
                 }
-                // Every frame header but those of Huffman tables, of extensions and of arithmetic coding.
+                // These are all frame headers. The excluded markers are Huffman tables, extensions and arithmetic coding.
                 0xc0..=0xcf if ![0xc4, 0xc8, 0xcc].contains(&marker) => {
                     sides = bytes.get(at + 5..at + 9)?.first_chunk().copied();
                 }

@@ -4,10 +4,10 @@ use image::metadata::Orientation;
 
 /// Number of the entry for the orientation (EXIF 2.32, 4.6.4).
 const ORIENTATION: u16 = 0x0112;
-/// Type of an entry that holds 16-bit numbers.
+/// Type of an entry that contains 16-bit numbers.
 const SHORT: u16 = 3;
 
-/// Returns the orientation that the EXIF data of a JPEG or PNG file asks for.
+/// Returns the orientation in the EXIF data of a JPEG or PNG file.
 pub(super) fn orientation(file: &[u8]) -> Option<Orientation> {
     let exif = match file {
         [0xff, 0xd8, rest @ ..] => of_jpeg(rest)?,
@@ -17,7 +17,7 @@ pub(super) fn orientation(file: &[u8]) -> Option<Orientation> {
     Orientation::from_exif(u8::try_from(Tiff::read(exif)?.short(ORIENTATION)?).ok()?)
 }
 
-/// Returns the EXIF data among the segments in front of the data of a JPEG file (ITU-T T.81, B.1.1; EXIF 2.32, 4.7.2).
+/// Returns the EXIF data in the segments before the data of a JPEG file (ITU-T T.81, B.1.1; EXIF 2.32, 4.7.2).
 fn of_jpeg(mut rest: &[u8]) -> Option<&[u8]> {
     loop {
         match rest {
@@ -51,7 +51,7 @@ fn of_png(mut rest: &[u8]) -> Option<&[u8]> {
     }
 }
 
-/// The first directory of a TIFF file, which EXIF data are (TIFF 6.0, section 2).
+/// The first directory of a TIFF file, which is the format of EXIF data (TIFF 6.0, section 2).
 struct Tiff<'a> {
     bytes: &'a [u8],
     is_little_endian: bool,
@@ -70,7 +70,7 @@ impl<'a> Tiff<'a> {
         })
     }
 
-    /// Returns the value of the entry with this number, if it is one 16-bit number.
+    /// Returns the value of the entry with this number, if it is a single 16-bit number.
     fn short(&self, tag: u16) -> Option<u16> {
         const ENTRY: usize = 12;
         let first = self.u32_at(4)? as usize;

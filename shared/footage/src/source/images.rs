@@ -7,29 +7,31 @@ use super::numbers::Numbered;
 use crate::turn::{Rotation, Turn};
 use crate::{FootageError, Size, SourceSpec};
 
-/// Bytes of a file that are searched for a second picture.
+/// Number of bytes of a file that are searched for a second picture.
 const MAX_PICTURE: u64 = 64 << 20;
-/// Most images of a sequence that are looked at for the bits that they use.
+/// Maximum number of images of a sequence that are read to find the number of used bits.
 const N_BRIGHTEST: usize = 8;
 
-/// The images to be read, in order.
+/// The images to read, in order.
 #[derive(Debug)]
 pub(super) struct Images {
-    /// Those that are left.
+    /// Images that have not been read yet.
     files: std::vec::IntoIter<Numbered>,
     first: PathBuf,
     reading: Reading,
-    /// Size of all, turned.
+    /// Size of all turned images.
     pub(super) size: Size,
     /// Orientation tag of the first image.
     pub(super) tag: Turn,
-    /// Frames, with those that have no image.
+    /// Number of frames, including those without an image.
     pub(super) n_frames: u64,
-    /// Frame behind the last one.
+    /// Index after the last frame.
     end: u64,
 }
 
 impl Images {
+    /// Opens a sequence.
+    ///
     /// * `files`: all images, with the numbers of their frames.
     pub(super) fn open(files: Vec<Numbered>, spec: &SourceSpec) -> Result<Self, FootageError> {
         let n_all = files.last().map_or(0, |file| file.frame + 1);
@@ -64,7 +66,7 @@ impl Images {
         self.reading.depth
     }
 
-    /// Reads the next image, and returns the number of its frame; none at the end.
+    /// Reads the next image. Returns the number of its frame; `None` at the end.
     pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<u64>, FootageError> {
         let Some(Numbered { path, frame }) = self.files.next() else {
             return Ok(None);
@@ -83,7 +85,7 @@ impl Images {
         Ok(Some(frame))
     }
 
-    /// Skips a frame without opening its image; whether there was such a frame.
+    /// Skips a frame without opening its image. Returns true if there was such a frame.
     pub(super) fn skip_one(&mut self, frame: u64) -> bool {
         if self.files.as_slice().first().is_some_and(|file| file.frame <= frame) {
             self.files.next();
@@ -92,7 +94,8 @@ impl Images {
     }
 }
 
-/// How many bits the images use, by some of them all over the sequence; none where they have 8, or use all of 16.
+/// Returns the number of bits that the images use, estimated from some images of the whole sequence. Returns `None` if the images have
+/// 8 bits, or use all of 16.
 fn depth(files: &[Numbered]) -> Result<Option<Depth>, FootageError> {
     let mut brightest = None;
     for it in files.iter().step_by(files.len().div_ceil(N_BRIGHTEST).max(1)) {
@@ -107,7 +110,7 @@ fn depth(files: &[Numbered]) -> Result<Option<Depth>, FootageError> {
     Ok(brightest.and_then(Depth::of))
 }
 
-/// The size of an image as it is stored, and what its tag asks.
+/// Returns the size of an image as it is stored, and the turn in its tag.
 pub(super) fn stored(path: &Path) -> Result<(Size, Turn), FootageError> {
     let encoded = Encoded::read(path)?;
     Ok((encoded.size()?, encoded.tag()))
@@ -156,36 +159,37 @@ impl Still {
     }
 }
 
-/// Decodes one image file: its size and its pixels, `width * height * 3` bytes of RGB, row major.
+/// Decodes one image file. Returns its size and its pixels, `width * height * 3` bytes of RGB, row major.
 ///
-/// The same pixels as those of [`Source`](crate::Source); `path` is a file, never a pattern.
+/// The pixels are the same as those of [`Source`](crate::Source). `path` is a file, never a pattern.
 ///
 /// # Errors
 ///
-/// [`FootageError`]: absent, empty, damaged or too large; each names the file.
+/// Returns a [`FootageError`] if the file is missing, empty, damaged or too large. The error names the file.
 pub fn read_image(path: &Path) -> Result<(Size, Vec<u8>), FootageError> {
     Still::open(path, 1, Rotation::Stored).map(|still| (still.size, still.rgb))
 }
 
-/// Decodes one image file upright: [`read_image`] with its orientation tag (EXIF) applied. Returns the tag too.
+/// Decodes one image file upright, with its orientation tag (EXIF) applied. Otherwise it works like [`read_image`], and also returns
+/// the tag.
 ///
-/// For pictures without a calibration. A calibration refers to pixels as they are stored: use
+/// Use this for pictures without a calibration. A calibration refers to pixels as they are stored: use
 /// [`read_image`] or [`Source`](crate::Source) with it.
 ///
 /// # Errors
 ///
-/// As [`read_image`].
+/// Fails in the same cases as [`read_image`].
 pub fn read_upright(path: &Path) -> Result<(Size, Vec<u8>, Turn), FootageError> {
     let still = Still::open(path, 1, Rotation::Tag)?;
     Ok((still.size, still.rgb, still.tag))
 }
 
-/// Returns true if the content of a file is that of one image (an empty file of an image's name counts as one): JPEG pictures one
-/// behind the other are a video.
+/// Returns true if the content of a file is one image. A sequence of JPEG pictures in one file is a video. An empty file counts as an
+/// image if it has the name of one.
 ///
 /// # Errors
 ///
-/// [`FootageError`]: absent, unreadable or empty.
+/// Returns a [`FootageError`] if the file is missing, unreadable or empty.
 pub fn is_image(path: &Path) -> Result<bool, FootageError> {
     use std::io::Read as _;
     let failed = |source| FootageError::Io {

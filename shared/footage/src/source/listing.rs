@@ -1,4 +1,4 @@
-//! The files that a path stands for, and their order.
+//! Finds the files that a path stands for, and their order.
 
 use std::cmp::Ordering;
 use std::ffi::OsStr;
@@ -15,11 +15,11 @@ use crate::FootageError;
 pub(super) enum Listing {
     /// One file, which may be an image or a video.
     File(PathBuf),
-    /// The images of a sequence, in order; at least one.
+    /// The images of a sequence, in order; at least one image.
     Images(Vec<PathBuf>),
 }
 
-/// Finds the files of `path`: what exists under that name, else a numbered pattern, else a glob.
+/// Finds the files of `path`: a file or folder with this name if there is one, otherwise those of a numbered pattern or a glob.
 pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
     if path.is_empty() {
         return Err(FootageError::NoName);
@@ -55,7 +55,7 @@ pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
     Ok(Listing::Images(images))
 }
 
-/// The metadata of a path; `None` if it does not exist.
+/// Returns the metadata of a path; `None` if it does not exist.
 fn metadata_of(path: &Path) -> Result<Option<Metadata>, FootageError> {
     match std::fs::metadata(path) {
         Ok(metadata) => Ok(Some(metadata)),
@@ -82,7 +82,7 @@ fn absent(path: &str) -> FootageError {
     }
 }
 
-/// The wanted files of a folder, in natural order of their names.
+/// Returns the wanted files of a folder, in natural order of their names.
 fn files_of(folder: &Path, wanted: impl Fn(&OsStr) -> bool) -> Result<Vec<PathBuf>, FootageError> {
     let read = || -> std::io::Result<Vec<PathBuf>> {
         let mut files = Vec::new();
@@ -136,7 +136,7 @@ fn matches_of(pattern: &str) -> Result<Vec<PathBuf>, FootageError> {
     Ok(files)
 }
 
-/// A file name with a number in it, as `im%05d.png`.
+/// A file name that contains a number, such as `im%05d.png`.
 struct Numbered<'a> {
     folder: &'a Path,
     prefix: &'a str,
@@ -159,7 +159,7 @@ impl<'a> Numbered<'a> {
         })
     }
 
-    /// Files with any number in that place, in the order of their numbers; gaps do not end the sequence.
+    /// Returns the files with any number in place of the pattern, in the order of their numbers. Gaps do not end the sequence.
     fn files(&self) -> Result<Vec<PathBuf>, FootageError> {
         files_of(self.folder, |name| {
             name.to_str()
@@ -177,7 +177,7 @@ fn sort_naturally(paths: &mut [PathBuf]) {
     });
 }
 
-/// Natural order: runs of digits by their value, everything else by character.
+/// Compares in natural order: runs of digits by their value, and all other text by character.
 fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut a, mut b) = (a, b);
     loop {
@@ -196,7 +196,7 @@ fn natural_order(a: &str, b: &str) -> Ordering {
     }
 }
 
-/// The runs of digits and of anything else.
+/// Splits a text into runs of digits and runs of other characters.
 pub(super) fn runs(mut text: &str) -> Vec<&str> {
     let mut all = Vec::new();
     while !text.is_empty() {
@@ -207,7 +207,7 @@ pub(super) fn runs(mut text: &str) -> Vec<&str> {
     all
 }
 
-/// The leading run of digits, or the leading run of anything else, and the rest.
+/// Splits off the leading run of digits or of other characters, and returns the run and the rest.
 fn split_run(text: &str) -> (&str, &str) {
     let is_number = text.starts_with(|letter: char| letter.is_ascii_digit());
     let end = text
@@ -216,7 +216,7 @@ fn split_run(text: &str) -> (&str, &str) {
     text.split_at(end)
 }
 
-/// The digits without leading zeros, of any length; they compare by length and then by character.
+/// Returns the digits without leading zeros, of any length. They compare by length and then by character.
 fn value_of(run: &str) -> Option<&str> {
     run.starts_with(|letter: char| letter.is_ascii_digit())
         .then(|| run.trim_start_matches('0'))

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use super::password::without_passwords;
 
-/// Where a live camera is.
+/// Location of a live camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LiveAddress {
     /// A video device of this machine: `/dev/video0`.
@@ -17,8 +17,8 @@ pub enum LiveAddress {
 }
 
 impl LiveAddress {
-    /// Reads `v4l2:/dev/video0`, a path under `/dev`, and addresses of streams (`rtsp`, `udp`, `http` and such); none
-    /// for anything else, which is footage.
+    /// Parses `v4l2:/dev/video0`, a path under `/dev`, or the address of a stream (`rtsp`, `udp`, `http` and similar). Returns `None`
+    /// for any other text, which is footage.
     ///
     /// ```
     /// use footage::LiveAddress;
@@ -45,7 +45,7 @@ impl LiveAddress {
 }
 
 impl fmt::Display for LiveAddress {
-    /// Without the name and the passwords that an address may hold.
+    /// Writes the address without the name and the passwords that it may contain.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(path) => write!(f, "{}", path.display()),
@@ -60,7 +60,7 @@ pub fn is_live(text: &str) -> bool {
     LiveAddress::parse(text).is_some()
 }
 
-/// Returns true if a text is an address of any kind, also one that cannot be read: not the path of a file.
+/// Returns true if a text is an address of any kind, even one that cannot be read. Such a text is not the path of a file.
 pub fn is_address(text: &str) -> bool {
     what(text).is_some()
 }
@@ -82,7 +82,7 @@ pub(super) fn what(text: &str) -> Option<&'static str> {
     }
 }
 
-/// The name of a file type that is neither a file nor a folder.
+/// Returns the name of a file type that is neither a file nor a folder.
 pub(super) fn kind(file_type: FileType) -> &'static str {
     if file_type.is_char_device() || file_type.is_block_device() {
         "a device"

@@ -6,25 +6,26 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Bytes kept of a log; a damaged video can fill a disk with it.
+/// Maximum number of bytes kept of a log, because a damaged video could fill a disk with its log.
 const MAX_BYTES: usize = 16 << 10;
-/// Capacity of the queue of times: of the frames between two that are read, and those that a decoder is ahead.
+/// Capacity of the queue of times. It must hold the times of the frames between two frames that are read, and those that the decoder
+/// is ahead.
 const MAX_TIMES: usize = 1 << 14;
-/// How long to wait for the time of a frame that has been read.
+/// Time to wait for the time of a frame that has been read.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Complaints of a decoder.
+/// Error messages of a decoder.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Complaints {
-    /// Messages.
+    /// Number of messages.
     pub messages: u64,
-    /// Those that say that a picture could not be decoded.
+    /// Number of messages saying that a picture could not be decoded.
     pub undecoded: u64,
     /// The last message.
     pub last: String,
 }
 
-/// How `ffmpeg` begins or ends what it says of a picture that it leaves out, by version.
+/// Beginnings or ends of `ffmpeg`'s messages about a picture that it leaves out, by version.
 const UNDECODED: [&str; 4] = [
     "Error while decoding stream",
     "Error submitting packet",
@@ -32,7 +33,7 @@ const UNDECODED: [&str; 4] = [
     "Decoding error",
 ];
 
-/// Reads a log to its end in a thread of its own, so that a decoder with much output does not block.
+/// Reads a log to its end on a separate thread, so that a decoder with much output does not block.
 #[derive(Debug)]
 pub(crate) struct Log {
     reader: Option<JoinHandle<Vec<u8>>>,
@@ -43,9 +44,9 @@ pub(crate) struct Log {
 /// Log entry of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameTime {
-    /// Its presentation time, seconds.
+    /// Presentation time of the frame, seconds.
     pub(crate) time_s: f64,
-    /// Size of what was made of it for this output, bytes.
+    /// Size of the frame in the format of this output, bytes.
     pub(crate) bytes: u64,
 }
 
@@ -64,18 +65,18 @@ impl Log {
         })
     }
 
-    /// Returns the complaints of the decoder so far.
+    /// Returns the error messages of the decoder so far.
     pub(crate) fn complaints(&self) -> Complaints {
         let complaints = self.complaints.lock();
         complaints.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The time of the next frame; waits for it for a short time.
+    /// Returns the time of the next frame, and waits for it for a short time.
     pub(crate) fn next_time(&self) -> Option<FrameTime> {
         self.times.recv_timeout(PATIENCE).ok()
     }
 
-    /// Waits for the end of the log, and returns its last messages; empty if there were none.
+    /// Waits for the end of the log. Returns its last messages; empty if there were none.
     pub(crate) fn finish(&mut self) -> String {
         let bytes = self.reader.take().and_then(|thread| thread.join().ok());
         summary(&bytes.unwrap_or_default())
@@ -85,7 +86,7 @@ impl Log {
 /// Separates the lines of ffmpeg's `framecrc` output from error messages.
 struct Lines {
     times: SyncSender<FrameTime>,
-    /// The unit of time from its header, seconds.
+    /// Unit of time from the log's header, seconds.
     unit_s: f64,
     /// The error messages.
     kept: Vec<u8>,
@@ -151,9 +152,11 @@ impl Lines {
     }
 }
 
-/// The time of a frame in a line such as `0,  0,  3,  1,  12, 0x14a00440`: stream, decoding time,
-/// presentation time, duration, bytes, checksum. It is written at once, but possibly in the middle of an error
-/// message, which is written in pieces: any text before it is ignored.
+/// Returns the time of a frame in a line such as `0,  0,  3,  1,  12, 0x14a00440`: stream, decoding time,
+/// presentation time, duration, bytes, checksum.
+///
+/// The line is written in one step, but possibly in the middle of an error
+/// message, which is written in pieces. Any text before it is therefore ignored.
 fn frame_units(line: &str) -> Option<(f64, u64)> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let [.., stream, _, presented, _, bytes, checksum] = fields[..] else {
@@ -164,14 +167,14 @@ fn frame_units(line: &str) -> Option<(f64, u64)> {
     Some((presented.parse::<i64>().ok()? as f64, bytes))
 }
 
-/// `1/25`.
+/// Parses a fraction such as `1/25`.
 fn fraction(text: &str) -> Option<f64> {
     let (above, below) = text.trim().split_once('/')?;
     let [above, below] = [above, below].map(|number| number.parse::<f64>().ok());
     Some(above? / below?)
 }
 
-/// The last three lines, as one.
+/// Joins the last three lines to one.
 pub(crate) fn summary(log: &[u8]) -> String {
     let text = String::from_utf8_lossy(log);
     let lines: Vec<&str> = text
@@ -182,7 +185,7 @@ pub(crate) fn summary(log: &[u8]) -> String {
     lines[lines.len().saturating_sub(3)..].join("; ")
 }
 
-/// A line without the component of ffmpeg and its memory address, `[mov,mp4 @ 0x55d1]`.
+/// Removes the component of ffmpeg and its memory address, such as `[mov,mp4 @ 0x55d1]`, from a line.
 fn without_address(line: &str) -> &str {
     let Some((head, rest)) = line.split_once("] ") else {
         return line;
@@ -195,7 +198,7 @@ fn without_address(line: &str) -> &str {
 mod tests {
     use super::*;
 
-    /// The messages and the times in a text.
+    /// Returns the messages and the times in a text.
     fn read(text: &str) -> (Vec<u8>, Vec<f64>) {
         let (sender, times) = sync_channel(MAX_TIMES);
         let kept = Lines::new(sender).read(text.as_bytes());

@@ -1,4 +1,4 @@
-//! The numbers in the names of pictures, and the frames that follow from those of all cameras.
+//! The numbers in the names of pictures, and the frames that follow from the numbers of all cameras.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -10,13 +10,13 @@ use crate::{FootageError, PictureNumbers};
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Numbered {
     pub(super) path: PathBuf,
-    /// From 0.
+    /// Number of the frame, counted from 0.
     pub(super) frame: u64,
 }
 
-/// The frames of pictures: by their numbers if these are given, else one after the other.
+/// Returns the frames of pictures: by their numbers if these are given, otherwise in order.
 ///
-/// Pictures in front of the first frame, and between two frames, are left out.
+/// Pictures before the first frame, and between two frames, are left out.
 pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Vec<Numbered> {
     let told = numbers.and_then(|numbers| Some((numbers, numbers_of(&paths)?)));
     let Some((PictureNumbers { first, step }, numbers)) = told else {
@@ -37,9 +37,9 @@ pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Ve
     .collect()
 }
 
-/// The numbers of pictures, rising, each once; none where they are not numbered.
+/// Returns the distinct numbers of pictures, ascending; `None` if the pictures are not numbered.
 ///
-/// * `paths`: in natural order.
+/// * `paths`: paths of the pictures, in natural order.
 fn numbers_of(paths: &[PathBuf]) -> Option<Vec<u64>> {
     let texts: Vec<String> = paths
         .iter()
@@ -60,16 +60,18 @@ fn numbers_of(paths: &[PathBuf]) -> Option<Vec<u64>> {
         let numbers: Vec<u64> = numbers.collect::<Option<_>>()?;
         numbers.is_sorted_by(|a, b| a < b).then_some(numbers)
     };
-    // Of several that rise (a number and a time), the one with the least gaps; the last of equal ones.
+    // Names may contain several ascending numbers, such as a number and a time. The one with the smallest gaps is used, and the last of
+    // equal ones.
     let rising = (0..first.len()).rev().filter_map(column);
     rising.min_by_key(|numbers| numbers[numbers.len() - 1] - numbers[0])
 }
 
-/// The numbers of the pictures of a folder, a pattern or a glob, rising; none for other footage, and where they are not numbered.
+/// Returns the numbers of the pictures of a folder, a pattern or a glob, ascending. Returns `None` for other footage, and for pictures
+/// that are not numbered.
 ///
 /// # Errors
 ///
-/// There is no such footage, or it cannot be read.
+/// Fails if there is no such footage, or if it cannot be read.
 pub fn picture_numbers(path: &str) -> Result<Option<Vec<u64>>, FootageError> {
     Ok(match listing::list(path)? {
         Listing::Images(paths) => numbers_of(&paths),
@@ -77,19 +79,21 @@ pub fn picture_numbers(path: &str) -> Result<Option<Vec<u64>>, FootageError> {
     })
 }
 
-/// How the pictures of several cameras are counted.
+/// Method of counting the pictures of several cameras.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Counting {
-    /// One after the other, as their numbers are none of frames: too far apart.
+    /// In order, because their numbers are too far apart to be numbers of frames.
     InOrder,
-    /// By their numbers, which the cameras have in common.
+    /// By their numbers, which all cameras share.
     Common(PictureNumbers),
-    /// By their numbers, each camera from its own first one: their ranges have little in common.
+    /// By their numbers, starting from each camera's own first number, because their ranges have little in common.
     Own(Vec<PictureNumbers>),
 }
 
 impl Counting {
-    /// * `cameras`: the numbers of every camera, rising; none empty.
+    /// Chooses the method for some cameras.
+    ///
+    /// * `cameras`: the numbers of every camera, ascending and not empty.
     pub fn of(cameras: &[Vec<u64>]) -> Self {
         let firsts: Vec<u64> =
             cameras.iter().filter_map(|camera| camera.first().copied()).collect();
@@ -113,7 +117,7 @@ impl Counting {
     }
 }
 
-/// Amount by which numbers rise from frame to frame; none where most frames would have no picture of any camera.
+/// Returns the difference of the numbers from frame to frame; `None` if most frames would have no picture of any camera.
 ///
 /// * `firsts`: the number of frame 0 of every camera.
 fn step_of(firsts: &[u64], cameras: &[Vec<u64>]) -> Option<u64> {
@@ -126,7 +130,7 @@ fn step_of(firsts: &[u64], cameras: &[Vec<u64>]) -> Option<u64> {
     (n_frames <= MOST_FRAMES * all.len() as u64).then_some(step)
 }
 
-/// The greatest common divisor.
+/// Returns the greatest common divisor.
 fn common(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { common(b, a % b) }
 }

@@ -1,4 +1,4 @@
-//! Names and passwords in the addresses of cameras, which belong in no message and in no file.
+//! Removes names and passwords from the addresses of cameras, so that they never appear in messages and files.
 
 /// Text that replaces a password.
 const HIDDEN: &str = "***";
@@ -20,8 +20,8 @@ const SECRET_KEYS: [&str; 14] = [
     "loginpas",
 ];
 
-/// A text with addresses in it, without the names and passwords in front of their hosts, and without the values of keys such as
-/// `password` behind their paths.
+/// Removes secrets from the addresses in a text: the names and passwords before their hosts, and the values of keys such as
+/// `password` after their paths.
 ///
 /// ```
 /// let text = footage::without_passwords("no picture from rtsp://me:secret@10.0.0.5/a?pwd=1&x=2");
@@ -42,12 +42,14 @@ pub fn without_passwords(text: &str) -> String {
     out
 }
 
-/// Where an address ends in a text.
+/// Returns true if an address in a text ends before this character.
 fn is_end(it: char) -> bool {
     it.is_whitespace() || it == '"'
 }
 
-/// * `address`: what follows the scheme.
+/// Appends an address without its secrets.
+///
+/// * `address`: the address without its scheme.
 fn push_address(out: &mut String, address: &str) {
     let end = address.find(['/', '?', '#']).unwrap_or(address.len());
     let (host, path) = address.split_at(end);
@@ -68,10 +70,10 @@ fn push_address(out: &mut String, address: &str) {
     }
 }
 
-/// Fewest characters of a secret that is looked for: what is shorter stands in any text.
+/// Minimum length of a secret that is searched for, characters. A shorter text may occur anywhere.
 const SHORTEST: usize = 3;
 
-/// A message about one address, also where it repeats the password alone.
+/// Removes the password of one address from a message, even if the message repeats only the password.
 pub(crate) fn without_password_of(address: &str, message: &str) -> String {
     let shown = without_passwords(address);
     let mut message = without_passwords(&message.replace(address, &shown));

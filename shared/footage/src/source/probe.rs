@@ -1,4 +1,4 @@
-//! The properties of a video, from `ffprobe`.
+//! Properties of a video, from `ffprobe`.
 
 use std::path::Path;
 
@@ -7,30 +7,30 @@ use serde_json::Value;
 use super::answers::run_ffprobe;
 use crate::{FootageError, Size, SourceSpec, Turn};
 
-/// Facts about a video that are known before it is decoded.
+/// Properties of a video that are known before it is decoded.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Probe {
     /// Number of the stream in the file.
     pub(super) stream: u64,
-    /// Size as stored.
+    /// Size of the stored pictures.
     pub(super) stored: Size,
-    /// Turn that the display matrix asks for.
+    /// Turn in the display matrix.
     pub(super) tag: Turn,
-    /// Frames per second, where the file tells.
+    /// Frames per second, if the file states them.
     pub(super) rate_hz: Option<f64>,
-    /// Frames per second of the times that the decoder gives, also where these are made up.
+    /// Frames per second according to the times of the decoder, even if the decoder invented these.
     pub(super) clock_hz: Option<f64>,
-    /// Frames in the stream, from the container or by counting packets.
+    /// Number of frames in the stream, from the container or by counting packets.
     pub(super) n_frames: u64,
-    /// Frames according to the duration in the header.
+    /// Number of frames according to the duration in the header.
     pub(super) n_promised: u64,
-    /// Presentation times, seconds after the first frame, where frames are not equally spaced.
+    /// Presentation times, seconds after the first frame, if frames are not equally spaced.
     pub(super) times_s: Option<Vec<f64>>,
-    /// Time of the first frame as the decoder has it, seconds; none where only the first one that is decoded tells.
+    /// Time of the first frame in the decoder, seconds; `None` if it is known only after the first frame has been decoded.
     pub(super) origin_s: Option<f64>,
     /// True if pictures are coded from other pictures.
     pub(super) is_inter: bool,
-    /// True if every picture holds two of different moments, line by line.
+    /// True if the video is interlaced: every picture has alternate lines from two different moments.
     pub(super) is_interlaced: bool,
     /// True if the option that keeps every frame is called `-fps_mode` (since 5.1), false if it is `-vsync`.
     pub(super) has_fps_mode: bool,
@@ -39,15 +39,17 @@ pub(super) struct Probe {
 const ENTRIES: &str = "program_version=version:\
     stream=index,codec_name,width,height,nb_frames,avg_frame_rate,r_frame_rate,duration,start_time,has_b_frames,field_order:\
     stream_disposition=attached_pic,timed_thumbnails,still_image:stream_side_data:format=format_name,duration,start_time";
-/// A rate that nobody has, to see whether ffprobe repeats it for a stream without a container.
+/// An unusual rate, to test whether ffprobe repeats it for a stream without a container.
 const ODD_RATE: &str = "225/32";
-/// Codecs of pictures that stand alone; the first four are also those of cover pictures.
+/// Codecs whose pictures do not depend on other pictures. The first four are also used for cover pictures.
 const INTRA: [&str; 9] = [
     "mjpeg", "png", "bmp", "gif", "rawvideo", "ffv1", "huffyuv", "prores", "dnxhd",
 ];
 
-/// Probes the film of `path`. Reads the whole file (without decoding) only if the container does not have the number of frames
-/// that are shown, or may not have equally spaced ones.
+/// Probes the film of `path`.
+///
+/// Reads the whole file (without decoding) only in two cases: the container does not state the number of shown frames, or the frames
+/// may not be equally spaced.
 pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageError> {
     let wanted = ["-show_program_version", "-show_entries", ENTRIES];
     let output = run_ffprobe(path, spec, "v", &wanted)?;
@@ -56,7 +58,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
     let is_bare = number(&output["format"]["duration"]).is_none() && !has_clock(stream);
     let mut is_made_up = false;
     if is_bare {
-        // A stream without a container: some tell their rate, for others 25 Hz are made up.
+        // A stream without a container may state its rate. Otherwise, ffprobe invents 25 Hz.
         let again = ["-framerate", ODD_RATE, "-show_entries", ENTRIES];
         let told = run_ffprobe(path, spec, "v", &again)?;
         is_made_up =
@@ -102,7 +104,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
     Ok(probe)
 }
 
-/// The size of the pictures of a video as they are stored, and what its display matrix asks.
+/// Returns the size of the pictures of a video as they are stored, and the turn in its display matrix.
 pub(super) fn stored(path: &Path, spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
     let wanted = ["-show_program_version", "-show_entries", ENTRIES];
     let output = run_ffprobe(path, spec, "v", &wanted)?;
@@ -111,7 +113,8 @@ pub(super) fn stored(path: &Path, spec: &SourceSpec) -> Result<(Size, Turn), Foo
     Ok((Size::new(side("width"), side("height")), tag(stream)))
 }
 
-/// The stream of a file that is the film: no cover picture, no thumbnails, no single picture; of several the largest.
+/// Returns the stream of a file that is the film, and not a cover picture, thumbnails or a single picture. If there are several, returns
+/// the largest one.
 fn film(output: &Value) -> &Value {
     let streams = output["streams"].as_array().map_or(&[][..], Vec::as_slice);
     let rank = |stream: &Value| {
@@ -123,16 +126,16 @@ fn film(output: &Value) -> &Value {
         let sides = ["width", "height"].map(|name| stream[name].as_u64().unwrap_or(0));
         (!is_marked, !is_single, !is_of_covers, sides[0] * sides[1])
     };
-    // The first of equal ones.
+    // The reversed order selects the first of equal streams.
     let best = streams.iter().rev().max_by_key(|stream| rank(stream));
     best.unwrap_or(&Value::Null)
 }
 
-/// Returns the turn that the display matrix of a stream asks for.
+/// Returns the turn in the display matrix of a stream.
 fn tag(stream: &Value) -> Turn {
     let data = stream["side_data_list"].as_array().map_or(&[][..], Vec::as_slice);
     let text = data.iter().find_map(|value| value["displaymatrix"].as_str());
-    // "00000000:  0  65536  0", a row a line.
+    // Each line is a row such as "00000000:  0  65536  0".
     let rows = text.unwrap_or_default().lines().filter_map(|line| {
         let mut numbers = line.split_once(':')?.1.split_whitespace().map(str::parse::<f64>);
         Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
@@ -143,9 +146,9 @@ fn tag(stream: &Value) -> Turn {
     }
 }
 
-/// When the decoder shows the first frame, seconds.
+/// Returns the time at which the decoder shows the first frame, seconds.
 ///
-/// Where frames are not decoded in their order, some containers have the times of decoding alone, which the decoder shifts.
+/// If frames are not decoded in their order, some containers have only the times of decoding, which the decoder shifts.
 fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
     let has_order = INTRA.contains(&codec) || stream["has_b_frames"] == 0;
     let starts = [stream, format].map(|value| number(&value["start_time"]));
@@ -157,7 +160,7 @@ fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
 }
 
 impl Probe {
-    /// Returns true if fewer frames are shown than are stored, by the duration shown: MP4 and its relatives have edit lists.
+    /// Returns true if fewer frames are shown than are stored, according to the shown duration. MP4 and related formats have edit lists.
     fn is_trimmed(&self, stream: &Value, format: &Value) -> bool {
         let names = format["format_name"].as_str().unwrap_or_default();
         let has_edits = names.split(',').any(|part| part == "mov" || part == "mp4");
@@ -168,7 +171,7 @@ impl Probe {
 
     /// Determines the number and the times of the frames from the packets of the stream.
     fn count(&mut self, packets: &[Value], duration_s: Option<f64>) {
-        // Packets in front of the first frame that is shown, and behind the last one, are marked `D`, to be discarded.
+        // Packets before the first shown frame and after the last one are marked `D`, which means "discard".
         let is_discarded =
             |packet: &Value| packet["flags"].as_str().is_some_and(|flags| flags.contains('D'));
         let shown: Vec<&Value> = packets.iter().filter(|packet| !is_discarded(packet)).collect();
@@ -193,18 +196,18 @@ impl Probe {
         self.times_s = (!self.is_regular(&times_s)).then_some(times_s);
     }
 
-    /// The rate by which the times of the decoder tell frames, where these are equally spaced.
+    /// Returns the rate that converts times of the decoder to frames, if the frames are equally spaced.
     pub(super) fn regular_hz(&self) -> Option<f64> {
         self.clock_hz.filter(|_| self.times_s.is_none())
     }
 
-    /// The times of all frames, where these are not equally spaced.
+    /// Returns the times of all frames, if they are not equally spaced.
     pub(super) fn listed_s(&self) -> Option<&[f64]> {
         let times = self.times_s.as_deref()?;
         (times.len() as u64 == self.n_frames).then_some(times)
     }
 
-    /// The frame of a time of the decoder; none where times tell nothing.
+    /// Returns the frame at a time of the decoder; `None` if times do not identify frames.
     pub(super) fn frame_at(&self, time_s: f64) -> Option<u64> {
         if let Some(rate_hz) = self.regular_hz() {
             return Some((time_s * rate_hz).round() as u64);
@@ -217,7 +220,7 @@ impl Probe {
         nearest.map(|nearest| nearest as u64)
     }
 
-    /// Returns true if all frames are equally spaced, to a quarter of a frame, because some containers round times to
+    /// Returns true if all frames are equally spaced. The tolerance is a quarter of a frame, because some containers round times to
     /// milliseconds.
     fn is_regular(&self, times_s: &[f64]) -> bool {
         self.clock_hz.is_some_and(|rate_hz| {
@@ -227,11 +230,11 @@ impl Probe {
     }
 }
 
-/// Frames that can be decoded without any other, by the packets of a stream.
+/// Returns the frames that can be decoded without any other frame, from the packets of a stream.
 ///
 /// # Errors
 ///
-/// The file cannot be read.
+/// Fails if the file cannot be read.
 pub(super) fn key_frames(
     path: &Path,
     spec: &SourceSpec,
@@ -258,7 +261,7 @@ pub(super) fn number(value: &Value) -> Option<f64> {
     value.as_str()?.parse().ok()
 }
 
-/// `"60000/1001"`; `"0/0"` means unknown.
+/// Parses a fraction such as `"60000/1001"`; `"0/0"` means unknown.
 pub(crate) fn fraction(value: &Value) -> Option<f64> {
     let (numerator, denominator) = value.as_str()?.split_once('/')?;
     let rate = numerator.parse::<f64>().ok()? / denominator.parse::<f64>().ok()?;
@@ -267,7 +270,7 @@ pub(crate) fn fraction(value: &Value) -> Option<f64> {
 
 /// Returns true if `ffmpeg` is of version 5.1 or later, which has `-fps_mode` and writes the times of sender reports.
 ///
-/// * `version`: `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are assumed to be recent.
+/// * `version`: for example `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`. Builds without a number are assumed to be recent.
 pub(crate) fn is_5_1(version: &str) -> bool {
     let mut numbers = version
         .trim_start_matches('n')

@@ -1,11 +1,11 @@
-//! How a file is named to ffmpeg and ffprobe.
+//! Names of files for ffmpeg and ffprobe.
 
 use std::io;
 use std::path::Path;
 
 use crate::FootageError;
 
-/// Returns the options that ffmpeg needs to read a file: JPEG pictures one behind the other are a video, whatever its name.
+/// Returns the options that ffmpeg needs to read a file. A sequence of JPEG pictures is a video, regardless of the file's name.
 pub(crate) fn input_options(path: &Path) -> &'static [&'static str] {
     use std::io::Read as _;
     let mut head = [0; 3];
@@ -16,7 +16,7 @@ pub(crate) fn input_options(path: &Path) -> &'static [&'static str] {
     &[]
 }
 
-/// The name of a file for ffmpeg, protected against names such as `concat:x` and `-x`.
+/// Returns the name of a file for ffmpeg, protected against names such as `concat:x` and `-x`.
 pub(crate) fn input_name(path: &Path) -> std::ffi::OsString {
     let mut name = std::ffi::OsString::from("file:");
     name.push(path);

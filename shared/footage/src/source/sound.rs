@@ -12,7 +12,7 @@ use super::probe::{number, probe};
 use super::program::{input_name, missing};
 use crate::{FootageError, SourceSpec, is_image};
 
-/// The sound of a video, all channels mixed.
+/// The sound of a video, with all channels mixed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedSound {
     /// Time of the first sample, seconds after the first frame.
@@ -21,13 +21,13 @@ pub struct RecordedSound {
     pub samples: Vec<i16>,
 }
 
-/// Reads the whole sound of footage; none for images and videos without any.
+/// Reads the whole sound of footage; returns `None` for images and for videos without sound.
 ///
-/// * `rate_hz`: samples a second that it is converted to.
+/// * `rate_hz`: sample rate to which the sound is converted, hertz.
 ///
 /// # Errors
 ///
-/// There is no such footage, it cannot be read, or `ffmpeg` is missing.
+/// Fails if there is no such footage, if it cannot be read, or if `ffmpeg` is missing.
 pub fn read_sound(spec: &SourceSpec, rate_hz: u32) -> Result<Option<RecordedSound>, FootageError> {
     let path = match listing::list(&spec.path)? {
         Listing::File(path) if !is_image(&path)? => path,
@@ -43,7 +43,7 @@ pub fn read_sound(spec: &SourceSpec, rate_hz: u32) -> Result<Option<RecordedSoun
     let start_s = |value: &Value| number(&value["start_time"]).unwrap_or(0.0);
     let first_frame_s = start_s(&of_pictures["streams"][0]);
     Ok(Some(RecordedSound {
-        // Silence is put before a sound that begins later than the file.
+        // The decoder inserts silence before a sound that begins later than the file.
         begins_s: start_s(&of_pictures["format"]) - first_frame_s,
         samples: samples(&path, spec, rate_hz)?,
     }))
@@ -80,7 +80,7 @@ fn samples(path: &Path, spec: &SourceSpec, rate_hz: u32) -> Result<Vec<i16>, Foo
 mod tests {
     use super::*;
 
-    /// A video with a tone that begins 0.5 s after the first frame; `None`, with a message, without ffmpeg.
+    /// Creates a video with a tone that begins 0.5 s after the first frame. Without ffmpeg, prints a message and returns `None`.
     #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
     fn video(path: &Path, with_sound: bool) -> Option<()> {
         let mut command = Command::new("ffmpeg");

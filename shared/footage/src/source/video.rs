@@ -9,31 +9,31 @@ use super::probe::{Probe, key_frames, probe};
 use super::program::{input_name, input_options, missing};
 use crate::{FootageError, Size, SourceSpec};
 
-/// A running decoder. It is killed when this is dropped. If this process dies without dropping it,
+/// A running decoder. Dropping this value kills the decoder. If this process dies without dropping it,
 /// the decoder ends at its next write to the closed pipe.
 #[derive(Debug)]
 pub(super) struct Video {
     path: PathBuf,
     pub(super) probe: Probe,
-    /// Size of the pictures, turned and shrunk.
+    /// Size of the turned and shrunk pictures.
     pub(super) size: Size,
-    /// Factor by which they are shrunk.
+    /// Factor by which the pictures are shrunk.
     pub(super) shrink: usize,
     spec: SourceSpec,
-    /// Expected frames, from the index of the container.
+    /// Expected number of frames, from the index of the container.
     pub(super) n_frames: u64,
-    /// Expected frames, from the duration in the header.
+    /// Expected number of frames, from the duration in the header.
     n_promised: u64,
     n_read: u64,
-    /// Those of them that were handed out.
+    /// Number of returned frames.
     n_given: u64,
-    /// Index in the footage of the frame that was read last.
+    /// Index in the footage of the last frame that was read.
     last_index: u64,
-    /// The last frame whose time was given.
+    /// Last frame whose time the decoder reported.
     last_told: Option<u64>,
-    /// Pictures that the decoder had left out at the last gap.
+    /// Number of pictures that the decoder had left out at the last gap.
     n_undecoded: u64,
-    /// Frames that stand alone, while those that are read are made of one that could not be decoded.
+    /// Frames that do not depend on others. Set while the frames that are read depend on one that could not be decoded.
     is_broken: Option<Vec<u64>>,
     child: Child,
     stdout: ChildStdout,
@@ -47,7 +47,7 @@ impl Video {
         let n_promised = spec.n_delivered(probe.n_promised)?;
         let not_started = |source| missing(&spec.ffmpeg, path, source);
         let mut child = Command::new(&spec.ffmpeg)
-            // A picture that is not whole is left out; otherwise its rest would be made up.
+            // An incomplete picture is left out, because the decoder would otherwise invent the rest of it.
             .args(["-nostdin", "-v", "error", "-noautorotate"])
             .args(["-err_detect:v", "explode"])
             .args(input_options(path))
@@ -82,9 +82,9 @@ impl Video {
         })
     }
 
-    /// Reads the next frame, and returns its index in the footage; `None` at the end of a complete video.
+    /// Reads the next frame. Returns its index in the footage; `None` at the end of a complete video.
     ///
-    /// The index of a frame that could not be decoded is left out.
+    /// Indices of frames that could not be decoded are skipped.
     pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<u64>, FootageError> {
         while self.spec.count.is_none_or(|most| self.n_given < most) {
             if !self.fill(rgb)? {
@@ -100,7 +100,7 @@ impl Video {
         Ok(None)
     }
 
-    /// Finds the index of the frame whose pixels have just been read; whether it is whole.
+    /// Finds the index of the frame whose pixels have just been read. Returns true if the frame is complete.
     fn identify(&mut self) -> Result<bool, FootageError> {
         let due = match self.n_read {
             0 => self.spec.start,
@@ -111,7 +111,7 @@ impl Video {
             return Ok(true);
         }
         loop {
-            // Times are told of all frames, pixels of those that are chosen.
+            // The decoder reports times of all frames, but pixels only of the chosen ones.
             let time_s = self.log.next_time().map(|next_time| next_time.time_s);
             let Some(told) = time_s.and_then(|time_s| self.probe.frame_at(time_s)) else {
                 self.last_index = due;
@@ -137,12 +137,12 @@ impl Video {
         self.probe.listed_s().is_some()
     }
 
-    /// Returns the complaints of the decoder so far.
+    /// Returns the error messages of the decoder so far.
     pub(super) fn complaints(&self) -> Complaints {
         self.log.complaints()
     }
 
-    /// Reads the pixels of the next frame that the decoder gives; whether there was one.
+    /// Reads the pixels of the next frame of the decoder. Returns true if there was one.
     fn fill(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
         let mut filled = 0;
         while filled < rgb.len() {
@@ -164,9 +164,10 @@ impl Video {
         Ok(filled == rgb.len())
     }
 
-    /// Returns true if a frame depends on no frame that failed to decode: after one, from the next key frame on.
+    /// Returns true if a frame does not depend on a frame that failed to decode. After a failure, this is the case from the next key frame
+    /// on.
     ///
-    /// * `next`: the frame that follows the one before it.
+    /// * `next`: the expected index, which follows that of the frame before.
     fn is_whole(&mut self, index: u64, next: u64) -> Result<bool, FootageError> {
         if !self.probe.is_inter {
             return Ok(true);
@@ -187,9 +188,9 @@ impl Video {
         Ok(is_whole)
     }
 
-    /// Distinguishes the end of a complete video from one that is cut off.
+    /// Distinguishes the end of a complete video from the end of a video that is cut off.
     ///
-    /// A video counts as damaged if the decoder reports errors *and* frames are missing: many valid videos cause
+    /// A video counts as damaged if the decoder reports errors *and* frames are missing. Many valid videos cause
     /// messages, and some containers count a frame or two that are never shown. Without a message, a tenth of
     /// the frames may be missing. The duration in the header is used only if there is a message, because the
     /// sound may be longer than the pictures.
@@ -211,7 +212,7 @@ impl Video {
             });
         }
         let n_expected = self.n_promised;
-        // Frames that could not be decoded do not mean that the end is missing.
+        // If some frames could not be decoded, the end may still be complete.
         let start = self.spec.start;
         let n_reached = (self.last_index.max(start) - start) / self.spec.step + 1;
         let has_errors = !message.is_empty() && n_reached < n_expected;
@@ -222,7 +223,7 @@ impl Video {
                 n_read: self.n_read,
                 n_expected,
                 message: if message.is_empty() {
-                    format!("the decoder says nothing ({status})")
+                    format!("the decoder gave no message ({status})")
                 } else {
                     message
                 },
@@ -234,25 +235,25 @@ impl Video {
 
 impl Drop for Video {
     fn drop(&mut self) {
-        // Both fail only if the decoder has been waited for already.
+        // Both calls fail only if the decoder has already been waited for.
         self.child.kill().ok();
         self.child.wait().ok();
     }
 }
 
-/// Size of the turned pictures.
+/// Returns the size of the turned pictures.
 fn turned_size(probe: &Probe, spec: &SourceSpec) -> Size {
     spec.rotation.turn(probe.tag).size(probe.stored)
 }
 
-/// Factor by which the pictures are shrunk.
+/// Returns the factor by which the pictures are shrunk.
 fn shrink(probe: &Probe, spec: &SourceSpec) -> usize {
     let Size { width, height } = probe.stored;
     let divides = |by: &usize| width.is_multiple_of(*by) && height.is_multiple_of(*by);
     (1..=spec.most_shrink).rev().find(divides).unwrap_or(1)
 }
 
-/// The filter that shrinks the pictures, if there is one.
+/// Returns the filter that shrinks the pictures, if they are shrunk.
 fn shrinking(probe: &Probe, spec: &SourceSpec) -> Option<String> {
     let by = shrink(probe, spec);
     let Size { width, height } = probe.stored.shrunk(by);
@@ -260,16 +261,19 @@ fn shrinking(probe: &Probe, spec: &SourceSpec) -> Option<String> {
     (by > 1).then_some(filter)
 }
 
-/// Returns true if the decoder is asked for the times of frames.
+/// Returns true if the decoder reports the times of frames.
 fn has_times(probe: &Probe) -> bool {
     probe.regular_hz().is_some() || probe.listed_s().is_some()
 }
 
-/// The outputs of the decoder: where times tell frames, the times of all on standard error, and the pixels of the chosen frames. A
-/// frame that cannot be decoded is missing in both.
+/// Returns the options for the outputs of the decoder.
 ///
-/// Times come first. Of two frames that are decoded at once, the decoder writes all that belongs to its first output, then all that
-/// belongs to its second: who reads the pixels of one waits for its time before the pixels of the next.
+/// If times identify frames, the times of all frames are written to standard error. The pixels of the chosen frames are written to
+/// standard output. A frame that cannot be decoded is missing in both outputs.
+///
+/// Times come first. If two frames are decoded at once, the decoder writes everything that belongs to its first output, then
+/// everything that belongs to its second. A reader that has the pixels of a frame must therefore wait for its time before it reads the
+/// next pixels.
 fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let mut arguments = Vec::new();
     if has_times(probe) {
@@ -282,7 +286,7 @@ fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
             "framecrc",
             "pipe:2",
         ];
-        // Of all frames from the first to the last, so that one that is missing between those that are chosen is noticed.
+        // Times are written for all frames from the first to the last, so that a missing frame between the chosen ones is noticed.
         let all = SourceSpec {
             step: 1,
             count: spec.count.map(|count| (count - 1).saturating_mul(spec.step).saturating_add(1)),
@@ -323,11 +327,11 @@ fn output(
     arguments
 }
 
-/// The filter that drops the frames that are not wanted before they are written to the pipe.
+/// Returns the filter that drops unwanted frames before they are written to the pipe.
 ///
-/// Every earlier frame is decoded nevertheless: a seek finds the wrong frame in many files. Where
-/// frames are equally spaced they are chosen by their time, so that one which cannot be decoded does not
-/// shift the others; where their times are listed, by who reads them.
+/// All earlier frames are decoded nevertheless, because a seek finds the wrong frame in many files. If
+/// frames are equally spaced, they are chosen by their time, so that a frame that cannot be decoded does not
+/// shift the others. If their times are listed, the reader of the pipe chooses them.
 fn frame_choice(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let (start, step) = (spec.start, spec.step);
     let is_part = start > 0 || step > 1;
@@ -418,7 +422,7 @@ mod tests {
         ));
     }
 
-    /// A second of video, too large for the pipe; `None`, with a message, without ffmpeg.
+    /// Creates a second of video, which is too large for the pipe. Without ffmpeg, prints a message and returns `None`.
     #[cfg(target_os = "linux")]
     #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
     fn long_video(folder: &Path) -> Option<PathBuf> {
@@ -458,7 +462,7 @@ mod tests {
             return;
         };
         let mut video = Video::open(&path, &SourceSpec::new("x")).unwrap();
-        // As after the death of this process: the only reader of the pipe is closed.
+        // Closes the only reader of the pipe, as the death of this process would do.
         let other = Command::new("true").stdout(Stdio::piped()).spawn();
         let (mut other, pipe) = (other.unwrap(), &mut video.stdout);
         drop(std::mem::replace(pipe, other.stdout.take().unwrap()));

@@ -3,25 +3,27 @@
 use super::Fill;
 use crate::Size;
 
-/// Which source pixels one output coordinate covers, and how much of each.
+/// Source pixels that one output coordinate covers, and the covered share of each.
 #[derive(Debug, Clone, PartialEq)]
 struct Cover {
     first: usize,
     weights: Vec<f32>,
 }
 
-/// Row and column covers; a pixel is the sum over both, divided by the area.
+/// Row and column covers. A pixel is the sum over both, divided by the area.
 #[derive(Debug, Clone)]
 pub(super) struct Area {
     columns: Vec<Cover>,
     rows: Vec<Cover>,
     divisor: f32,
-    /// One source row: the weighted sum of the rows that an output row covers.
+    /// Weighted sum of the source rows that an output row covers.
     sums: Vec<f32>,
 }
 
 impl Area {
-    /// * `axes`: factor and shift of x, factor and shift of y; factors of at least 1 in size.
+    /// Prepares the area means.
+    ///
+    /// * `axes`: factor and shift of x, and factor and shift of y. The factors have an absolute value of at least 1.
     pub(super) fn new(source: Size, output: Size, axes: [[f64; 2]; 2], fill: Fill) -> Self {
         let [x_axis, y_axis] = axes;
         let cover = |n_output: usize, axis: [f64; 2], n_source: usize| {
@@ -57,9 +59,12 @@ impl Area {
 }
 
 impl Cover {
-    /// * `centre`: where the output coordinate falls in the source; `width`: how much it covers.
+    /// Returns the cover of one output coordinate.
+    ///
+    /// * `centre`: position of the output coordinate in the source.
+    /// * `width`: covered width.
     fn new(centre: f64, width: f64, n_source: usize, fill: Fill) -> Self {
-        // Edges, in units where source pixel `i` covers `[i, i + 1]`.
+        // Edges of the cover, in units where source pixel `i` covers `[i, i + 1]`.
         let low = centre + 0.5 - width / 2.0;
         let high = low + width;
         let last = n_source as f64 - 1.0;
@@ -102,8 +107,8 @@ impl Cover {
                 *total += weight * value;
             }
         }
-        // A sum of integers is exact below 2^24, and its quotient correctly rounded: integer factors
-        // give the true mean.
+        // A sum of integers is exact below 2^24, and its quotient is correctly rounded. Integer factors
+        // therefore give the true mean.
         total.map(|sum| (sum / area + 0.5) as u8)
     }
 }

@@ -1,41 +1,42 @@
-//! Bilinear samples in few steps, for maps that turn a picture and do not shrink it.
+//! Bilinear samples in few steps, for maps that turn a picture without shrinking it.
 //!
-//! [`Sampled`] is the readable reference: the same bits, in four times as long. It also takes the pixels at the border.
+//! [`Sampled`] is the readable reference, with the same bits but four times the computing time. It also computes the pixels at the
+//! border.
 
 use std::ops::Range;
 
 use super::sampled::{POSITION_BITS, Sampled, Start};
 
-/// Bytes that are copied for a pixel: its three channels, and one of the next.
+/// Number of bytes that are copied for a pixel: its three channels, and one of the next pixel.
 const LANES: usize = 4;
-/// Positions that are taken together.
+/// Number of positions that are processed together.
 const TILE: usize = 64;
-/// Bits of the parts of a source pixel in which positions are counted.
+/// Number of fractional bits of a position, in source pixels.
 const PART_BITS: u32 = 5;
 const PARTS: u16 = 1 << PART_BITS;
-/// Bits of the sum of all weights.
+/// Number of bits of the sum of all weights.
 const SUM_BITS: u32 = 2 * PART_BITS;
 
-/// A lane for each channel, for every position of a tile.
+/// A lane for each channel of every position of a tile.
 type Lanes = [[u8; LANES]; TILE];
 
-/// A mean of the four source pixels around every position, weighted by how near they are.
+/// Computes the mean of the four source pixels around every position, weighted by their nearness.
 #[derive(Debug, Clone)]
 pub(super) struct Near {
     sampled: Sampled,
 }
 
-/// Some positions of a row.
+/// Data of several positions of a row.
 struct Tile {
     /// Source pixels above left, above right, below left and below right of the position.
     around: [Lanes; 4],
-    /// How far the position lies to the right of the left ones, and below the upper ones, 1/32 pixel.
+    /// Distance of the position from the left pixels, and from the upper pixels, in 1/32 pixel.
     parts: [Lanes; 2],
     mean: Lanes,
 }
 
 impl Near {
-    /// The samples of a map in few steps; `None` if a position takes more than four pixels, or is counted in other parts of a pixel.
+    /// Converts the samples of a map; returns `None` if a position uses more than four pixels, or has other fractional bits.
     pub(super) fn new(sampled: &Sampled) -> Option<Self> {
         sampled.is_bilinear(PART_BITS).then(|| Self {
             sampled: sampled.clone(),
@@ -68,7 +69,7 @@ impl Near {
         }
     }
 
-    /// The part of an output row whose positions have all four pixels. A row is straight in the source, so that this is one part.
+    /// Returns the part of an output row whose positions have all four pixels. It is one range, because a row is straight in the source.
     #[inline(always)]
     fn within(&self, y: usize) -> Range<usize> {
         let width = self.sampled.width();
@@ -93,7 +94,7 @@ impl Tile {
         for x in 0..n.min(TILE) {
             let [column, row] = [u, v].map(|at| (at >> POSITION_BITS) as usize);
             let first = row * stride + 3 * column;
-            // `has_all` has made sure of a pixel more than a position takes.
+            // `has_all` has ensured that there is one pixel more than a position uses.
             let eight = |at: usize| {
                 let bytes = &source[at..at + 8];
                 u64::from_le_bytes(std::array::from_fn(|nth| bytes[nth]))
@@ -112,7 +113,7 @@ impl Tile {
         }
     }
 
-    /// Adds up the products: in a pass of their own, because compilers vectorise only this one.
+    /// Adds up the products, in a separate pass, because compilers vectorise only this pass.
     #[inline(always)]
     fn add_up(&mut self) {
         let [a, b, c, d] = self.around.each_ref().map(|lanes| lanes.as_flattened());

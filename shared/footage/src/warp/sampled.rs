@@ -1,23 +1,24 @@
 //! The mean of bilinear samples, for maps that turn or enlarge.
 //!
-//! All samples of an output pixel are one weighted sum of the source pixels around its centre, and the
-//! weights depend only on where between source pixels the centre falls. So they are tabulated, per
-//! *phase*, and a pixel costs one short integer correlation, whatever the number of samples.
+//! All samples of an output pixel are one weighted sum of the source pixels around its centre. The
+//! weights depend only on the position of the centre between source pixels. They are therefore tabulated per
+//! *phase*, and a pixel costs one short integer correlation, regardless of the number of samples.
 
 use super::{Affine, Fill};
 use crate::Size;
 
-/// Source pixels of one block of a kernel row; three channels of them fill whole vector registers.
+/// Number of source pixels in a block of a kernel row. Three channels of them fill whole vector registers.
 const BLOCK_PIXELS: usize = 8;
 const BLOCK: usize = 3 * BLOCK_PIXELS;
 
-/// Fractional bits of source positions.
+/// Number of fractional bits of source positions.
 pub(super) const POSITION_BITS: u32 = 32;
 
-/// Weights of a kernel add up to `1 << WEIGHT_BITS`, exactly, so that a constant image is unchanged.
+/// Number of fractional bits of weights. The weights of a kernel add up to exactly `1 << WEIGHT_BITS`, so that a constant image is
+/// unchanged.
 const WEIGHT_BITS: u32 = 14;
 
-/// Weights per byte of a stretch of a source row: every pixel's weight three times.
+/// Weights per byte of a stretch of a source row: the weight of every pixel appears three times.
 type Block = [i16; BLOCK];
 
 /// Weighted values, added up per byte of a block.
@@ -33,34 +34,34 @@ pub(super) struct Sampled {
     footprint: Footprint,
     /// Positions are rounded to `2^-phase_bits` source pixels.
     phase_bits: u32,
-    /// `[phase y][phase x][row][block]`.
+    /// Kernels, indexed by `[phase y][phase x][row][block]`.
     kernels: Vec<Block>,
-    /// One output row.
+    /// Sums of one output row.
     sums: Vec<Sums>,
 }
 
-/// Where the centre of an output pixel falls in the source.
+/// Position of the centre of an output pixel in the source.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
-    /// Behind which part of a source pixel, along rows and columns.
+    /// Phase of the centre within a source pixel, along rows and columns.
     phase: [usize; 2],
     /// First column and row of the footprint.
     left: i64,
     top: i64,
 }
 
-/// Where a row of the output lies in the source.
+/// Position of a row of the output in the source.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
-    /// Column and row of its first pixel, in fixed point, rounded when it is cut off.
+    /// Column and row of the first pixel, in fixed point, with an offset for rounding.
     pub(super) at: [i64; 2],
-    /// From one of its pixels to the next.
+    /// Step from one pixel of the row to the next.
     pub(super) step: [i64; 2],
-    /// Bytes of a row of the source.
+    /// Number of bytes of a row of the source.
     pub(super) stride: usize,
 }
 
-/// The source pixels that a kernel covers, relative to the one that its centre lies in.
+/// The source pixels that a kernel covers, relative to the pixel that contains its centre.
 #[derive(Debug, Clone, Copy)]
 struct Footprint {
     left: i64,
@@ -71,7 +72,9 @@ struct Footprint {
 }
 
 impl Sampled {
-    /// * `n_samples`: samples per output pixel along its rows and columns.
+    /// Prepares the samples.
+    ///
+    /// * `n_samples`: number of samples per output pixel along its rows and columns.
     pub(super) fn new(
         sizes: [Size; 2],
         source_from_output: &Affine,
@@ -103,12 +106,12 @@ impl Sampled {
         }
     }
 
-    /// Output pixels of a row.
+    /// Returns the number of output pixels of a row.
     pub(super) fn width(&self) -> usize {
         self.output.width
     }
 
-    /// Where a row begins in the source, from one of its pixels on.
+    /// Returns the position of a row in the source, starting from one of its pixels.
     #[inline(always)]
     pub(super) fn start(&self, [x, y]: [usize; 2]) -> Start {
         let half = 1 << (POSITION_BITS - self.phase_bits - 1);
@@ -119,7 +122,7 @@ impl Sampled {
         }
     }
 
-    /// Returns true if the source has all pixels of an output pixel's footprint, and a column more.
+    /// Returns true if the source has all pixels of an output pixel's footprint, and one more column.
     #[inline(always)]
     pub(super) fn has_all(&self, at: [i64; 2]) -> bool {
         let Footprint {
@@ -131,7 +134,7 @@ impl Sampled {
             && fits(place.top, n_rows, self.source.height)
     }
 
-    /// Returns true if every output pixel is one bilinear sample, with positions of so many fractional bits.
+    /// Returns true if every output pixel is one bilinear sample, and positions have this number of fractional bits.
     pub(super) fn is_bilinear(&self, part_bits: u32) -> bool {
         let Footprint {
             n_columns, n_rows, ..
@@ -139,13 +142,13 @@ impl Sampled {
         [n_columns, n_rows] == [2, 2] && self.phase_bits == part_bits
     }
 
-    /// One output pixel at the border of the source, or outside.
+    /// Computes one output pixel at the border of the source, or outside.
     pub(super) fn pixel_across(&self, source: &[u8], at: [i64; 2]) -> [u8; 3] {
         rounded(by_channel(&self.add_across(source, &self.place(at))))
     }
 
-    /// In two passes over every row, because compilers vectorise them only apart: sums per byte of a
-    /// block, then per channel.
+    /// There are two passes over every row, because compilers vectorise them only separately: sums per byte of a
+    /// block, then sums per channel.
     #[inline(always)]
     pub(super) fn apply(&mut self, source: &[u8], out: &mut [u8]) {
         let mut sums = std::mem::take(&mut self.sums);
@@ -161,7 +164,7 @@ impl Sampled {
         self.sums = sums;
     }
 
-    /// The products of one output pixel, added up per byte of a block.
+    /// Returns the products of one output pixel, added up per byte of a block.
     #[inline(always)]
     fn add_up(&self, source: &[u8], at: [i64; 2], sums: &mut Sums) {
         let place = self.place(at);
@@ -171,7 +174,7 @@ impl Sampled {
         }
     }
 
-    /// Where the centre of an output pixel falls.
+    /// Returns the position of the centre of an output pixel in the source.
     #[inline(always)]
     pub(super) fn place(&self, [x, y]: [i64; 2]) -> Place {
         let half = 1 << (POSITION_BITS - self.phase_bits - 1);
@@ -193,7 +196,7 @@ impl Sampled {
         &self.kernels[phase * n_kernel..][..n_kernel]
     }
 
-    /// Index of the first byte of the footprint, if all blocks of it lie in the source.
+    /// Returns the index of the first byte of the footprint, if all its blocks are inside the source.
     #[inline(always)]
     fn inside(&self, place: &Place) -> Option<usize> {
         let (left, top) = (
@@ -207,7 +210,7 @@ impl Sampled {
             ..
         } = self.footprint;
         let width = self.source.width;
-        // A block may reach into the next row, with weights of 0, but not beyond the last.
+        // A block may extend into the next row, with weights of 0, but not beyond the last row.
         let end = ((top + n_rows - 1) * width + left) * 3 + n_blocks * BLOCK;
         let is_inside = left + n_columns <= width && end <= self.source.rgb_bytes();
         is_inside.then_some((top * width + left) * 3)
@@ -227,7 +230,7 @@ impl Sampled {
         *sums = added;
     }
 
-    /// The same sums, already per channel, where some pixels are outside of the source.
+    /// Returns the same sums, already per channel, if some pixels are outside the source.
     #[cold]
     fn add_across(&self, source: &[u8], place: &Place) -> Sums {
         let kernel = self.kernel(place);
@@ -254,7 +257,7 @@ impl Sampled {
     }
 }
 
-/// Where a stretch of kernel taps falls on an axis of the source.
+/// Position of a stretch of kernel taps on an axis of the source.
 #[derive(Clone, Copy)]
 struct Axis {
     first: i64,
@@ -273,7 +276,7 @@ impl Axis {
         }
     }
 
-    /// Taps that fall on a pixel, and on which.
+    /// Iterates over the taps that are on a pixel, with the index of that pixel.
     fn positions(self) -> impl Iterator<Item = (usize, usize)> {
         let taps = match self.fill {
             Fill::Replicate => 0..self.n_taps as i64,
@@ -302,7 +305,8 @@ fn rounded(total: [i32; 3]) -> [u8; 3] {
     total.map(|total| ((total + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS) as u8)
 }
 
-/// 1/32 source pixel, but not finer than 1/128 output pixel: large kernels need fewer phases.
+/// Returns the number of fractional bits of a phase: 1/32 source pixel, but not finer than 1/128 output pixel. Large kernels need fewer
+/// phases.
 fn phase_bits(n_samples: [usize; 2]) -> u32 {
     match n_samples[0].max(n_samples[1]) {
         0..=4 => 5,
@@ -312,7 +316,7 @@ fn phase_bits(n_samples: [usize; 2]) -> u32 {
     }
 }
 
-/// Where the samples lie around the centre of an output pixel, in source pixels.
+/// Returns the positions of the samples relative to the centre of an output pixel, in source pixels.
 fn sample_offsets(map: &Affine, n_samples: [usize; 2]) -> Vec<[f64; 2]> {
     let centred = |i: usize, n: usize| (i as f64 + 0.5) / n as f64 - 0.5;
     let mut offsets = Vec::with_capacity(n_samples[0] * n_samples[1]);
@@ -326,7 +330,7 @@ fn sample_offsets(map: &Affine, n_samples: [usize; 2]) -> Vec<[f64; 2]> {
 }
 
 impl Footprint {
-    /// All pixels that samples at `offsets` touch, from phases up to `last_fraction` of a pixel.
+    /// Returns all pixels that samples at `offsets` touch, for phases up to `last_fraction` of a pixel.
     fn new(offsets: &[[f64; 2]], last_fraction: f64) -> Self {
         let range = |axis: usize| {
             let values = || offsets.iter().map(move |offset| offset[axis]);
@@ -344,7 +348,7 @@ impl Footprint {
         }
     }
 
-    /// The weights of all samples together, with the centre at `fraction` of a source pixel.
+    /// Returns the weights of all samples together, with the centre at `fraction` of a source pixel.
     fn kernel(&self, offsets: &[[f64; 2]], fraction: [f64; 2]) -> Vec<Block> {
         let mut weights = vec![0.0; self.n_columns * self.n_rows];
         let share = f64::from(1 << WEIGHT_BITS) / offsets.len() as f64;
@@ -370,7 +374,7 @@ impl Footprint {
     }
 }
 
-/// Rounds weights so that their sum stays `1 << WEIGHT_BITS`: the largest one takes the rounding error.
+/// Rounds weights so that their sum stays `1 << WEIGHT_BITS`. The largest weight absorbs the rounding error.
 fn integers(weights: &[f64]) -> Vec<i16> {
     let mut rounded: Vec<i16> = weights.iter().map(|weight| weight.round() as i16).collect();
     let sum: i32 = rounded.iter().copied().map(i32::from).sum();

@@ -6,10 +6,10 @@ use std::process::Command;
 use footage::Size;
 use image::RgbImage;
 
-/// Odd on purpose, so that rows are not aligned.
+/// Size of the clip, odd on purpose, so that rows are not aligned.
 pub(crate) const SIZE: Size = Size::new(67, 45);
 
-/// A ramp with a moving square; every frame differs in every channel.
+/// Returns a ramp with a moving square. Every frame differs in every channel.
 pub(crate) fn frame(index: usize) -> RgbImage {
     RgbImage::from_fn(SIZE.width as u32, SIZE.height as u32, |x, y| {
         let (left, n) = (4 * index as u32, index as u8);
@@ -21,7 +21,7 @@ pub(crate) fn frame(index: usize) -> RgbImage {
     })
 }
 
-/// `im1.png`, `im2.png`, ..., `im10.png`, ... in `folder`.
+/// Writes `im1.png`, `im2.png`, ..., `im10.png`, ... into `folder`.
 pub(crate) fn write_images(folder: &Path, n: usize) {
     for index in 0..n {
         let path = folder.join(format!("im{}.png", index + 1));
@@ -29,7 +29,7 @@ pub(crate) fn write_images(folder: &Path, n: usize) {
     }
 }
 
-/// Returns true if there is an ffmpeg; prints that the test is skipped if not.
+/// Returns true if there is an ffmpeg. Otherwise, prints that the test is skipped.
 #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 pub(crate) fn has_ffmpeg() -> bool {
     let is_there = Command::new("ffmpeg").arg("-version").output().is_ok();
@@ -57,5 +57,5 @@ pub(crate) fn encode(folder: &Path, name: &str, options: &[&str]) -> PathBuf {
     path
 }
 
-/// Losslessly, with a key frame at every third.
+/// Options for lossless encoding with every third frame a key frame.
 pub(crate) const FFV1: &[&str] = &["-c:v", "ffv1", "-pix_fmt", "gbrp", "-g", "3"];

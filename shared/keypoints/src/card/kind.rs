@@ -1,14 +1,14 @@
-//! Kind that a card declares, before its keys are read.
+//! Kind that a card declares, read before its keys.
 
 use serde::Deserialize;
 
 use super::CardError;
 
-/// The format name of a card.
+/// Format name of a card.
 pub(crate) const FORMAT: &str = "parallax-keypoint-network";
-/// The format name of the card of a detector.
+/// Format name of the card of a detector.
 pub(crate) const DETECTOR_FORMAT: &str = "parallax-detector";
-/// The version of either that is read.
+/// Version of both formats that is read.
 pub(crate) const VERSION: u32 = 1;
 
 /// Kind of network that a card describes.
@@ -39,7 +39,7 @@ struct Head {
     version: u32,
 }
 
-/// Checks what a text says that it is, before its keys are checked.
+/// Checks the format and version that a text declares, before its keys are checked.
 pub(crate) fn check_head(text: &str, expected: &'static str) -> Result<(), CardError> {
     let head: Head = toml::from_str(text)?;
     if head.format == expected && head.version == VERSION {

@@ -1,4 +1,4 @@
-//! Cards that are read, and cards that are refused.
+//! Tests of cards that are read, and of cards that are refused.
 
 use proptest::prelude::*;
 

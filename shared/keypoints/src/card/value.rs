@@ -1,17 +1,17 @@
-//! How the numbers of a map become a place and a score.
+//! Conversion of the numbers of a map to a position and a score.
 
 use serde::{Deserialize, Serialize};
 
-/// How a maximum of a map is refined.
+/// Method to refine a maximum of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Refine {
-    /// Not at all.
+    /// The maximum is not refined.
     None,
-    /// By a quarter of a cell towards the higher neighbour.
+    /// The maximum is moved by a quarter of a cell towards the higher neighbour.
     #[default]
     Quarter,
-    /// To the maximum of a parabola through logarithms (DARK: Zhang et al. 2020, without its smoothing).
+    /// The maximum is that of a parabola through logarithms (DARK: Zhang et al. 2020, without its smoothing).
     Parabola,
 }
 
@@ -19,15 +19,15 @@ pub enum Refine {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Score {
-    /// A number from 0 to 1.
+    /// The value is a number from 0 to 1.
     #[default]
     Share,
-    /// Log-odds: its logistic function is the score.
+    /// The value is log-odds, whose logistic function is the score.
     LogOdds,
 }
 
 impl Score {
-    /// A value of the output as a score.
+    /// Converts a value of the output to a score.
     pub fn of(self, value: f64) -> f64 {
         match self {
             Self::Share => value,

@@ -1,15 +1,15 @@
-//! Boxes of people by the cells in which their middles lie.
+//! Boxes of people, found by the cells that contain their middles.
 
 use super::PersonBox;
 
-/// Logarithms of sides beyond which a box is no larger or smaller: no network gives them for a picture of 2048 pixels.
+/// Maximum absolute logarithm of a side. No network gives a larger one for a picture of 2048 pixels.
 const MOST_LOGARITHM: f64 = 8.0;
 
-/// The boxes of the cells that are higher than their neighbours, pixels of the input; of equal neighbours the first one's.
+/// Returns the boxes of the cells that are higher than their neighbours, pixels of the input. Of equal neighbours, the first one counts.
 ///
 /// * `values`: log-odds, then logarithms of the distances to left, top, right and bottom, cells, each of them `[rows, columns]`.
-/// * `stride`: pixels for a cell.
-/// * `least`: the lowest score of a box.
+/// * `stride`: number of pixels per cell.
+/// * `least`: minimum score of a box.
 pub(super) fn boxes(
     values: &[f32],
     [columns, rows]: [usize; 2],
@@ -50,7 +50,7 @@ mod tests {
 
     const SIZE: [usize; 2] = [12, 8];
 
-    /// Heat of -9 but for the given cells, each with a box of these sides, cells.
+    /// Returns a heat of -9 except for the given cells, each of which has a box with these sides, cells.
     fn values(cells: &[([usize; 2], f32, [f32; 4])]) -> Vec<f32> {
         let n = SIZE[0] * SIZE[1];
         let mut values = vec![-9.0; n];

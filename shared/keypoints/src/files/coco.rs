@@ -13,7 +13,7 @@ use crate::files::seen::{
     FileError, MAX_FRAMES, MAX_PEOPLE, SeenKeypoints, at_most, person, told_by,
 };
 
-/// Layout of a data set, and of results, for errors.
+/// Description of the layout of a data set, and of results, for errors.
 const DATA_SET: &str =
     "`{\"images\": [{\"id\"}], \"annotations\": [{\"image_id\", \"keypoints\": [x, y, v, ...]}]}`";
 const RESULTS: &str = "`[{\"image_id\", \"keypoints\": [x, y, confidence, ...]}]`";
@@ -40,7 +40,7 @@ struct Category {
     keypoints: Vec<String>,
 }
 
-/// A person of a data set, or of results.
+/// A person of a data set or of results.
 #[derive(Deserialize)]
 struct Entry {
     image_id: ImageId,
@@ -61,7 +61,7 @@ enum ImageId {
 }
 
 impl ImageId {
-    /// The number; the last digits of a text, before what it ends on after a dot.
+    /// Returns the number. For a text, these are its last digits before the file extension.
     fn number(&self) -> Option<u64> {
         let text = match self {
             Self::Number(number) => return Some(*number),
@@ -87,17 +87,18 @@ impl fmt::Display for ImageId {
     }
 }
 
-/// Reads a file, of mmpose too.
+/// Reads a file of COCO or of mmpose.
 ///
-/// The frames of a data set are its images in the order of their `id`; those of results are their `image_id` itself. A third
-/// number of a data set is 0 for a keypoint that is not labelled, else counts as a score, at most 1; of results it is the score.
-/// Annotations of other categories than people are passed over.
+/// The frames of a data set are its images in the order of their `id`. The frames of results are their `image_id` itself. The third
+/// number of a keypoint in a data set is 0 if it is not labelled; otherwise it counts as a score, at most 1. In results, it is the score.
+/// Annotations of categories other than people are ignored.
 ///
-/// * `names`: what the keypoints are called; `None`: what the category tells, then their number ([`NameSet::of_number`]).
+/// * `names`: names of the keypoints. If `None`, they follow from the category, or else from the number of keypoints
+///   ([`NameSet::of_number`]).
 ///
 /// # Errors
 ///
-/// [`FileError`], naming the entry.
+/// Returns a [`FileError`], which names the entry.
 pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileError> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     if mmpose::is_mmpose(text) {
@@ -114,7 +115,7 @@ pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileError> {
     data_set(&set, names)
 }
 
-/// The first letters of a text that is not JSON.
+/// Returns the first letters of a text that is not JSON.
 fn not_json(text: &[u8]) -> Option<String> {
     let text = text.trim_ascii_start();
     let is_json = text.first().is_some_and(|first| b"[{".contains(first));
@@ -172,10 +173,10 @@ fn results(entries: &[Entry], names: Option<&NameSet>) -> Result<Film, FileError
     Ok(film)
 }
 
-/// The people of all entries.
+/// Returns the people of all entries.
 ///
-/// * `list`: what the list of entries is called, for errors.
-/// * whether an entry is to be read, and the frame of an image.
+/// * `list`: name of the list of entries, for errors.
+/// * The last argument has two functions: one selects the entries to read, the other returns the frame of an image.
 fn collected(
     entries: &[Entry],
     list: &str,
@@ -224,7 +225,7 @@ fn collected(
     })
 }
 
-/// The category of people: the only one that has keypoints, or the one called `person`.
+/// Returns the category of people: the only one that has keypoints, or the one called `person`.
 fn category(all: &[Category]) -> Result<Option<&Category>, FileError> {
     let with: Vec<&Category> =
         all.iter().filter(|category| !category.keypoints.is_empty()).collect();

@@ -1,4 +1,4 @@
-//! JSON as programs write it: with `NaN` and `Infinity`, too, which are no JSON.
+//! JSON as programs write it, including `NaN` and `Infinity`, which are not valid JSON.
 
 use std::borrow::Cow;
 
@@ -6,12 +6,12 @@ use serde::de::DeserializeOwned;
 
 use crate::files::seen::FileError;
 
-/// Numbers of a file; `None` for what is no number.
+/// Numbers of a file; `None` for a value that is not a number.
 pub(super) type Numbers = Vec<Option<f64>>;
 
-/// Reads JSON; `NaN`, `nan`, `Infinity` and `-Infinity` are read as `null`.
+/// Reads JSON. `NaN`, `nan`, `Infinity` and `-Infinity` are read as `null`.
 ///
-/// * `layout`: what is expected, for errors.
+/// * `layout`: expected layout, for errors.
 pub(super) fn from_json<T: DeserializeOwned>(
     text: &[u8],
     layout: &'static str,
@@ -24,7 +24,7 @@ pub(super) fn from_json<T: DeserializeOwned>(
         .map_err(|source| FileError::Json { layout, source })
 }
 
-/// The text with `null` in place of the words for what is no number, outside of strings.
+/// Replaces `NaN` and infinities outside strings by `null`.
 fn without_nan(text: &[u8]) -> Cow<'_, [u8]> {
     const WORDS: [&[u8]; 4] = [b"NaN", b"nan", b"-Infinity", b"Infinity"];
     let mut changed = Vec::new();

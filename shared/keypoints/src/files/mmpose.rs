@@ -1,4 +1,4 @@
-//! The layouts of mmpose: the people of a picture, or of the frames of a video, with places and scores in lists of their own.
+//! The layouts of mmpose: the people of a picture, or of the frames of a video, with positions and scores in separate lists.
 
 use std::collections::BTreeMap;
 
@@ -81,7 +81,7 @@ pub(super) fn frame(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileE
     }
 }
 
-/// Reads the file of a video; its frames are counted from the lowest `frame_id`.
+/// Reads the file of a video. Frames are counted from the lowest `frame_id`.
 pub(super) fn film(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileError> {
     let (told, frames) = read(text)?;
     let mut names = names.cloned().or(told);
@@ -130,7 +130,7 @@ fn read(text: &[u8]) -> Result<(Option<NameSet>, Frames), FileError> {
 }
 
 impl Meta {
-    /// The names that the file gives; a known set where its number and names are those.
+    /// Returns the names in the file, or a known set if the number and the names of the keypoints match it.
     fn names(&self) -> Result<Option<NameSet>, FileError> {
         let mut named: Vec<(usize, &String)> = Vec::new();
         for (number, name) in &self.keypoint_id2name {

@@ -2,56 +2,56 @@
 
 use crate::names::{BODY_25, COCO_17, HALPE_26, OPENPOSE_18, SETS, WHOLE_BODIES, joint_rows};
 
-/// Most keypoints of a person.
+/// Maximum number of keypoints of a person.
 const MAX_KEYPOINTS: usize = 256;
 
-/// The names of keypoints, each once, in the order of a file.
+/// Distinct names of keypoints, in the order of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NameSet {
     names: Vec<String>,
-    /// Keypoints of a person in the file: those after the named ones are not read.
+    /// Number of keypoints of a person in the file. Keypoints after the named ones are not read.
     in_file: usize,
 }
 
-/// Why texts are not the names of keypoints.
+/// Reason why texts are not valid names of keypoints.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NamesError {
-    /// No set of this name is known.
+    /// There is no known set with this name.
     #[error("{name:?} is not a known set of keypoints, expected one of {}", NameSet::known_sets().join(", "))]
     UnknownSet {
-        /// The name.
+        /// Name that is unknown.
         name: String,
     },
-    /// Too few or too many.
+    /// There are too few or too many names.
     #[error("{n} names of keypoints, expected 1 to {MAX_KEYPOINTS}")]
     Number {
-        /// How many.
+        /// Number of names.
         n: usize,
     },
-    /// Two keypoints have one name.
+    /// Two keypoints have the same name.
     #[error("the keypoint {name:?} is listed twice; every name must occur once")]
     Twice {
-        /// The name.
+        /// Name that occurs twice.
         name: String,
     },
-    /// No joint of the skeleton follows from them.
+    /// No joint of the skeleton follows from the keypoints.
     #[error(
         "no joint of the skeleton follows from the keypoints {names}; expected names such as \"left shoulder\""
     )]
     NoJoint {
-        /// The first of them.
+        /// Names of the first keypoints.
         names: String,
     },
 }
 
 impl NameSet {
-    /// Takes names; `left_hip` and `Left Hip` are `left hip`.
+    /// Creates a set from names. Both `left_hip` and `Left Hip` become `left hip`.
     ///
     /// # Errors
     ///
-    /// [`NamesError`].
+    /// Returns a [`NamesError`] on failure.
     pub fn new(names: impl IntoIterator<Item = impl AsRef<str>>) -> Result<Self, NamesError> {
-        // One more than can be, so that too many are seen without taking all of them.
+        // One name more than the maximum is taken, to detect that there are too many without taking all of them.
         let names = names.into_iter().take(MAX_KEYPOINTS + 1);
         let plain = |text: &str| text.trim().replace(['_', '-'], " ").to_lowercase();
         let names: Vec<String> = names.map(|name| plain(name.as_ref())).collect();
@@ -72,17 +72,17 @@ impl NameSet {
         Ok(Self { names, in_file })
     }
 
-    /// The names of all known sets: [`SETS`] and [`WHOLE_BODIES`].
+    /// Returns the names of all known sets: [`SETS`] and [`WHOLE_BODIES`].
     pub fn known_sets() -> Vec<&'static str> {
         let whole = WHOLE_BODIES.iter().map(|set| set.0);
         SETS.iter().map(|set| set.0).chain(whole).collect()
     }
 
-    /// A known set: one of [`SETS`] or [`WHOLE_BODIES`].
+    /// Returns a known set: one of [`SETS`] or [`WHOLE_BODIES`].
     ///
     /// # Errors
     ///
-    /// [`NamesError::UnknownSet`].
+    /// Returns [`NamesError::UnknownSet`] if there is no such set.
     pub fn of_set(name: &str) -> Result<Self, NamesError> {
         let body = SETS.iter().find(|set| set.0 == name);
         let whole = WHOLE_BODIES.iter().find(|set| set.0 == name);
@@ -93,8 +93,8 @@ impl NameSet {
             })
     }
 
-    /// The set that programs write with this number of keypoints: 17 `coco-17`, 18 `openpose-18`, 25 `body-25`, 26 `halpe-26`, and
-    /// those of [`WHOLE_BODIES`].
+    /// Returns the set that programs write with this number of keypoints: 17 for `coco-17`, 18 for `openpose-18`, 25 for `body-25`,
+    /// 26 for `halpe-26`, and the sets of [`WHOLE_BODIES`].
     pub fn of_number(n: usize) -> Option<Self> {
         let body: &[&str] = match n {
             17 => &COCO_17,
@@ -111,17 +111,17 @@ impl NameSet {
         Self { names, in_file }
     }
 
-    /// The names, in order.
+    /// Returns the names, in order.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// How many there are.
+    /// Returns the number of names.
     pub fn n(&self) -> usize {
         self.names.len()
     }
 
-    /// How many keypoints a person has in the file: the named ones, and others after them that are not read.
+    /// Returns the number of keypoints of a person in the file: the named ones, and those after them that are not read.
     pub fn n_in_file(&self) -> usize {
         self.in_file
     }

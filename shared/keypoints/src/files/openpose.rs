@@ -1,4 +1,4 @@
-//! The layout of OpenPose, which others write, too: a file for every frame.
+//! The layout of OpenPose, which other programs also write: a file for every frame.
 
 use serde::Deserialize;
 
@@ -12,18 +12,18 @@ use crate::files::seen::{FileError, MAX_PEOPLE, at_most};
 /// Expected layout, for errors.
 const LAYOUT: &str = "`{\"people\": [{\"pose_keypoints_2d\": [x, y, confidence, ...]}]}`";
 
-/// `bodies` and `joints` are `AlphaPose`'s.
+/// A file of a frame; `bodies` and `joints` are keys of `AlphaPose`.
 #[derive(Deserialize)]
 struct File {
     #[serde(alias = "bodies")]
     people: Vec<Person>,
 }
 
-/// Its identity, and the keypoints of face and hands, are not read.
+/// A person. The identity, and the keypoints of face and hands, are not read.
 #[derive(Deserialize)]
 struct Person {
-    /// Left out, or empty, where a program keeps the place of a person whom it did not find. Before its version 1.4 `OpenPose` called it
-    /// `pose_keypoints`.
+    /// Numbers of the keypoints. They are missing or empty if a program keeps the entry of a person that it did not find. Before version
+    /// 1.4, `OpenPose` called this key `pose_keypoints`.
     #[serde(alias = "pose_keypoints", alias = "joints", alias = "keypoints")]
     pose_keypoints_2d: Option<Numbers>,
 }
@@ -34,20 +34,21 @@ impl Person {
     }
 }
 
-/// Reads the file of a frame, of mmpose too. A keypoint whose three numbers are 0, or of which one is no number, was not found.
+/// Reads the file of a frame of `OpenPose` or of mmpose. A keypoint was not found if all its three numbers are 0, or if one of them is not
+/// a number.
 ///
-/// * `names`: what the keypoints are called; `None`: what their number tells ([`NameSet::of_number`]).
+/// * `names`: names of the keypoints. If `None`, they follow from the number of keypoints ([`NameSet::of_number`]).
 ///
 /// # Errors
 ///
-/// [`FileError`], naming the entry.
+/// Returns a [`FileError`], which names the entry.
 pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileError> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     if mmpose::is_mmpose(text) {
         return mmpose::frame(text, names);
     }
     if text.trim_ascii() == b"[]" {
-        // A picture of mmpose in which nobody was found.
+        // This is a picture of mmpose in which no person was found.
         return people_of(&[], names, |_| String::new());
     }
     let file: File = from_json(text, LAYOUT)?;
@@ -60,7 +61,7 @@ pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileError> {
     people_of(&lists, names, entry)
 }
 
-/// Refuses a person whose keypoints stand under keys that are not read.
+/// Refuses a person whose keypoints have keys that are not read.
 fn other_keys(text: &[u8]) -> Result<(), FileError> {
     #[derive(Deserialize)]
     struct Whole {

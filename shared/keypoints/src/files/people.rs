@@ -8,27 +8,27 @@ use crate::files::seen::{FileError, SeenKeypoints, person, told_by};
 /// The people of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Names of their keypoints; `None` where nobody has keypoints and no names were given.
+    /// Names of the people's keypoints; `None` if no person has keypoints and no names were given.
     pub names: Option<NameSet>,
-    /// In the order of the file. Without names their lists are empty.
+    /// People in the order of the file. Without names, their lists are empty.
     pub people: Vec<SeenKeypoints>,
 }
 
 /// The people of all frames of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
-    /// Names of their keypoints.
+    /// Names of the people's keypoints.
     pub names: NameSet,
-    /// Number of frames: images of a data set; one more than the highest number of results.
+    /// Number of frames: the number of images of a data set, or one more than the highest frame number of results.
     pub n_frames: u64,
-    /// The people of frames, by number from 0, in the order of the file. A data set has all its frames; of results those
-    /// are missing that have no person.
+    /// People of each frame, by number from 0, in the order of the file. A data set has all its frames. In results, frames
+    /// without a person are missing.
     pub frames: BTreeMap<u64, Vec<SeenKeypoints>>,
 }
 
-/// The people of lists of numbers.
+/// Returns the people of lists of numbers.
 ///
-/// * `entry`: what the list of a person is called, for errors.
+/// * `entry`: returns the name of a person's list, for errors.
 pub(super) fn people_of(
     lists: &[&[Option<f64>]],
     names: Option<&NameSet>,

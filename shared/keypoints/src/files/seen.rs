@@ -1,65 +1,65 @@
-//! A person of a file, and why a file cannot be read.
+//! A person of a file, and the reasons why a file cannot be read.
 
 use crate::decode::Keypoint;
 use crate::files::names::{NameSet, NamesError};
 
-/// Most people of a frame.
+/// Maximum number of people of a frame.
 pub const MAX_PEOPLE: usize = 1000;
-/// Most frames of a file, by their numbers.
+/// Maximum number of frames of a file, according to their numbers.
 pub const MAX_FRAMES: u64 = 10_000_000;
-/// Farthest from the top-left pixel that a keypoint can lie, pixels.
+/// Maximum distance of a keypoint from the top-left pixel, pixels.
 const FARTHEST_PX: f64 = 1e6;
 
-/// The keypoints of one person, as another program saw them.
+/// The keypoints of one person, as another program found them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SeenKeypoints {
-    /// In the order of the names: the place, pixels of the footage with the centre of the top-left pixel at (0, 0), and a score
-    /// from 0 to 1. `None` for a keypoint that was not found, or not labelled.
+    /// Keypoints in the order of the names. Each has a position, pixels of the footage with the centre of the top-left pixel at (0, 0),
+    /// and a score from 0 to 1. `None` for a keypoint that was not found, or not labelled.
     pub keypoints: Vec<Option<Keypoint>>,
 }
 
 impl SeenKeypoints {
-    /// The box around the keypoints that were found with a score above 0: left, top, right, bottom, pixels.
+    /// Returns the box around the keypoints that were found with a score above 0: left, top, right, bottom, pixels.
     pub fn outline(&self) -> Option<[f64; 4]> {
         crate::window::outline(&self.keypoints)
     }
 }
 
-/// Why a file of keypoints cannot be read.
+/// Reason why a file of keypoints cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// It is not JSON of the layout.
+    /// The text is not JSON of the layout.
     #[error("expected {layout}: {source}")]
     Json {
-        /// The layout.
+        /// Description of the layout.
         layout: &'static str,
-        /// Why, and where.
+        /// Cause and position of the error.
         source: serde_json::Error,
     },
-    /// It is not JSON at all.
+    /// The text is not JSON at all.
     #[error(
         "begins with {begin:?}, expected JSON; tables, such as those of DeepLabCut, are not read"
     )]
     NotJson {
-        /// Its first letters.
+        /// First letters of the text.
         begin: String,
     },
-    /// A list has a wrong number of numbers.
+    /// A list has a wrong number of values.
     #[error("`{entry}` has {got} numbers, expected {expected}")]
     Length {
-        /// The list.
+        /// Name of the list.
         entry: String,
-        /// How many it has.
+        /// Number of values in the list.
         got: usize,
-        /// How many are read.
+        /// Expected number of values.
         expected: String,
     },
     /// A number is out of range.
     #[error("number {index} of `{entry}` is {value}, expected {expected}")]
     Number {
-        /// The list.
+        /// Name of the list.
         entry: String,
-        /// Which of its numbers, from 0.
+        /// Index of the value in the list, counted from 0.
         index: usize,
         /// Value in the file.
         value: f64,
@@ -68,12 +68,12 @@ pub enum FileError {
     },
     /// The number of keypoints does not identify a set.
     #[error(
-        "`{entry}` has {n} keypoints; 17, 18, 25, 26, 133, 135 or 136 say what they are called by their number: else give `keypoint_names`, \
+        "`{entry}` has {n} keypoints; the names are known only for 17, 18, 25, 26, 133, 135 or 136: otherwise set `keypoint_names` to \
          one of {}",
         NameSet::known_sets().join(", ")
     )]
     UnknownSet {
-        /// The list.
+        /// Name of the list.
         entry: String,
         /// Number of keypoints.
         n: usize,
@@ -84,7 +84,7 @@ pub enum FileError {
         .keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
     )]
     OtherKeys {
-        /// The person.
+        /// Name of the person's entry.
         entry: String,
         /// Keys of the file.
         keys: Vec<String>,
@@ -92,34 +92,34 @@ pub enum FileError {
     /// The names of the keypoints cannot be used.
     #[error("`{entry}`: {source}")]
     Names {
-        /// The list of names.
+        /// Name of the list of names.
         entry: String,
-        /// Why.
+        /// Cause of the error.
         source: NamesError,
     },
-    /// There are too many of something.
+    /// There are too many items of some kind.
     #[error("{got} {what}, at most {most} are read")]
     TooMany {
         /// Kind of item.
         what: String,
-        /// How many.
+        /// Number of items.
         got: u64,
-        /// How many are read.
+        /// Maximum number of items that are read.
         most: u64,
     },
-    /// Something else is wrong with an entry.
+    /// Another problem with an entry.
     #[error("`{entry}` is {got}, expected {expected}")]
     Entry {
-        /// The entry.
+        /// Name of the entry.
         entry: String,
-        /// Entry in the file.
+        /// Content of the entry in the file.
         got: String,
         /// Description of the values that are accepted.
         expected: String,
     },
 }
 
-/// Refuses more than can be.
+/// Refuses a number of items above the maximum.
 pub(crate) fn at_most(got: usize, most: usize, what: &str) -> Result<(), FileError> {
     if got <= most {
         return Ok(());
@@ -131,11 +131,11 @@ pub(crate) fn at_most(got: usize, most: usize, what: &str) -> Result<(), FileErr
     })
 }
 
-/// A person of a list of numbers: column, row and a third one for every keypoint. A keypoint with a number that is not there was not
-/// found. No numbers at all are a person without keypoints; those after the named keypoints are not read.
+/// Returns the person of a list of numbers, which has column, row and a third number for every keypoint. A keypoint with a missing number
+/// was not found. An empty list is a person without keypoints. Numbers after the named keypoints are not read.
 ///
-/// * `entry`: the list, for errors.
-/// * `is_found`: whether three numbers are a keypoint that was found.
+/// * `entry`: returns the name of the list, for errors.
+/// * `is_found`: returns true if three numbers are a keypoint that was found.
 pub(crate) fn person(
     values: &[Option<f64>],
     names: &NameSet,
@@ -183,7 +183,7 @@ pub(crate) fn person(
     })
 }
 
-/// The set of names that follows from the number of values.
+/// Returns the set of names that follows from the number of values.
 pub(crate) fn told_by(n_values: usize, entry: impl Fn() -> String) -> Result<NameSet, FileError> {
     if !n_values.is_multiple_of(3) {
         return Err(FileError::Length {

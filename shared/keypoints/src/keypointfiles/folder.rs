@@ -7,7 +7,7 @@ use crate::files::MAX_FRAMES;
 
 use crate::keypointfiles::error::KeypointFileError;
 
-/// The files of a folder, with the numbers of their frames from 0: rising, each once.
+/// Returns the files of a folder with the numbers of their frames, counted from 0, ascending and distinct.
 pub(crate) fn files(folder: &Path) -> Result<Vec<(u64, PathBuf)>, KeypointFileError> {
     let failed = |source| KeypointFileError::Read {
         path: folder.to_owned(),
@@ -57,7 +57,7 @@ fn checked(
     Ok(files)
 }
 
-/// The number of a frame in the name of its file: the last digits before `_keypoints.json` or `.json`.
+/// Returns the number of a frame in the name of its file: the last digits before `_keypoints.json` or `.json`.
 fn number(name: &str) -> Option<u64> {
     let stem = name.strip_suffix(".json")?;
     let stem = stem.strip_suffix("_keypoints").unwrap_or(stem);

@@ -1,17 +1,19 @@
-//! Check whether 25 keypoints without names lie as those of `body-25` do.
+//! Checks whether 25 keypoints without names are arranged like those of `body-25`.
 //!
-//! OpenPose has two sets of 25, and files do not say which: `body-25`, and `body-25b` of its experimental model. The first has a
-//! pelvis in the middle of the hips. What is there in the second, an elbow, a wrist and a hip, lies apart.
+//! OpenPose has two sets of 25 keypoints, and files do not say which one they use: `body-25`, and `body-25b` of its experimental model. The
+//! first set has a pelvis in the middle of the hips. The second set has an elbow, a wrist and a hip in place of the pelvis and the hips,
+//! and these are apart from each other.
 
 use crate::BODY_25;
 use crate::files::SeenKeypoints;
 
-/// A point that is farther than this from the middle of the hips, in half of the people, is not the pelvis: share of the
-/// longer side of their box. In the demonstration of Pose2Sim, which is `body-25b`, the median of a camera is 0.17 to 0.51.
+/// Maximum distance of the pelvis from the middle of the hips, as a share of the longer side of a person's box. If the distance is larger
+/// in half of the people, the point is not the pelvis. In the demonstration of Pose2Sim, which is `body-25b`, the median of a camera is
+/// 0.17 to 0.51.
 const MOST_OFF: f64 = 0.1;
 
-/// How far from the middle of the hips half of the people have their pelvis, at least; `None` where it is near enough, or nobody
-/// has all three.
+/// Returns the median distance of the pelvis from the middle of the hips. Returns `None` if it is small enough, or if no person
+/// has all three keypoints.
 pub(crate) fn pelvis_off(people: &mut dyn Iterator<Item = &SeenKeypoints>) -> Option<f64> {
     let mut off: Vec<f64> = people.filter_map(off).collect();
     off.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! The people of every frame.
+//! Source of the people of every frame.
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
@@ -11,10 +11,10 @@ use crate::keypointfiles::error::KeypointFileError;
 use crate::keypointfiles::folder;
 use crate::keypointfiles::order::pelvis_off;
 
-/// Largest file of one frame, and of all frames, bytes.
+/// Maximum size of the file of one frame, and of the file of all frames, bytes.
 const MOST_OF_FRAME: u64 = 16 << 20;
 const MOST_OF_FILM: u64 = 1 << 30;
-/// Files with people that are read to see which 25 keypoints they have.
+/// Number of files with people that are read to find out which 25 keypoints they have.
 const N_LOOKED_AT: usize = 20;
 
 /// The keypoints of a film, by the numbers of its frames.
@@ -27,24 +27,24 @@ pub struct KeypointSource {
 
 #[derive(Debug)]
 enum Frames {
-    /// Files, read when their frame is asked for; rising by number.
+    /// Files with ascending numbers, each read when its frame is requested.
     Files(Vec<(u64, PathBuf)>),
-    /// Read already.
+    /// Frames that have already been read.
     Read(BTreeMap<u64, Vec<SeenKeypoints>>),
 }
 
 impl KeypointSource {
     /// Opens a folder of JSON files in OpenPose's layout, or one JSON file in COCO's.
     ///
-    /// A file's frame is the last number in its name, counted from the lowest one of the folder. Numbers that no file
-    /// has are frames without keypoints. Files that do not end in `.json` are passed over.
+    /// A file's frame is the last number in its name, counted from the lowest one of the folder. A number without a file
+    /// is a frame without keypoints. Files that do not end in `.json` are ignored.
     ///
-    /// * `names`: what the keypoints are called; `None`: as their number or their category in the files says. Then the
-    ///   files of a folder are read up to the first person, or a few more.
+    /// * `names`: names of the keypoints. If `None`, they follow from the number of keypoints or from the category in the files. In this
+    ///   case, the files of a folder are read up to the first person, or a few more.
     ///
     /// # Errors
     ///
-    /// [`KeypointFileError`], naming the file.
+    /// Returns a [`KeypointFileError`], which names the file.
     pub fn open(path: &Path, names: Option<NameSet>) -> Result<Self, KeypointFileError> {
         if path.is_dir() {
             return Self::folder(path, names);
@@ -79,19 +79,20 @@ impl KeypointSource {
         &self.names
     }
 
-    /// Number of frames: one more than the highest number in the files.
+    /// Returns the number of frames: one more than the highest number in the files.
     pub fn n_frames(&self) -> u64 {
         self.n_frames
     }
 
-    /// The people of a frame, from 0, in the order of its file.
+    /// Reads the people of a frame, counted from 0, in the order of its file.
     ///
-    /// * `people`: replaced by them; empty where there are none.
-    /// * Returns how many there are; `None` if the files do not have the frame: a gap, or beyond the end.
+    /// Returns the number of people; `None` if the files do not have the frame (a gap, or beyond the end).
+    ///
+    /// * `people`: replaced by the people of the frame; empty if there are none.
     ///
     /// # Errors
     ///
-    /// [`KeypointFileError`] of a file that cannot be read; `people` is empty then. Other frames can still be asked for.
+    /// Returns a [`KeypointFileError`] if a file cannot be read. `people` is then empty, and other frames can still be read.
     pub fn of_frame(
         &self,
         frame: u64,
@@ -119,7 +120,7 @@ impl KeypointSource {
     }
 }
 
-/// The names that follow from the first file with a person.
+/// Returns the names that follow from the first file with a person.
 fn told(folder: &Path, files: &[(u64, PathBuf)]) -> Result<NameSet, KeypointFileError> {
     let mut told: Option<NameSet> = None;
     let mut people = Vec::new();
@@ -169,7 +170,7 @@ fn in_file(path: &Path, source: FileError) -> KeypointFileError {
     }
 }
 
-/// The bytes of a file; not more than that, whatever its size is said to be.
+/// Reads the bytes of a file, but not more than `most`, regardless of its stated size.
 fn read(path: &Path, most: u64) -> Result<Vec<u8>, KeypointFileError> {
     let failed = |source| KeypointFileError::Read {
         path: path.to_owned(),

@@ -1,4 +1,4 @@
-//! Windows of pictures, and the coordinates of networks in them.
+//! Tests of windows of pictures, and of the coordinates of networks in them.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::decode::HeatMaps;
 
 #[test]
 fn a_widened_box_has_the_shape_of_the_input_and_holds_the_box() {
-    // 96 wide, 128 high; the box is 100 by 100, with its margin 125 by 125.
+    // The input is 96 wide and 128 high. The box is 100 by 100, and 125 by 125 with its margin.
     let window = Window::new(&card(), [50.0, 50.0, 150.0, 150.0]).unwrap();
     assert_eq!(window.step()[0], window.step()[1]);
     assert_eq!(window.in_picture([48.0, 64.0]), [100.0, 100.0]);
@@ -57,7 +57,7 @@ fn the_input_is_the_picture_prepared_as_the_card_says() {
     let mut card = card();
     (card.crop.margin, card.crop.fill) = (1.0, 9);
     (card.input.scale, card.input.mean, card.input.std) = (0.5, [1.0, 2.0, 3.0], [2.0, 4.0, 8.0]);
-    // A picture of one colour, in the middle of the window one pixel for one.
+    // The picture has one colour. In the middle of the window, one pixel of the picture is one pixel of the input.
     let rgb: Vec<u8> = [10, 20, 30].repeat(96 * 128);
     let window = Window::new(&card, [0.0, 0.0, 96.0, 128.0]).unwrap();
     let mut values = vec![f32::NAN; 3 * 96 * 128];
@@ -71,7 +71,7 @@ fn the_input_is_the_picture_prepared_as_the_card_says() {
     card.input.layout = Layout::Pixels;
     window.fill(&card, &rgb, [96, 128], &mut values);
     assert_eq!(values[..3], [7.0, 2.0, 0.25]);
-    // Beyond the picture.
+    // This window is outside the picture.
     let far = Window::new(&card, [500.0, 0.0, 596.0, 128.0]).unwrap();
     far.fill(&card, &rgb, [96, 128], &mut values);
     assert_eq!(values[..3], [1.75, 0.625, 0.1875]);
@@ -134,7 +134,7 @@ fn the_box_of_keypoints_is_of_those_that_were_found() {
     assert_eq!(outline(&all[1..3]), None);
 }
 
-/// A card with the maps of a network that was trained with unbiased coordinates, or without.
+/// Returns a card with the maps of a network that was trained with or without unbiased coordinates.
 fn udp_card(udp: bool) -> Card {
     let mut card = card();
     if let Codec::HeatMap { udp: it, .. } = &mut card.output {
@@ -143,13 +143,13 @@ fn udp_card(udp: bool) -> Card {
     card
 }
 
-/// The column or row of the input at one of the picture, by the matrix of mmpose's `get_udp_warp_matrix` without a rotation.
+/// Returns the column or row of the input at one of the picture, by the matrix of mmpose's `get_udp_warp_matrix` without a rotation.
 fn warped(x: f64, centre: f64, size: f64, side: f64) -> f64 {
     let scale = (side - 1.0) / size;
     scale * x + scale * (-0.5 * (2.0 * centre) + 0.5 * size)
 }
 
-/// The column or row of the picture at a cell of a map, as mmpose's `UDPHeatmap` decodes it and its estimator puts it back.
+/// Returns the column or row of the picture at a cell of a map, as mmpose's `UDPHeatmap` decodes it and its estimator converts it back.
 fn decoded(cell: f64, cells: f64, [centre, size, side]: [f64; 3]) -> f64 {
     let in_input = cell / (cells - 1.0) * side;
     in_input / side * size + centre - 0.5 * size
@@ -192,7 +192,7 @@ fn unbiased_corner_pixels_lie_on_the_edges_of_the_box() {
     assert!(near(window.in_picture([0.0, 0.0]), [50.0, 60.0]));
     assert!(near(window.in_picture([95.0, 127.0]), [146.0, 188.0]));
     assert!(near(window.in_picture([47.5, 63.5]), [98.0, 124.0]));
-    // Without it the middle is half the width, and a pixel of this box is one of the input.
+    // Without unbiased data processing, the middle is half the width, and a pixel of this box is one pixel of the input.
     let window = Window::new(&udp_card(false), [50.0, 60.0, 146.0, 188.0]).unwrap();
     assert_eq!(window.in_picture([48.0, 64.0]), [98.0, 124.0]);
 }

@@ -1,4 +1,4 @@
-//! Guests of a deployment: who is let in, and that nobody waits for them.
+//! Tests of guests: which guests a deployment accepts, and that no process waits for them.
 
 use core::time::Duration;
 
@@ -57,7 +57,7 @@ fn a_deployment_that_is_starting_is_waited_for_and_one_that_does_not_run_is_not(
     assert_eq!(namespace.description().unwrap(), "else");
 }
 
-/// A deployment of one lossless topic, and its bus.
+/// Returns a deployment with one lossless topic, and its bus.
 fn deployment(base: &Path) -> (DeploymentLock, Bus, Vec<Topic>) {
     let namespace = Namespace::below("here", base).unwrap();
     let lock = namespace.acquire().unwrap();
@@ -90,7 +90,7 @@ fn no_sender_waits_for_a_guest_and_what_it_holds_stays() {
     let refused = port.receive().map(drop);
     assert!(matches!(refused, Err(ReceiveError::TooManyHeld { .. })));
     drop(held);
-    // The queue kept the first of those for which there was room.
+    // The queue kept the first messages, for which there was room.
     let n_loops = || port.receive().unwrap().map(|receive| receive.payload()[0].n_loops);
     assert_eq!([n_loops(), n_loops(), n_loops()], [Some(1), Some(2), None]);
     assert!(!guest.is_over());
@@ -108,7 +108,7 @@ fn another_version_and_another_type_are_told_apart() {
         "{version}"
     );
     assert!(refused("frame/v1/0").contains("has no topic \"frame/v1/0\""));
-    // It was not there when it was opened, and is now.
+    // The topic was missing when it was opened, and exists now.
     let late = guest.absent("skeletons/v9");
     assert!(matches!(late, GuestError::NoSuchTopic { .. }), "{late}");
     let other = guest.port::<u8, messages::FrameHeader>("skeletons/v9");

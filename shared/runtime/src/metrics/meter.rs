@@ -12,20 +12,20 @@ const LONGEST_NANOS: u64 = 3_600_000_000_000;
 /// The times of one frame in a process, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Passage {
-    /// From sending of its message to the start of the work, if there was a message.
+    /// Time from the sending of the frame's message to the start of the work, if there was a message.
     pub waiting: Option<u64>,
-    /// Computing.
+    /// Time spent on computing.
     pub computing: u64,
-    /// Loaning memory for the result and sending it.
+    /// Time to loan memory for the result and send it.
     pub publishing: u64,
-    /// From capture to result, if known.
+    /// Time from capture to result, if known.
     pub since_capture: Option<u64>,
 }
 
 /// Collects durations and counts of one process.
 ///
-/// A histogram is created with the first duration of its stage and view; after that nothing is allocated.
-/// Durations that need a further row beyond [`MAX_ROWS`] are ignored.
+/// The first duration of a stage and view creates a histogram. After that, nothing is allocated.
+/// Durations that need more than [`MAX_ROWS`] rows are ignored.
 #[derive(Debug)]
 pub struct Meter {
     rows: Vec<Row>,
@@ -63,7 +63,7 @@ impl Default for Meter {
 impl Meter {
     /// Sets the view that the process works for.
     ///
-    /// * `name`: the camera's; truncated if it does not fit into a message.
+    /// * `name`: name of the camera, truncated if it does not fit into a message.
     pub fn belongs_to(&mut self, view: usize, name: &str) {
         self.view = number_of(Some(view));
         self.name = cut(name);
@@ -71,7 +71,7 @@ impl Meter {
 
     /// Records a duration.
     ///
-    /// * `view`: of which view, if of one.
+    /// * `view`: view that the duration belongs to, if there is one.
     pub fn spent(&mut self, span: Span, view: Option<usize>, nanos: u64) {
         let view = number_of(view);
         let existing = self.rows.iter().position(|row| row.span == span && row.view == view);
@@ -107,39 +107,39 @@ impl Meter {
         self.n_dropped[cause as usize] += n;
     }
 
-    /// Losses of all causes together.
+    /// Returns the number of losses of all causes together.
     pub fn n_dropped(&self) -> u64 {
         self.n_dropped.iter().sum()
     }
 
-    /// Records how many frames or results wait in the process.
+    /// Records the number of frames or results that wait in the process.
     pub fn queued(&mut self, n: usize) {
         let n = u32::try_from(n).unwrap_or(NO_QUEUE - 1).min(NO_QUEUE - 1);
         let longest = self.queue.map_or(0, |[_, longest]| longest);
         self.queue = Some([n, longest.max(n)]);
     }
 
-    /// Records how many people there are in a result.
+    /// Records the number of people in a result.
     pub fn counted_people(&mut self, n: u32) {
         self.n_people = n;
     }
 
-    /// Notes what became of the pictures of a live camera so far.
+    /// Records the counts of the pictures of a live camera.
     pub fn camera(&mut self, counts: CameraCounts) {
         self.camera = counts;
     }
 
-    /// Counts evidence that was sent.
+    /// Counts bytes of evidence that was sent.
     pub fn sent_evidence(&mut self, bytes: u64) {
         self.evidence_bytes += bytes;
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn n_rows(&self) -> usize {
         self.rows.len()
     }
 
-    /// A row of the message, without its rate; `None` beyond [`Self::n_rows`].
+    /// Returns a row of the message, without its rate; `None` beyond [`Self::n_rows`].
     pub fn row(&self, index: usize) -> Option<MetricsRow> {
         let Row {
             span,
@@ -160,7 +160,7 @@ impl Meter {
         })
     }
 
-    /// The message without the rows and the process's own fields.
+    /// Returns the message without the rows and the process's own fields.
     pub fn head(&self) -> Metrics {
         let [queue, longest_queue] = self.queue.unwrap_or([NO_QUEUE; 2]);
         Metrics {
@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Two significant digits: the buckets of a histogram are at most a hundredth wide.
+        /// The histogram has two significant digits: its buckets are at most a hundredth wide.
         #[test]
         fn percentiles_are_exact_to_a_hundredth(
             mut nanos in proptest::collection::vec(1_u64..10_000_000_000, 1..300)

@@ -6,7 +6,7 @@ use messages::{MAX_ROWS, Metrics};
 
 /// The time window of the rates, nanoseconds.
 const REACH_NANOS: u64 = 5_000_000_000;
-/// Shortest time that gives a rate, nanoseconds.
+/// Shortest time from which a rate is computed, nanoseconds.
 const LEAST_NANOS: u64 = 200_000_000;
 
 /// Rates over the last five seconds, or since the start.
@@ -25,7 +25,7 @@ struct Past {
 impl Rates {
     /// Starts with counts of zero.
     ///
-    /// * `at_nanos`: now.
+    /// * `at_nanos`: current time.
     pub fn new(at_nanos: u64) -> Self {
         let start = Past {
             at_nanos,
@@ -37,7 +37,7 @@ impl Rates {
         }
     }
 
-    /// Computes the rates of a message from its counts and time, and keeps those. Rows must keep their order
+    /// Computes the rates of a message from its counts and time, and keeps these for the next message. Rows must keep their order
     /// from message to message.
     pub fn fill(&mut self, message: &mut Metrics) {
         let now = Past {
@@ -64,7 +64,7 @@ impl Rates {
     }
 }
 
-/// In thousandths.
+/// Returns a rate in thousandths per second.
 fn per_second(now: u64, then: u64, nanos: u64) -> u64 {
     let thousandths = u128::from(now.saturating_sub(then)) * 1_000_000_000_000 / u128::from(nanos);
     u64::try_from(thousandths).unwrap_or(u64::MAX)

@@ -5,58 +5,58 @@ use messages::{
     NO_QUEUE, NO_VIEW, Span,
 };
 
-/// A malformed metrics message.
+/// Reason why a metrics message is malformed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReadingError {
-    /// More rows than a message can hold.
+    /// There are more rows than a message can hold.
     #[error("{rows} rows, a message has room for {MAX_ROWS}")]
     TooManyRows {
-        /// The stated number.
+        /// Number of rows in the message.
         rows: u32,
     },
-    /// A stage that does not exist.
+    /// A row has a stage that does not exist.
     #[error("row {row} is of unknown stage {span}")]
     UnknownSpan {
-        /// Which row.
+        /// Index of the row.
         row: usize,
-        /// Its stage.
+        /// Number of the stage.
         span: u32,
     },
-    /// An invalid view.
+    /// The index of a view is too large.
     #[error("view {view} of at most {MAX_VIEWS}")]
     UnknownView {
-        /// The view.
+        /// Index of the view.
         view: u32,
     },
-    /// Percentiles that are not ascending.
+    /// Percentiles are not ascending.
     #[error("row {row} has percentiles that decrease, or none for {count} durations")]
     Disordered {
-        /// Which row.
+        /// Index of the row.
         row: usize,
-        /// The stated number of durations.
+        /// Number of durations in the message.
         count: u64,
     },
-    /// Two rows of the same stage and view.
+    /// Two rows have the same stage and view.
     #[error("rows {first} and {second} are of the same stage and view")]
     Twice {
-        /// The first of them.
+        /// Index of the first row.
         first: usize,
-        /// The second.
+        /// Index of the second row.
         second: usize,
     },
-    /// A name that is not UTF-8.
+    /// The name of the view is not UTF-8.
     #[error("the name of the view is not UTF-8, or has text after its end")]
     Name,
-    /// A flag that is neither 0 nor 1.
+    /// A flag is neither 0 nor 1.
     #[error("finished is {finished}, neither 0 nor 1")]
     Flag {
-        /// Its value.
+        /// Value of the flag.
         finished: u32,
     },
-    /// Counts or times that contradict each other.
+    /// Counts or times contradict each other.
     #[error("counts contradict each other: {what}")]
     Contradiction {
-        /// The contradiction.
+        /// Description of the contradiction.
         what: &'static str,
     },
 }
@@ -64,80 +64,80 @@ pub enum ReadingError {
 /// The metrics of another process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reading {
-    /// The session.
+    /// Session of the run.
     pub session: u64,
     /// Process id.
     pub pid: u32,
-    /// How often the process has been restarted.
+    /// Number of restarts of the process.
     pub restarts: u32,
-    /// When the process started, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the process started, `CLOCK_MONOTONIC`, nanoseconds.
     pub began_at_nanos: u64,
-    /// When the message was sent, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the message was sent, `CLOCK_MONOTONIC`, nanoseconds.
     pub at_nanos: u64,
-    /// Messages received.
+    /// Number of messages received.
     pub n_received: u64,
-    /// Messages sent.
+    /// Number of messages sent.
     pub n_sent: u64,
-    /// Messages sent per second recently, in thousandths.
+    /// Recent rate of messages sent per second, in thousandths.
     pub sent_millihertz: u64,
-    /// Messages or frames lost, in the order of [`Cause::ALL`].
+    /// Number of messages or frames lost, in the order of [`Cause::ALL`].
     pub n_dropped: [u64; N_CAUSES],
-    /// Evidence sent, bytes.
+    /// Size of the evidence sent, bytes.
     pub evidence_bytes: u64,
-    /// Physical memory, bytes; 0 where the system does not report it.
+    /// Physical memory, bytes; 0 if the system does not report it.
     pub memory_bytes: u64,
     /// Peak physical memory, bytes.
     pub peak_memory_bytes: u64,
-    /// Current and longest queue of frames or results, if there is a queue.
+    /// Current and maximum length of the queue of frames or results, if there is a queue.
     pub queue: Option<[u32; 2]>,
-    /// Number of people in the last result, if it counts them.
+    /// Number of people in the last result, if the process counts them.
     pub n_people: Option<u32>,
-    /// Its view, if it works for one.
+    /// View that the process works for, if there is one.
     pub view: Option<ViewName>,
-    /// True if it has received the end of stream and sent it on.
+    /// True if the process has received the end of stream and sent it on.
     pub is_finished: bool,
-    /// Counts of the pictures of its live camera, if it has one.
+    /// Counts of the pictures of the process's live camera, if it has one.
     pub camera: Option<CameraCounts>,
-    /// Durations by stage and view.
+    /// Statistics of the durations, by stage and view.
     pub times: Vec<Timed>,
 }
 
 /// The view that a process works for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ViewName {
-    /// Its number.
+    /// Index of the view.
     pub index: usize,
-    /// Its camera's name; empty if unknown.
+    /// Name of the view's camera; empty if unknown.
     pub name: String,
 }
 
-/// Durations of one stage, nanoseconds.
+/// Statistics of the durations of one stage, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timed {
-    /// Which stage.
+    /// Stage that was measured.
     pub span: Span,
-    /// The view, if it belongs to one.
+    /// View that the durations belong to, if there is one.
     pub view: Option<usize>,
-    /// How many were measured.
+    /// Number of measured durations.
     pub count: u64,
-    /// Number per second recently, in thousandths.
+    /// Recent number of durations per second, in thousandths.
     pub millihertz: u64,
-    /// Median.
+    /// Median duration.
     pub p50_nanos: u64,
-    /// 99th percentile.
+    /// 99th percentile of the durations.
     pub p99_nanos: u64,
-    /// 99.9th percentile.
+    /// 99.9th percentile of the durations.
     pub p99_9_nanos: u64,
-    /// The longest.
+    /// Longest duration.
     pub max_nanos: u64,
 }
 
 impl Reading {
-    /// Reads a message; rows beyond their number are ignored.
+    /// Reads a message. Rows beyond the stated number are ignored.
     ///
     /// # Errors
     ///
-    /// [`ReadingError`].
+    /// Returns a [`ReadingError`] on failure.
     pub fn from_message(message: &Metrics) -> Result<Self, ReadingError> {
         let rows = message.rows.get(..message.n_rows as usize);
         let rows = rows.ok_or(ReadingError::TooManyRows {
@@ -231,7 +231,7 @@ impl Reading {
         }
     }
 
-    /// Losses of one cause.
+    /// Returns the number of losses of one cause.
     pub fn n_dropped_by(&self, cause: Cause) -> u64 {
         self.n_dropped[cause as usize]
     }
@@ -410,7 +410,7 @@ mod tests {
         it
     }
 
-    /// The error for a changed message.
+    /// Returns the error for a changed message.
     fn refused(change: impl FnOnce(&mut Metrics)) -> ReadingError {
         let mut it = message();
         change(&mut it);

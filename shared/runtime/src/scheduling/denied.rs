@@ -1,4 +1,4 @@
-//! Scheduling requests that the system denies, and what to try.
+//! Scheduling requests that the system denies, and remedies.
 
 use std::io;
 
@@ -7,40 +7,40 @@ use super::{Policy, RealTime, text};
 /// A request that the system denies. The process can continue without it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
-    /// Not all cores may be used.
+    /// The process may not use all requested cores.
     #[error(
         "cannot run on cores {}: {} may be used", text::list(.asked), text::list(.allowed)
     )]
     Cores {
-        /// Cores that were asked for.
+        /// Requested cores.
         asked: Vec<usize>,
-        /// Cores that may be used.
+        /// Cores that the process may use.
         allowed: Vec<usize>,
-        /// Why, if the system call failed.
+        /// Cause of the error, if the system call failed.
         #[source]
         source: Option<Refusal>,
     },
-    /// The real-time priority may not be used.
+    /// The process may not use the real-time priority.
     #[error("cannot run at real-time priority {} ({})", .asked.priority, .asked.policy.system_name())]
     RealTime {
-        /// Priority that was asked for.
+        /// Requested priority.
         asked: RealTime,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: Refusal,
     },
-    /// Memory may not be locked, or not all of it.
+    /// The process may not lock memory, or only a part of it.
     #[error("cannot lock memory{}", limit(.limit_bytes.as_ref()))]
     Memory {
-        /// The limit, bytes; none if that is not the reason.
+        /// Maximum amount of memory, bytes; `None` if the limit is not the reason.
         limit_bytes: Option<u64>,
-        /// Why.
+        /// Cause of the error.
         #[source]
         source: Refusal,
     },
 }
 
-/// The error of the system.
+/// Error of the system.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{text}")]
 pub struct Refusal {
@@ -68,7 +68,7 @@ impl Denied {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Cores { .. } => {
-                "name cores of this machine that its container, its slice or `taskset` leave to it (`nproc`, `taskset -cp $$`)"
+                "name cores of this machine that the process's container, slice or `taskset` allows (`nproc`, `taskset -cp $$`)"
             }
             Self::RealTime { .. } => {
                 "`ulimit -r 99` (root or /etc/security/limits.conf: rtprio), systemd LimitRTPRIO=99, Docker --cap-add=SYS_NICE, or `setcap cap_sys_nice+ep` on the executable"
@@ -81,7 +81,7 @@ impl Denied {
 }
 
 impl Policy {
-    /// Its name in Linux.
+    /// Returns the name of the policy in Linux.
     pub fn system_name(self) -> &'static str {
         match self {
             Self::Fifo => "SCHED_FIFO",

@@ -9,12 +9,12 @@ use super::{Policy, RealTime, Scheduling};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{option:?} is not one of cores=0,1 fifo=1 round-robin=1 lock-memory spin")]
 pub struct SchedulingError {
-    /// The text.
+    /// The text of the option.
     pub option: String,
 }
 
 impl Display for Scheduling {
-    /// Options separated by spaces, `cores=0,1 fifo=50 lock-memory spin`; empty if nothing is requested.
+    /// Writes options separated by spaces, such as `cores=0,1 fifo=50 lock-memory spin`. Empty if nothing is requested.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let mut words = Vec::new();
         if !self.cores.is_empty() {
@@ -68,10 +68,10 @@ impl Scheduling {
 }
 
 impl Policy {
-    /// All.
+    /// All policies.
     pub const ALL: [Self; 2] = [Self::Fifo, Self::RoundRobin];
 
-    /// Its name in settings.
+    /// Returns the name of the policy in settings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Fifo => "fifo",
@@ -80,7 +80,7 @@ impl Policy {
     }
 }
 
-/// Numbers separated by commas.
+/// Returns numbers separated by commas.
 pub(super) fn list(numbers: &[usize]) -> String {
     let numbers: Vec<String> = numbers.iter().map(ToString::to_string).collect();
     if numbers.is_empty() {

@@ -1,4 +1,4 @@
-//! A video device: opened, asked what it is, set to a format.
+//! A video device: opens it, queries it, and sets its format.
 
 use std::fs;
 use std::io;
@@ -10,21 +10,21 @@ use rustix::fs::{FileType, Mode, OFlags, major, open, stat};
 use super::raw::{self, Raw, Request};
 use super::{FourCc, VideoError};
 
-/// Description of a device by itself.
+/// A device's description of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoAbout {
     /// Name of the camera.
     pub card: String,
-    /// The kernel's driver.
+    /// Name of the kernel's driver.
     pub driver: String,
-    /// Where it is plugged in.
+    /// Port that the device is plugged into.
     pub bus: String,
 }
 
-/// Wishes for a device; a setting that is not given stays as the device has it.
+/// Settings requested from a device. A setting that is not given stays unchanged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VideoWish {
-    /// Formats, the best first; the first that the device has is taken.
+    /// Pixel formats, best first. The first one that the device offers is used.
     pub formats: Vec<FourCc>,
     /// Width and height, pixels.
     pub size: Option<[u32; 2]>,
@@ -32,20 +32,20 @@ pub struct VideoWish {
     pub rate_hz: Option<f64>,
 }
 
-/// How a device delivers.
+/// Mode in which a device delivers pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VideoMode {
     /// Format of the pixels.
     pub format: FourCc,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// From one row to the next, bytes; 0 where there are no rows.
+    /// Bytes from one row to the next; 0 for formats without rows.
     pub bytes_per_row: u32,
-    /// Pictures per second, where the device tells.
+    /// Pictures per second, if the device reports the rate.
     pub rate_hz: Option<f64>,
 }
 
-/// Refuses what is no video device by its kind and number, before it is opened: opening some devices has an effect.
+/// Refuses a path that is not a video device, by its kind and number, before it is opened. Opening some devices has an effect.
 fn check_kind(path: &Path) -> Result<(), VideoError> {
     const VIDEO: u32 = 81;
     let status = stat(path).map_err(|error| VideoError::Open {
@@ -57,7 +57,7 @@ fn check_kind(path: &Path) -> Result<(), VideoError> {
         FileType::CharacterDevice | FileType::BlockDevice => "it is a device of another kind",
         FileType::Directory => "it is a folder",
         FileType::RegularFile => "it is a file",
-        _ => "it is no device",
+        _ => "it is not a device",
     };
     Err(VideoError::NoCamera {
         path: path.to_owned(),
@@ -77,7 +77,7 @@ impl VideoDevice {
     ///
     /// # Errors
     ///
-    /// [`VideoError`]: it is not there, may not be opened, or is no camera.
+    /// Returns a [`VideoError`] if the device does not exist, may not be opened, or is not a camera.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         check_kind(path)?;
         let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::CLOEXEC | OFlags::NOCTTY;
@@ -125,7 +125,7 @@ impl VideoDevice {
     ///
     /// # Errors
     ///
-    /// [`VideoError::NoCamera`].
+    /// Returns [`VideoError::NoCamera`] on failure.
     pub fn about(&self) -> Result<VideoAbout, VideoError> {
         let it = self.capability()?;
         Ok(VideoAbout {
@@ -135,7 +135,7 @@ impl VideoDevice {
         })
     }
 
-    /// The path that it was opened by.
+    /// Returns the path with which the device was opened.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -144,7 +144,7 @@ impl VideoDevice {
         self.fd.as_fd()
     }
 
-    /// Asks, and names what was asked for in the error.
+    /// Sends a request to the device. An error names the request.
     pub(super) fn ask<T: Raw>(
         &self,
         request: Request,
@@ -158,11 +158,11 @@ impl VideoDevice {
         })
     }
 
-    /// How it delivers now.
+    /// Returns the mode in which the device delivers pictures now.
     ///
     /// # Errors
     ///
-    /// [`VideoError::Request`].
+    /// Returns [`VideoError::Request`] on failure.
     pub fn mode(&self) -> Result<VideoMode, VideoError> {
         let mut format = raw::Format::default();
         self.ask(raw::G_FMT, "tell its format", &mut format)?;
@@ -178,23 +178,23 @@ impl VideoDevice {
     }
 }
 
-/// Pictures per second of seconds per picture.
+/// Converts seconds per picture to pictures per second.
 pub(super) fn rate_hz([numerator, denominator]: [u32; 2]) -> Option<f64> {
     let is_one = numerator > 0 && denominator > 0;
     is_one.then(|| f64::from(denominator) / f64::from(numerator))
 }
 
-/// A text of the kernel, which ends with a zero.
+/// Returns a text of the kernel, which ends with a zero.
 pub(super) fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).trim().to_owned()
 }
 
-/// The video devices of this machine, in the order of their numbers: `/dev/video0`. Some of them may be no cameras.
+/// Returns the video devices of this machine, such as `/dev/video0`, in the order of their numbers. Some of them may not be cameras.
 ///
 /// # Errors
 ///
-/// The folder of devices cannot be read.
+/// Fails if the folder of devices cannot be read.
 pub fn video_devices() -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir("/dev")? {
@@ -216,7 +216,7 @@ mod tests {
         assert!(matches!(absent, VideoError::Open { .. }), "{absent}");
         let other = VideoDevice::open(Path::new("/dev/null")).unwrap_err();
         assert!(
-            other.to_string().contains("/dev/null is no camera"),
+            other.to_string().contains("/dev/null is not a camera"),
             "{other}"
         );
     }

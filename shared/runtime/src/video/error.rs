@@ -5,73 +5,73 @@ use std::path::PathBuf;
 
 use failure::{ExitKind, Fault};
 
-/// Why a video device cannot be used. Names the device, and what it offers instead.
+/// Reason why a video device cannot be used. It names the device and the choices that the device offers.
 #[derive(Debug, thiserror::Error)]
 pub enum VideoError {
-    /// It cannot be opened.
+    /// The device cannot be opened.
     #[error("cannot open the camera {}", path.display())]
     Open {
-        /// Which.
+        /// Path of the device.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         source: io::Error,
     },
-    /// A device of another kind.
-    #[error("{} is no camera: {why}", path.display())]
+    /// The device is of another kind.
+    #[error("{} is not a camera: {why}", path.display())]
     NoCamera {
-        /// Which.
+        /// Path of the device.
         path: PathBuf,
-        /// Condition that is missing.
+        /// Condition that is not met.
         why: String,
     },
     /// A request failed.
     #[error("the camera {} does not {what}", path.display())]
     Request {
-        /// Which.
+        /// Path of the device.
         path: PathBuf,
         /// Request to the kernel.
         what: &'static str,
-        /// Why.
+        /// Cause of the error.
         source: io::Error,
     },
-    /// A format, a size or a rate that it does not have.
+    /// The device does not have the requested format, size or rate.
     #[error("the camera {} has no {what} {wanted}; it offers {offered}", path.display())]
     NotOffered {
-        /// Which.
+        /// Path of the device.
         path: PathBuf,
-        /// Format, size or rate.
+        /// Kind of the request: format, size or rate.
         what: &'static str,
-        /// As asked for.
+        /// Requested value.
         wanted: String,
         /// Choices that the device has.
         offered: String,
     },
-    /// A control that it does not have.
+    /// The device does not have the requested control.
     #[error("the camera {} has no control {name:?}; it has {offered}", path.display())]
     NoControl {
-        /// Which.
+        /// Path of the device.
         path: PathBuf,
-        /// As asked for.
+        /// Requested name.
         name: String,
         /// Controls that the device has.
         offered: String,
     },
-    /// A value that a control does not take.
+    /// The control does not accept the value.
     #[error("the control {name:?} of the camera {} takes {expected}, got {value}", path.display())]
     Value {
-        /// Which camera.
+        /// Path of the device.
         path: PathBuf,
-        /// Which control.
+        /// Name of the control.
         name: String,
-        /// As asked for.
+        /// Requested value.
         value: i64,
-        /// Values that the control takes.
+        /// Values that the control accepts.
         expected: String,
     },
-    /// It does not deliver any more.
+    /// The device no longer delivers pictures.
     #[error("the camera {} is gone", path.display())]
     Gone {
-        /// Which.
+        /// Path of the device.
         path: PathBuf,
         /// Error of the kernel.
         source: io::Error,

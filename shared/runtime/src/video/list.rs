@@ -4,33 +4,33 @@ use super::device::{rate_hz, text};
 use super::raw::{self, QueryControl};
 use super::{FourCc, VideoDevice, VideoError};
 
-/// The most entries of any list that is asked of a driver, which could answer for ever.
+/// Maximum number of entries of any list that is requested from a driver. Without a limit, a driver could send entries forever.
 const MOST: u32 = 1024;
 
 /// A format with its sizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoFormat {
-    /// Its letters.
+    /// Letters of the format.
     pub format: FourCc,
-    /// As the driver calls it.
+    /// Name of the format in the driver.
     pub description: String,
-    /// The sizes that it has.
+    /// Sizes that the format offers.
     pub sizes: Vec<VideoSize>,
 }
 
 /// A size, or a range of sizes, with its rates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoSize {
-    /// The least width and height, pixels.
+    /// Minimum width and height, pixels.
     pub least: [u32; 2],
-    /// The most; equal to the least for one size.
+    /// Maximum width and height, pixels. Equal to `least` for a single size.
     pub most: [u32; 2],
-    /// Pictures per second, the fastest first; of a range its two ends.
+    /// Pictures per second, the fastest first. A range has its two ends.
     pub rates_hz: Vec<f64>,
 }
 
 impl VideoSize {
-    /// `640x480`, or `16x16 to 1920x1080`.
+    /// Returns a text such as `640x480` or `16x16 to 1920x1080`.
     pub fn text(&self) -> String {
         let [least, most] = [self.least, self.most].map(|[w, h]| format!("{w}x{h}"));
         if self.least == self.most {
@@ -47,7 +47,7 @@ impl VideoSize {
 }
 
 impl VideoFormat {
-    /// The size itself where it is offered, else the largest that is.
+    /// Returns the size itself if it is offered, otherwise the largest offered size.
     pub(super) fn nearest(&self, size: [u32; 2]) -> Option<[u32; 2]> {
         if self.sizes.iter().any(|range| range.has(size)) {
             return Some(size);
@@ -62,27 +62,27 @@ impl VideoFormat {
     }
 }
 
-/// Something of a camera that can be set: a number, a switch, a choice.
+/// A setting of a camera: a number, a switch or a choice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoControl {
-    /// Its number in the kernel.
+    /// Number of the control in the kernel.
     pub id: u32,
-    /// As in a deployment file: `exposure_time_absolute`.
+    /// Name of the control in a deployment file, such as `exposure_time_absolute`.
     pub name: String,
-    /// The least, the most, and the step.
+    /// Minimum, maximum and step of the value.
     pub range: [i32; 3],
-    /// Where nobody has set it.
+    /// Default value.
     pub default: i32,
-    /// Now; none if it cannot be read.
+    /// Current value; `None` if it cannot be read.
     pub value: Option<i32>,
-    /// The choices of a menu: number and name.
+    /// Number and name of each choice of a menu.
     pub choices: Vec<(u32, String)>,
-    /// True if it cannot be set, now or ever.
+    /// True if the control cannot be set, now or ever.
     pub is_fixed: bool,
 }
 
 impl VideoControl {
-    /// Returns the values that it takes, for people.
+    /// Returns a text with the values that the control accepts, for users.
     pub fn takes(&self) -> String {
         if self.choices.is_empty() {
             let [least, most, step] = self.range;
@@ -105,11 +105,11 @@ impl VideoControl {
 }
 
 impl VideoDevice {
-    /// Its formats with their sizes and rates.
+    /// Returns the formats of the device with their sizes and rates.
     ///
     /// # Errors
     ///
-    /// [`VideoError::Request`] if it tells none.
+    /// Returns [`VideoError::Request`] if the device reports no formats.
     pub fn formats(&self) -> Result<Vec<VideoFormat>, VideoError> {
         let mut formats = Vec::new();
         for index in 0..MOST {
@@ -184,7 +184,7 @@ impl VideoDevice {
         rates
     }
 
-    /// Its controls, in the order of the driver.
+    /// Returns the controls of the device, in the order of the driver.
     pub fn controls(&self) -> Vec<VideoControl> {
         let mut controls = Vec::new();
         let mut last = 0;
@@ -203,7 +203,7 @@ impl VideoDevice {
     }
 
     fn control(&self, it: &QueryControl) -> Option<VideoControl> {
-        /// `V4L2_CTRL_TYPE_INTEGER`, `BOOLEAN`, `MENU`, `BUTTON`, `BITMASK`, `INTEGER_MENU`.
+        /// Numbers of `V4L2_CTRL_TYPE_INTEGER`, `BOOLEAN`, `MENU`, `BUTTON`, `BITMASK`, `INTEGER_MENU`.
         const WITH_NUMBERS: [u32; 6] = [1, 2, 3, 4, 8, 9];
         if it.flags & raw::CTRL_FLAG_DISABLED != 0 || !WITH_NUMBERS.contains(&it.kind) {
             return None;
@@ -259,8 +259,8 @@ impl VideoDevice {
     ///
     /// # Errors
     ///
-    /// [`VideoError::NoControl`] with those that it has; [`VideoError::Value`] with what it takes;
-    /// [`VideoError::Request`] if the device refuses.
+    /// Returns [`VideoError::NoControl`] with the controls that the device has, [`VideoError::Value`] with the values that the control
+    /// accepts, or [`VideoError::Request`] if the device refuses.
     pub fn set_control(&self, name: &str, value: i64) -> Result<(), VideoError> {
         let controls = self.controls();
         let Some(control) = controls.iter().find(|control| control.name == name) else {
@@ -292,7 +292,7 @@ impl VideoDevice {
     }
 }
 
-/// The driver's name of a control as a key: `Exposure Time, Absolute` is `exposure_time_absolute`.
+/// Converts the driver's name of a control to a key: `Exposure Time, Absolute` becomes `exposure_time_absolute`.
 fn as_key(name: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric();
     let words = name.split(|letter| !is_plain(letter)).filter(|part| !part.is_empty());

@@ -8,23 +8,23 @@ use std::os::fd::{AsRawFd as _, BorrowedFd};
 ///
 /// # Safety
 ///
-/// Plain old data (every pattern of bits is a value, no pointers) in the kernel's layout for [`Self::REQUESTS`].
+/// The type must be plain old data (every pattern of bits is a value, no pointers) in the kernel's layout for [`Self::REQUESTS`].
 pub(super) unsafe trait Raw {
     /// The requests that take this structure.
     const REQUESTS: &'static [Request];
 }
 
-/// The number of a request, without the size of its structure.
+/// Number of a request, without the size of its structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Request {
-    /// Bits 30 and 31: 1 written, 2 read by this process.
+    /// Bits 30 and 31: 1 if this process writes, 2 if it reads.
     direction: u32,
     number: u32,
 }
 
 macro_rules! raw {
     ($name:ident: $($request:expr),+) => {
-        // SAFETY: integers and arrays of them only, laid out as in linux/videodev2.h; the tests check the sizes.
+        // SAFETY: the structure has only integers and arrays of them, laid out as in linux/videodev2.h. The tests check the sizes.
         unsafe impl Raw for $name {
             const REQUESTS: &'static [Request] = &[$($request),+];
         }
@@ -191,7 +191,7 @@ pub(super) struct StreamParameters {
     pub kind: u32,
     pub capability: u32,
     pub capture_mode: u32,
-    /// Seconds per frame, a fraction.
+    /// Numerator of the seconds per frame.
     pub numerator: u32,
     pub denominator: u32,
     pub rest: [u32; 46],
@@ -244,7 +244,7 @@ pub(super) struct QueryMenu {
 }
 raw!(QueryMenu: QUERYMENU);
 
-/// A size: `[width, height]` where `kind` is 1, else `[least, most, step]` of both.
+/// A size: `[width, height]` if `kind` is 1, otherwise `[least, most, step]` of both.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FrameSize {
@@ -256,7 +256,7 @@ pub(super) struct FrameSize {
 }
 raw!(FrameSize: ENUM_FRAMESIZES);
 
-/// Seconds per frame, fractions: one where `kind` is 1, else the least, the most and the step.
+/// Seconds per frame, as fractions: one value if `kind` is 1, otherwise the minimum, the maximum and the step.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FrameInterval {
@@ -270,15 +270,15 @@ pub(super) struct FrameInterval {
 }
 raw!(FrameInterval: ENUM_FRAMEINTERVALS);
 
-/// Asks a device; what it answers stands in `it`.
+/// Sends a request to a device. The answer is written to `it`.
 ///
 /// # Errors
 ///
-/// Errors of the kernel.
+/// Returns the error of the kernel.
 ///
 /// # Panics
 ///
-/// If the request takes another structure.
+/// Panics if the request takes another structure.
 pub(super) fn ask<T: Raw>(device: BorrowedFd<'_>, request: Request, it: &mut T) -> io::Result<()> {
     assert!(
         T::REQUESTS.contains(&request),
@@ -287,8 +287,8 @@ pub(super) fn ask<T: Raw>(device: BorrowedFd<'_>, request: Request, it: &mut T) 
     let code = code::<T>(request);
     let address = core::ptr::from_mut(it);
     loop {
-        // SAFETY: `address` points to a structure of the size that is a part of `code`, which is alive; the kernel
-        // reads and writes only that, and `Raw` says that any bytes are a value of it.
+        // SAFETY: `address` points to a living structure, whose size is part of `code`. The kernel
+        // reads and writes only this structure, and `Raw` guarantees that any bytes are a value of it.
         let outcome = unsafe { libc::ioctl(device.as_raw_fd(), code, address) };
         if outcome >= 0 {
             return Ok(());

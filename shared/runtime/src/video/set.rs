@@ -5,11 +5,11 @@ use super::raw;
 use super::{FourCc, VideoDevice, VideoError, VideoFormat, VideoMode, VideoSize, VideoWish};
 
 impl VideoDevice {
-    /// Sets format, size and rate; returns how it delivers from now on.
+    /// Sets format, size and rate. Returns the resulting mode of the device.
     ///
     /// # Errors
     ///
-    /// [`VideoError::NotOffered`] with what it offers where it takes something else; [`VideoError::Request`].
+    /// Returns [`VideoError::NotOffered`] with the offered choices if the device does not accept a value, or [`VideoError::Request`].
     pub fn set(&self, wish: &VideoWish) -> Result<VideoMode, VideoError> {
         let offered = self.formats()?;
         let now = self.mode()?;
@@ -58,7 +58,7 @@ impl VideoDevice {
         Ok(())
     }
 
-    /// Sets the rate that is nearest, which may differ by 2 in 100: 29.97 where 30 is asked for.
+    /// Sets the nearest rate, which may differ by 2 in 100: for example 29.97 instead of 30.
     fn set_rate(
         &self,
         rate: f64,

@@ -13,41 +13,41 @@ use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use super::raw::{self, Buffer};
 use super::{VideoDevice, VideoError, VideoMode};
 
-/// Buffers: enough for a reader that is held up for a tenth of a second at 60 Hz.
+/// Number of buffers, which is enough for a reader that is delayed by a tenth of a second at 60 Hz.
 const N_BUFFERS: u32 = 6;
 
 /// A picture as the device made it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VideoPicture<'a> {
-    /// Its bytes, in the format of the stream.
+    /// Bytes of the picture, in the format of the stream.
     pub bytes: &'a [u8],
-    /// When the kernel got it, `CLOCK_MONOTONIC`, nanoseconds; none if the driver uses another clock.
+    /// Time at which the kernel received the picture, `CLOCK_MONOTONIC`, nanoseconds; `None` if the driver uses another clock.
     pub at_nanos: Option<u64>,
-    /// Its number by the driver, which counts those that are lost too.
+    /// Number of the picture from the driver, which also counts lost pictures.
     pub sequence: u32,
     /// True if the driver marked it as damaged.
     pub is_damaged: bool,
-    /// True if all buffers were full before it was read: the next loss was for want of a buffer.
+    /// True if all buffers were full before this picture was read. The next picture may then be lost for lack of a buffer.
     pub was_full: bool,
 }
 
-/// A device that streams. It stops when this is dropped.
+/// A device that streams. Streaming stops when this value is dropped.
 #[derive(Debug)]
 pub struct VideoStream {
-    // Before the device, so that the buffers are unmapped first.
+    // Declared before the device, so that the buffers are unmapped first.
     buffers: Vec<Mapping>,
     device: VideoDevice,
     mode: VideoMode,
-    /// The buffer that was handed out last, and goes back to the driver.
+    /// Index of the buffer that was handed out last and goes back to the driver.
     lent: Option<u32>,
 }
 
 impl VideoDevice {
-    /// Starts to stream, in the format that was set.
+    /// Starts streaming in the current format.
     ///
     /// # Errors
     ///
-    /// [`VideoError::Request`]: the device is in use, or has no buffers.
+    /// Returns [`VideoError::Request`] if the device is in use or has no buffers.
     pub fn start(self) -> Result<VideoStream, VideoError> {
         let mode = self.mode()?;
         let mut request = raw::RequestBuffers {
@@ -79,12 +79,12 @@ impl VideoDevice {
 }
 
 impl VideoStream {
-    /// How the device delivers.
+    /// Returns the mode in which the device delivers pictures.
     pub fn mode(&self) -> VideoMode {
         self.mode
     }
 
-    /// The device.
+    /// Returns the device.
     pub fn device(&self) -> &VideoDevice {
         &self.device
     }
@@ -113,13 +113,13 @@ impl VideoStream {
         }
     }
 
-    /// The next picture; none if there is none within `patience`.
+    /// Returns the next picture; `None` if none comes within `patience`.
     ///
-    /// The picture before it goes back to the driver.
+    /// The previous picture goes back to the driver.
     ///
     /// # Errors
     ///
-    /// [`VideoError::Gone`]: unplugged, or the driver gave up.
+    /// Returns [`VideoError::Gone`] if the device was unplugged or the driver gave up.
     pub fn next(&mut self, patience: Duration) -> Result<Option<VideoPicture<'_>>, VideoError> {
         if let Some(index) = self.lent.take() {
             self.give_back(index)?;
@@ -183,7 +183,7 @@ impl VideoStream {
 impl Drop for VideoStream {
     fn drop(&mut self) {
         let mut kind = raw::Kind(raw::VIDEO_CAPTURE);
-        // Fails only if the device is gone, and then nothing streams.
+        // The request fails only if the device is gone, and then nothing streams.
         raw::ask(self.device.fd(), raw::STREAMOFF, &mut kind).ok();
     }
 }
@@ -204,12 +204,12 @@ struct Mapping {
     len: usize,
 }
 
-// SAFETY: the mapping belongs to nobody else in this process, and is only read.
+// SAFETY: nothing else in this process owns the mapping, and it is only read.
 unsafe impl Send for Mapping {}
 
 impl Mapping {
     fn new(device: &VideoDevice, offset: u32, len: usize) -> io::Result<Self> {
-        // SAFETY: the kernel chooses an address that is free; nothing of Rust lies there.
+        // SAFETY: the kernel chooses a free address, so no Rust object is there.
         let mapped = unsafe {
             mmap(
                 core::ptr::null_mut(),
@@ -224,7 +224,7 @@ impl Mapping {
         Ok(Self { address, len })
     }
 
-    /// The bytes, which the driver leaves alone while the buffer is dequeued.
+    /// Returns the bytes, which the driver does not change while the buffer is dequeued.
     fn bytes(&self) -> &[u8] {
         // SAFETY: `len` bytes are mapped at `address` for as long as `self` lives, and any byte is a `u8`.
         unsafe { core::slice::from_raw_parts(self.address.as_ptr().cast::<u8>(), self.len) }
@@ -233,9 +233,9 @@ impl Mapping {
 
 impl Drop for Mapping {
     fn drop(&mut self) {
-        // SAFETY: mapped by `new`, not unmapped before, and no slice of it outlives `self`.
+        // SAFETY: `new` mapped the buffer, it has not been unmapped, and no slice of it outlives `self`.
         let unmapped = unsafe { munmap(self.address.as_ptr(), self.len) };
-        // Fails only for addresses that were never mapped.
+        // The call fails only for addresses that were never mapped.
         unmapped.ok();
     }
 }

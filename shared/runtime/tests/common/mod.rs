@@ -1,4 +1,4 @@
-//! A deployment of its own for every test, which leaves no files behind.
+//! A separate deployment for every test, which leaves no files behind.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use failure::Stop;
 use runtime::{Bus, DeploymentLock, Namespace, Topic, TopicPlan};
 
-/// Dropped in this order: topics before the lock, which removes all files.
+/// The fields are dropped in this order: topics before the lock, which removes all files.
 pub(crate) struct Deployment {
     stop: Stop,
     _topics: Vec<Topic>,
@@ -39,7 +39,7 @@ impl Deployment {
         &self.stop
     }
 
-    /// Names and process ids of the registered processes.
+    /// Returns the names and process ids of the registered processes.
     pub(crate) fn alive(&self) -> Vec<String> {
         let base = self.namespace().base();
         let all = runtime::deployments(base).unwrap();
@@ -58,7 +58,7 @@ pub(crate) fn namespace(base: &Path) -> Namespace {
     Namespace::below(&format!("t{n}"), base).unwrap()
 }
 
-/// Files of a deployment in shared memory.
+/// Returns the files of a deployment in shared memory.
 pub(crate) fn shared_memory(namespace: &Namespace) -> Vec<String> {
     std::fs::read_dir("/dev/shm")
         .unwrap()

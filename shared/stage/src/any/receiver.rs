@@ -11,20 +11,20 @@ use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter}
 /// A message as bytes, and the fields of its envelope.
 #[derive(Debug)]
 pub struct Received {
-    /// Its session.
+    /// Session of the message.
     pub session: u64,
-    /// Its frame; 0 for heartbeats.
+    /// Frame of the message; 0 for heartbeats.
     pub frame: u64,
-    /// When it was sent, nanoseconds; 0 if unknown.
+    /// Time at which the message was sent, nanoseconds; 0 if unknown.
     pub sent_at: u64,
-    /// Says that the message carries a result, or why it does not; heartbeats always do.
+    /// Says that the message carries a result, or why it has none. Heartbeats always carry a result.
     pub status: Status,
-    /// Heartbeats, and pictures of cameras, which are numbered: the epoch of the process, and how many messages it has sent in this
-    /// epoch.
+    /// For heartbeats and for pictures of cameras, which are numbered: the epoch of the process, and the number of messages that it has
+    /// sent in this epoch.
     pub life: Option<[u64; 2]>,
-    /// Poses of a view: whether evidence was sent with them.
+    /// For poses of a view: true if evidence was sent with them.
     pub has_evidence: bool,
-    /// The message as it is written into a recording; none if there is no room for it.
+    /// The message in the form in which it is written into a recording; `None` if there is no room for it.
     pub data: Option<Vec<u8>>,
 }
 
@@ -57,7 +57,7 @@ impl Receiver {
     ///
     /// # Errors
     ///
-    /// [`PortError`].
+    /// Returns a [`PortError`] on failure.
     pub fn open(
         bus: &Bus,
         kind: Kind,
@@ -83,18 +83,18 @@ impl Receiver {
         })
     }
 
-    /// The kind of its messages.
+    /// Returns the kind of the messages.
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// The oldest waiting message.
+    /// Returns the oldest waiting message.
     ///
-    /// * `room`: whether there is room for a number of bytes.
+    /// * `room`: returns true if there is room for a number of bytes.
     ///
     /// # Errors
     ///
-    /// [`ReceiveError`].
+    /// Returns a [`ReceiveError`] on failure.
     pub fn receive(
         &self,
         room: impl FnOnce(usize) -> bool,
@@ -129,7 +129,7 @@ impl Receiver {
             Port::Picture(port) => port.receive()?.and_then(|sample| {
                 let head = sample.header();
                 let received = of(bytes_of(head), sample.payload())?;
-                // The end of the pictures has the number of all.
+                // The frame number at the end of the pictures is their total number.
                 let is_one = head.status != Status::END;
                 let n_sent = head.stamp.frame.saturating_add(u64::from(is_one));
                 Some(Received {

@@ -39,7 +39,7 @@ impl Sender {
     ///
     /// # Errors
     ///
-    /// [`PortError`].
+    /// Returns a [`PortError`] on failure.
     pub fn open(bus: &Bus, kind: Kind, topic: &str) -> Result<Self, PortError> {
         let port = match kind {
             Kind::Frame => Port::Frame(bus.slice_publisher(topic)?),
@@ -55,12 +55,12 @@ impl Sender {
         Ok(Self { kind, port })
     }
 
-    /// See [`SlicePublisher::wait_for_subscribers`].
+    /// Waits for subscribers, see [`SlicePublisher::wait_for_subscribers`].
     pub fn wait_for_subscribers(&self, n: usize, patience: Patience) -> usize {
         self.receivers().map_or(0, |receiver| receiver.wait_for(n, patience))
     }
 
-    /// Processes that are subscribed.
+    /// Returns the number of subscribed processes.
     pub fn n_connected(&self) -> usize {
         self.receivers().map_or(0, Receivers::n_connected)
     }
@@ -83,7 +83,7 @@ impl Sender {
     ///
     /// # Errors
     ///
-    /// [`SendError`].
+    /// Returns a [`SendError`] on failure.
     pub fn send(&self, message: &Message<'_>, envelope: &Envelope) -> Result<(), SendError> {
         let mut head = message.head.to_vec();
         envelope.put(self.kind, &mut head);
@@ -111,7 +111,7 @@ impl Sender {
     ///
     /// # Errors
     ///
-    /// [`SendError`].
+    /// Returns a [`SendError`] on failure.
     pub fn end(&self, envelope: &Envelope) -> Result<(), SendError> {
         let head = match self.kind {
             Kind::Evidence | Kind::Picture | Kind::Health => return Ok(()),

@@ -1,4 +1,4 @@
-//! Joins with inputs made of lists, and a clock that the tests set.
+//! Tests of joins, with inputs made of lists, and a clock that the tests set.
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, VecDeque};
@@ -16,7 +16,7 @@ use crate::{Account, Port, Receive, Sender, Stamped};
 const SESSION: u64 = 7;
 const PATIENCE: Duration = Duration::from_nanos(100);
 
-/// A topic made of a list; a sent message is appended.
+/// A topic made of a list. A sent message is appended to the list.
 #[derive(Debug)]
 struct Topic<M> {
     waiting: Rc<RefCell<VecDeque<M>>>,
@@ -125,7 +125,7 @@ fn inbox(inputs: Vec<Box<dyn Input<u64>>>, n_slots: usize, rules: Rules) -> Inbo
     Inbox::new(inputs, rules, &[], vec![None; n_slots], Duration::ZERO)
 }
 
-/// Two views' topics, and a stage that joins them.
+/// Returns the topics of two views, and a stage that joins them.
 fn two_views(rules: Rules) -> ([Topic<ViewPose>; 2], Inbox<'static, u64>) {
     let topics = [Topic::new(), Topic::new()];
     let inputs = [0, 1].map(|view| input(&topics[view], Sender::View(view), Slots::one(view)));
@@ -133,7 +133,7 @@ fn two_views(rules: Rules) -> ([Topic<ViewPose>; 2], Inbox<'static, u64>) {
     (topics, inbox)
 }
 
-/// Polls; returns the complete frames, and for every slot whether it has a message.
+/// Polls. Returns the complete frames, and for every slot whether it has a message.
 fn frames(inbox: &mut Inbox<'_, u64>, counts: &Counts, now: u64) -> Vec<(u64, Vec<bool>)> {
     let clock = move || now;
     let context = Context::new(SESSION, &clock, counts);
@@ -250,7 +250,7 @@ fn the_messages_and_the_end_of_a_worker_count_for_its_pairs() {
     assert!(inbox.is_over(2));
 }
 
-/// A view's poses, and its expected errors: optional, with a deadline of 30 ns and a largest age of 25 ns.
+/// Returns a view's poses and its expected errors, which are optional, with a deadline of 30 ns and a maximum age of 25 ns.
 fn with_errors(delivery: Delivery) -> (Topic<ViewPose>, Topic<ViewQuality>, Inbox<'static, u64>) {
     let (poses, errors) = (Topic::new(), Topic::new());
     let inputs = vec![
@@ -279,7 +279,7 @@ fn no_frame_waits_for_an_optional_message_past_its_deadline_and_the_last_one_is_
     assert_eq!(frames(&mut inbox, &counts, 40), [(1, vec![true, false])]);
     assert_eq!(inbox.last().of(1, 2, 20), Some((2, &0)));
     assert_eq!(inbox.last().of(1, 3, 30), None, "too old");
-    // Too late for its own frame, in time for the next.
+    // The message is too late for its own frame, but in time for the next one.
     errors.send(message(1, 0));
     assert_eq!(frames(&mut inbox, &counts, 41), []);
     assert_eq!(inbox.last().of(1, 3, 30), Some((2, &1)));

@@ -1,25 +1,25 @@
-//! Which frames a stage processes when it cannot process all, so that all stages choose the same ones.
+//! Chooses the frames that a stage processes if it cannot process all, so that all stages choose the same ones.
 
-/// Consecutive frames that must be too slow, or fast, before the stride changes.
+/// Number of consecutive frames that must be too slow, or fast, before the stride changes.
 const N_SLOW: u32 = 3;
 const N_FAST: u32 = 8;
-/// Largest share of the available time that a frame may need for the stride to be halved.
+/// Maximum share of the available time that a frame may need for the stride to be halved.
 const HALVING_LOAD: f64 = 0.7;
-/// Largest stride.
+/// Maximum stride.
 const MAX_STRIDE: u64 = 1 << 16;
 
-/// Chooses how many frames to skip where the latest frame wins.
+/// Chooses the number of frames to skip with realtime delivery.
 ///
 /// If every stage processed the newest frame whenever it is idle, stages would process different frames, and their
-/// messages could not be joined. So a stage processes every n-th frame only. n is a power of two and follows from the
-/// measured processing time. The frames of the slowest stage are then among those of all others, without any
+/// messages could not be joined. A stage therefore processes only every n-th frame. n is a power of two and follows from the
+/// measured processing time. The frames of the slowest stage are then among those of all other stages, without any
 /// communication between stages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cadence {
     stride: u64,
     n_slow: u32,
     n_fast: u32,
-    /// The previous frame that was processed, and its capture time.
+    /// The last processed frame, and its capture time.
     last: Option<(u64, u64)>,
 }
 
@@ -35,21 +35,21 @@ impl Default for Cadence {
 }
 
 impl Cadence {
-    /// Returns true if a frame is to be processed.
+    /// Returns true if a frame has to be processed.
     ///
-    /// * `nth`: its position among the frames that the deployment uses; the same in all stages.
+    /// * `nth`: position of the frame among the used frames of the deployment; the same in all stages.
     pub fn takes(&self, nth: u64) -> bool {
         nth.is_multiple_of(self.stride)
     }
 
-    /// Distance between the frames that are processed.
+    /// Returns the distance between processed frames.
     pub fn stride(&self) -> u64 {
         self.stride
     }
 
-    /// Notes that a frame was processed.
+    /// Records that a frame was processed.
     ///
-    /// * `captured_at_nanos`: gives the time between frames.
+    /// * `captured_at_nanos`: capture time, from which the time between frames follows.
     /// * `busy_nanos`: the processing time.
     pub fn processed(&mut self, nth: u64, captured_at_nanos: u64, busy_nanos: u64) {
         let last = self.last.replace((nth, captured_at_nanos));
@@ -88,7 +88,7 @@ mod tests {
 
     use super::*;
 
-    /// The frames that are processed, of frames 100 ns apart that take `busy` ns each.
+    /// Returns the processed frames if frames are 100 ns apart and take `busy` ns each.
     fn taken(cadence: &mut Cadence, frames: core::ops::Range<u64>, busy: u64) -> Vec<u64> {
         let mut free_at = 0;
         let mut taken = Vec::new();

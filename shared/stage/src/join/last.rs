@@ -1,8 +1,8 @@
-//! The last messages of each input, for frames that did not wait for it.
+//! The last messages of each input, for frames that did not wait for the input.
 
 use std::collections::VecDeque;
 
-/// Messages kept per input: an input may be ahead of the frame that is being processed.
+/// Number of messages kept per input, because an input may be ahead of the frame that is being processed.
 const KEPT: usize = 4;
 
 /// Keeps the last messages of several inputs while they are fresh.
@@ -20,9 +20,9 @@ struct Message<T> {
 }
 
 impl<T> Last<T> {
-    /// Makes an empty store.
+    /// Creates an empty store.
     ///
-    /// * `max_age_nanos`: largest difference of capture times at which a message is used for a later frame.
+    /// * `max_age_nanos`: maximum difference of capture times at which a message is used for a later frame.
     pub fn new(n_inputs: usize, max_age_nanos: u64) -> Self {
         Self {
             of_input: (0..n_inputs).map(|_| VecDeque::new()).collect(),
@@ -30,9 +30,9 @@ impl<T> Last<T> {
         }
     }
 
-    /// Keeps the message of an input about a frame; frames may come in any order.
+    /// Keeps the message of an input about a frame. Frames may come in any order.
     ///
-    /// * `captured_at`: when the frame was captured, nanoseconds.
+    /// * `captured_at`: time at which the frame was captured, nanoseconds.
     pub fn keep(&mut self, input: usize, frame: u64, captured_at: u64, item: T) {
         let Some(messages) = self.of_input.get_mut(input) else {
             return;
@@ -49,7 +49,7 @@ impl<T> Last<T> {
         }
     }
 
-    /// The latest message about this frame or an earlier one, if it is fresh, and its age in frames.
+    /// Returns the latest message about this frame or an earlier one, if it is fresh, and its age in frames.
     pub fn of(&self, input: usize, frame: u64, captured_at: u64) -> Option<(u64, &T)> {
         let messages = self.of_input.get(input)?;
         let latest = messages.iter().rev().find(|message| message.frame <= frame)?;

@@ -1,4 +1,4 @@
-//! Tests of people and maps on their way.
+//! Tests of sending people and maps in messages.
 
 use proptest::prelude::*;
 

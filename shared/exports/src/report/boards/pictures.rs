@@ -1,4 +1,4 @@
-//! The corners of a camera in its picture, and what they are off.
+//! Draws the corners of a camera in its picture, and their residuals.
 
 use calibration::board::{CameraOutcome, Residual};
 
@@ -6,15 +6,15 @@ use crate::report::html::{Html, html, put};
 
 /// Width of the picture in the page.
 const WIDTH: f64 = 420.0;
-/// How much longer residuals are drawn.
+/// Factor by which residuals are enlarged in the drawing.
 const LONGER: f64 = 25.0;
-/// Side of the plot of residuals, and what one pixel is there.
+/// Side of the plot of residuals, and the length of one pixel in the plot.
 const PLOT: f64 = 180.0;
 const PIXEL: f64 = 40.0;
-/// The most corners that are drawn.
+/// Maximum number of corners that are drawn.
 const MOST: usize = 1500;
 
-/// Both drawings.
+/// Returns both drawings.
 pub(super) fn corners(camera: &CameraOutcome) -> Html {
     let [width, height] = camera.camera.intrinsics.size.map(f64::from);
     let scale = WIDTH / width.max(1.0);
@@ -33,7 +33,7 @@ pub(super) fn corners(camera: &CameraOutcome) -> Html {
         [WIDTH, drawn]
     );
     let step = camera.residuals.len().div_ceil(MOST).max(1);
-    // Those that were left out are few: all of them are drawn.
+    // Only few corners were left out, so all of these are drawn.
     let shown = camera.residuals.iter().enumerate();
     for (_, it) in shown.filter(|(nth, it)| it.is_wrong || nth % step == 0) {
         corner(&mut out, it, scale);

@@ -1,4 +1,4 @@
-//! Cameras and boards in space, from three sides.
+//! Draws cameras and boards in space, from three sides.
 
 use nalgebra::{Matrix2x3, Point3, Vector2};
 
@@ -8,10 +8,10 @@ use crate::report::html::{Html, html, put};
 /// Side of a view in the page.
 const SIDE: f64 = 300.0;
 const MARGIN: f64 = 30.0;
-/// The most boards that are drawn.
+/// Maximum number of boards that are drawn.
 const MOST: usize = 60;
 
-/// Obliquely, from above, from the side. The world is the frame of the first camera: x right, y down, z forward.
+/// Returns three views: oblique, from above, from the side. The world is the frame of the first camera: x right, y down, z forward.
 pub(super) fn views(page: &Page<'_>) -> Html {
     let oblique = Matrix2x3::new(0.87, 0.0, -0.5, 0.25, 0.87, -0.43);
     let above = Matrix2x3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
@@ -123,7 +123,7 @@ fn outlines(out: &mut Html, frame: &Frame, boards: Vec<[Vector2<f64>; 4]>) {
     }
 }
 
-/// A line of a round length.
+/// Draws a line of a round length.
 fn ruler(out: &mut Html, scale: f64) {
     let metres = [
         0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0,

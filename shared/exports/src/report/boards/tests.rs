@@ -1,4 +1,4 @@
-//! The page with text that would break it, and numbers that are not finite.
+//! Tests of the page with text that would break it, and with numbers that are not finite.
 
 use calibration::board::{Doubt, Known, OutOfStep, Residual};
 use geometry::{Camera, Intrinsics, Lens};

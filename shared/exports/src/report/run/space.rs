@@ -1,20 +1,20 @@
-//! The skeleton in space, frame by frame: what the script of the page draws.
+//! The skeleton in space, frame by frame: data for the script of the page.
 
 use serde_json::{Value, json};
 
-/// A place in space, metres in the world.
+/// A point in space, metres in the world.
 pub type Point = [f64; 3];
 
 /// Everything that is drawn in space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Space {
-    /// Names of the joints; those of either side begin with it (`left`, `right`).
+    /// Names of the joints. Names of joints with a side begin with it (`left`, `right`).
     pub joints: Vec<String>,
-    /// Joints that a line connects.
+    /// Pairs of joints that a line connects.
     pub limbs: Vec<(usize, usize)>,
     /// The cameras, in the order of [`Moment::views`].
     pub eyes: Vec<Eye>,
-    /// Against gravity.
+    /// Direction against gravity.
     pub up: Point,
     /// The results, in the order of time.
     pub moments: Vec<Moment>,
@@ -23,11 +23,11 @@ pub struct Space {
 /// A camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Eye {
-    /// Its name.
+    /// Name of the camera.
     pub name: String,
-    /// Its centre, metres in the world.
+    /// Centre of the camera, metres in the world.
     pub at: Point,
-    /// Where it looks, of length 1.
+    /// Viewing direction of the camera, of length 1.
     pub axis: Point,
 }
 
@@ -36,18 +36,18 @@ pub struct Eye {
 pub struct Moment {
     /// Number of the frame.
     pub frame: u64,
-    /// When it was taken, seconds since the first frame.
+    /// Time at which the frame was taken, seconds since the first frame.
     pub seconds: f64,
-    /// The joints that were found.
+    /// Positions of the joints that were found.
     pub found: Vec<Option<Point>>,
-    /// Where they are; empty if that is not known.
+    /// True positions of the joints; empty if they are not known.
     pub truth: Vec<Point>,
-    /// For every view nothing, or why it has no part in this result.
+    /// For every view, `None`, or the reason why it did not contribute to this result.
     pub views: Vec<Option<String>>,
 }
 
 impl Space {
-    /// For the script: coordinates in whole millimetres.
+    /// Returns the data for the script, with coordinates in whole millimetres.
     pub(crate) fn json(&self) -> Value {
         let mm = |point: &Point| point.map(|value| (1000.0 * value).round() as i64);
         let eyes = self

@@ -1,4 +1,4 @@
-//! Tests of the content of the page, and that it asks for nothing.
+//! Tests of the content of the page, and that it sends no request.
 
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -148,7 +148,7 @@ fn the_page_is_dark_where_its_reader_wants_that_and_scrolls_what_is_wide() {
             "{name} has no dark tone"
         );
     }
-    // No colour of the page is fixed but that of the stage, which is dark in both.
+    // No colour of the page is fixed except that of the stage, which is dark in both styles.
     let rules = STYLE.split("}\n}\n").nth(1).unwrap();
     assert_eq!(
         rules.matches('#').count(),
@@ -213,10 +213,10 @@ fn no_text_of_the_page_becomes_markup() {
         }
     }
     let html = html(&page);
-    // The data and the script of the page itself.
+    // The two scripts are the data and the script of the page itself.
     assert_eq!(html.matches("<script").count(), 2);
-    // The title twice, lead, legend, 2 limits of 3, 2 cameras, a view's absence, a mark, 6 of the table, the strip, and
-    // its pictures: one with a name, one with a name and why it is not there.
+    // The count is: the title twice, lead, legend, 2 limits of 3, 2 cameras, a view's absence, a mark, 6 of the table, the strip, and
+    // its pictures: one with a name, and one with a name and the reason for its absence.
     let escaped = html.matches("&lt;script&gt;&#39;&quot;&amp;").count();
     assert_eq!(escaped, 2 + 2 + 6 + 2 + 1 + 1 + 6 + 1 + 3);
 }

@@ -1,14 +1,14 @@
-//! Who was there when: a row for every view, a tick for every result.
+//! The presence of views over time: a row for every view, a tick for every result.
 
 use super::space::Space;
 use crate::report::html::{Html, put};
 
-/// Something that happened.
+/// An event during the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
-    /// When, seconds since the first frame.
+    /// Time of the event, seconds since the first frame.
     pub seconds: f64,
-    /// What, in a word or two.
+    /// Name of the event, in a word or two.
     pub what: String,
 }
 
@@ -35,7 +35,7 @@ pub(crate) fn svg(space: &Space, marks: &[Mark]) -> Html {
         ticks(&mut out, space, row, &x);
     }
     for (nth, mark) in marks.iter().enumerate() {
-        // The words of marks that follow each other closely stand to either side.
+        // If marks follow each other closely, their words are on opposite sides.
         let (class, dx) = if nth == 0 { ("end", -4.0) } else { ("", 4.0) };
         let at = x(mark.seconds);
         put!(
@@ -61,7 +61,7 @@ pub(crate) fn svg(space: &Space, marks: &[Mark]) -> Html {
     out
 }
 
-/// One view: its name, and a tick for every result.
+/// Draws one view: its name, and a tick for every result.
 fn ticks(out: &mut Html, space: &Space, row: usize, x: &dyn Fn(f64) -> f64) {
     let y = TOP + ROW * row as f64;
     put!(

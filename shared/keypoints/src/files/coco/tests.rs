@@ -3,7 +3,7 @@
 use super::*;
 use crate::decode::Keypoint;
 
-/// 17 keypoints, the third number of all of them the same.
+/// Returns 17 keypoints whose third numbers are all the same.
 fn list(x: f64, third: f64) -> String {
     let three = format!("{x},{},{third}", x + 1.0);
     format!("[{}]", vec![three; 17].join(","))
@@ -122,7 +122,7 @@ fn a_data_set_without_people_needs_names() {
 fn what_other_programs_write_is_refused_in_words() {
     let table = refused("scorer,DLC,DLC,DLC\nbodyparts,nose,nose,nose\n");
     assert!(table.contains("begins with \"scorer,DLC"), "{table}");
-    // Ultralytics: a list of people for each frame.
+    // Ultralytics writes a list of people for each frame.
     let frames = refused("[[{\"name\":\"person\",\"keypoints\":{\"x\":[1],\"y\":[2]}}]]");
     assert!(frames.contains("expected an `image_id`"), "{frames}");
 }

@@ -6,7 +6,7 @@ use tempfile::TempDir;
 
 use super::*;
 
-/// A frame of some people with 25 keypoints at one place each.
+/// Returns a frame of some people, each with 25 keypoints at one position.
 fn frame(people: &[f64]) -> String {
     let person = |x: &f64| format!("{{\"pose_keypoints_2d\":{:?}}}", vec![*x; 75]);
     let people: Vec<String> = people.iter().map(person).collect();
@@ -132,7 +132,7 @@ fn one_file_in_the_layout_of_coco_has_all_frames() {
     assert!(error.to_string().contains("frame.json: expected"));
 }
 
-/// A frame of one upright person with the keypoints of a set, as far as they have names below.
+/// Returns a frame of one upright person with those keypoints of a set whose names are listed below.
 fn upright(names: &[&str]) -> String {
     let at = |name: &str| match name {
         "pelvis" => [101.0, 100.0],
