@@ -1,6 +1,6 @@
-//! A model as one HTML page that explains it to a person: filters, tree, springs, biases, numbers.
+//! A model as one HTML page with explanations: filters, tree, springs, biases, numbers.
 //!
-//! The page has no script. It is well-formed XML too, which is how the tests read it.
+//! The page has no script. It is also well-formed XML, so the tests read it as XML.
 
 mod biases;
 mod colours;
@@ -16,12 +16,13 @@ use figure::Figure;
 
 /// Draws a model.
 ///
-/// * Every filter as a glyph: per cell the positive weights of its nine orientations, as strokes along
-///   the edges that they answer to.
-/// * The whole body twice, in an ordinary posture: as filters, and as a tree with the springs, which are ellipses at a score of [`SPRING_COST`] below the best.
-/// * Per part the springs of all types and the biases of all pairs of types.
+/// * Every filter as a glyph: for each cell, the positive weights of its nine orientations, as strokes along
+///   the edges that they respond to.
+/// * The whole body twice in an ordinary posture: as filters, and as a tree with springs. Springs are ellipses at a score of
+///   [`SPRING_COST`] below the best.
+/// * For each part, the springs of all types and the biases of all pairs of types.
 ///
-/// Parts and types count from 1, as in everything a user sees.
+/// Parts and types are counted from 1, as in everything that users see.
 pub fn html(model: &Model) -> String {
     let title = &model.spec().name;
     let figure = Figure::new(model);
@@ -54,10 +55,10 @@ pub fn html(model: &Model) -> String {
     page.into_page()
 }
 
-/// How much of the score a part loses on the ellipse that is drawn for its spring.
+/// Loss of score on the ellipse that is drawn for a spring.
 pub const SPRING_COST: f64 = 0.05;
 
-/// Styles that only this page needs.
+/// Styles of this page, besides the common ones.
 const MORE_STYLE: &str = "
 body { max-width: 84em; }
 h3 { margin: 0 0 .5em; }
@@ -127,7 +128,7 @@ fn numbers(model: &Model) -> Html {
     out
 }
 
-/// Everything about one part.
+/// Draws the card of one part.
 fn card(model: &Model, part: usize) -> Html {
     let spec = &model.spec().parts[part];
     let n_types = model.n_types(part);

@@ -1,4 +1,4 @@
-//! `parallax-lab model show` of a network that finds keypoints: what it takes and gives, its card, what it sees in a picture.
+//! `parallax-lab model show` for a network that finds keypoints: its inputs and outputs, its card, and its keypoints in a picture.
 
 mod detector;
 
@@ -21,11 +21,10 @@ use terminal::{Outline, outline, output};
 /// Options of `model show` for networks.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Card of a network (.onnx); if not given, the file beside the network whose ending is .toml, or the entry `parallax.card`
-    /// of the network.
+    /// Card of a network (.onnx); if not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
     #[arg(long, value_name = "CARD", conflicts_with = "html")]
     card: Option<PathBuf>,
-    /// Picture of a person to show to a network, or of people to show to a detector.
+    /// Picture to apply the network to: of one person for keypoints, or of people for a detector.
     #[arg(
         long,
         value_name = "PICTURE",
@@ -33,7 +32,7 @@ pub(crate) struct Arguments {
         conflicts_with = "html"
     )]
     image: Option<PathBuf>,
-    /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the whole picture.
+    /// Box around the person, in pixels of the picture: left, top, right, bottom; the whole picture if not given.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "image", allow_hyphen_values = true)]
     outline: Option<Outline>,
     /// Draw the joints and their maps, or the boxes of a detector, into this PNG file.
@@ -42,13 +41,13 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Returns true if any is given.
+    /// Returns true if any option is given.
     pub(crate) fn is_given(&self) -> bool {
         self.card.is_some() || self.image.is_some()
     }
 }
 
-/// Shows a network or a detector, whichever its card says that it is.
+/// Shows a network or a detector, depending on its card.
 pub(crate) fn show(file: &Path, as_json: bool, arguments: &Arguments) -> Result<ExitCode, Failure> {
     match Described::open(file, arguments.card.as_deref())? {
         Described::Network(it) => show_network(file, it, as_json, arguments),
@@ -118,7 +117,7 @@ fn show_network(
     Ok(ExitCode::SUCCESS)
 }
 
-/// The keypoints that a network finds in a picture, which is drawn.
+/// Returns the keypoints that a network finds in a picture, and draws them.
 fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Vec<Value>, Failure> {
     let picture = first_picture(image)?;
     let whole = [picture.size.width as f64, picture.size.height as f64];
@@ -133,7 +132,7 @@ fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Ve
     network::keypoints_json(&sight)
 }
 
-/// The picture of a file, or its first one.
+/// Reads a picture file, or the first picture of a file with several.
 fn first_picture(file: &Path) -> Result<Picture, Failure> {
     let one = Frames {
         every: 1,
@@ -315,7 +314,7 @@ fn given(card: &Card) -> String {
     }
 }
 
-/// A value of a card as it is written there.
+/// Returns a value as it is spelled in a card.
 fn word(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Evaluation of who is who, on a set of several people.
+//! Evaluation of identities, on a set of several people.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -32,9 +32,9 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Fail
     )
 }
 
-/// Judges a finished run against the truth of its scene.
+/// Evaluates a finished run against the truth of its scene.
 ///
-/// * `run`: the folder of its results.
+/// * `run`: folder with the results of the run.
 pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode, Failure> {
     let [folder] = &arguments.sequences[..] else {
         let what = "--run judges one run against the truth of one sequence";
@@ -66,7 +66,7 @@ pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode
     )
 }
 
-/// Writes a report to the folder for it, and prints it.
+/// Writes a report into the output folder, and prints it.
 fn leave(arguments: &Arguments, report: &impl Serialize, lines: &str) -> Result<(), Failure> {
     inputs::make_folder(&arguments.out)?;
     let text = serde_json::to_string_pretty(report).or_fail(ExitKind::Run)?;
@@ -109,7 +109,7 @@ fn everybody_in_lines(report: &Everybody) -> String {
     )
 }
 
-/// A number with its interval.
+/// Formats a number with its interval.
 fn number(measured: Option<Measured>) -> String {
     let Some(Measured { value, interval }) = measured else {
         return "-".to_owned();
@@ -118,7 +118,7 @@ fn number(measured: Option<Measured>) -> String {
     format!("{value:.2} ({low:.2} to {high:.2})")
 }
 
-/// The views that were asked for; all if none was.
+/// Returns the selected views; all views if the selection is empty.
 fn chosen(asked: &[usize], n_views: usize) -> Result<Vec<usize>, Failure> {
     let is_twice = |nth: usize| asked[..nth].contains(&asked[nth]);
     let wrong = (0..asked.len()).find(|nth| asked[*nth] >= n_views || is_twice(*nth));

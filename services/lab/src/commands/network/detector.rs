@@ -1,4 +1,4 @@
-//! `parallax-lab model show` of a detector of people.
+//! `parallax-lab model show` for a detector of people.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -65,7 +65,7 @@ pub(super) fn show(
     fitted.map(|_| ExitCode::SUCCESS)
 }
 
-/// The boxes that a detector finds in a picture, which is drawn.
+/// Returns the boxes that a detector finds in a picture, and draws them.
 fn look(detector: &Detector, image: &Path, out: Option<&Path>) -> Result<Vec<PersonBox>, Failure> {
     let picture = first_picture(image)?;
     let found = detector::people(detector, &picture, &mut Vec::new())?;

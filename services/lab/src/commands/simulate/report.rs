@@ -1,4 +1,4 @@
-//! The costs of a run, from the report that it printed.
+//! Costs of a run, from the report that it printed.
 
 use std::path::Path;
 
@@ -8,11 +8,12 @@ use serde_json::Value;
 
 use super::DEFAULT;
 
-/// Reads the costs of a run: processor time of its stages, and of the link what `hosts.json` in its folder says, if there is one.
+/// Reads the costs of a run: the processor time of its stages, and the costs of the link from `hosts.json` in its folder, if this file
+/// exists.
 ///
 /// # Errors
 ///
-/// The file is not the report of a run, or the run passed no frame.
+/// Fails if the file is not the report of a run, or the run processed no frame.
 pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
     let refused = |what: &str| {
         let failure = Failure::new(ExitKind::Input, format!("{}: {what}", file.display()));
@@ -38,7 +39,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
             "{n_frames} frames of {n_views} views: no costs can be computed from that"
         ));
     }
-    // A process of a service, milliseconds for each frame.
+    // Mean time of a process of this service, milliseconds per frame.
     let mean = |service: &str| {
         let is_meant = |name: &str| {
             let rest = name.strip_prefix(service);
@@ -62,14 +63,15 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         ..DEFAULT
     };
     let n_pose = spent.keys().filter(|key| key.starts_with("pose-")).count();
-    // Where poses cross, some are found elsewhere.
+    // If hosts send poses, some poses are found on other hosts.
     let carries_poses = n_pose > 0 && n_pose < n_views;
     Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
 }
 
-/// Adds the measured costs of the link to the costs.
+/// Adds the measured costs of the link.
 ///
-/// * `hosts`: what `hosts.json` says; `carries_poses`: whether poses cross, and no frames.
+/// * `hosts`: content of `hosts.json`.
+/// * `carries_poses`: true if hosts send poses instead of frames.
 fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
     let far = hosts["hosts"].as_array().into_iter().flatten();
     let far = far.filter_map(|value| value["views"].as_array()).flatten();

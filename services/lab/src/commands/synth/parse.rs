@@ -8,7 +8,7 @@ pub(super) fn rig(text: &str) -> Result<RigChoice, String> {
     RigChoice::parse(text).map_err(|error| error.to_string())
 }
 
-/// Parses skews, milliseconds: `0,5,11,16`.
+/// Parses skews in milliseconds, for example `0,5,11,16`.
 pub(super) fn skews(text: &str) -> Result<Vec<f64>, String> {
     let skews = scene::Settings::parse_skews_ms(text);
     skews.ok_or_else(|| {
@@ -18,10 +18,10 @@ pub(super) fn skews(text: &str) -> Result<Vec<f64>, String> {
     })
 }
 
-/// Maximal number of subjects of one command.
+/// Largest number of subjects in one command.
 const MAX_SUBJECTS: usize = 10_000;
 
-/// Parses a list of subjects: `3`, or `1-20,25`. Keeps the order and removes duplicates.
+/// Parses a list of subjects, for example `3` or `1-20,25`. Keeps the order and removes duplicates.
 pub(super) fn subjects(text: &str) -> Result<Vec<u64>, String> {
     let wrong =
         || format!("{text:?}: expected numbers and ranges with commas, for example 1-20,25");
