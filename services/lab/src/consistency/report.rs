@@ -7,20 +7,20 @@ use serde_json::{Value, json};
 use super::work::Done;
 use multiview::learned::{Appearance, Point};
 
-/// Version of the JSON.
+/// Schema version of the JSON.
 const SCHEMA: u32 = 1;
 
 impl Done {
-    /// For programs.
+    /// Returns the report as JSON.
     ///
-    /// * `out`: the file that was written.
+    /// * `out`: the written file.
     pub fn json(&self, out: &Path) -> Value {
         json(out, self)
     }
 
-    /// For people.
+    /// Returns the report as text.
     ///
-    /// * `out`: the file that was written.
+    /// * `out`: the written file.
     pub fn text(&self, out: &Path) -> String {
         text(out, self)
     }

@@ -1,9 +1,9 @@
-//! The sequences that are learned from, and those that are held out.
+//! Split of sequences into training and held-out sequences.
 
 use failure::{ExitKind, Failure};
 use training::datasets::sequences::Sequence;
 
-/// Those that are learned from, and those that the weights are chosen on.
+/// Splits sequences into training sequences and held-out ones, on which the weights are chosen.
 pub(super) fn split(
     all: Vec<Sequence>,
     hold_out: &[String],
@@ -33,7 +33,7 @@ pub(super) fn split(
     Ok((train, held))
 }
 
-/// Sees that all sequences have the same cameras.
+/// Checks that all sequences have the same cameras.
 pub(super) fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
     let cameras = |sequence: &Sequence| -> Vec<String> {
         let views = sequence.views.iter();
@@ -59,7 +59,7 @@ mod tests {
 
     use super::*;
 
-    /// One camera; what it sees does not matter here.
+    /// A rig with one camera; its picture is irrelevant here.
     fn rig() -> Rig {
         let camera = geometry::Camera {
             name: "c1".to_owned(),

@@ -1,13 +1,13 @@
-//! Frames done, and the time that is left.
+//! Progress display: frames done, and the remaining time.
 
 use std::time::{Duration, Instant};
 
 use failure::Console;
 
-/// How long a line of progress lasts where there is no bar.
+/// Time between two lines of progress if there is no bar.
 const EVERY: Duration = Duration::from_secs(10);
 
-/// Shows on a console how far the run is: by a bar, or by a message now and then if there is no bar.
+/// Shows progress on a console: with a bar, or otherwise with a message now and then.
 pub(super) struct Progress<'a> {
     console: &'a dyn Console,
     begin: Instant,

@@ -1,4 +1,4 @@
-//! An evaluation as one HTML page: what was run, the tables with the paper's numbers beside ours, the figures.
+//! An evaluation as one HTML page: a description of the run, tables with the paper's numbers beside ours, and figures.
 
 mod figure;
 mod pictures;
@@ -12,18 +12,18 @@ use figure::{bars, colour, curves, histogram};
 
 pub use pictures::pictures_html;
 
-/// The content of the page.
+/// Content of the page.
 #[derive(Debug, Clone)]
 pub struct Page<'a> {
-    /// The numbers.
+    /// The numbers to show.
     pub summary: &'a Summary,
-    /// The versions of the summary.
+    /// The versions in the summary.
     pub versions: &'a [Version],
-    /// Description of the run: key and value.
+    /// Description of the run, as keys and values.
     pub about: &'a [(String, String)],
 }
 
-/// One self-contained page.
+/// Returns one self-contained page.
 pub fn html(page: &Page<'_>) -> String {
     let titles: Vec<String> = page.versions.iter().map(|version| version.title()).collect();
     let mut out = begin("Parallax: evaluation");
@@ -55,7 +55,7 @@ pub fn html(page: &Page<'_>) -> String {
     out.into_page()
 }
 
-/// The paper's main tables: PCP3D by group, with the published values.
+/// Adds the paper's main tables: PCP3D by group, with the published values.
 fn scores(out: &mut Html, page: &Page<'_>, titles: &[String]) {
     let confidence = 100.0 * page.summary.confidence;
     put!(
@@ -102,9 +102,9 @@ fn interval(ends: Option<[f64; 2]>, digits: usize) -> Html {
     })
 }
 
-/// All other measures of a group, a column for each version.
+/// Adds all other measures of a group, with a column for each version.
 fn measures(out: &mut Html, group: &Group, titles: &[String]) {
-    /// A number, its interval, and how many decimals both have.
+    /// Returns a number, its interval, and the number of decimals of both.
     type Cell = fn(&Numbers) -> (Option<f64>, Option<[f64; 2]>, usize);
     let rows: [(&str, Cell); 17] = [
         ("PCP3D at 0.5, %", |own| (own.pcp3d, own.pcp3d_interval, 2)),
@@ -162,7 +162,7 @@ fn measures(out: &mut Html, group: &Group, titles: &[String]) {
     put!(out, "</table></div>\n");
 }
 
-/// Quality of the expected errors.
+/// Adds the quality of the expected errors.
 fn predictions(out: &mut Html, summary: &Summary) {
     if summary.predictions.is_empty() {
         return;

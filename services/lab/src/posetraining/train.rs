@@ -1,4 +1,4 @@
-//! The training itself: from prepared people to an ONNX file with its card.
+//! The training: from prepared people to an ONNX file with its card.
 
 use exports::report::curves::{self, Line, Panel};
 use training::networks::Trainer;
@@ -9,10 +9,10 @@ use crate::trained::{self, Job, Shown};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use inputs::cards::METADATA_KEY;
 
-/// The results of a hundred steps.
+/// Results of a hundred steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
 
-/// Reads the network that the training goes on from; nothing for random parameters.
+/// Reads the network to start from; `None` for random parameters.
 fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
     let Some(from) = &job.from else {
         if settings.extras_alone {
@@ -29,7 +29,7 @@ fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
     Ok(Some(begun))
 }
 
-/// Draws the costs of all passes, and the scores on people who are kept apart.
+/// Draws the costs of all passes, and the scores on held-out people.
 fn drawn(passes: &[Pass]) -> String {
     let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
         name,
@@ -66,12 +66,13 @@ fn drawn(passes: &[Pass]) -> String {
     curves::svg(&panels, None)
 }
 
-/// Trains a network on prepared people, and writes it; a checkpoint, and curves (`.svg`), follow every hundred steps.
+/// Trains a network on prepared people, and writes it. After every hundred steps, a checkpoint and the curves (`.svg`) are written.
 ///
 /// # Errors
 ///
-/// Nobody to learn from, or nobody kept apart; the checkpoint is of another training; a file cannot be written; it was stopped
-/// ([`ExitKind::Interrupted`]).
+/// Fails if there are no people for training or no held-out people, if the checkpoint is from another training, if a file cannot be
+/// written,
+/// or on a stop request ([`ExitKind::Interrupted`]).
 pub fn train(
     (job, settings): (&Job, &Settings),
     people: &Prepared,
@@ -99,7 +100,7 @@ pub fn train(
     trained::run(job, task, &shown, &written, (stop, console))
 }
 
-/// Describes a pass in a line.
+/// Describes a pass in a line of text.
 fn line(pass: &Pass) -> String {
     let cost = pass.cost;
     let learnt = format!(

@@ -1,4 +1,4 @@
-//! The training of a network that predicts errors.
+//! Training of a network that predicts errors.
 
 use std::fs;
 use std::io;
@@ -18,28 +18,28 @@ use training::networks::{Backend, Parameter, TrainError};
 use super::replace::replace;
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file};
 
-/// The results of a pass over the samples.
+/// Results of a pass over the samples.
 type Pass = training::networks::Pass<f32, Validated>;
 type Trainer<'a> = training::networks::Trainer<QualityTask<'a>>;
 
-/// Data and settings of the training of a network.
+/// Data and settings for training a network.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Files of samples to learn from and to validate on.
+    /// Files of samples for training and validation.
     pub samples: Vec<PathBuf>,
-    /// Files of samples to judge the network on; every file by itself.
+    /// Files of samples for testing the network, each file separately.
     pub judge: Vec<PathBuf>,
-    /// The ONNX file to write; the checkpoint and the curves are beside it.
+    /// The ONNX file to write; the checkpoint and the curves are in files beside it.
     pub out: PathBuf,
-    /// Weights of torchvision's VGG-16 to begin with.
+    /// Weights of torchvision's VGG-16 to start from.
     pub weights: Option<PathBuf>,
-    /// Identity in the file; its name if not given.
+    /// Identity stored in the file; the file's name if `None`.
     pub identity: Option<String>,
-    /// True to go on from the checkpoint of an interrupted training, if there is one.
+    /// True to continue from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
 }
 
-/// How good the network was after a pass.
+/// Returns the quality of the network after a pass.
 fn validated(pass: &Pass) -> Validated {
     pass.score.unwrap_or(Validated {
         loss: f32::NAN,
@@ -47,7 +47,7 @@ fn validated(pass: &Pass) -> Validated {
     })
 }
 
-/// The losses above, and the area under the ROC below.
+/// Draws two panels: the losses, and below the area under the ROC curve.
 fn drawn(passes: &[Pass], best: Option<usize>) -> String {
     let line = |name, value: &dyn Fn(&Pass) -> f64| Line {
         name,
@@ -73,7 +73,7 @@ fn drawn(passes: &[Pass], best: Option<usize>) -> String {
 ///
 /// # Errors
 ///
-/// Samples, weights or a checkpoint that cannot be used; a file that cannot be written; a stop request
+/// Fails if samples, weights or a checkpoint cannot be used, if a file cannot be written, or on a stop request
 /// ([`ExitKind::Interrupted`]).
 pub fn train(
     job: &Job,
@@ -135,7 +135,7 @@ pub fn train(
     fs::remove_file(&kept).map_err(|error| in_file(&kept, &error))
 }
 
-/// Weights of torchvision's VGG-16.
+/// Reads the weights of torchvision's VGG-16.
 fn weights(file: &Path) -> Result<Vec<Parameter>, Failure> {
     let bytes = files::read(file, files::RESULTS).map_err(|error| in_file(file, &error))?;
     vgg::parse(&bytes).map_err(|error| in_file(file, &error))
@@ -146,7 +146,7 @@ fn read(file: &Path) -> Result<Samples, Failure> {
     Samples::from_bytes(&bytes).map_err(|error| in_file(file, &error))
 }
 
-/// Several files as one.
+/// Reads several files as one set of samples.
 fn read_all(files: &[PathBuf]) -> Result<Samples, Failure> {
     let mut all = Samples::default();
     for file in files {
@@ -186,12 +186,12 @@ fn refused(error: TrainError, checkpoint: &Path) -> Failure {
     failure
 }
 
-/// Reports how far the training is.
+/// Reports the progress of the training.
 struct Say<'a> {
     console: &'a dyn Console,
     epochs: usize,
     begin: Instant,
-    /// Passes that were done before.
+    /// Number of passes done earlier, by an interrupted process.
     before: usize,
 }
 
