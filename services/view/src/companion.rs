@@ -90,7 +90,7 @@ fn watch(mut command: Command, over: &AtomicBool) {
             match child.try_wait() {
                 Ok(None) => std::thread::sleep(TURN),
                 Ok(Some(status)) => {
-                    tracing::warn!(%status, "the view has ended; it is started again");
+                    tracing::warn!(%status, "the view ended and will be restarted");
                     break;
                 }
                 Err(error) => {

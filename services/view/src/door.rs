@@ -45,7 +45,7 @@ pub(crate) fn open(
                     drop(seat);
                 });
                 if let Err(error) = started {
-                    tracing::debug!(%error, "a connection is closed: there is no thread for it");
+                    tracing::debug!(%error, "a connection was closed: cannot start a thread for it");
                 }
             }
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => wait(listener, stop),

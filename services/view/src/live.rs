@@ -52,7 +52,7 @@ fn waiting(named: Option<&str>, why: &str) -> Value {
 /// Looks on until the deployment ends.
 fn watch(mut session: Session, board: &Board, stop: &Stop) -> Result<(), Failure> {
     board.begin(&session.hello(), Some(session.scene()));
-    board.event(Weight::Note, "looking on");
+    board.event(Weight::Note, "connected to the deployment");
     while !stop.is_requested() {
         let turned = Instant::now();
         if session.look(board)? == Look::Over {

@@ -75,7 +75,7 @@ fn check(listen: &Listen) -> Result<(), Failure> {
         return Ok(());
     }
     let text = format!(
-        "{} is not the loopback, and there is no token",
+        "{} is not a loopback address, so a token is needed",
         listen.address
     );
     Err(Failure::new(ExitKind::Usage, text))
@@ -89,7 +89,7 @@ fn bind(listen: &Listen) -> Result<TcpListener, Failure> {
     }
     bound.map_err(|error| {
         let text = format!("cannot listen on {}: {error}", listen.address);
-        Failure::new(ExitKind::Run, text).with_hint("--port 0 takes any free port")
+        Failure::new(ExitKind::Run, text).with_hint("--port 0 uses any free port")
     })
 }
 

@@ -68,7 +68,7 @@ pub(crate) fn talk(stream: TcpStream, site: &Site) {
     match page {
         Ok(Some(page)) => page.talk(stream, site.clone()),
         Ok(None) => {}
-        Err(error) => tracing::debug!(%error, "a connection ended before its answer"),
+        Err(error) => tracing::debug!(%error, "a connection ended before its response"),
     }
 }
 
@@ -132,9 +132,9 @@ fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
     let mut hosts = headers.get_all(HOST).iter();
     let host = hosts.next().and_then(|host| host.to_str().ok());
     let host = host.filter(|_| hosts.next().is_none());
-    let host = host.ok_or("the request has no host, or several")?;
+    let host = host.ok_or("the request must have exactly one Host header")?;
     if !has_token && !is_loopback(host) {
-        return Err("this page is for this machine: ask for it as localhost or 127.0.0.1");
+        return Err("this page is only for this machine: open it as localhost or 127.0.0.1");
     }
     let Some(origin) = headers.get(ORIGIN) else {
         return Ok(());
@@ -144,7 +144,7 @@ fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
     if site == Some(host) {
         Ok(())
     } else {
-        Err("pages of other sites may not ask")
+        Err("requests from pages of other sites are refused")
     }
 }
 

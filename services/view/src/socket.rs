@@ -87,7 +87,7 @@ impl Opened {
         let bell = match bell {
             Ok(bell) => bell,
             Err(error) => {
-                tracing::debug!(%error, "a page cannot be talked with");
+                tracing::debug!(%error, "cannot exchange messages with a page");
                 return;
             }
         };
@@ -186,7 +186,7 @@ impl Page {
             Ok(question) => question,
             Err(why) => {
                 self.n_refused += 1;
-                let why = format!("not a question: {why}");
+                let why = format!("not a valid request: {why}");
                 return vec![text(&json!({ "type": "refused", "why": why }))];
             }
         };
@@ -198,7 +198,7 @@ impl Page {
             Some(on) if self.may_record => self.board().ask_to_record(on, self.number),
             Some(_) => answers.push(text(&json!({
                 "type": "refused",
-                "why": "recording is for the user whose run this is, or for pages with a token (`--token`)",
+                "why": "only the user who runs the view, or a page with a token (`--token`), can record",
             }))),
             None => {}
         }

@@ -52,7 +52,7 @@ impl Folder {
         let poses = open_lines(path, FrameLine::FILE, &mut notes)?.ok_or_else(|| {
             let text = format!("{} has no {}", path.display(), FrameLine::FILE);
             let failure = Failure::new(ExitKind::Input, text);
-            failure.with_hint("name the folder that a run has left, its `output`")
+            failure.with_hint("name the output folder of a run (`output` in its deployment)")
         })?;
         let mut frames = Vec::new();
         let add = |head: Head, place| {
@@ -163,7 +163,7 @@ fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Opti
             Ok(file) => {
                 if name == part {
                     notes.push(format!(
-                        "the run was cut short, or has not ended: {name} is not finished"
+                        "{name} is not complete: the run was cut short or has not ended"
                     ));
                 }
                 return Ok(Some(file));

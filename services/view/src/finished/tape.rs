@@ -40,7 +40,7 @@ impl Tape {
         let about = recording.about.as_ref();
         let about = about.map_err(|why| refused(why.to_string()))?;
         let settings = serde_json::from_str::<Settings>(&about.settings);
-        let settings = settings.map_err(|why| refused(format!("its settings: {why}")))?;
+        let settings = settings.map_err(|why| refused(format!("the settings cannot be read: {why}")))?;
         let scene = Scene::of_finished(&settings.resolved);
         let mut notes: Vec<String> = scene.problem.clone().into_iter().collect();
         note(&recording, &mut notes);
@@ -51,7 +51,7 @@ impl Tape {
             read_pose(&mut input, pose).is_ok_and(|message| message.status != Status::END)
         });
         if poses.is_empty() {
-            return Err(refused("it has no result".to_owned()));
+            return Err(refused("the recording has no result".to_owned()));
         }
         poses.sort_by_key(|pose| pose.frame);
         let frame = |(place, entry): (usize, &Entry)| Frame {
@@ -127,7 +127,7 @@ fn read_pose(file: &mut File, entry: &Entry) -> Result<Box<Skeletons>, Failure> 
     let mut buffer = Buffer::default();
     let message = recording::read(file, Kind::Skeletons, entry, &mut buffer);
     let message = message.map_err(|why| Failure::new(ExitKind::Input, why))?;
-    let refused = || Failure::new(ExitKind::Input, "a message of results is of another kind");
+    let refused = || Failure::new(ExitKind::Input, "a message of the results topic is of another kind");
     message.skeletons().ok_or_else(refused)
 }
 
@@ -137,7 +137,7 @@ fn note(recording: &Recording, notes: &mut Vec<String>) {
         notes.push("the recording was cut off, or is still being written".to_owned());
     }
     if !recording.extent.damage.is_empty() || recording.extent.n_malformed > 0 {
-        notes.push("the recording is damaged; what cannot be read is left out".to_owned());
+        notes.push("the recording is damaged; unreadable messages are left out".to_owned());
     }
     if recording.n_lost() > 0 {
         notes.push(format!(

@@ -52,7 +52,7 @@ impl Events {
     /// A message about a frame cannot be used; said once.
     pub(crate) fn refused(&mut self, board: &Board, why: &str) {
         if !self.has_refused {
-            board.event(Weight::Error, &format!("a result cannot be shown: {why}"));
+            board.event(Weight::Error, &format!("cannot show a result: {why}"));
         }
         self.has_refused = true;
     }
@@ -63,7 +63,7 @@ impl Events {
             if self.n_without >= IN_A_ROW {
                 board.event(
                     Weight::Note,
-                    &format!("frame {}: a skeleton again", moment.frame),
+                    &format!("frame {}: skeleton is back", moment.frame),
                 );
             }
             self.n_without = 0;
@@ -86,7 +86,7 @@ impl Events {
         *last = status;
         let name = scene.views.get(view).map_or("", |view| &view.name);
         match status {
-            Status::OK => board.event(Weight::Note, &format!("{name}: pictures again")),
+            Status::OK => board.event(Weight::Note, &format!("{name}: pictures are back")),
             Status::END => board.event(Weight::Note, &format!("{name}: end of footage")),
             other => board.event(Weight::Error, &format!("{name}: {}", other.reason())),
         }
@@ -133,7 +133,7 @@ fn tell(board: &Board, name: &str, known: Seen, seen: Seen) {
     if seen.restarts > known.restarts {
         board.event(
             Weight::Warning,
-            &format!("{name} was started again, {} times so far", seen.restarts),
+            &format!("{name} was restarted, {} times so far", seen.restarts),
         );
         return;
     }
@@ -161,7 +161,7 @@ fn lost(board: &Board, name: &str, seen: &mut Seen, now: &[u64; Cause::ALL.len()
         .map(|((now, then), cause)| format!("{} {}", now - then, cause.name()))
         .collect();
     if !new.is_empty() {
-        let what = format!("{name} has lost messages or frames: {}", new.join(", "));
+        let what = format!("{name} lost messages or frames: {}", new.join(", "));
         board.event(Weight::Warning, &what);
         (seen.told, seen.dropped) = (Some(Instant::now()), *now);
     }

@@ -103,7 +103,7 @@ impl Tape {
                 board.event(Weight::Warning, &what);
             }
             Ok(Err(why)) => board.event(Weight::Error, &format!("cannot record: {why}")),
-            Err(_panic) => board.event(Weight::Error, "the recording has failed"),
+            Err(_panic) => board.event(Weight::Error, "the recording failed"),
         }
     }
 
