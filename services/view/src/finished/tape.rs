@@ -1,4 +1,4 @@
-//! A recording: its results and its pictures, by their places in the file.
+//! A recording, with the positions of its results and pictures in the file.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,12 +25,12 @@ pub(crate) struct Tape {
     frames: Vec<Frame>,
     notes: Vec<String>,
     poses: Vec<Entry>,
-    /// Pictures of every view by their frames.
+    /// Pictures of every view by frame number.
     pictures: Vec<BTreeMap<u64, Entry>>,
 }
 
 impl Tape {
-    /// Opens it.
+    /// Opens a recording.
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
         let recording = recorded::open(path)?;
         let refused = |why: String| {
@@ -78,17 +78,17 @@ impl Tape {
         })
     }
 
-    /// Its cameras and joints.
+    /// Returns the cameras and joints of the run.
     pub(crate) fn scene(&self) -> Arc<Scene> {
         Arc::clone(&self.scene)
     }
 
-    /// Where it is.
+    /// Returns the path of the recording.
     pub(crate) fn name(&self) -> String {
         self.name.clone()
     }
 
-    /// Its frames, ascending.
+    /// Returns the frames in ascending order.
     pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
     }
@@ -98,7 +98,7 @@ impl Tape {
         &self.notes
     }
 
-    /// A frame.
+    /// Returns a frame.
     pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
         let at = at.min(self.poses.len() - 1);
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -111,7 +111,7 @@ impl Tape {
         Ok(moment)
     }
 
-    /// A picture, of the frame or of the last one before it.
+    /// Returns the picture of the frame, or the last one before it.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         let (frame, entry) = self.pictures.get(view)?.range(..=frame).next_back()?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
