@@ -102,7 +102,7 @@ fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>,
         Some(it) => {
             let why = match it {
                 Scenario::Host(_) if !bridge::HAS_LINK => {
-                    "this build has no hosts: build it with `--features hosts`"
+                    "this build does not support hosts: build with `--features hosts`"
                 }
                 Scenario::Host(_) => "the deployment has fewer than four cameras",
                 _ => "the deployment has no such process",

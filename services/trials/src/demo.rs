@@ -211,7 +211,7 @@ fn announce(
     }
     let (frames, rate) = (setup.n_frames, setup.rate_hz);
     output::message(format_args!(
-        "{n_processes} processes and their supervisor; {frames} frames at {rate} a second; results in {}",
+        "{n_processes} processes and their supervisor; {frames} frames at {rate} per second; results in {}",
         synthetic.folder.display()
     ));
 }

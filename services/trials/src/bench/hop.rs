@@ -179,7 +179,7 @@ fn no_report(child: &mut Child) -> Failure {
     for line in child.read_lines().unwrap_or_default() {
         output::message(line);
     }
-    Failure::new(ExitKind::Run, "the receiving process says nothing")
+    Failure::new(ExitKind::Run, "the receiving process does not respond")
 }
 
 /// The number of messages whose location both processes know, and of those with the same location.

@@ -35,9 +35,9 @@ impl Kind {
 
     fn title(self) -> &'static str {
         match self {
-            Self::Latency => "from capture to result at the pace of the clock, milliseconds",
-            Self::Throughput => "every frame as fast as it is taken, milliseconds",
-            Self::Scale => "one camera more from run to run, milliseconds",
+            Self::Latency => "from capture to result in real time, milliseconds",
+            Self::Throughput => "every frame, as fast as possible, milliseconds",
+            Self::Scale => "one more camera in each run, milliseconds",
         }
     }
 
@@ -108,8 +108,8 @@ impl Options {
         let file = self.deployment.as_ref();
         let pictures = match file {
             Some(file) => file.display().to_string(),
-            None if self.live => format!("made while it runs, seed {}", self.seed),
-            None => format!("made beforehand, seed {}", self.seed),
+            None if self.live => format!("rendered during the run, seed {}", self.seed),
+            None => format!("rendered in advance, seed {}", self.seed),
         };
         json!({
             "views": n_views,
@@ -142,7 +142,7 @@ impl Options {
                 )
             }),
             self.min_rate_hz
-                .map(|min_rate_hz| limit::at_least("results a second", min_rate_hz, rate)),
+                .map(|min_rate_hz| limit::at_least("results per second", min_rate_hz, rate)),
         ];
         limits.into_iter().flatten().collect()
     }
@@ -151,7 +151,15 @@ impl Options {
 /// The table: per run a row and one row per stage.
 fn table(all: &[Measured]) -> Table {
     let mut table = Table::new([
-        "<run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
+        "<run",
+        "results",
+        "per second",
+        "p50",
+        "p99",
+        "p99.9",
+        "max",
+        "cpu",
+        "dropped",
     ]);
     for measured in all {
         let number =

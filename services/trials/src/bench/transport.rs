@@ -55,7 +55,7 @@ pub fn transport(options: &Transport, verbosity: Verbosity) -> Result<Option<Rep
     let provenance = Provenance::now();
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     for denied in sender.apply() {
-        tracing::warn!("{denied}; going on without. Try: {}", denied.hint());
+        tracing::warn!("{denied}; continuing without it. Try: {}", denied.hint());
     }
     let mut rows = Vec::new();
     for spins in [false, true] {
@@ -103,7 +103,8 @@ impl Transport {
     /// The scheduling of the sender and the receiver.
     fn scheduling(&self) -> Result<[Scheduling; 2], Failure> {
         if ![0, 2].contains(&self.cores.len()) {
-            let message = "--cores takes two: the sender's and the receiver's";
+            let message =
+                "--cores needs two values: the core of the sender and that of the receiver";
             return Err(Failure::new(ExitKind::Usage, message));
         }
         let of = |index: usize| Scheduling {
@@ -159,9 +160,9 @@ impl Transport {
         let sum = |of: fn(&Measured) -> u64| rows.iter().map(|row| of(&row.measured)).sum::<u64>();
         let compared = sum(|measured| measured.n_compared as u64);
         limits.extend([
-            limit::at_least("messages asked where they lie", 1.0, Some(compared as f64)),
+            limit::at_least("messages with a known location", 1.0, Some(compared as f64)),
             limit::at_most(
-                "of these elsewhere than they were written",
+                "messages received at another location",
                 0.0,
                 Some((compared - sum(|measured| measured.n_same_place as u64)) as f64),
             ),
@@ -171,7 +172,7 @@ impl Transport {
                 Some(sum(|measured| measured.copied_bytes) as f64),
             ),
             limit::at_most(
-                "messages with another content",
+                "messages with wrong content",
                 0.0,
                 Some(sum(|measured| measured.receiver.broken) as f64),
             ),

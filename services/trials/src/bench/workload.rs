@@ -324,7 +324,7 @@ fn keep_views(deployment: &mut Deployment, n_views: usize) {
 /// Processor time of all child processes that have ended, seconds.
 fn cpu_seconds_of_children() -> Result<f64, Failure> {
     let stat = fs::read_to_string("/proc/self/stat").or_fail(ExitKind::Run)?;
-    let seconds = parse_stat(&stat).ok_or("/proc/self/stat is not as it was expected");
+    let seconds = parse_stat(&stat).ok_or("/proc/self/stat has an unexpected format");
     seconds.or_fail(ExitKind::Run)
 }
 

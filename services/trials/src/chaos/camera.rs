@@ -80,17 +80,22 @@ impl CameraFailure {
     /// Checks the limits of the scenario.
     pub(super) fn judge(&self, limits: &Limits, outcome: &RunOutcome) -> Vec<Limit> {
         let flagged = self.flagged.iter();
-        let flagged = flagged
-            .map(|(cause, n)| at_least(&format!("frames called {cause}"), 1.0, Some(*n as f64)));
+        let flagged = flagged.map(|(cause, n)| {
+            at_least(
+                &format!("frames reported as: {cause}"),
+                1.0,
+                Some(*n as f64),
+            )
+        });
         let mut checked: Vec<Limit> = flagged.collect();
         checked.extend([
             at_least(
-                "results of others meanwhile",
+                "results of the others during the fault",
                 1.0,
                 Some(self.results_without_it as f64),
             ),
             at_most(
-                "longest pause of results meanwhile, ms",
+                "longest pause between results, ms",
                 limits.max_pause_ms,
                 self.longest_pause_ms,
             ),
@@ -104,7 +109,7 @@ impl CameraFailure {
     fn measured(&self, n_results: usize) -> String {
         let flagged = self.flagged.iter().map(|(cause, n)| format!("{n} {cause}"));
         format!(
-            "{}, {} frames: {}; {} results without it, longest pause {}; back {}; {n_results} results",
+            "{}, {} frames: {}; {} results without the camera, longest pause: {}; back: {}; {n_results} results",
             self.camera,
             self.span[1] - self.span[0],
             flagged.collect::<Vec<_>>().join(", "),
@@ -212,7 +217,10 @@ mod tests {
     fn an_undetected_fault_and_a_camera_that_never_returns_miss_limits() {
         let unnoticed: Vec<FrameResult> =
             (0..8).map(|i| moment(i, 100.0 * i as f64, None)).collect();
-        assert_eq!(missed(&failed(&unnoticed)), ["frames called camera gone"]);
+        assert_eq!(
+            missed(&failed(&unnoticed)),
+            ["frames reported as: camera gone"]
+        );
         let gone = Some("camera gone");
         let never_back: Vec<FrameResult> =
             (0..8).map(|i| moment(i, 100.0 * i as f64, gone.filter(|_| i > 1))).collect();

@@ -35,18 +35,15 @@ impl CameraFault {
         match self {
             Self::Unplug => [
                 "camera-unplug",
-                "a camera is unplugged, and plugged in again",
+                "a camera is unplugged and plugged in again",
             ],
-            Self::Freeze => [
-                "camera-freeze",
-                "a camera gives the same picture again and again",
-            ],
+            Self::Freeze => ["camera-freeze", "a camera repeats the same picture"],
             Self::Clock => [
                 "camera-clock",
-                "the clock of a camera jumps, goes back and stands still",
+                "the clock of a camera jumps, goes back and stops",
             ],
-            Self::Size => ["camera-size", "a camera gives pictures of another size"],
-            Self::Slow => ["camera-slow", "a camera leaves out every second frame"],
+            Self::Size => ["camera-size", "a camera sends pictures of another size"],
+            Self::Slow => ["camera-slow", "a camera skips every second frame"],
             Self::Damage => [
                 "camera-damage",
                 "the pictures of a camera cannot be decoded",

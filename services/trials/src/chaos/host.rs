@@ -94,7 +94,7 @@ fn verdict(name: &str, options: &Options, measured: Measured) -> Verdict {
     Verdict {
         scenario: name.to_owned(),
         measured: format!(
-            "noticed {}, back after {}",
+            "noticed: {}, back: {}",
             verdict::ms(gone_ms),
             verdict::ms(back_ms)
         ),
@@ -117,7 +117,7 @@ impl Running {
     fn end(&mut self) {
         let ended = self.0.kill().and_then(|()| self.0.wait());
         if let Err(error) = ended {
-            tracing::debug!(%error, "a host that had ended");
+            tracing::debug!(%error, "the host had already ended");
         }
     }
 }
@@ -178,7 +178,7 @@ fn unaccounted(state: &Value, n_frames: u64) -> Vec<String> {
         .map(|view| format!("view {}: {} of {n_frames}", view["view"], sum(view)))
         .collect();
     if views(state).next().is_none() {
-        odd.push("all: there is no hosts.json".to_owned());
+        odd.push("all: hosts.json is missing".to_owned());
     }
     odd
 }

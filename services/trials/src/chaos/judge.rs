@@ -50,16 +50,13 @@ impl RunOutcome {
             none_of("failures of the run", &failure),
             at_least("results", 1.0, Some(self.n_results as f64)),
             at_most(
-                "frames whose end is not known",
+                "frames unaccounted for",
                 (MAX_UNACCOUNTED * n_kills) as f64,
                 unanswered,
             ),
-            none_of("processes that failed by themselves", &self.failed),
-            none_of("left in shared memory", &self.leftovers),
-            none_of(
-                "cameras reported as moved that stand where they should",
-                &self.suspected,
-            ),
+            none_of("other processes that failed", &self.failed),
+            none_of("files left in shared memory", &self.leftovers),
+            none_of("cameras wrongly reported as moved", &self.suspected),
         ]
     }
 }
@@ -89,7 +86,7 @@ pub(super) fn once(
         at_most("noticed after, ms", notice, cost.noticed_ms),
         at_most("back after, ms", back, cost.back_ms),
         at_most(
-            "longest pause of results meanwhile, ms",
+            "longest pause between results, ms",
             pause,
             cost.longest_pause_ms,
         ),
@@ -118,7 +115,7 @@ pub(super) fn random(
     let mut limits = vec![
         at_least("kills", 1.0, Some(kills.n_kills as f64)),
         at_least(
-            "came back",
+            "kills with a recovery",
             kills.n_kills as f64,
             Some(kills.downtime_ms.map_or(0, |downtime_ms| downtime_ms.n) as f64),
         ),
@@ -136,30 +133,30 @@ pub(super) fn random(
         };
         limits.extend([
             grown(
-                "memory at last, MB",
+                "final memory, MB",
                 |used| used.memory_bytes,
                 MORE_BYTES,
                 1e6,
             ),
             grown(
-                "memory of the supervisor at last, MB",
+                "final memory of the supervisor, MB",
                 |used| used.supervisor_memory_bytes,
                 MORE_BYTES,
                 1e6,
             ),
             grown(
-                "shared memory at last, MB",
+                "final shared memory, MB",
                 |used| used.shared_bytes,
                 MORE_BYTES,
                 1e6,
             ),
             grown(
-                "descriptors at last",
+                "final number of descriptors",
                 |used| used.descriptors,
                 MORE_FILES,
                 1.0,
             ),
-            grown("files at last", |used| used.files, MORE_FILES, 1.0),
+            grown("final number of files", |used| used.files, MORE_FILES, 1.0),
         ]);
     }
     limits
@@ -185,7 +182,11 @@ pub(super) fn supervisor(
     outcome: &RunOutcome,
 ) -> Vec<Limit> {
     let mut limits = vec![
-        at_most("its processes ended after, ms", NOTICE_MS, killed.ended_ms),
+        at_most(
+            "processes of the killed run ended after, ms",
+            NOTICE_MS,
+            killed.ended_ms,
+        ),
         at_most(
             "first result of the next run after, ms",
             requested.max_return_ms,
@@ -250,28 +251,28 @@ mod tests {
             (|cost, _| cost.back_ms = None, &["back after, ms"]),
             (
                 |cost, _| cost.longest_pause_ms = Some(2001.0),
-                &["longest pause of results meanwhile, ms"],
+                &["longest pause between results, ms"],
             ),
             (|_, outcome| outcome.n_results = 0, &["results"]),
             (
                 |_, outcome| outcome.unanswered = 3,
-                &["frames whose end is not known"],
+                &["frames unaccounted for"],
             ),
             (
                 |_, outcome| outcome.failed = vec!["pose-1".to_owned()],
-                &["processes that failed by themselves"],
+                &["other processes that failed"],
             ),
             (
                 |_, outcome| outcome.leftovers = vec!["px".to_owned()],
-                &["left in shared memory"],
+                &["files left in shared memory"],
             ),
             (
                 |_, outcome| outcome.suspected = vec!["c1".to_owned()],
-                &["cameras reported as moved that stand where they should"],
+                &["cameras wrongly reported as moved"],
             ),
             (
                 |_, outcome| outcome.failure = Some("it broke".to_owned()),
-                &["failures of the run", "frames whose end is not known"],
+                &["failures of the run", "frames unaccounted for"],
             ),
         ];
         for (change, expected) in changes {
@@ -335,35 +336,34 @@ mod tests {
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 8] = [
             (|_, _| (), nothing),
-            (|series, _| series.n_kills = 4, &["came back"]),
+            (|series, _| series.n_kills = 4, &["kills with a recovery"]),
             (
                 |series, _| series.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
                 &["back after (p99), ms"],
             ),
             (
                 |_, used| used.memory_bytes = 143_000_000,
-                &["memory at last, MB"],
+                &["final memory, MB"],
             ),
             (
                 |_, used| used.supervisor_memory_bytes = 44_000_000,
-                &["memory of the supervisor at last, MB"],
+                &["final memory of the supervisor, MB"],
             ),
             (
                 |_, used| used.shared_bytes = 39_000_000,
-                &["shared memory at last, MB"],
+                &["final shared memory, MB"],
             ),
-            (|_, used| used.descriptors = 119, &["descriptors at last"]),
-            (|_, used| used.files = 64, &["files at last"]),
+            (
+                |_, used| used.descriptors = 119,
+                &["final number of descriptors"],
+            ),
+            (|_, used| used.files = 64, &["final number of files"]),
         ];
         for (change, expected) in changes {
             assert_eq!(missed_random(change), expected);
         }
         let none = random(&ASKED, &RandomKillsOutcome::default(), &good().1);
-        let expected = [
-            "kills",
-            "back after (p99), ms",
-            "frames whose end is not known",
-        ];
+        let expected = ["kills", "back after (p99), ms", "frames unaccounted for"];
         assert_eq!(missed(none), expected, "nobody was killed");
     }
 
@@ -386,7 +386,10 @@ mod tests {
             ended_ms: None,
             ..good_one.clone()
         };
-        assert_eq!(judge(&orphans), ["its processes ended after, ms"]);
+        assert_eq!(
+            judge(&orphans),
+            ["processes of the killed run ended after, ms"]
+        );
         let broken = SupervisorKillOutcome {
             result_ms: None,
             ..good_one

@@ -72,11 +72,11 @@ fn wait_for_results(testbed: &Testbed, supervisor: &mut Child, file: &Path) -> R
             return Ok(());
         }
         if let Some(status) = supervisor.try_wait().or_fail(ExitKind::Run)? {
-            let message = format!("the run ended before it was killed: {status}");
+            let message = format!("the run ended before it could be killed: {status}");
             return Err(Failure::new(ExitKind::Run, message));
         }
         if begin.elapsed() > PATIENCE {
-            let message = "the run that was to be killed gave no results";
+            let message = "the run that should be killed gave no results";
             return Err(Failure::new(ExitKind::Run, message));
         }
         std::thread::sleep(POLL_INTERVAL);

@@ -65,7 +65,7 @@ fn accept(listener: &TcpListener, port: u16, flags: &Flags) {
         if let Ok(far) = TcpStream::connect_timeout(&address, Duration::from_secs(1))
             && let Err(error) = join(&near, &far, flags)
         {
-            tracing::debug!(%error, "a connection that is not relayed");
+            tracing::debug!(%error, "a connection cannot be relayed");
         }
     }
 }
@@ -106,7 +106,7 @@ fn pass(mut from: TcpStream, mut to: TcpStream, (is_cut, is_over): &Flags) {
     }
     for it in [from, to] {
         if let Err(error) = it.shutdown(std::net::Shutdown::Both) {
-            tracing::debug!(%error, "a connection that was closed");
+            tracing::debug!(%error, "a connection was closed");
         }
     }
 }

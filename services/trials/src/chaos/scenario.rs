@@ -54,7 +54,7 @@ impl Scenario {
     /// There is no scenario of that name; the message is for the user.
     pub fn by_name(name: &str) -> Result<Self, String> {
         let found = Self::all().into_iter().find(|scenario| scenario.name() == name);
-        found.ok_or_else(|| "there is no scenario of this name; --list names them all".to_owned())
+        found.ok_or_else(|| "there is no scenario of this name; --list shows all names".to_owned())
     }
 
     /// Its name.
@@ -82,18 +82,17 @@ impl Scenario {
                 format!("a {service} process is stopped (SIGSTOP), as if it hung")
             }
             Self::Once(ProcessFault::Spin, service) => {
-                format!(
-                    "a {service} process computes for ever, with signs of life but without work"
-                )
+                format!("a {service} process loops endlessly: it sends heartbeats but does no work")
             }
-            Self::Random => "a process chosen at random is killed every two seconds".to_owned(),
+            Self::Random => "a randomly chosen process is killed every two seconds".to_owned(),
             Self::Supervisor => {
-                "`parallax run` itself is killed, and the same deployment started again".to_owned()
+                "`parallax run` itself is killed, and the same deployment is started again"
+                    .to_owned()
             }
             Self::Camera(it) => it.name_and_summary()[1].to_owned(),
-            Self::Moved => "a camera was turned by two degrees after the calibration".to_owned(),
+            Self::Moved => "a camera was rotated by two degrees after the calibration".to_owned(),
             Self::Stall => {
-                "the results process stands still for three seconds, and goes on".to_owned()
+                "the results process is stopped for three seconds, and then continues".to_owned()
             }
             Self::Host(it) => it.name_and_summary()[1].to_owned(),
         }

@@ -94,9 +94,11 @@ impl StallInjector {
         self.first.get_or_insert(state);
         let pid = self.pid?;
         let (stops, message) = match (self.stopped, self.resumed) {
-            (None, _) if frame >= self.at_frame => (true, "stopping results on purpose"),
+            (None, _) if frame >= self.at_frame => {
+                (true, "stopping the process results on purpose")
+            }
             (Some([at, _]), None) if state[0] - at >= STALL_NANOS => {
-                (false, "letting results go on")
+                (false, "resuming the process results")
             }
             _ => return None,
         };
@@ -136,7 +138,7 @@ fn judge(
 ) -> Vec<Limit> {
     let most_ms = STALL_NANOS as f64 / 1e6 + requested.max_pause_ms;
     let mut limits = vec![at_most(
-        "it stood still, ms",
+        "duration of the stop, ms",
         most_ms,
         measurement.map(|measurement| measurement.stall_ms),
     )];
@@ -146,7 +148,11 @@ fn judge(
         let [before, meanwhile] =
             measurement.map_or([f64::NAN; 2], |measurement| measurement.rates_hz);
         let meanwhile = Some(meanwhile).filter(|value| value.is_finite());
-        at_least("results a second meanwhile", SHARE * before, meanwhile)
+        at_least(
+            "results per second during the stop",
+            SHARE * before,
+            meanwhile,
+        )
     });
     limits.extend(outcome.judge(0));
     limits
@@ -173,7 +179,7 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     Ok(Verdict {
         scenario: STALL.to_owned(),
         measured: format!(
-            "results stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
+            "results stopped for {}; results per second: {before:.1} before, {meanwhile:.1} during the stop; {} results written",
             ms(measurement.map(|measurement| measurement.stall_ms)),
             outcome.n_results
         ),
@@ -252,7 +258,10 @@ mod tests {
             })
         };
         assert_eq!(missed(with(2.0), None), [""; 0]);
-        assert_eq!(missed(with(1.9), None), ["results a second meanwhile"]);
+        assert_eq!(
+            missed(with(1.9), None),
+            ["results per second during the stop"]
+        );
         assert_eq!(missed(with(0.0), Some(20)), [""; 0]);
         assert_eq!(missed(with(0.0), Some(21)), ["results written"]);
         assert_eq!(missed(None, None).len(), 2);

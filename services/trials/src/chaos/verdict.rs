@@ -78,7 +78,7 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
 /// Text on a fault of a process.
 pub(super) fn of_cost(process: &str, cost: &Cost, n_results: usize) -> String {
     format!(
-        "{process}: noticed {}, restarted {}, back {}; longest pause {} (before {}); {n_results} results",
+        "{process}: noticed: {}, restarted: {}, back: {}; longest pause: {} (before the fault: {}); {n_results} results",
         ms(cost.noticed_ms),
         ms(cost.restarted_ms),
         ms(cost.back_ms),
@@ -90,7 +90,7 @@ pub(super) fn of_cost(process: &str, cost: &Cost, n_results: usize) -> String {
 /// Text on random kills.
 pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -> String {
     let mut text = format!(
-        "{} kills; back p50 {}, p99 {}; {n_results} results",
+        "{} kills; back: p50 {}, p99 {}; {n_results} results",
         measured.n_kills,
         ms(measured.downtime_ms.map(|downtime_ms| downtime_ms.p50)),
         ms(measured.downtime_ms.map(|downtime_ms| downtime_ms.p99)),
@@ -100,7 +100,7 @@ pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -
         // Writing to a string cannot fail.
         let _infallible = write!(
             text,
-            "; at first and at last {:.0} and {:.0} MB, {} and {} descriptors, {} and {} files",
+            "; at the start and at the end {:.0} and {:.0} MB, {} and {} descriptors, {} and {} files",
             mb(first.memory_bytes + first.supervisor_memory_bytes),
             mb(last.memory_bytes + last.supervisor_memory_bytes),
             first.descriptors,
@@ -115,7 +115,7 @@ pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -
 /// Text on a killed supervisor.
 pub(super) fn of_orphans(killed: &SupervisorKillOutcome, n_results: usize) -> String {
     format!(
-        "its processes ended {}; {} files left for the next start, whose first result came {}; {n_results} results",
+        "processes ended: {}; {} files left for the next run; first result of the next run: {}; {n_results} results",
         ms(killed.ended_ms),
         killed.files,
         ms(killed.result_ms),
@@ -168,6 +168,6 @@ mod tests {
             ..Cost::default()
         };
         let text = of_cost("pose-1", &cost, 7);
-        assert!(text.contains("noticed 3 ms, restarted never"), "{text}");
+        assert!(text.contains("noticed: 3 ms, restarted: never"), "{text}");
     }
 }

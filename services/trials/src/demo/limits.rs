@@ -47,7 +47,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
             share(results, measured.n_frames as usize),
         ),
         at_least(
-            "of these with a skeleton, %",
+            "results with a skeleton, %",
             requested.min_skeletons,
             share(skeletons, results),
         ),
@@ -69,9 +69,9 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
                 (measured.spread * requested.max_return_ms).round(),
                 cost.back_ms,
             ),
-            at_least("results of the others meanwhile", least, results),
+            at_least("results of the others during the fault", least, results),
             at_most(
-                "longest pause of results meanwhile, ms",
+                "longest pause between results, ms",
                 (measured.slowness * requested.max_pause_ms).round(),
                 cost.longest_pause_ms,
             ),
@@ -85,11 +85,11 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     };
     limits.extend([
         at_most(
-            "frames whose end is not known",
+            "frames unaccounted for",
             may_be_lost as f64,
             Some(unanswered as f64),
         ),
-        none_of("processes that failed by themselves", measured.failed),
+        none_of("other processes that failed", measured.failed),
         at_most(
             "results not written",
             0.0,
@@ -224,10 +224,7 @@ mod tests {
         type Change = fn(&mut Run);
         let changes: [(Change, &str); 10] = [
             (|run| run.n_results = [9, 9], "frames with a result, %"),
-            (
-                |run| run.n_results = [90, 80],
-                "of these with a skeleton, %",
-            ),
+            (|run| run.n_results = [90, 80], "results with a skeleton, %"),
             (|run| run.score = score(Some(49.9)), "PCP3D at 0.5, %"),
             (|run| run.score = score(None), "PCP3D at 0.5, %"),
             (
@@ -240,19 +237,16 @@ mod tests {
             ),
             (
                 |run| run.changed_cost(|cost| cost.results_without_it = 0),
-                "results of the others meanwhile",
+                "results of the others during the fault",
             ),
             (
                 |run| run.changed_cost(|cost| cost.longest_pause_ms = Some(2001.0)),
-                "longest pause of results meanwhile, ms",
+                "longest pause between results, ms",
             ),
-            (
-                |run| run.views[0] = view(2),
-                "frames whose end is not known",
-            ),
+            (|run| run.views[0] = view(2), "frames unaccounted for"),
             (
                 |run| run.failed.push("pose-1".to_owned()),
-                "processes that failed by themselves",
+                "other processes that failed",
             ),
         ];
         for (change, expected) in changes {
@@ -274,11 +268,7 @@ mod tests {
         for (back_ms, pause_ms, expected) in [
             (16_000.0, 6000.0, &[][..]),
             (16_001.0, 6000.0, &["killed camera back after, ms"]),
-            (
-                16_000.0,
-                6001.0,
-                &["longest pause of results meanwhile, ms"],
-            ),
+            (16_000.0, 6001.0, &["longest pause between results, ms"]),
         ] {
             let got = missed(|run| {
                 slow(run);
@@ -311,12 +301,15 @@ mod tests {
             }
         };
         assert_eq!(missed(back(1099.0)), Vec::<String>::new());
-        assert_eq!(missed(back(1101.0)), ["results of the others meanwhile"]);
+        assert_eq!(
+            missed(back(1101.0)),
+            ["results of the others during the fault"]
+        );
     }
 
     #[test]
     fn without_a_kill_no_frame_may_be_unaccounted_for() {
         let got = missed(|run| run.cost = None);
-        assert_eq!(got, ["frames whose end is not known"]);
+        assert_eq!(got, ["frames unaccounted for"]);
     }
 }

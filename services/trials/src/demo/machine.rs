@@ -57,7 +57,7 @@ impl Gauge {
         let view = |camera: usize| {
             let view = View::new(&scene, camera).or_fail(ExitKind::Run)?;
             let step = process::network_step(resolved, camera)?
-                .ok_or("the demo is measured with a network")
+                .ok_or("the speed for the demo can only be measured with a network")
                 .or_fail(ExitKind::Run)?;
             Ok(GaugedView {
                 picture: vec![0; view.size().rgb_bytes()],
@@ -180,13 +180,13 @@ impl Machine {
         };
         let frame_ms = 1000.0 * self.frame_s();
         let text = format!(
-            "{busy}a frame of {n_cameras} cameras takes {frame_ms:.0} ms of the {n_cores} cores together"
+            "{busy}a frame of {n_cameras} cameras takes {frame_ms:.0} ms on all {n_cores} cores"
         );
         if self.slowness() <= 1.0 {
             return text;
         }
         format!(
-            "{text}, so the cameras take {} frames a second instead of {FULL_RATE_HZ}, the killed camera has {:.1} \
+            "{text}, so the cameras take {} frames per second instead of {FULL_RATE_HZ}, the killed camera has {:.1} \
              times as long to come back, and a pause may be {:.1} times as long",
             self.rate_hz(),
             self.spread(),

@@ -35,11 +35,11 @@ impl Report {
         let scores = [
             ("all results", of(&|_| true)),
             (
-                "with every camera",
+                "results with every camera",
                 of(&|result| result.views.iter().all(|view| view.missing.is_none())),
             ),
             (
-                "without the killed one",
+                "without the killed camera",
                 of(&|result| result.views[VICTIM].missing.is_some()),
             ),
         ];

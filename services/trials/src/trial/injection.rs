@@ -31,7 +31,7 @@ impl ProcessFault {
         match self {
             Self::Kill => ["killing", "killed"],
             Self::Stop => ["stopping", "stopped"],
-            Self::Spin => ["letting spin", "sent spinning"],
+            Self::Spin => ["starting an endless loop in", "put into an endless loop"],
         }
     }
 }

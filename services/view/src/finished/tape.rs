@@ -40,7 +40,8 @@ impl Tape {
         let about = recording.about.as_ref();
         let about = about.map_err(|why| refused(why.to_string()))?;
         let settings = serde_json::from_str::<Settings>(&about.settings);
-        let settings = settings.map_err(|why| refused(format!("the settings cannot be read: {why}")))?;
+        let settings =
+            settings.map_err(|why| refused(format!("the settings cannot be read: {why}")))?;
         let scene = Scene::of_finished(&settings.resolved);
         let mut notes: Vec<String> = scene.problem.clone().into_iter().collect();
         note(&recording, &mut notes);
@@ -127,7 +128,12 @@ fn read_pose(file: &mut File, entry: &Entry) -> Result<Box<Skeletons>, Failure> 
     let mut buffer = Buffer::default();
     let message = recording::read(file, Kind::Skeletons, entry, &mut buffer);
     let message = message.map_err(|why| Failure::new(ExitKind::Input, why))?;
-    let refused = || Failure::new(ExitKind::Input, "a message of the results topic is of another kind");
+    let refused = || {
+        Failure::new(
+            ExitKind::Input,
+            "a message of the results topic is of another kind",
+        )
+    };
     message.skeletons().ok_or_else(refused)
 }
 
