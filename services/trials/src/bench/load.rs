@@ -13,14 +13,14 @@ use super::workload::{Case, Measured, Workload};
 use crate::spread::Spread;
 use crate::trial::limit;
 
-/// The kind of load benchmark.
+/// Kind of load benchmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// All cameras in real time; then the same with one killed.
+    /// All cameras in real time; then the same with one camera killed.
     Latency,
-    /// All cameras, every frame, as fast as possible.
+    /// All cameras, with every frame processed as fast as possible.
     Throughput,
-    /// One camera, two, and so on, in real time; then all with one killed.
+    /// One camera, two cameras, and so on, in real time; then all cameras with one killed.
     Scale,
 }
 
@@ -41,7 +41,7 @@ impl Kind {
         }
     }
 
-    /// The runs of a benchmark with at most `n_views` cameras.
+    /// Returns the runs of a benchmark with at most `n_views` cameras.
     fn cases(self, n_views: usize) -> Vec<Case> {
         let case = |n_views| Case {
             n_views,
@@ -62,11 +62,11 @@ impl Kind {
     }
 }
 
-/// Measures a deployment under load. `None` if it was interrupted.
+/// Measures a deployment under load. `None` if the benchmark was interrupted.
 ///
 /// # Errors
 ///
-/// The deployment cannot be read or used, has fewer cameras than requested, or a run fails.
+/// Fails if the deployment cannot be read or used, if it has fewer cameras than requested, or if a run fails.
 pub fn load(
     kind: Kind,
     options: &Options,
@@ -121,7 +121,7 @@ impl Options {
         })
     }
 
-    /// The requested limits, checked on the run with all cameras.
+    /// Returns the requested limits, checked on the run with all cameras.
     fn limits(&self, all: &[Measured]) -> Vec<Limit> {
         let whole = all.iter().rfind(|measured| !measured.case.has_dead);
         let end_to_end = whole.and_then(|whole| whole.end_to_end);
@@ -148,7 +148,7 @@ impl Options {
     }
 }
 
-/// The table: per run a row and one row per stage.
+/// Returns the table, with a row for each run and a row for each stage of a run.
 fn table(all: &[Measured]) -> Table {
     let mut table = Table::new([
         "<run",

@@ -10,32 +10,32 @@ use crate::trial::cost::Cost;
 use crate::trial::injection::ProcessFault;
 use crate::trial::limit::{at_least, at_most, none_of};
 
-/// The longest time until a death is noticed, milliseconds.
+/// Longest time until a death is noticed, milliseconds.
 const NOTICE_MS: f64 = 1000.0;
-/// The longest time from the hang limit until a hang is noticed, milliseconds.
+/// Longest time from the hang limit until a hang is noticed, milliseconds.
 const LATE_MS: f64 = 1000.0;
-/// Frames that may be unaccounted for per kill: the one that the process held, and one that its last health message did
+/// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
 /// not count.
 const MAX_UNACCOUNTED: u64 = 2;
-/// Growth allowed for a resource: by this factor, plus the following amounts.
+/// Factor by which a resource may grow; the following amounts are added.
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
 
-/// The outcome of a run, as far as it is the same for all scenarios.
+/// Part of a run's outcome that is the same for all scenarios.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RunOutcome {
-    /// Why the run failed, if it did.
+    /// Reason why the run failed; `None` if it did not fail.
     pub failure: Option<String>,
     /// Number of results that were written.
     pub n_results: usize,
     /// Number of frames, over all views, that are unaccounted for.
     pub unanswered: u64,
-    /// Processes that were restarted more often than faults were injected into them, or were given up.
+    /// Processes that were given up, or were restarted more often than faults were injected into them.
     pub failed: Vec<String>,
     /// Names of the files left in shared memory.
     pub leftovers: Vec<String>,
-    /// Cameras whose calibration is suspected to be wrong although it is right.
+    /// Cameras whose calibration is wrongly suspected.
     pub suspected: Vec<String>,
 }
 
@@ -63,8 +63,8 @@ impl RunOutcome {
 
 /// Checks a run with one fault of a process.
 ///
-/// * `hang_ms`: how long a stopped process may send no heartbeat, or a spinning one report no progress, before the
-///   supervisor kills it.
+/// * `hang_ms`: time without heartbeats (for a stopped process) or without progress (for an endless loop) after which the
+///   supervisor kills the process.
 pub(super) fn once(
     requested: &Limits,
     fault: ProcessFault,
@@ -79,7 +79,7 @@ pub(super) fn once(
     let back = requested.max_return_ms + patience;
     let pause = match service_of(process) {
         "capture" | "pose" | "quality" => requested.max_pause_ms,
-        // Without the others some or all results are missing.
+        // Without the other processes, some or all results are missing.
         _ => back,
     };
     let mut limits = vec![
@@ -95,14 +95,14 @@ pub(super) fn once(
     limits
 }
 
-/// The measurements of a run with random kills.
+/// Measurements of a run with random kills.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RandomKillsOutcome {
     /// Number of kills.
     pub n_kills: usize,
-    /// Downtimes of the processes that came back, milliseconds; none if none came back.
+    /// Downtimes of the processes that came back, milliseconds; `None` if none came back.
     pub downtime_ms: Option<Spread>,
-    /// The resources in use at the start and at the end; none if the run was too short.
+    /// Resources in use at the start and at the end; `None` if the run was too short.
     pub resources: Option<[ResourceUse; 2]>,
 }
 
@@ -162,12 +162,12 @@ pub(super) fn random(
     limits
 }
 
-/// The measurements of a run whose supervisor was killed, and of the next run.
+/// Measurements of a run whose supervisor was killed, and of the next run.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SupervisorKillOutcome {
-    /// Time from the kill until the last of its processes had ended, milliseconds; none if some did not end.
+    /// Time from the kill until the last process of the run had ended, milliseconds; `None` if some did not end.
     pub ended_ms: Option<f64>,
-    /// Number of files that were left for the next run to remove.
+    /// Number of files left for the next run to remove.
     pub files: u64,
     /// Time from the planning of the next run to its first result, milliseconds.
     pub result_ms: Option<f64>,
@@ -226,7 +226,7 @@ mod tests {
         missed.map(|missed| missed.what).collect()
     }
 
-    /// The limits that a good run misses after a change.
+    /// Returns the limits that a good run misses after a change.
     fn missed_once(
         fault: ProcessFault,
         process: &str,
@@ -308,7 +308,7 @@ mod tests {
         assert_eq!(missed_once(ProcessFault::Kill, "capture-1", pause).len(), 1);
     }
 
-    /// The limits that a good run with random kills misses after a change.
+    /// Returns the limits that a good run with random kills misses after a change.
     fn missed_random(
         change: impl FnOnce(&mut RandomKillsOutcome, &mut ResourceUse),
     ) -> Vec<String> {

@@ -8,32 +8,32 @@ use super::score::Score;
 use crate::trial::cost::Cost;
 use crate::trial::limit::{at_least, at_most, none_of};
 
-/// Frames that may be unaccounted for per kill: the one that the process held, and one that its last health message did
+/// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
 /// not count.
 const MAX_UNACCOUNTED: u64 = 2;
 
 /// The measurements of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured<'a> {
-    /// Frames that the cameras should capture.
+    /// Number of frames that the cameras should capture.
     pub n_frames: u64,
-    /// Number of results, and of those with a skeleton.
+    /// Number of results, and number of results with a skeleton.
     pub n_results: [usize; 2],
-    /// The accuracy of the results.
+    /// Accuracy of the results.
     pub score: &'a Score,
-    /// The cost of the kill, if a kill was planned.
+    /// Cost of the kill; `None` if no kill was planned.
     pub cost: Option<&'a Cost>,
-    /// How long a stage waits for a late view, milliseconds.
+    /// Time that a stage waits for a late view, milliseconds.
     pub deadline_ms: f64,
     /// Computing time relative to a machine that keeps up with 5 frames per second, at least 1.
     pub slowness: f64,
-    /// Interval of frames relative to 5 frames per second, at least 1.
+    /// Interval between frames relative to 5 frames per second, at least 1.
     pub spread: f64,
-    /// The frame counts of every view.
+    /// Frame counts of every view.
     pub views: &'a [ViewReport],
-    /// Processes that ended unexpectedly, other than the one that was killed.
+    /// Processes that ended unexpectedly, except the killed one.
     pub failed: &'a [String],
-    /// Number of results that were not written, if it is known.
+    /// Number of results that were not written; `None` if unknown.
     pub n_unwritten: Option<u64>,
 }
 
@@ -99,8 +99,9 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     limits
 }
 
-/// Returns true if the camera was away for so long that there must be results of the other views meanwhile: longer than the
-/// usual pauses between results and the deadline of a late view.
+/// Returns true if the camera was away so long that there must be results of the other views in the meantime. This is the case if it was
+/// away
+/// longer than the usual pauses between results and the deadline for a late view.
 fn needs_results_meanwhile(cost: &Cost, deadline_ms: f64) -> bool {
     let away = cost.back_ms.unwrap_or(f64::INFINITY);
     away > 2.0 * cost.usual_pause_ms.unwrap_or(0.0) + deadline_ms
@@ -158,7 +159,7 @@ mod tests {
         }
     }
 
-    /// The measurements of a good run.
+    /// Measurements of a good run.
     struct Run {
         n_results: [usize; 2],
         score: Score,
@@ -207,7 +208,7 @@ mod tests {
         }
     }
 
-    /// The limits that a good run misses after a change.
+    /// Returns the limits that a good run misses after a change.
     fn missed(change: impl FnOnce(&mut Run)) -> Vec<String> {
         let limits = Run::changed(change).limits().into_iter();
         limits.filter(|limit| !limit.held).map(|limit| limit.what).collect()

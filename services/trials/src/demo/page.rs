@@ -1,4 +1,4 @@
-//! The content of the demo's HTML page: tables, space view and pictures.
+//! Content of the demo's HTML page: tables, skeletons in space, and pictures.
 
 use std::path::Path;
 
@@ -264,7 +264,7 @@ fn accounts(run: &Run<'_>) -> Table {
     table
 }
 
-/// Strips of overlays of some frames in all views; see [`chosen`].
+/// Returns strips of overlays of some frames in all views; see [`chosen`].
 fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     let file = |camera: &String, frame: u64| {
         folder.join("overlays").join(camera).join(format!("{frame:06}.png"))
@@ -292,7 +292,7 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     shown.iter().map(strip).collect()
 }
 
-/// The frames to show: the first complete one, the last complete one before the kill, the first without the camera, and the
+/// Returns the frames to show: the first complete frame, the last complete one before the kill, the first without the camera, and the
 /// last complete one.
 ///
 /// * `drawn`: the frames with overlays.
@@ -316,7 +316,7 @@ fn chosen<'a>(drawn: &[&'a FrameResult], killed_at: Option<u64>) -> Vec<&'a Fram
     shown
 }
 
-/// An overlay as JPEG.
+/// Reads an overlay as JPEG.
 fn jpeg(file: &Path) -> Result<Vec<u8>, image::ImageError> {
     let picture = image::open(file)?.into_rgb8();
     let mut bytes = Vec::new();
@@ -329,7 +329,7 @@ mod tests {
     use super::*;
     use crate::trial::results::ViewResult;
 
-    /// A frame with overlays, with all four cameras or without the killed one.
+    /// Returns a frame with overlays, with all four cameras or without the killed one.
     fn drawn(frame: u64, is_complete: bool) -> FrameResult {
         let mut views = vec![ViewResult::default(); 4];
         views[VICTIM].missing = (!is_complete).then(|| "process lost".to_owned());
