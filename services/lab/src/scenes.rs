@@ -49,8 +49,7 @@ pub(crate) struct Shown<'a> {
     /// The camera.
     pub(crate) camera: &'a geometry::Camera,
     /// Joints of all people in the picture and the number of pixels that show each person, the subject first. Joints are not finite behind
-    /// the
-    /// camera.
+    /// the camera.
     pub(crate) everybody: Vec<(Vec<[f64; 2]>, f64)>,
 }
 

@@ -24,8 +24,7 @@ use crate::site::Site;
 /// # Errors
 ///
 /// Fails if the folder or recording cannot be read, if the address is in use or does not belong to this machine, or if it is not the
-/// loopback
-/// and there is no token.
+/// loopback and there is no token.
 pub fn run(options: &Options, stop: &Stop, say: &mut dyn FnMut(&str)) -> Result<(), Failure> {
     check(&options.listen)?;
     let finished = match &options.subject {

@@ -17,8 +17,7 @@ pub type Pass = training::networks::Pass<Cost, Score>;
 /// # Errors
 ///
 /// Fails if there are no training pictures or no held-out pictures, if the checkpoint is from another training, if a file cannot be
-/// written,
-/// or on a stop request ([`ExitKind::Interrupted`]).
+/// written, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn train(
     (job, settings): (&Job, &Settings),
     pictures: &Prepared,

@@ -52,8 +52,7 @@ impl Store {
     /// # Errors
     ///
     /// Fails if the path of the model is not a file in an existing folder, if another training is writing it, or if there is a checkpoint
-    /// that
-    /// the training does not continue from.
+    /// that the training does not continue from.
     pub fn new(out: &Path, resume: bool) -> Result<Self, Failure> {
         let wrong = |what: &str| {
             let message = format!("--out {}: {what}", out.display());

@@ -16,8 +16,7 @@ pub(super) struct Crop {
 
 impl Crop {
     /// Returns the square around the joints with finite positions: the size of the network's window, with a margin. `None` if the joints
-    /// have no
-    /// extent.
+    /// have no extent.
     ///
     /// * `angle`: clockwise rotation of the picture before cropping, radians.
     pub(super) fn around(joints: &[[f64; 2]], angle: f64) -> Option<Self> {

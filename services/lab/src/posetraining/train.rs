@@ -71,8 +71,7 @@ fn drawn(passes: &[Pass]) -> String {
 /// # Errors
 ///
 /// Fails if there are no people for training or no held-out people, if the checkpoint is from another training, if a file cannot be
-/// written,
-/// or on a stop request ([`ExitKind::Interrupted`]).
+/// written, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn train(
     (job, settings): (&Job, &Settings),
     people: &Prepared,

@@ -183,8 +183,7 @@ fn distance(put: &Joints, there: &Joints) -> f64 {
 }
 
 /// Returns the area under the curve of precision over recall, percent. The surest people come first. A person is correct if the nearest
-/// true
-/// person is close enough and no surer person has the same one.
+/// true person is close enough and no surer person has the same one.
 fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f64 {
     let mut taken = std::collections::BTreeSet::new();
     let (mut n_right, mut points) = (0.0, Vec::new());

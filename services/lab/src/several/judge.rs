@@ -47,8 +47,7 @@ impl Put {
     }
 
     /// Applies the rule of 4D Association. The bottom of the head is midway between the shoulders and the ears. Its top is 0.125 m from
-    /// there in the
-    /// direction of the face, and 0.145 m up. The ears are at 1 / 1.8 of the distance from the neck to the top of the head.
+    /// there in the direction of the face, and 0.145 m up. The ears are at 1 / 1.8 of the distance from the neck to the top of the head.
     pub fn new(id: u64, joints: &Joints) -> Self {
         let middle = |a: usize, b: usize| Some(nalgebra::center(&joints[a]?, &joints[b]?));
         let [shoulders, hips] = [middle(8, 9), middle(2, 3)];

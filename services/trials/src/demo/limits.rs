@@ -100,8 +100,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
 }
 
 /// Returns true if the camera was away so long that there must be results of the other views in the meantime. This is the case if it was
-/// away
-/// longer than the usual pauses between results and the deadline for a late view.
+/// away longer than the usual pauses between results and the deadline for a late view.
 fn needs_results_meanwhile(cost: &Cost, deadline_ms: f64) -> bool {
     let away = cost.back_ms.unwrap_or(f64::INFINITY);
     away > 2.0 * cost.usual_pause_ms.unwrap_or(0.0) + deadline_ms

@@ -131,8 +131,7 @@ pub(super) struct Machine {
 
 impl Machine {
     /// Returns the mean time for one frame of all cameras on all cores, seconds. If the machine is too slow to follow the person from box
-    /// to box,
-    /// the network is applied to more boxes: those around the last box, and a closer one.
+    /// to box, the network is applied to more boxes: those around the last box, and a closer one.
     fn frame_s(&self) -> f64 {
         if self.followed_s <= SHARE * FOLLOWED_S {
             self.followed_s

@@ -137,8 +137,7 @@ impl Injector {
     }
 
     /// Returns the process whose health messages show that it is time. This is the process that makes the results. For `Spin`, it is the
-    /// process
-    /// itself, which does not continue after its frame.
+    /// process itself, which does not continue after its frame.
     fn trigger(&self) -> &str {
         match self.fault {
             ProcessFault::Kill | ProcessFault::Stop => "triangulate",

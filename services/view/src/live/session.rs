@@ -23,7 +23,7 @@ const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// Longest pause between two looks at the cameras while there is no result.
 const PATIENCE: Duration = Duration::from_millis(90);
 
-/// Whether to continue following the deployment.
+/// Decision whether to continue following the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Look {
     /// The deployment still runs.
