@@ -321,7 +321,10 @@ fn only_the_agreed_entries_lie_at_the_top() {
         return;
     };
     for name in String::from_utf8(listing.stdout).unwrap().lines() {
-        assert!(agreed.contains(&name), "{name} is in the top folder: move it");
+        assert!(
+            agreed.contains(&name),
+            "{name} is in the top folder: move it"
+        );
     }
 }
 
