@@ -81,9 +81,7 @@ pub fn prepare(
         prepared.add(picture, subject.is_multiple_of(KEPT as u64));
     }
     let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!(
-        "{learnt} pictures to learn from, {kept} kept apart"
-    ));
+    console.message(&format!("{learnt} pictures for training, {kept} held out"));
     Ok(prepared)
 }
 

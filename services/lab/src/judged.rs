@@ -108,7 +108,7 @@ pub fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
     if n == N_PARTS {
         return Ok(());
     }
-    let message = format!("{name} has {n} parts, only models of {N_PARTS} can be judged");
+    let message = format!("{name} has {n} parts, but only models with {N_PARTS} can be evaluated");
     Err(Failure::new(ExitKind::Input, message))
 }
 
@@ -211,7 +211,8 @@ pub fn offset_numbers(offsets: &[Offset]) -> Value {
 /// Returns the mean offsets of joints as a table.
 pub fn offset_table(offsets: &[Offset]) -> String {
     let mut text =
-        "mean offset, % of the height     found    along the bone          across it".to_owned();
+        "mean offset, % of the height     found    along the bone          across the bone"
+            .to_owned();
     for it in offsets {
         let number = |axis: usize| {
             let [low, high] = it.interval[axis];

@@ -87,7 +87,7 @@ pub fn prepare(
         prepared.add(person, is_kept);
     }
     let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!("{learnt} people to learn from, {kept} kept apart"));
+    console.message(&format!("{learnt} people for training, {kept} held out"));
     Ok(prepared)
 }
 

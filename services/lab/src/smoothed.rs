@@ -94,7 +94,9 @@ fn truth(
             path.display(),
             sequences.len()
         );
-        return Err(Failure::new(ExitKind::Usage, what).with_hint("name the folder of one of them"));
+        return Err(
+            Failure::new(ExitKind::Usage, what).with_hint("name the folder of one sequence")
+        );
     };
     let first = sequence.views.first().map_or(0, |view| view.first);
     let mut all = vec![vec![None; frames.len()]; recorded.joints.len()];

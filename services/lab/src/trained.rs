@@ -68,8 +68,8 @@ pub(crate) fn run<T: Task>(
     let kept = match files::read(&file, files::RESULTS) {
         Ok(bytes) if job.resume => Some(bytes),
         Ok(_) => {
-            let message = format!("{} is of an interrupted training", file.display());
-            let hint = "go on from it with --resume, or delete it";
+            let message = format!("{} is from an interrupted training", file.display());
+            let hint = "continue from it with --resume, or delete it";
             return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
         }
         Err(_) => None,
@@ -87,7 +87,7 @@ pub(crate) fn run<T: Task>(
     while !trainer.is_done() {
         if !trainer.pass(&mut |_| !stop.is_requested()) {
             let message = format!("stopped after step {}", trainer.step());
-            let hint = "go on with --resume";
+            let hint = "continue with --resume";
             return Err(Failure::new(ExitKind::Interrupted, message).with_hint(hint));
         }
         write(&file, &trainer.checkpoint().or_fail(ExitKind::Run)?)?;

@@ -129,9 +129,9 @@ fn options_of_sequences_are_refused_for_single_pictures_and_vice_versa() {
     let case = case(1, 1);
     let people = people(&case);
     for (words, expected) in [
-        (&[people, "--oracle"][..], "--oracle has no meaning"),
-        (&[people, "--resume"], "--resume has no meaning"),
-        (&[people, "walk.toml"], "not judged in one run"),
+        (&[people, "--oracle"][..], "--oracle has no effect"),
+        (&[people, "--resume"], "--resume has no effect"),
+        (&[people, "walk.toml"], "cannot be evaluated in one run"),
         (&["walk.toml", "--only", "1"], "there are none"),
         (&[people, people], "people is given twice"),
     ] {
@@ -194,8 +194,7 @@ fn footage_that_ends_before_the_ground_truth_is_reported() {
     assert!(ended.stderr.contains("2 frames"), "{}", ended.stderr);
     assert!(ended.stdout.contains("planted walk"), "{}", ended.stdout);
     // The person in these pictures is smaller than models of people require.
-    let height =
-        "px high in the frames of planted, where the filters want 150 to 250: see --scale 2";
+    let height = "px tall in the frames of planted, but the filters need 150 to 250: use --scale 2";
     assert!(ended.stderr.contains(height), "{}", ended.stderr);
 }
 
@@ -208,7 +207,7 @@ fn impossible_evaluations_are_refused() {
         (&["--versions", "adaptive"][..], 2, "--oracle"),
         (&["--versions", "fnp"], 2, "fnp"),
         (&["--size", "12"], 2, "WIDTHxHEIGHT"),
-        (&["--share", "1-0.5"], 2, "nothing lies between"),
+        (&["--share", "1-0.5"], 2, "there is nothing between"),
         (&["--paper", "wrong.toml"], 3, "alhpa"),
         (&["--paper", "beyond.toml"], 3, "`paper.alpha` is -1"),
         (&["--paper", "none.toml"], 4, "none.toml"),
@@ -271,7 +270,11 @@ fn an_unusable_consistency_file_is_refused() {
     ];
     let ended = case.start(&out).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("nobody is left"), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("no subject is left"),
+        "{}",
+        ended.stderr
+    );
     let ended = case.start(&[&out[..], &["--hold-out", "eve"]].concat()).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(

@@ -199,7 +199,7 @@ fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
     signal("KILL", killed.id());
     assert_eq!(killed.wait().status.code(), None);
     let resumed = drawn.train("killed/m.fmp", &["--resume"]).wait();
-    assert_ended(&resumed, 0, &["going on after step"]);
+    assert_ended(&resumed, 0, &["continuing after step"]);
     assert!(drawn.model("one/m.fmp") == drawn.model("killed/m.fmp"));
     assert!(is_gone(&drawn.path("killed/m.fmp.checkpoint")));
 
@@ -220,7 +220,7 @@ fn an_interrupted_training_reports_how_to_continue_and_refuses_foreign_state() {
     let stopped = drawn.begun("m.fmp");
     signal("INT", stopped.id());
     let stopped = stopped.wait();
-    assert_ended(&stopped, 130, &["stopped after", "--resume goes on from"]);
+    assert_ended(&stopped, 130, &["stopped after", "--resume continues from"]);
     assert!(is_gone(&drawn.path("m.fmp")));
     let checkpoint = drawn.model("m.fmp.checkpoint");
 
@@ -233,7 +233,7 @@ fn an_interrupted_training_reports_how_to_continue_and_refuses_foreign_state() {
     for damage in [&checkpoint[..checkpoint.len() - 1], b"PLXMODEL", b""] {
         drawn.write("m.fmp.checkpoint", damage);
         let damaged = drawn.train("m.fmp", &["--resume"]).wait();
-        assert_ended(&damaged, 4, &["is no sound checkpoint", "delete"]);
+        assert_ended(&damaged, 4, &["is not a valid checkpoint", "delete"]);
     }
 }
 

@@ -175,13 +175,13 @@ fn share(text: &str) -> Result<[f64; 2], String> {
     let (from, to) = text.split_once('-').ok_or("expected FROM-TO, as 0.8-1")?;
     let end = |text: &str| match text.parse::<f64>() {
         Ok(end) if (0.0..=1.0).contains(&end) => Ok(end),
-        _ => Err(format!("{text:?} is no share from 0 to 1")),
+        _ => Err(format!("{text:?} is not a share from 0 to 1")),
     };
     let [from, to] = [end(from)?, end(to)?];
     if from < to {
         Ok([from, to])
     } else {
-        Err(format!("nothing lies between {from} and {to}"))
+        Err(format!("there is nothing between {from} and {to}"))
     }
 }
 
@@ -300,7 +300,7 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
             let is_judged = done.sequences.iter().any(|sequence| !sequence.1.is_empty());
             failure::require_results(
                 is_judged,
-                "no frame was judged: there is none, or --only and --every leave none",
+                "no frame was evaluated: there is none, or --only and --every leave none",
             )
         }
         n => {
@@ -320,13 +320,13 @@ fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
     let selects = arguments.only.is_some() || arguments.without.is_some();
     let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));
     if n == 0 && selects {
-        return refuse("--only and --without choose single pictures, and there are none");
+        return refuse("--only and --without select single pictures, but there are none");
     }
     if n > 0 && arguments.evidence.network_evidence.is_some() {
-        return refuse("--network-evidence judges sequences, not single pictures");
+        return refuse("--network-evidence is for sequences, not for single pictures");
     }
     if n > 0 && n < arguments.sequences.len() {
-        return refuse("single pictures and sequences are not judged in one run");
+        return refuse("single pictures and sequences cannot be evaluated in one run");
     }
     Ok(n > 0)
 }

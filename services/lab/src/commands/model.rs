@@ -113,7 +113,7 @@ fn show(file: &Path, as_json: bool) -> Result<ExitCode, Failure> {
     let [rows, cols] = model.max_filter();
     output::line(format_args!("{}: {}", file.display(), spec.name))?;
     output::line(format_args!(
-        "  {} parts, {} filters of up to {rows}x{cols} cells of {} px, {} levels an octave",
+        "  {} parts, {} filters of up to {rows}x{cols} cells of {} px, {} levels per octave",
         model.n_parts(),
         model.n_filters(),
         spec.cell_px,

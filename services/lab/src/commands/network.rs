@@ -109,10 +109,10 @@ fn show_network(
     let fitted = fitted?;
     if fitted.is_none() && arguments.image.is_some() {
         let message = format!(
-            "{}: a network without a card cannot look at a picture",
+            "{}: a network without a card cannot be applied to a picture",
             file.display()
         );
-        return Err(Failure::new(ExitKind::Input, message).with_hint("give one with --card"));
+        return Err(Failure::new(ExitKind::Input, message).with_hint("give a card with --card"));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -205,7 +205,7 @@ fn ports_in_words(description: &Description) -> Result<(), Failure> {
     ] {
         for it in ports {
             let sides = match &it.sides[..] {
-                [] => "of a shape that the file does not give".to_owned(),
+                [] => "of unknown shape".to_owned(),
                 sides => written(sides),
             };
             output::line(format_args!("  {what:<6} `{}` {sides}", it.name))?;
@@ -218,14 +218,14 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
     let mut entries = description.metadata.iter();
     if entries.any(|entry| entry.0 == viewquality::key::VERSION) {
         return output::line(
-            "  it predicts the errors of single views (`errors` in [paper] of a deployment), and finds no keypoints",
+            "  it predicts the errors of single views (`errors` in [paper] of a deployment) and does not find keypoints",
         );
     }
-    output::line("  no card: none beside it, none in it, none given")?;
+    output::line("  no card: none was given, and there is none in the network or beside it")?;
     let networks = network::nearest(description);
     let detectors = network::nearest_detectors(description);
     if networks.is_empty() && detectors.is_empty() {
-        output::line("  no card in configs/networks or configs/detectors comes near")?;
+        output::line("  no card in configs/networks or configs/detectors is similar")?;
     }
     for (folder, of, nearest) in [
         ("networks", "networks that find keypoints", networks),
@@ -237,16 +237,16 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
             .collect();
         let come = match &files[..] {
             [] => continue,
-            [_] => "comes nearest",
-            _ => "come equally near",
+            [_] => "is the closest",
+            _ => "are equally close",
         };
         output::line(format_args!(
-            "  of the cards of {of} {} {come}, by the shapes of input and outputs",
+            "  among the cards of {of}, {} {come}, by the shapes of inputs and outputs",
             files.join(", ")
         ))?;
     }
     output::line(format_args!(
-        "  copy one to {}, change what differs (docs/networks.md), and show the network again",
+        "  copy a card to {}, change the differences (see docs/networks.md), and show the network again",
         file.with_extension("toml").display()
     ))
 }
@@ -284,7 +284,7 @@ fn given(card: &Card) -> String {
             further,
             ..
         } => format!(
-            "a map for every keypoint and {further} further ones; corner cells on corner pixels: {udp}; cells in the middle of \
+            "a map for every keypoint and {further} further maps; corner cells on corner pixels: {udp}; cells in the middle of \
              their pixels: {centred}; maxima refined: {}; \
              values: {}",
             word(&json!(refine)),
@@ -295,7 +295,7 @@ fn given(card: &Card) -> String {
             y,
             bins_per_pixel,
             ..
-        } => format!("`{x}` for columns, `{y}` for rows, {bins_per_pixel} bins for a pixel"),
+        } => format!("`{x}` for columns, `{y}` for rows, {bins_per_pixel} bins per pixel"),
         Codec::Keypoints {
             fields,
             unit,

@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let run = finished::read(&arguments.folder, None)?;
     if let [first, _, ..] = &run.people[..] {
         output::message(format_args!(
-            "the run has {} people, the truth has one: person {} is compared",
+            "the run has {} people, but the truth has one: comparing person {}",
             run.people.len(),
             first.ids[0]
         ));
@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         output::json(&json!({ "compared": comparison.n_compared, "methods": methods }))?;
     } else {
         output::line(format_args!(
-            "{} positions that every method has, means and 95 % intervals:\n{}",
+            "means and 95 % intervals over {} positions that every method has:\n{}",
             comparison.n_compared,
             smoothed::table(&comparison.rows)
         ))?;

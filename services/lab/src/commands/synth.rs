@@ -239,7 +239,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
     if skews_ms.len() > n_cameras {
         let message = format!(
-            "--skew-ms names {}, the rig has {n_cameras} cameras",
+            "--skew-ms has {} values, but the rig has {n_cameras} cameras",
             skews_ms.len()
         );
         return Err(Failure::new(ExitKind::Usage, message));
@@ -284,7 +284,7 @@ fn report(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Fa
             "pictures"
         };
         output::message(format_args!(
-            "{out}: {n} sequences, {pictures} {what} in {seconds:.1} s ({rate:.1} a second)"
+            "{out}: {n} sequences, {pictures} {what} in {seconds:.1} s ({rate:.1} per second)"
         ));
     }
     Ok(())

@@ -26,7 +26,7 @@ pub(super) fn split(
     let (held, train): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|sequence| held.contains(&sequence.subject));
     if train.is_empty() {
-        let message = "all subjects are held out: nobody is left to learn from";
+        let message = "all subjects are held out: no subject is left for training";
         let failure = Failure::new(ExitKind::Usage, message);
         return Err(failure.with_hint("sequences of at least two subjects are needed"));
     }
@@ -43,7 +43,7 @@ pub(super) fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
         if cameras(pair[0]) != cameras(pair[1]) {
             let other = pair[1];
             let message = format!(
-                "--rig {rig}: {} {} has other cameras than the sequence before it",
+                "--rig {rig}: {} {} has other cameras than the previous sequence",
                 other.dataset, other.name
             );
             return Err(Failure::new(ExitKind::Usage, message));
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn somebody_must_be_left_to_learn_from() {
-        assert!(held(&["s1"], &[]).unwrap_err().contains("nobody is left"));
+        assert!(held(&["s1"], &[]).unwrap_err().contains("no subject is left"));
         let said = held(&["s1", "s2"], &["s3"]).unwrap_err();
         assert!(said.contains("no subject \"s3\", only s1, s2"), "{said}");
     }

@@ -90,7 +90,7 @@ impl<'a> Learning<'a> {
         keep: &dyn Fn(&Learned) -> Result<(), Failure>,
     ) -> Result<Done, Failure> {
         let learners = self.look(train, "learning")?;
-        let others = self.look(held, "looking at people held out")?;
+        let others = self.look(held, "processing held-out people")?;
         let known = learners.iter().zip(&others);
         let bins: Vec<(usize, Option<f64>)> = BINS
             .iter()
@@ -239,7 +239,7 @@ impl<'a> Learning<'a> {
                 if self.stop.is_requested() {
                     let failure = Failure::new(ExitKind::Interrupted, "interrupted");
                     return Err(failure.with_hint(
-                        "if the command had begun to try weights, OUT has what it learned so far",
+                        "if weights were being tried, OUT contains the tables learned so far",
                     ));
                 }
                 let images = film.at(frame.index).map_err(film_failure)?;

@@ -193,7 +193,7 @@ impl Job<'_> {
         };
         let mut forecaster = forecaster.lock().unwrap_or_else(PoisonError::into_inner);
         let forecast = forecaster.run(&seen).inspect_err(
-            |error| tracing::warn!(view = look.view, %error, "the network says nothing"),
+            |error| tracing::warn!(view = look.view, %error, "the network gives no prediction"),
         );
         let forecast = forecast.ok()?;
         let tenth = joints.map(|joint| tenth_of(joint));
@@ -238,7 +238,7 @@ impl Job<'_> {
         let (mut records, mut n_bytes) = (Vec::new(), 0);
         if file.exists() {
             if !self.resume {
-                let message = format!("{} is there already", file.display());
+                let message = format!("{} already exists", file.display());
                 let failure = Failure::new(ExitKind::Usage, message);
                 return Err(failure.with_hint("continue it with --resume, or choose another --out"));
             }

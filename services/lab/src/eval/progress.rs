@@ -40,7 +40,7 @@ impl<'a> Progress<'a> {
         let each = self.begin.elapsed().as_secs_f64() / self.n_solved as f64;
         let left = self.n_frames - self.n_solved - self.n_passed;
         let minutes = each * left as f64 / 60.0;
-        let text = format!("{sequence}: {each:.2} s a frame, {minutes:.1} minutes left");
+        let text = format!("{sequence}: {each:.2} s per frame, {minutes:.1} minutes left");
         self.console.details(&text);
         self.console.advance(1);
         if !self.console.shows_bar() && self.said.elapsed() >= EVERY {

@@ -90,7 +90,7 @@ pub fn text(summary: &Summary, versions: &[Version]) -> String {
         };
         let [auc, correlation] = [it.auc, it.rank_correlation].map(number);
         lines.push(format!(
-            "expected errors, mean over parts: area under the ROC {auc}, rank correlation {correlation}"
+            "expected errors, mean over parts: area under the ROC curve {auc}, rank correlation {correlation}"
         ));
     }
     lines.join("\n")

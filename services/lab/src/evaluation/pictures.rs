@@ -118,7 +118,7 @@ fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
             let (n, missed) = (report.n_images(), report.n_missed());
             let judged = which.title();
             format!(
-                "{}: {what}, {judged}; {n} images, nothing found on {missed}",
+                "{}: {what}, {judged}; {n} images, no detection in {missed}",
                 set.name
             )
         };

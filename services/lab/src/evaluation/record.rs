@@ -73,7 +73,7 @@ pub enum RecordError {
     #[error("line 1 is not the header of a file of records")]
     Header(#[source] serde_json::Error),
     /// The records are from a run with other settings.
-    #[error("they come from a run with other settings or versions")]
+    #[error("the records are from a run with other settings or versions")]
     Other,
     /// A line before the last is damaged.
     #[error("line {line}")]

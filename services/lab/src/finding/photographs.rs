@@ -117,7 +117,7 @@ fn read_all(
         let died = || {
             Err(Failure::new(
                 ExitKind::Run,
-                "a thread that read photographs died",
+                "a thread that reads photographs has panicked",
             ))
         };
         let join =

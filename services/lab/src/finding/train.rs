@@ -27,8 +27,7 @@ pub fn train(
     let begun = |from: &Earlier| {
         let begun = finder::begun(&settings.shape, settings.seed, &from.bytes);
         begun.map_err(|error| {
-            let hint =
-                "--from takes a network of `train finder` that has the `shape` of the settings";
+            let hint = "--from needs a network of `train finder` with the `shape` of the settings";
             failure::in_file(&from.file, &error).with_hint(hint)
         })
     };
@@ -73,11 +72,11 @@ fn drawn(passes: &[Pass]) -> String {
             ],
         ),
         panel(
-            "pictures kept apart",
+            "held-out pictures",
             vec![
                 score("recall", &|score| score.recall),
-                score("false boxes a picture", &|score| score.false_boxes),
-                score("nobody found where nobody is", &|score| score.quiet),
+                score("false boxes per picture", &|score| score.false_boxes),
+                score("empty pictures without a box", &|score| score.quiet),
             ],
         ),
     ];

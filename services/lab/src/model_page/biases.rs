@@ -30,7 +30,7 @@ pub(super) fn table(edge: &Edge) -> Html {
     }
     put!(
         out,
-        "</table><figcaption>biases: parent's type down, own across</figcaption></figure>\n"
+        "</table><figcaption>biases: parent's type in rows, own type in columns</figcaption></figure>\n"
     );
     out
 }

@@ -106,13 +106,13 @@ impl Alarms {
         let [(trained, at_trained), (used, at_used)] = self.counts;
         let of = match &self.folder {
             Some(folder) => format!("images of {}", folder.display()),
-            None => "negatives, which were trained on".to_owned(),
+            None => "negatives of the training".to_owned(),
         };
         let n = self.n_images;
         let of_trained = self.per_image(at_trained);
         let where_detection_begins = if used < trained {
             let of_used = self.per_image(at_used);
-            format!(", {of_used:.3} at {used} where detection begins")
+            format!(", {of_used:.3} at the detection threshold {used}")
         } else {
             String::new()
         };

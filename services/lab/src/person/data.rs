@@ -109,7 +109,7 @@ impl Data {
         }
         if data.people.is_empty() {
             let n: usize = data.left_out.values().sum();
-            let message = format!("nobody is left to train on: all {n} people were left out");
+            let message = format!("no person is left to train on: all {n} people were left out");
             return Err(Failure::new(ExitKind::Input, message));
         }
         data.negatives(&arguments.negatives, progress)?;

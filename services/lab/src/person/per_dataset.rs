@@ -56,9 +56,9 @@ pub(crate) fn deal<'a>(
                 let first = datasets.first().map(|dataset| dataset.display().to_string());
                 let first = first.unwrap_or_default();
                 let message =
-                    format!("{option} {argument}: of several data sets, which one is meant?");
+                    format!("{option} {argument}: there are several data sets, and none is named");
                 return Err(Failure::new(ExitKind::Usage, message).with_hint(format!(
-                    "name it as you wrote it, for example {option} {first}={argument}"
+                    "name the data set as on the command line, for example {option} {first}={argument}"
                 )));
             }
         }

@@ -92,12 +92,12 @@ impl Progress {
 
     /// Starts to read the features of a checkpoint's examples again.
     pub(super) fn resuming(&self, n_done: usize) {
-        self.console.begin(&format!("going on after step {n_done}"), "");
+        self.console.begin(&format!("continuing after step {n_done}"), "");
     }
 
     /// Reports that a training continues.
     pub(super) fn resumed(&self, n_done: usize, n_steps: usize) -> Result<(), Failure> {
-        self.console.message(&format!("going on after step {n_done} of {n_steps}"));
+        self.console.message(&format!("continuing after step {n_done} of {n_steps}"));
         self.console
             .event(&json!({ "event": "resumed", "done": n_done, "steps": n_steps }))
     }

@@ -126,7 +126,7 @@ impl Report {
     fn write(&self, text: &mut String) -> core::fmt::Result {
         writeln!(
             text,
-            "people        {} used, in {} images with turned and mirrored ones",
+            "people        {} used, in {} images including rotated and mirrored ones",
             self.n_people, self.n_images
         )?;
         let reasons: Vec<String> =
@@ -141,7 +141,7 @@ impl Report {
         if let Some(n_lost) = self.n_lost {
             writeln!(
                 text,
-                "  lost        {n_lost} images: the model fits on no level of them"
+                "  lost        {n_lost} images in which the model could not be placed"
             )?;
         }
         writeln!(
@@ -151,7 +151,7 @@ impl Report {
         )?;
         let before = match self.n_resumed {
             0 => String::new(),
-            n => format!(", {n} of them before it went on"),
+            n => format!(", {n} of them before the interruption"),
         };
         writeln!(
             text,

@@ -32,14 +32,14 @@ struct State {
 enum Refused {
     #[error("cannot read the checkpoint {}", path.display())]
     Io { path: PathBuf, source: io::Error },
-    #[error("{} is no sound checkpoint", path.display())]
+    #[error("{} is not a valid checkpoint", path.display())]
     Bytes {
         path: PathBuf,
         source: CheckpointBytesError,
     },
-    #[error("the checkpoint {} is of a training on other image files", path.display())]
+    #[error("the checkpoint {} is from a training with other image files", path.display())]
     Images { path: PathBuf },
-    #[error("cannot go on from the checkpoint {}", path.display())]
+    #[error("cannot continue from the checkpoint {}", path.display())]
     Other {
         path: PathBuf,
         source: CheckpointError,
@@ -72,11 +72,11 @@ impl Store {
         let checkpoint = store.checkpoint();
         if !resume && checkpoint.exists() {
             let message = format!(
-                "{} is there: an earlier training was interrupted",
+                "{} exists: an earlier training was interrupted",
                 checkpoint.display()
             );
             return Err(Failure::new(ExitKind::Usage, message).with_hint(
-                "continue from it with --resume; to start anew, delete it or choose another --out",
+                "continue from it with --resume; to start from the beginning, delete it or choose another --out",
             ));
         }
         Ok(store)
@@ -198,11 +198,11 @@ impl Store {
         };
         if !path.exists() {
             return so_far
-                .with_hint("nothing is kept: the first checkpoint is written after a step");
+                .with_hint("there is no checkpoint: the first one is written after a step");
         }
         let path = path.display();
         so_far.with_hint(format!(
-            "the same command with --resume goes on from {path}"
+            "the same command with --resume continues from {path}"
         ))
     }
 

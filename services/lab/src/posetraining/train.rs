@@ -16,14 +16,14 @@ pub type Pass = training::networks::Pass<Cost, Score>;
 fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
     let Some(from) = &job.from else {
         if settings.extras_alone {
-            let message = "extras_alone = true keeps all but the extra keypoints of a network, and none is named";
-            let hint = "name the network with --from, or take extras_alone out of the settings";
+            let message = "extras_alone = true keeps a network except for its extra keypoints, but no network is named";
+            let hint = "name the network with --from, or remove extras_alone from the settings";
             return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
         }
         return Ok(None);
     };
     let begun = pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
-        let hint = "--from takes a network of `train network` that has the `shape` of the settings";
+        let hint = "--from needs a network of `train network` with the `shape` of the settings";
         failure::in_file(&from.file, &error).with_hint(hint)
     })?;
     Ok(Some(begun))
@@ -54,7 +54,7 @@ fn drawn(passes: &[Pass]) -> String {
             ],
         ),
         panel(
-            "share, people kept apart",
+            "share, held-out people",
             vec![
                 score("limbs, both ends", &|score| score.both_ends),
                 score("direction", &|score| score.front),
@@ -110,7 +110,7 @@ fn line(pass: &Pass) -> String {
         return learnt;
     };
     format!(
-        "{learnt}; {} people kept apart: limbs {:.1} / {:.1} %, direction {:.1} %, errors told by {:.3}, extra keypoints {:.1} %",
+        "{learnt}; {} held-out people: limbs {:.1} / {:.1} %, direction {:.1} %, area of errors {:.3}, extra keypoints {:.1} %",
         score.people,
         100.0 * score.mean_of_ends,
         100.0 * score.both_ends,

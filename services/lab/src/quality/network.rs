@@ -62,7 +62,7 @@ fn drawn(passes: &[Pass], best: Option<usize>) -> String {
     };
     let area = Panel {
         what: "area",
-        lines: vec![line("area under the ROC, validated", &|pass| {
+        lines: vec![line("area under the ROC curve, validated", &|pass| {
             validated(pass).area
         })],
     };
@@ -107,7 +107,7 @@ pub fn train(
     while !trainer.is_done() {
         if !trainer.pass(&mut |_| !stop.is_requested()) {
             let failure = Failure::new(ExitKind::Interrupted, "stopped");
-            return Err(failure.with_hint(format!("--resume goes on from {}", kept.display())));
+            return Err(failure.with_hint(format!("--resume continues from {}", kept.display())));
         }
         replace(&kept, &trainer.checkpoint().or_fail(ExitKind::Run)?)?;
         let drawn = drawn(trainer.passes(), trainer.best());
@@ -125,7 +125,7 @@ pub fn train(
         let all: Vec<&Sample> = samples.all.iter().collect();
         if samples.tile != settings.network.tile().unwrap_or(samples.tile) {
             let message = format!(
-                "{}: its tiles do not have the size that this network takes",
+                "{}: the tiles do not have the input size of this network",
                 file.display()
             );
             return Err(Failure::new(ExitKind::Input, message));
@@ -152,7 +152,7 @@ fn read_all(files: &[PathBuf]) -> Result<Samples, Failure> {
     for file in files {
         let samples = read(file)?;
         if !all.all.is_empty() && samples.tile != all.tile {
-            let message = format!("{}: its tiles are of another size", file.display());
+            let message = format!("{}: the tiles have another size", file.display());
             return Err(Failure::new(ExitKind::Input, message));
         }
         all.tile = samples.tile;
@@ -167,9 +167,10 @@ fn checkpoint(path: &Path, resume: bool) -> Result<Option<Vec<u8>>, Failure> {
         Err(error) => Err(in_file(path, &error)),
         Ok(bytes) if resume => Ok(Some(bytes)),
         Ok(_) => {
-            let message = format!("{} is there: a training was interrupted", path.display());
-            Err(Failure::new(ExitKind::Usage, message)
-                .with_hint("continue from it with --resume; to start anew, delete it"))
+            let message = format!("{} exists: a training was interrupted", path.display());
+            Err(Failure::new(ExitKind::Usage, message).with_hint(
+                "continue from it with --resume; to start from the beginning, delete it",
+            ))
         }
     }
 }
@@ -180,7 +181,7 @@ fn refused(error: TrainError, checkpoint: &Path) -> Failure {
     if is_old {
         let path = checkpoint.display();
         return failure.with_hint(format!(
-            "--resume needs the samples and settings that it was made with; to begin anew, delete {path}"
+            "--resume needs the same samples and settings; to start from the beginning, delete {path}"
         ));
     }
     failure
@@ -204,10 +205,10 @@ impl Say<'_> {
             "event": "data", "learnt": learnt, "validated": validated, "resumed": self.before,
         }))?;
         console.message(&format!(
-            "{learnt} samples to learn from, {validated} to validate on"
+            "{learnt} samples for training, {validated} for validation"
         ));
         if self.before > 0 {
-            console.message(&format!("going on after pass {}", self.before));
+            console.message(&format!("continuing after pass {}", self.before));
         }
         Ok(())
     }
@@ -248,7 +249,7 @@ impl Say<'_> {
             .map(|area| area.map_or("-".to_owned(), |value| format!("{:.0}", 100.0 * value)));
         let areas: Vec<String> = areas.collect();
         self.console.result(&format!(
-            "{name}: {} samples, area under the ROC {:.3}, rank correlation {:.3}\n  area by part, %: {}",
+            "{name}: {} samples, area under the ROC curve {:.3}, rank correlation {:.3}\n  area by part, %: {}",
             judgement.n,
             judgement.mean_area(),
             judgement.mean_rank_correlation(),

@@ -18,13 +18,13 @@ pub(super) enum NoSample {
     #[error(transparent)]
     Search(#[from] fmp::ImageTooSmall),
     /// The search found no person.
-    #[error("nobody was found")]
+    #[error("no person was found")]
     Nobody,
     /// A true joint is unknown.
-    #[error("a joint is not known")]
+    #[error("a joint is unknown")]
     Unknown,
     /// The model has another number of parts.
-    #[error("the model is not one of 26 parts")]
+    #[error("the model does not have 26 parts")]
     Model,
     /// The evidence cannot be written.
     #[error("the results of the search do not fit a network of expected errors")]

@@ -61,7 +61,7 @@ pub fn make(
     if n == 0 {
         return Err(Failure::new(
             ExitKind::Input,
-            "not one picture makes a sample",
+            "there is no sample for any picture",
         ));
     }
     let samples = Samples {

@@ -103,7 +103,7 @@ pub fn n_frames(
     let most = (recording.seconds() * rate_hz + 1e-6).floor() as u64 + 1;
     match asked {
         Some(asked) if asked > most => Err(format!(
-            "{asked} frames, but what was recorded ends after {most} at {rate_hz} frames a second"
+            "{asked} frames were requested, but the recording ends after {most} at {rate_hz} frames per second"
         ))
         .or_fail(ExitKind::Usage),
         asked => Ok(asked.unwrap_or(most)),

@@ -33,7 +33,7 @@ fn warning(sequence: &Sequence, size: Option<[u32; 2]>, scale: f64) -> Option<St
     let [least, most] = USABLE_PX;
     let outside = seen.iter().find(|seen| !(least..=most).contains(&seen[1]))?;
     Some(format!(
-        "a person is about {:.0} px high in the frames of {}, where the filters want {} to {}: see --scale {}",
+        "a person is about {:.0} px tall in the frames of {}, but the filters need {} to {}: use --scale {}",
         outside[1],
         sequence.dataset,
         GOOD_PX[0],

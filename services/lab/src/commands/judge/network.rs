@@ -115,7 +115,7 @@ impl fmt::Display for Expected {
         };
         write!(
             to,
-            "expected errors of the maxima: area under the ROC {} ({} of {} joints are off by more than half a head), rank correlation {}",
+            "expected errors of the maxima: area under the ROC curve {} ({} of {} joints are off by more than half a head), rank correlation {}",
             auc,
             self.n_far,
             self.n_joints,

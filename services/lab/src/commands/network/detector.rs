@@ -23,7 +23,7 @@ pub(super) fn show(
 ) -> Result<ExitCode, Failure> {
     if arguments.outline.is_some() {
         let message = format!(
-            "{}: --box is for networks that find keypoints; a detector looks at the whole picture",
+            "{}: --box is for networks that find keypoints; a detector uses the whole picture",
             file.display()
         );
         return Err(Failure::new(ExitKind::Usage, message));
@@ -108,7 +108,7 @@ fn in_words(
     ))?;
     output::line(format_args!("  gives  {}", given(card)))?;
     output::line(format_args!(
-        "  keeps  boxes with a score of at least {}, and of two that share more than {} of their union the better",
+        "  keeps  boxes with a score of at least {}; if two boxes share more than {} of their union, the better one",
         card.least_score, card.most_overlap
     ))?;
     for (what, text) in [("licence", &card.licence), ("weights", &card.weights)] {

@@ -31,12 +31,12 @@ pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
 
 fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     let spent = report["processor_s"].as_object();
-    let spent = spent.ok_or("it has no `processor_s`: it is not the report of a run")?;
+    let spent = spent.ok_or("`processor_s` is missing: this is not the report of a run")?;
     let n_views = report["views"].as_array().map_or(0, Vec::len);
     let n_frames = report["frames_in_footage"].as_f64().unwrap_or(0.0);
     if n_views == 0 || n_frames < 1.0 {
         return Err(format!(
-            "{n_frames} frames of {n_views} views: no costs can be computed from that"
+            "{n_frames} frames of {n_views} views: no costs can be computed"
         ));
     }
     // Mean time of a process of this service, milliseconds per frame.
@@ -50,7 +50,8 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         let sum: f64 = all.iter().sum();
         (!all.is_empty()).then(|| 1e3 * sum / (all.len() as f64 * n_frames))
     };
-    let needed = |service: &str| mean(service).ok_or_else(|| format!("no process {service} in it"));
+    let needed =
+        |service: &str| mean(service).ok_or_else(|| format!("no process {service} in the report"));
     let workers = spent.keys().filter(|key| key.starts_with("fuse-")).count() as f64;
     let fused = mean("fuse").map_or(0.0, |value| value * workers)
         + needed("triangulate")?

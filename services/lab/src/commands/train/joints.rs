@@ -90,11 +90,11 @@ fn summary(learned: &Learned) -> serde_json::Value {
 
 fn text(learned: &Learned) -> String {
     let it = &learned.file.learned;
-    let mut lines = vec!["reach  ridge   error of people left out, % of their size".to_owned()];
+    let mut lines = vec!["reach  ridge   error on people left out, % of their size".to_owned()];
     for (tried, errors) in &learned.tried {
         let errors: Vec<String> = errors.iter().map(|error| format!("{error:.3}")).collect();
         let is_taken = tried.reach == it.reach && tried.ridge == it.ridge;
-        let mark = if is_taken { "  <- taken" } else { "" };
+        let mark = if is_taken { "  <- chosen" } else { "" };
         let (reach, ridge) = (tried.reach, tried.ridge);
         lines.push(format!(
             "{reach:>5} {ridge:>6}   {}{mark}",
@@ -103,7 +103,7 @@ fn text(learned: &Learned) -> String {
     }
     for set in &it.sets {
         lines.push(format!(
-            "{}: {} of {} people found; error {:.3} before, {:.3} after, of people left out",
+            "{}: {} of {} people found; error on people left out: {:.3} before, {:.3} after",
             set.name, set.found, set.people, set.error_before, set.error_after
         ));
     }

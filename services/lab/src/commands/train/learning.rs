@@ -85,8 +85,8 @@ fn backend(name: &str) -> Result<Backend, Failure> {
         "libtorch" => Ok(Backend::LibTorch),
         #[cfg(not(feature = "libtorch"))]
         "libtorch" => {
-            let message = "this Parallax was built without LibTorch";
-            let hint = "build it with --features libtorch: docs/guide/train.md says how";
+            let message = "this executable was built without LibTorch";
+            let hint = "build with --features libtorch; see docs/guide/train.md";
             Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
         }
         _ => Ok(Backend::BuiltIn),

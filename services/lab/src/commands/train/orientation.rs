@@ -146,13 +146,13 @@ fn json(report: &Report) -> serde_json::Value {
 
 fn text(report: &Report) -> String {
     let mut lines = vec![format!(
-        "learned from {} photographs ({} from behind) and {} pictures of scenes",
+        "trained on {} photographs ({} from behind) and {} pictures of scenes",
         report.n_photographs, report.n_behind, report.n_rendered
     )];
     lines.extend(report.judged.iter().map(|judged| {
         let [low, high] = judged.interval.map(|interval| 100.0 * interval);
         format!(
-            "{}: right for {:.1} % of {} people ({low:.1} to {high:.1}), surprise {:.3} nats (0.693: knows nothing)",
+            "{}: correct for {:.1} % of {} people ({low:.1} to {high:.1}), surprise {:.3} nats (0.693: no information)",
             judged.on,
             100.0 * judged.right,
             judged.n,

@@ -27,7 +27,7 @@ fn the_page_is_self_contained_with_every_table_and_figure() {
         "paper 69.45",
         "a &lt;b&gt; &amp; c",
         "Geom., all views",
-        "iterations until settled",
+        "iterations until convergence",
         "<polyline",
     ] {
         assert!(page.contains(text), "{text}");

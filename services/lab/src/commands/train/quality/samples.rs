@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if arguments.scenes == 0 && arguments.datasets.is_empty() {
         let failure = Failure::new(
             ExitKind::Usage,
-            "no pictures: name a DATASET, or --scenes N",
+            "no pictures: name a DATASET, or use --scenes N",
         );
         return Err(failure);
     }
@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let made = pool.install(|| samples::make(&job, &arguments.out, model, (stop, &terminal)))?;
     if !globals.quiet {
         output::message(format_args!(
-            "{}: {} samples, {} pictures on which nobody was found",
+            "{}: {} samples, {} pictures without a detected person",
             arguments.out.display(),
             made.n,
             made.n_lost
