@@ -65,7 +65,7 @@ pub struct Forecast {
 }
 
 /// Returns the resources that cameras on hosts need. Cameras are distributed evenly by cost: the fusing host gets
-/// fewer of them, because it has more work. `near` of the load fixes the number of its views instead.
+/// fewer of them, because it has more work. If the load has `near`, the fusing host gets this number of views.
 pub fn forecast(costs: &Costs, load: &Load) -> Forecast {
     let n_far = load.n_hosts.saturating_sub(1);
     if let Some(near) = load.near.filter(|near| n_far > 0 && *near <= load.n_cameras) {

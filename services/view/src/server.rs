@@ -125,7 +125,7 @@ fn is_same(token: &str, other: &str) -> bool {
     token.len() == other.len() && differences == 0
 }
 
-/// Refuses requests for pages of other sites.
+/// Refuses requests that pages of other sites make.
 ///
 /// * `has_token`: true if pages must know a token; then any host name of this machine is allowed.
 fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {

@@ -315,7 +315,7 @@ fn find(
     }))
 }
 
-/// Pairs are those of the mirror image.
+/// The pairs of joints must match those of the mirror image.
 const _: () = {
     assert!(MIRROR[PAIRS[0][0]] == PAIRS[0][1], "hips");
     assert!(MIRROR[PAIRS[1][0]] == PAIRS[1][1], "shoulders");

@@ -38,7 +38,7 @@ pub struct Put {
 }
 
 impl Put {
-    /// Takes the joints unchanged; the head is from the neck to its top.
+    /// Takes the joints unchanged; the head extends from the neck to its top.
     pub fn plain(id: u64, joints: &Joints) -> Self {
         let mut all = [None; N_TRUE];
         all[..14].copy_from_slice(joints);
