@@ -1,5 +1,5 @@
-//! Every fuzz target over its seeds and some thousand mutations of them, without nightly and without a
-//! sanitizer: a short run of what `fuzz/README.md` runs for long.
+//! Runs every fuzz target over its seeds and some thousand mutations of them, without nightly and without a
+//! sanitizer. It is a short form of the runs in `fuzz/README.md`.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stdout, reason = "the input that failed is told")]
@@ -18,9 +18,9 @@ use std::time::{Duration, Instant};
 
 use properties::TARGETS;
 
-/// Mutations of all seeds of a target.
+/// Number of mutations of a target's seeds.
 const N_MUTATIONS: u64 = 4000;
-/// A target whose inputs are slow has fewer.
+/// Time after which a slow target ends with fewer mutations.
 const LONGEST: Duration = Duration::from_secs(4);
 
 fn folder() -> PathBuf {
@@ -34,7 +34,7 @@ fn names(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Some bytes of a seed changed, moved, repeated, left out or taken from another one.
+/// Changes, moves, repeats or removes some bytes of a seed, or takes them from another seed.
 fn mutate(seed: &[u8], other: &[u8], random: &mut fastrand::Rng) -> Vec<u8> {
     let mut bytes = seed.to_vec();
     for _ in 0..random.usize(1..6) {

@@ -1,6 +1,6 @@
-//! Rules of the house that the compiler cannot see.
+//! Rules of the code base that the compiler does not check.
 //!
-//! Each rule is one test; each failure names the file and what to do.
+//! Each rule is one test. Each failure names the file and says what to do.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
@@ -16,7 +16,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A crate may depend only on crates in its own row and above. Cargo refuses circles.
+/// A crate may only depend on crates in its own row and in rows above. Cargo refuses circular dependencies.
 const LAYERS: &[(&str, &[&str])] = &[
     (
         "ground",
@@ -74,10 +74,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("executables", &["lab", "parallax"]),
 ];
 
-/// The only crates that may contain the word.
+/// The only crates that may contain unsafe code.
 const MAY_BE_UNSAFE: &[&str] = &["failure", "gpu", "kernels", "runtime"];
 
-/// The only crates that may know the transport.
+/// The only crates that may use the transport directly.
 const MAY_KNOW_TRANSPORT: &[&str] = &["messages", "runtime"];
 
 const MAX_LINES: usize = 500;
@@ -179,7 +179,7 @@ fn files_stay_readable() {
             );
             assert!(
                 text.starts_with("//! "),
-                "{} says nothing about itself: open with a `//!` sentence",
+                "{} has no module documentation: begin with a `//!` sentence",
                 file.display()
             );
         }
@@ -200,7 +200,7 @@ fn no_files_import_one_another_in_a_circle() {
     }
 }
 
-/// Places in the old dialect. This number only goes down.
+/// Number of places in the old dialect. It only decreases.
 const DIALECT: usize = 50;
 
 #[test]
@@ -220,7 +220,7 @@ fn the_old_dialect_goes() {
 
 #[test]
 fn no_test_is_ignored_and_no_work_is_left_marked() {
-    // Put together here so that this file does not find itself.
+    // The marks are concatenated here, so that this file does not find itself.
     let marks = [
         ["#[ign", "ore"].concat(),
         ["TO", "DO"].concat(),
@@ -243,7 +243,7 @@ fn no_test_is_ignored_and_no_work_is_left_marked() {
 
 #[test]
 fn files_of_users_are_written_through_one_room() {
-    // These write into folders of their own, or a new file exclusively; the record of benchmarks is appended to.
+    // These files write into folders of their own or create a new file exclusively, except the record of benchmarks, which is appended to.
     let may = [
         "shared/failure/src/claim.rs",
         "shared/files/",
@@ -269,7 +269,7 @@ fn files_of_users_are_written_through_one_room() {
             for way in writes {
                 assert!(
                     !code.contains(way),
-                    "{name} writes by {way}...): `files` does not follow links"
+                    "{name} writes with {way}...): use `files`, which does not follow links"
                 );
             }
         }
@@ -321,7 +321,10 @@ fn only_the_agreed_entries_lie_at_the_top() {
         return;
     };
     for name in String::from_utf8(listing.stdout).unwrap().lines() {
-        assert!(agreed.contains(&name), "{name} lies at the top: move it");
+        assert!(
+            agreed.contains(&name),
+            "{name} is in the top folder: move it"
+        );
     }
 }
 

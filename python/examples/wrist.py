@@ -1,4 +1,4 @@
-"""Prints a moving wrist of a running deployment, and says what was missing: python wrist.py demo "right wrist"."""
+"""Prints the positions of a wrist in a running deployment, or the reason if it is missing: python wrist.py demo "right wrist"."""
 
 import sys
 import time
@@ -16,7 +16,7 @@ def main():
             longest = max(longest, now - (last or now))
             n, missed, last = n + 1, missed + moment.n_missed, now
             if moment.followed is None:
-                print(f"{moment.frame:6d}  nobody: {moment.status}", flush=True)
+                print(f"{moment.frame:6d}  no person: {moment.status}", flush=True)
                 continue
             wrist = moment.followed.joint(joint)
             if wrist.position is None:

@@ -1,4 +1,4 @@
-"""A read-only door to Parallax: running deployments, finished folders, recordings.
+"""Read-only access to Parallax: running deployments, folders of finished runs, recordings.
 
     import parallax_client
 
@@ -8,7 +8,7 @@
                 wrist = person.joint("right wrist")
                 print(moment.frame, person.id, wrist.position, wrist.deviation, wrist.reason)
 
-Live messages need the package `iceoryx2` of the version that the deployment was built with; folders do not.
+Live messages need the package `iceoryx2` in the version that the deployment was built with. Folders do not need it.
 """
 
 from .errors import ClientError, Full, NotRunning, VersionMismatch

@@ -1,21 +1,21 @@
-"""Why a deployment or a file cannot be read."""
+"""Errors of reading deployments and files."""
 
 
 class ClientError(Exception):
-    """A deployment or a file cannot be read; the text says what is missing."""
+    """A deployment or a file cannot be read; the message says why."""
 
 
 class NotRunning(ClientError):
-    """The deployment does not run. `running` has the names of those that do."""
+    """The deployment does not run. `running` has the names of the running deployments."""
 
     def __init__(self, name, running):
         self.name, self.running = name, list(running)
-        ones = "running: " + ", ".join(self.running) if self.running else "none does"
+        ones = "running: " + ", ".join(self.running) if self.running else "no deployment is running"
         super().__init__(f"deployment {name!r} does not run; {ones}")
 
 
 class VersionMismatch(ClientError):
-    """The deployment sends another version of a message than this package reads."""
+    """The deployment sends a version of a message that this package does not read."""
 
     def __init__(self, name, what, theirs, ours):
         self.what, self.theirs, self.ours = what, theirs, ours
@@ -26,7 +26,7 @@ class VersionMismatch(ClientError):
 
 
 class Full(ClientError):
-    """As many programs read the deployment as may."""
+    """The largest number of programs already read the deployment."""
 
     def __init__(self, name, most, guests):
         self.most = most

@@ -1,4 +1,4 @@
-"""What a run leaves: folders as NumPy arrays or pandas tables, and recordings message by message."""
+"""Files of a run: folders as NumPy arrays or pandas tables, and recordings message by message."""
 
 import json
 import pathlib
@@ -13,16 +13,16 @@ SCHEMA_VERSION = 2
 
 
 class Person:
-    """One person of a finished run.
+    """One person in a finished run.
 
     id          identity within the run
-    status      "ok", or why there is no skeleton, None in frames without the person, [frame]
-    sides       "sure", "unsure" or "as-seen", None in frames without the person, [frame]
+    status      "ok", or the reason for a missing skeleton; None in frames without the person, [frame]
+    sides       certainty of left and right: "sure", "unsure" or "as-seen"; None in frames without the person, [frame]
     joints      names of the joints
-    positions   metres in the world of the calibration, NaN where there is none, [frame, joint, axis]
-    covariance  square metres, NaN where there is no position, [frame, joint, axis, axis]
-    reprojection_px  NaN where there is no position, [frame, joint]
-    n_views     views that the joint was located with, [frame, joint]
+    positions   positions in the world of the calibration, metres; NaN for a missing joint, [frame, joint, axis]
+    covariance  covariance of the positions, square metres; NaN for a missing joint, [frame, joint, axis, axis]
+    reprojection_px  reprojection error, pixels; NaN for a missing joint, [frame, joint]
+    n_views     number of views from which the joint was located, [frame, joint]
     """
 
     def __init__(self, identity, joints, n_frames):
@@ -50,13 +50,13 @@ class Person:
 
     @property
     def deviation(self):
-        """Standard deviation of every joint along one axis, metres, NaN where there is no position: [frame, joint]."""
+        """Standard deviation of every joint along one axis, metres; NaN for a missing joint, [frame, joint]."""
         return np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3)
 
     def joint(self, name):
-        """Positions of one joint, [frame, axis] in metres."""
+        """Returns the positions of one joint, metres, [frame, axis]."""
         if name not in self.joints:
-            raise KeyError(f"no joint {name!r}, but {', '.join(self.joints)}")
+            raise KeyError(f"no joint {name!r}; the joints are {', '.join(self.joints)}")
         return self.positions[:, self.joints.index(name)]
 
 
@@ -64,22 +64,22 @@ class Run:
     """A finished run.
 
     frames      numbers of the frames, [frame]
-    time_s      their times in the footage, NaN where no frame rate is known, [frame]
-    status      "ok" if anybody has a skeleton, or why nobody has, or "no result", [frame]
-    reason      why there is no result, [frame]
+    time_s      times of the frames in the footage, seconds; NaN if the frame rate is unknown, [frame]
+    status      "ok" if there is a skeleton, otherwise the reason for its absence or "no result", [frame]
+    reason      reason for a missing result, [frame]
     joints      names of the joints
-    people      every `Person` by identity
-    followed    a `Person` made of whoever is followed in each frame, who may be one after the other
-    summary     the contents of summary.json
+    people      all people (`Person`) by identity
+    followed    a `Person` with the data of the followed person in each frame; the followed person can change
+    summary     contents of summary.json
 
-    Of a run in which never two people are in a frame, `positions`, `covariance`, `reprojection_px`, `n_views`, `deviation`, `sides` and
-    `joint()` are those of `followed`.
+    If no frame has more than one person, `positions`, `covariance`, `reprojection_px`, `n_views`, `deviation`, `sides` and
+    `joint()` are also available on the run, with the data of `followed`.
     """
 
     def __init__(self, folder):
         folder = pathlib.Path(folder)
         if not folder.is_dir():
-            raise ClientError(f"{folder} is no folder")
+            raise ClientError(f"{folder} is not a folder")
         self.folder = folder
         self.summary = self._summary()
         lines = self._lines()
@@ -102,10 +102,10 @@ class Run:
 
     @property
     def only(self):
-        """`followed`, of a run in which never two people are in a frame. Several are an error."""
+        """Returns `followed` if no frame has more than one person; otherwise raises an error."""
         if not self._is_one:
             identities = ", ".join(str(it) for it in self.people)
-            raise ClientError(f"{self.folder} has {len(self.people)} people: take one of `people`: {identities}")
+            raise ClientError(f"{self.folder} has {len(self.people)} people: use one of `people`: {identities}")
         return self.followed
 
     positions = property(lambda self: self.only.positions)
@@ -116,11 +116,11 @@ class Run:
     sides = property(lambda self: self.only.sides)
 
     def joint(self, name):
-        """Positions of one joint of the only person, [frame, axis] in metres."""
+        """Returns the positions of one joint of the only person, metres, [frame, axis]."""
         return self.only.joint(name)
 
     def to_pandas(self):
-        """A table with one row for every person, frame and joint."""
+        """Returns a table with one row for each person, frame and joint."""
         try:
             import pandas
         except ImportError:
@@ -143,7 +143,7 @@ class Run:
         path = self.folder / "summary.json"
         if not path.exists():
             part = (self.folder / "pose3d.jsonl.part").exists()
-            why = "the run has not ended, or was killed" if part else "it is no folder of a run"
+            why = "the run has not ended, or was killed" if part else "this is not the folder of a run"
             raise ClientError(f"{path} does not exist: {why}")
         summary = _json(path, path.read_text(encoding="utf-8"))
         version = summary.get("schema_version") if isinstance(summary, dict) else None
@@ -174,24 +174,24 @@ def _json(where, text):
 
 
 def _problem(line):
-    """What is wrong with a line; None if nothing is."""
+    """Returns the problem of a line; None if the line is valid."""
     lacks = {"frame", "status", "people"} - set(line if isinstance(line, dict) else ())
     if lacks:
         return f"no {', '.join(sorted(lacks))}"
     people = line["people"]
     if len(people) > layout.LIMITS["MAX_PEOPLE"]:
-        return f"{len(people)} people, a frame has at most {layout.LIMITS['MAX_PEOPLE']}"
+        return f"{len(people)} people, but a frame has at most {layout.LIMITS['MAX_PEOPLE']}"
     for nth, person in enumerate(people):
         lacks = {"id", "status", "joints"} - set(person if isinstance(person, dict) else ())
         if lacks:
             return f"person {nth} of the line has no {', '.join(sorted(lacks))}"
         if any(it["id"] == person["id"] for it in people[:nth]):
-            return f"two people with id {person['id']}, ids of a frame differ"
+            return f"two people with id {person['id']}, but ids in a frame must differ"
     return None
 
 
 def _names(lines):
-    """The names of joints, of a set that this package does not know."""
+    """Returns the names of the joints in a run with an unknown joint set."""
     names = []
     for person in (person for line in lines for person in line["people"]):
         names.extend(it for it in person["joints"] if it not in names)
@@ -199,14 +199,14 @@ def _names(lines):
 
 
 def read_folder(folder):
-    """Reads the folder of a finished run as a `Run`."""
+    """Reads the folder of a finished run, and returns a `Run`."""
     return Run(folder)
 
 
 def read_recording(file, about="skeletons"):
-    """The messages of one kind in a recording (MCAP), one after the other, as pairs of its topic and the message.
+    """Yields the messages of one kind in a recording (MCAP), as pairs of topic and message. Needs the package `mcap`.
 
-    about: "skeletons", "people", "view-pose", "pair-pose", "view-quality" or "health". Needs the package `mcap`.
+    about: "skeletons", "people", "view-pose", "pair-pose", "view-quality" or "health".
     """
     try:
         from mcap.reader import make_reader
@@ -214,18 +214,18 @@ def read_recording(file, about="skeletons"):
         raise ClientError("recordings need the package mcap: `pip install mcap`") from None
     kind = layout.TOPICS[about]
     if kind["elements"] is not None:
-        raise ClientError(f"{about!r} carries arrays, which are not read from recordings here")
+        raise ClientError(f"messages {about!r} contain arrays, which this package does not read from recordings")
     dtype = layout.dtype(kind["message"])
     prefix = kind["name"].split("{}")[0]
     with open(file, "rb") as opened:
         for _, channel, message in make_reader(opened).iter_messages():
             if not channel.topic.lstrip("/").startswith(prefix):
                 continue
-            # The head of CDR has four bytes; a struct without padding has the layout that CDR asks for.
+            # The header of CDR has four bytes. A struct without padding has the layout that CDR requires.
             data = message.data[4:]
             if about == "skeletons" and len(data) >= dtype.fields["people"][1]:
-                # A recording holds the people that there are and no more.
+                # A recording only contains the people in the frame, not the whole array.
                 data = data.ljust(dtype.itemsize, b"\0")
             if len(data) < dtype.itemsize:
-                raise ClientError(f"{file}: a message of {channel.topic} has {len(data)} bytes, {dtype.itemsize} are meant")
+                raise ClientError(f"{file}: a message of {channel.topic} has {len(data)} bytes instead of {dtype.itemsize}")
             yield channel.topic, np.frombuffer(data, dtype, count=1)[0]

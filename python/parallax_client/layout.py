@@ -1,7 +1,7 @@
-"""The layout of every message, from `messages.json`, which `parallax messages --json` makes of the Rust definitions.
+"""Layouts of all messages, from `messages.json`. `parallax messages --json` generates this file from the Rust definitions.
 
-`dtype(name)` is the NumPy type of a struct. It is built with the offsets and sizes of the file, and refused if NumPy
-makes another size of them.
+`dtype(name)` returns the NumPy type of a struct. It is built with the offsets and sizes in the file. If NumPy computes
+another size, this is an error.
 """
 
 import ctypes
@@ -15,28 +15,28 @@ _ALL = json.loads(pathlib.Path(__file__).with_name("messages.json").read_text(en
 _STRUCTS = _ALL["structs"]
 
 TOPICS = _ALL["topics"]
-"""Of every kind of topic its name, version and message."""
+"""Name, version and message of every kind of topic."""
 LIMITS = _ALL["limits"]
-"""The lengths of arrays in messages."""
+"""Lengths of arrays in messages."""
 STATUSES = _ALL["statuses"]
-"""The reasons by the number of a status; 0 is "ok"."""
+"""Texts of the statuses by number; 0 is "ok"."""
 SIDES = _ALL["sides"]
 KEPT = _ALL["kept"]
 JOINT_SETS = _ALL["joint_sets"]
-"""The names of the joints of every set, in order."""
+"""Names of the joints in every joint set, in order."""
 
 OK, END = STATUSES.index("ok"), STATUSES.index("end of footage")
 
 
 def reason(status):
-    """The words for a status, as in the files of a run."""
+    """Returns the text of a status, as in the files of a run."""
     status = int(status)
     return STATUSES[status] if status < len(STATUSES) else "unknown"
 
 
 @functools.lru_cache(maxsize=None)
 def dtype(name):
-    """The NumPy type of a struct, or of a number."""
+    """Returns the NumPy type of a struct or a number."""
     if name not in _STRUCTS:
         return np.dtype(name)
     layout = _STRUCTS[name]
@@ -48,18 +48,18 @@ def dtype(name):
     made = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": layout["size"]})
     end = offsets[-1] + made.fields[names[-1]][0].itemsize
     if end != layout["size"]:
-        raise AssertionError(f"{name} has {layout['size']} bytes, and its fields end at {end}")
+        raise AssertionError(f"{name} has {layout['size']} bytes, but its fields end at {end}")
     return made
 
 
 @functools.lru_cache(maxsize=None)
 def ctype(name):
-    """A ctypes struct with the name, size and alignment by which the transport tells types apart. Its content is bytes:
-    messages are read through `dtype`."""
+    """Returns a ctypes struct with the name, size and alignment by which the transport distinguishes types. Its content
+    is bytes: messages are read through `dtype`."""
     layout = _STRUCTS[name]
     word = {4: ctypes.c_uint32, 8: ctypes.c_uint64}.get(layout["align"])
     if word is None:
-        # Alignments above those of numbers come by `_align_`, which Python has from 3.13; see `alignments`.
+        # Alignments above those of numbers need `_align_`, which exists since Python 3.13; see `alignment`.
         word = ctypes.c_uint64
     n = layout["size"] // ctypes.sizeof(word)
     made = type(name, (ctypes.Structure,), {
@@ -67,10 +67,10 @@ def ctype(name):
         "type_name": staticmethod(lambda: layout["type_name"]),
     })
     if ctypes.sizeof(made) != layout["size"]:
-        raise AssertionError(f"{name} has {layout['size']} bytes, ctypes makes it {ctypes.sizeof(made)}")
+        raise AssertionError(f"{name} has {layout['size']} bytes, but {ctypes.sizeof(made)} in ctypes")
     return made
 
 
 def alignment(name):
-    """The alignment of a struct, bytes."""
+    """Returns the alignment of a struct, bytes."""
     return _STRUCTS[name]["align"]

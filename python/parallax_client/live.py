@@ -20,58 +20,61 @@ _MOST_PENDING = 32
 
 
 class Joint(collections.namedtuple("Joint", "name position covariance deviation reprojection_px n_views status")):
-    """One joint. `position` in metres, `covariance` 3x3 in square metres and `deviation`, the standard deviation along one
-    axis in metres, are None where there is no position: `reason` says why, and is None otherwise."""
+    """One joint.
+
+    `position` is in metres, `covariance` (3x3) in square metres, and `deviation` is the standard deviation along one axis in
+    metres. They are None for a missing joint; then `reason` is a text.
+    """
 
     __slots__ = ()
 
     @property
     def reason(self):
-        """Why there is no position; None if there is one."""
+        """Reason for a missing position; None if there is a position."""
         return None if self.position is not None else layout.reason(self.status)
 
 
 class Skeleton:
-    """One person of a frame: a copy of the struct `SkeletonMessage`, which is `message`."""
+    """One person in a frame. `message` is a copy of the struct `SkeletonMessage`."""
 
     def __init__(self, message, running):
         self.message, self._running = message, running
 
     @property
     def id(self):
-        """Identity within the run, from 1."""
+        """Identity within the run, counted from 1."""
         return int(self.message["id"])
 
     @property
     def status(self):
-        """"ok", or why there is no skeleton."""
+        """"ok", or the reason for a missing skeleton."""
         return layout.reason(self.message["status"])
 
     @property
     def positions(self):
-        """Positions of all joints, `[joint, axis]` in metres; NaN where there is none."""
+        """Positions of all joints, `[joint, axis]` in metres; NaN for a missing joint."""
         joints = self.message["joints"][: int(self.message["n_joints"])]
         found = joints["status"] == layout.OK
         return np.where(found[:, None], joints["in_world"], np.nan)
 
     @property
     def sides(self):
-        """Whether left and right are decided: "sure", "unsure" or "as seen"."""
+        """Certainty of left and right: "sure", "unsure" or "as seen"."""
         number = int(self.message["sides"])
         return layout.SIDES[number] if number < len(layout.SIDES) else "unknown"
 
     def joint(self, name):
-        """The joint of a name; without a position, and with the reason, where the frame has none."""
+        """Returns the joint with a name. A missing joint has no position, but a reason."""
         try:
             number = self._running["joints"].index(name)
         except ValueError:
-            raise KeyError(f"no joint {name!r}, but {', '.join(self._running['joints'])}") from None
+            raise KeyError(f"no joint {name!r}; the joints are {', '.join(self._running['joints'])}") from None
         if number >= int(self.message["n_joints"]):
             return Joint(name, None, None, None, None, 0, int(self.message["status"]))
         return _joint(name, self.message["joints"][number])
 
     def joints(self):
-        """All joints by name."""
+        """Returns all joints by name."""
         return {name: self.joint(name) for name in self._running["joints"]}
 
 
@@ -87,7 +90,7 @@ def _joint(name, joint):
 
 
 class Picture:
-    """A picture of one view. `pixels` is `[row, column, RGB]`, or None where there is none: `status` says why."""
+    """A picture of one view. `pixels` is `[row, column, RGB]`, or None if there are no pixels; `status` has the reason."""
 
     def __init__(self, header, pixels, sample=None):
         self.header, self._sample = header, sample
@@ -99,7 +102,7 @@ class Picture:
             self.pixels = pixels.reshape(height, width, 3)
 
     def release(self):
-        """Gives the memory back to the sender, where this is no copy."""
+        """Returns the memory to the sender, if the picture is not a copy."""
         sample, self._sample = self._sample, None
         if sample is not None:
             self.header = self.pixels = None
@@ -113,10 +116,10 @@ class Picture:
 
 
 class Moment:
-    """Everything about one frame that was asked for and is there.
+    """All requested messages of one frame that have arrived.
 
-    `skeletons` is a copy of the message `Skeletons`, `people` are its people, each a `Skeleton`, the one who is followed first; `poses`
-    and `pictures` are dictionaries by camera, `n_missed` is how many frames lie between this one and the one given before.
+    `skeletons` is a copy of the message `Skeletons`. `people` has a `Skeleton` for each person, the followed person first.
+    `poses` and `pictures` are dictionaries by camera. `n_missed` is the number of frames between this moment and the previous one.
     """
 
     def __init__(self, session, frame):
@@ -127,16 +130,16 @@ class Moment:
 
     @property
     def status(self):
-        """"ok" if anybody has a skeleton, or why nobody has; None if skeletons were not asked for."""
+        """"ok" if there is a skeleton, otherwise the reason for its absence; None if skeletons were not requested."""
         return None if self.skeletons is None else layout.reason(self.skeletons["status"])
 
     @property
     def followed(self):
-        """The person who is followed; None if there is nobody."""
+        """The followed person; None if there is no person."""
         return self.people[0] if self.people else None
 
     def person(self, identity):
-        """The person of an identity; None if it is not there."""
+        """Returns the person with an identity; None if this person is not in the frame."""
         return next((it for it in self.people if it.id == identity), None)
 
     def _set(self, skeletons, running):
@@ -145,21 +148,26 @@ class Moment:
 
 
 def connect(name, *, skeletons=True, poses=False, pictures=False, cameras=None, every=False, most=256, wait=False):
-    """Joins a running deployment.
+    """Connects to a running deployment.
 
-    skeletons, poses, pictures: what is taken of every frame. Pictures of moments are copies: `Client.picture` gives
-    one in place. cameras: their names; all if it is None. every: every frame in order, at most `most` of them waiting,
-    instead of the newest. wait: do not fail if the deployment does not run, but join it when it does.
+    skeletons, poses, pictures: the messages to receive for every frame. Pictures in moments are copies; `Client.picture`
+    returns one in the sender's memory.
+    cameras: names of the cameras; None for all.
+    every: true to receive every frame in order, with at most `most` of them waiting; false to receive the newest frame.
+    wait: true to wait for the deployment if it does not run; false to raise an error.
     """
     return Client(name, skeletons, poses, pictures, cameras, most if every else 1, wait)
 
 
 class Client:
-    """Reads a deployment; see `connect`. It leaves when the deployment ends, and joins the next of that name by itself."""
+    """Reads a deployment; see `connect`.
+
+    It disconnects when the deployment ends, and automatically connects to the next run with the same name.
+    """
 
     def __init__(self, name, skeletons, poses, pictures, cameras, most, wait):
         if not (skeletons or poses or pictures):
-            raise ClientError("nothing is requested: neither skeletons nor poses nor pictures")
+            raise ClientError("nothing is requested: choose skeletons, poses or pictures")
         self.name, self._wish = name, (skeletons, poses, pictures)
         self._cameras, self._most = cameras, most
         self._changed, self._ready = threading.Condition(), collections.deque()
@@ -176,11 +184,11 @@ class Client:
 
     @property
     def is_connected(self):
-        """Whether the deployment runs and is read."""
+        """True while the deployment runs and is read."""
         return self._run is not None
 
     def next(self, patience=None):
-        """The next moment, or None if none came within so many seconds; None waits for ever."""
+        """Returns the next moment; None if there is none within `patience` seconds. Without `patience`, waits forever."""
         with self._changed:
             self._changed.wait_for(lambda: self._ready or self._problem or self._leaving, patience)
             if not self._ready:
@@ -196,18 +204,23 @@ class Client:
         return moment
 
     def moments(self, patience=None):
-        """Moments one after the other, until none comes for so many seconds."""
+        """Yields moments until there is none within `patience` seconds."""
         while (moment := self.next(patience)) is not None:
             yield moment
 
     def picture(self, camera, patience=1.0):
-        """The newest picture of a camera where its sender wrote it, to be used in a `with` statement; None if none came in
-        time. It must not be held for long: one of a camera can be held at a time."""
+        """Returns the newest picture of a camera in the sender's memory, for use in a `with` statement.
+
+        None if there is no picture in time. Do not hold it for long: only one picture of each camera can be held at a time.
+        """
         port = self._in_place("frame", camera)
         return self._newest(port, lambda it: Picture(it.message, it.array, it), patience)
 
     def latest_skeletons(self, patience=1.0):
-        """The newest message `Skeletons` as a `Sample` in place, to be used in a `with` statement; None if none came in time."""
+        """Returns the newest message `Skeletons` in the sender's memory as a `Sample`, for use in a `with` statement.
+
+        None if there is no message in time.
+        """
         return self._newest(self._in_place("skeletons", None), lambda it: it, patience)
 
     def _in_place(self, about, camera):
@@ -229,7 +242,7 @@ class Client:
                 except TooManyHeld:
                     if newest is None:
                         raise
-                    # A newer one was sent since: this one makes room.
+                    # A newer message has arrived: release the previous one.
                     newest.release()
                     newest = None
                     continue
@@ -245,7 +258,7 @@ class Client:
             time.sleep(_PAUSE_S)
 
     def close(self):
-        """Leaves the deployment."""
+        """Disconnects from the deployment."""
         with self._changed:
             self._leaving = True
             self._changed.notify_all()
@@ -316,12 +329,12 @@ class Client:
 def _number(guest, camera):
     names = [it["name"] for it in guest.running["views"]]
     if camera not in names:
-        raise ClientError(f"deployment {guest.name!r} has no camera {camera!r}, but {', '.join(names)}")
+        raise ClientError(f"deployment {guest.name!r} has no camera {camera!r}; its cameras are {', '.join(names)}")
     return names.index(camera)
 
 
 def _is_ours(sample, run):
-    """Whether a message is of this run, and its counts and numbers can be; not those that only say that it ends."""
+    """Returns true if a message is from this run and its counts and numbers are valid; false for messages that end the run."""
     message = sample.message
     if run is None or int(message["stamp"]["session"]) != run.guest.running["session"]:
         return False
@@ -353,7 +366,7 @@ def _is_skeleton(person, running):
 
 
 class _Run:
-    """The ports of one run of the deployment, and the frames that wait for their parts."""
+    """Ports of one run of the deployment, and frames that wait for further messages."""
 
     def __init__(self, guest, wish, cameras):
         self.guest, self._wish, self.in_place, self.refused = guest, wish, {}, 0
@@ -370,7 +383,7 @@ class _Run:
         self.guest.close()
 
     def turn(self):
-        """The moments that are whole, in order. Skeletons are the last that is sent about a frame."""
+        """Returns the complete moments, in order. The skeletons are the last message about a frame."""
         skeletons = list(self._drain(self._skeletons))
         for name, port in self._poses.items():
             for message, _ in self._drain(port):
@@ -384,7 +397,7 @@ class _Run:
         return self._take()
 
     def _drain(self, port):
-        """Copies of the messages that wait."""
+        """Yields copies of the waiting messages."""
         for _ in range(64):
             sample = port.receive() if port is not None else None
             if sample is None:

@@ -1,4 +1,4 @@
-"""Where the deployments of this user are, which of them run, and a place among the programs that read one."""
+"""Directories of this user's deployments, running deployments, and the limited number of programs that read one."""
 
 import errno
 import fcntl
@@ -9,20 +9,20 @@ import pathlib
 from .errors import ClientError, Full, NotRunning, VersionMismatch
 
 DESCRIPTION_VERSION = 1
-"""Version of the description that a deployment gives of itself."""
+"""Version of a deployment's description of itself."""
 SUPERVISOR = "supervisor"
-"""Name of the process that runs a deployment, for the transport."""
+"""Name in the transport of the process that runs a deployment."""
 MOST_GUESTS = 4
-"""Programs that may read one deployment at the same time."""
+"""Largest number of programs that may read one deployment at the same time."""
 
 
 def base():
-    """The directory of the deployments of this user."""
+    """Returns the directory of this user's deployments."""
     return pathlib.Path(f"/dev/shm/px-{os.getuid()}")
 
 
 def root(name):
-    """The directory of a deployment."""
+    """Returns the directory of a deployment."""
     plain = name and len(name) <= 32 and not name.startswith(".")
     if not plain or not all(it.isascii() and (it.isalnum() or it in "-_.") for it in name):
         raise ClientError(
@@ -32,16 +32,16 @@ def root(name):
 
 
 def supervisor(folder):
-    """The process that runs a deployment, from the kernel's list of locks; None if it does not run or is about to end.
+    """Returns the id of the process that runs a deployment; None if the deployment does not run or is about to end.
 
-    The list leaves out holders in other pid namespaces (containers): there it is the living process with the supervisor's
-    name, with the process id that it has in its own.
+    The id comes from the kernel's list of locks. This list omits processes in other pid namespaces (containers). For these, the
+    transport's list of processes is searched for the supervisor's name; the id is that in the other namespace.
     """
     if (folder / "ending").exists():
         return None
     try:
         about = os.stat(folder / "lock")
-        # It comes page by page: where others lock and unlock meanwhile, a line may be passed over.
+        # The kernel returns the list page by page. If locks change meanwhile, a line can be missing, so it is read three times.
         lines = [line for _ in range(3) for line in pathlib.Path("/proc/locks").read_text().splitlines()]
     except OSError:
         return None
@@ -56,7 +56,7 @@ def supervisor(folder):
 def _elsewhere(folder):
     try:
         import iceoryx2
-    except ImportError:  # the list of locks alone then
+    except ImportError:  # then only the list of locks is available
         return None
     file = folder / "config" / "iceoryx2.toml"
     if not file.exists():
@@ -65,7 +65,7 @@ def _elsewhere(folder):
     try:
         config = iceoryx2.config.from_file(iceoryx2.FilePath.new(str(file)))
         nodes = iceoryx2.Node.list(iceoryx2.ServiceType.Ipc, config)
-    except (iceoryx2.ConfigCreationError, iceoryx2.NodeListFailure):  # it ends meanwhile
+    except (iceoryx2.ConfigCreationError, iceoryx2.NodeListFailure):  # the deployment ends meanwhile
         return None
     for node in nodes:
         details = node[0].details if isinstance(node, iceoryx2.NodeState.Alive) else None
@@ -75,7 +75,7 @@ def _elsewhere(folder):
 
 
 def running_deployments():
-    """The names of the deployments of this user that run."""
+    """Returns the names of this user's running deployments."""
     try:
         folders = sorted(base().iterdir())
     except OSError:
@@ -84,12 +84,12 @@ def running_deployments():
 
 
 def is_described(name):
-    """Whether a deployment has said what it is."""
+    """Returns true if a deployment has written its description."""
     return (root(name) / "deployment.json").exists()
 
 
 def description(name):
-    """What a running deployment says about itself, as a dictionary."""
+    """Returns the description of a running deployment, as a dictionary."""
     try:
         whole = json.loads((root(name) / "deployment.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -97,7 +97,7 @@ def description(name):
     own = whole.get("programs") if isinstance(whole, dict) else None
     if not isinstance(own, dict) or "format" not in own:
         raise ClientError(
-            f"deployment {name!r} does not describe itself to other programs: it is of another version of Parallax"
+            f"deployment {name!r} has no description for other programs: it runs another version of Parallax"
         )
     if own["format"] != DESCRIPTION_VERSION:
         raise VersionMismatch(name, "description", own["format"], DESCRIPTION_VERSION)
@@ -105,7 +105,10 @@ def description(name):
 
 
 class Seat:
-    """A place among the programs that read a deployment: a locked file, which the system unlocks however this process ends."""
+    """One of the limited number of places for programs that read a deployment.
+
+    It is a locked file; the operating system unlocks it when this process ends.
+    """
 
     def __init__(self, name):
         folder = root(name) / "guests"
@@ -132,7 +135,7 @@ class Seat:
         raise Full(name, MOST_GUESTS, guests)
 
     def leave(self):
-        """Gives the place to others."""
+        """Frees the place."""
         if self._file is not None:
             os.close(self._file)
             self._file = None

@@ -1,4 +1,4 @@
-"""The topics of a running deployment, as NumPy views on shared memory. Nothing here can send."""
+"""Topics of a running deployment, as NumPy views of shared memory. This module cannot send messages."""
 
 import threading
 import time
@@ -12,30 +12,30 @@ from .errors import ClientError, NotRunning, VersionMismatch
 
 try:
     import iceoryx2
-except ImportError:  # folders can be read without it
+except ImportError:  # not needed to read folders
     iceoryx2 = None
 
 
 class TooManyHeld(ClientError):
-    """Another message cannot be taken before one that is held is given back."""
+    """A held message must be released before another one can be received."""
 
 
 class _Owner:
-    """Memory of a message. It is given back when nothing refers to it any more, not before: no view can outlive it."""
+    """Memory of a message. It is released when the last reference is gone, so no view can outlive it."""
 
     def __init__(self, sample, pointer, n_bytes):
         self._sample = sample
-        # The second entry says that nobody may write.
+        # The second entry of `data` makes it read-only.
         self.__array_interface__ = {
             "version": 3, "typestr": "|u1", "shape": (n_bytes,), "data": (pointer, True),
         }
 
 
 class Sample:
-    """A message where its sender wrote it. Use it in a `with` statement, or call `release()`.
+    """A message in the sender's memory. Use it in a `with` statement, or call `release()`.
 
-    `message` is the message (or the header of an array) as a NumPy structured scalar view, `array` the array behind a
-    header, or None. Both are read-only, and neither is a copy: copy what you keep. The memory is given back when
+    `message` is the message (or the header of an array) as a NumPy structured scalar view. `array` is the array after a
+    header, or None. Both are read-only views, not copies: copy the data that you keep. The memory is released when
     the last view is gone.
     """
 
@@ -56,11 +56,11 @@ class Sample:
         self._owners = [weakref.ref(it) for it in owners]
 
     def release(self):
-        """Gives the memory back, if no view of it is left."""
+        """Releases the memory, if no view of it is left."""
         self.message = self.array = None
         if any(it() is not None for it in self._owners):
             warnings.warn(
-                "a view of a message is still in use: its memory is given back when that is gone; copy what you keep",
+                "a view of a message is still in use: its memory is released when the view is gone; copy the data that you keep",
                 ResourceWarning, stacklevel=2,
             )
 
@@ -79,7 +79,7 @@ class Port:
         self._message, self._elements = message, elements
 
     def receive(self):
-        """The oldest waiting message as a `Sample`, or None."""
+        """Returns the oldest waiting message as a `Sample`, or None."""
         with self._guest.lock:
             if self._subscriber is None:
                 return None
@@ -88,7 +88,7 @@ class Port:
             except iceoryx2.ReceiveError as error:
                 if "ExceedsMaxBorrows" in str(error):
                     raise TooManyHeld(
-                        "another message cannot be taken before one that is held is given back"
+                        "a held message must be released before another one can be received"
                     ) from None
                 raise ClientError(f"cannot receive: {error}") from None
         return None if sample is None else Sample(sample, self._message, self._elements)
@@ -108,7 +108,7 @@ class Guest:
         self._folder, self.supervisor = folder, place.supervisor(folder)
         if self.supervisor is None:
             raise NotRunning(name, place.running_deployments())
-        # One that is starting says what it is when all its topics are there.
+        # A deployment that is starting writes its description when all its topics exist.
         end = time.monotonic() + 5
         while not place.is_described(name) and not self.is_over() and time.monotonic() < end:
             time.sleep(0.02)
@@ -133,11 +133,11 @@ class Guest:
             raise ClientError(f"cannot read deployment {name!r}: {error}") from error
 
     def is_over(self):
-        """Whether the deployment is ending, so that this guest has to be closed."""
+        """Returns true if the deployment is ending, so that this connection must be closed."""
         return place.supervisor(self._folder) != self.supervisor
 
     def port(self, about, whose=None):
-        """Subscribes to a topic: `port("frame", 0)`, `port("skeletons")`."""
+        """Subscribes to a topic, for example `port("frame", 0)` or `port("skeletons")`."""
         kind = layout.TOPICS[about]
         topic = kind["name"].replace("{}", str(whose))
         message, elements = kind["message"], kind["elements"]
@@ -150,7 +150,7 @@ class Guest:
             struct = layout.ctype(message)
             details = details.type_name(iceoryx2.TypeName.new(struct.type_name()))
             details = details.size(_ctypes().sizeof(struct)).alignment(layout.alignment(message))
-            # The public method takes the alignment of a ctypes struct, which is that of a number before Python 3.13.
+            # The public method uses the alignment of a ctypes struct. Before Python 3.13, this is the alignment of a number.
             builder = getattr(builder, "__user_header_type_details")(details)
         try:
             service = builder.open()
@@ -175,18 +175,18 @@ class Guest:
             return ClientError(f"deployment {self.name!r} has no topic {topic!r}")
         if "IncompatibleTypes" in str(error):
             return ClientError(
-                f"topic {topic!r} of deployment {self.name!r} has another layout than this package knows: "
+                f"topic {topic!r} of deployment {self.name!r} has a layout that this package does not know: "
                 "install the package from the same version of Parallax"
             )
         return ClientError(f"cannot read topic {topic!r} of deployment {self.name!r}: {error}")
 
     def topics(self):
-        """The names of all topics of the deployment."""
+        """Returns the names of all topics in the deployment."""
         listed = iceoryx2.Service.list(self._config, iceoryx2.ServiceType.Ipc)
         return [str(it.static_details.name).strip('"') if hasattr(it, "static_details") else str(it) for it in listed]
 
     def close(self):
-        """Leaves the deployment. Views that are still held keep it from being started anew."""
+        """Disconnects from the deployment. While views are still held, the deployment cannot be restarted."""
         with self.lock:
             for it in self._ports:
                 it._close()

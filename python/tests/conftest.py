@@ -1,4 +1,4 @@
-"""A deployment of synthetic cameras to read, and a finished run. Both need the executable: PARALLAX, or a build in target/."""
+"""Fixtures: a deployment of synthetic cameras, and a finished run. Both need the executable: PARALLAX, or a build in target/."""
 
 import os
 import pathlib
@@ -29,7 +29,7 @@ def executable():
 
 
 class Deployment:
-    """`parallax demo` under a name of its own."""
+    """`parallax demo` with a unique name."""
 
     def __init__(self, executable, folder, seconds, name=None):
         self.name = name or f"py-{os.getpid()}-{time.monotonic_ns() % 100000}"
@@ -41,7 +41,7 @@ class Deployment:
         )
 
     def pids(self, service):
-        """The processes of a service."""
+        """Returns the processes of a service."""
         found = []
         for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
             try:
@@ -65,7 +65,7 @@ class Deployment:
 
 @pytest.fixture(scope="session")
 def live():
-    """Skips where the transport is not installed."""
+    """Skips the test if the transport is not installed."""
     pytest.importorskip("iceoryx2", reason="the package iceoryx2 is not installed")
 
 
@@ -74,7 +74,7 @@ def deploy(executable, live, tmp_path):
     """Starts deployments, and stops them."""
     started = []
 
-    # Longer than a test takes on a machine that does much else: each is stopped when its test is over.
+    # Longer than any test on a busy machine. Each deployment is stopped when its test ends.
     def start(seconds=1800, name=None):
         made = Deployment(executable, tmp_path / f"out-{len(started)}", seconds, name)
         started.append(made)

@@ -1,4 +1,4 @@
-"""Folders of finished runs."""
+"""Tests of the folders of finished runs."""
 
 import json
 
@@ -47,9 +47,9 @@ def test_a_table_has_a_row_for_every_frame_and_joint(tmp_path):
 
 
 def test_what_is_wrong_with_a_folder_is_said(tmp_path):
-    with pytest.raises(ClientError, match="is no folder"):
+    with pytest.raises(ClientError, match="is not a folder"):
         read_folder(tmp_path / "none")
-    with pytest.raises(ClientError, match="no folder of a run"):
+    with pytest.raises(ClientError, match="not the folder of a run"):
         read_folder(tmp_path)
     folder(tmp_path, version=7)
     with pytest.raises(VersionMismatch, match="version 7.*version 2"):
@@ -62,7 +62,7 @@ def test_what_is_wrong_with_a_folder_is_said(tmp_path):
     with pytest.raises(ClientError, match="no people, status"):
         read_folder(tmp_path)
     folder(tmp_path, more=range(2, 10))
-    with pytest.raises(ClientError, match="line 3: 9 people, a frame has at most 8"):
+    with pytest.raises(ClientError, match="line 3: 9 people, but a frame has at most 8"):
         read_folder(tmp_path)
     folder(tmp_path, more=[5, 5])
     with pytest.raises(ClientError, match="line 3: two people with id 5"):
@@ -77,5 +77,5 @@ def test_each_of_several_people_has_arrays_of_its_own(tmp_path):
     assert other.joint("head")[2].tolist() == [4, 2, 3] and np.isnan(other.positions[:2]).all()
     assert other.status.tolist() == [None, None, "ok"] and one.sides.tolist() == ["sure", None, "sure"]
     assert run.followed.joint("head")[2].tolist() == [4, 2, 3] and run.followed.id is None
-    with pytest.raises(ClientError, match="2 people: take one of `people`: 1, 4"):
+    with pytest.raises(ClientError, match="2 people: use one of `people`: 1, 4"):
         run.positions

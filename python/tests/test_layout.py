@@ -1,4 +1,4 @@
-"""The layouts, without a deployment."""
+"""Tests of the layouts, without a deployment."""
 
 import subprocess
 

@@ -1,4 +1,4 @@
-"""A real deployment of synthetic cameras, read while it runs. Skipped without the executable or iceoryx2."""
+"""Tests with a real deployment of synthetic cameras, read while it runs. Skipped without the executable or iceoryx2."""
 
 import itertools
 import os
@@ -13,26 +13,26 @@ import pytest
 
 import parallax_client
 
-# What takes longer is stuck, also on a machine that does much else, seconds.
+# Time limit in seconds, long enough for a busy machine.
 PATIENCE = 300
 
 
 def mapping_of(array):
-    """The line of /proc/self/maps that an array lies in."""
+    """Returns the line of /proc/self/maps that contains an array."""
     pointer = array.__array_interface__["data"][0]
     with open("/proc/self/maps", encoding="ascii") as lines:
         for line in lines:
             begin, end = (int(it, 16) for it in line.split()[0].split("-"))
             if begin <= pointer < end:
                 return line
-    raise AssertionError("the array lies nowhere")
+    raise AssertionError("the array is in no mapping")
 
 
 def test_skeletons_poses_and_pictures_of_a_frame_come_together_and_a_process_that_dies_comes_back(deploy):
     deployment = deploy()
     with pytest.raises(parallax_client.NotRunning, match="does not run"):
         parallax_client.connect("no-such-deployment")
-    # Before it runs: the client joins it when it does.
+    # The deployment does not run yet; the client connects to it when it starts.
     with parallax_client.connect(deployment.name, poses=True, pictures=True, every=True, wait=True) as client:
         moment = next(it for it in client.moments(PATIENCE) if it.is_complete and it.people)
         assert set(moment.pictures) == set(moment.poses) == {it["name"] for it in client.running["views"]}
@@ -44,7 +44,7 @@ def test_skeletons_poses_and_pictures_of_a_frame_come_together_and_a_process_tha
         for joint in joints.values():
             assert (joint.position is None) == (joint.reason is not None)
 
-        # In place: read-only, in the memory of the sender, and never taken away from a view.
+        # The view is read-only, in the memory of the sender, and remains valid.
         with client.picture("c1", PATIENCE) as picture:
             assert not picture.pixels.flags.writeable and not picture.pixels.flags.owndata
             with pytest.raises(ValueError):
@@ -55,7 +55,7 @@ def test_skeletons_poses_and_pictures_of_a_frame_come_together_and_a_process_tha
         with client.latest_skeletons(PATIENCE) as sample:
             assert np.isfinite(sample.message["people"]["joints"]["in_world"]).all()
 
-        # A process that is killed comes back without a word.
+        # A killed process comes back without an error in the client.
         pid = deployment.pids("triangulate")[0]
         os.kill(pid, signal.SIGKILL)
         killed = time.monotonic_ns()
@@ -78,7 +78,7 @@ def test_programs_that_are_killed_or_asleep_keep_no_place_and_hold_up_nobody(dep
     with parallax_client.connect(deployment.name) as client:
         frames = [client.next(PATIENCE).frame for _ in range(3)]
         assert frames == sorted(set(frames))
-        # The deployment ends although one sleeps and one is connected.
+        # The deployment ends although one client sleeps and another is connected.
         deployment.stop()
         again = deploy(name=deployment.name)
         moment = client.next(PATIENCE)
@@ -97,7 +97,7 @@ def test_the_example_prints_a_wrist_that_moves_also_after_a_process_was_killed(d
                                env={**os.environ, "PYTHONPATH": paths})
 
     def places(n):
-        """The next places that it prints; a deployment that ends ends the program, and with it these."""
+        """Returns the next positions that the program prints. They end when the deployment, and so the program, ends."""
         found = (line.split()[1:4] for line in program.stdout if " m  +-" in line)
         return {tuple(it) for it in itertools.islice(found, n)}
 

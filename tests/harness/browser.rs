@@ -8,15 +8,15 @@ use std::process::{Command, Stdio};
 /// Names under which a browser may be installed.
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
-/// The elements of a page that reach beyond its width, each as `tag.class: right edge`; those inside an element of
+/// Returns the elements of a page that reach beyond its width, each as `tag.class: right edge`. Elements inside an element of
 /// the class `scroll` do not count. `None` if there is no browser.
 ///
-/// * `folder`: for temporary files.
-/// * `width`: of the page, pixels.
+/// * `folder`: folder for temporary files.
+/// * `width`: width of the page, pixels.
 ///
 /// # Errors
 ///
-/// The files cannot be written, or the browser does not report a result.
+/// Fails if the files cannot be written, or the browser does not report a result.
 pub fn too_wide(html: &str, folder: &Path, width: u32) -> io::Result<Option<Vec<String>>> {
     let installed = |name: &&&str| {
         let status = Command::new(name)
@@ -29,7 +29,7 @@ pub fn too_wide(html: &str, folder: &Path, width: u32) -> io::Result<Option<Vec<
     let Some(browser) = BROWSERS.iter().find(installed) else {
         return Ok(None);
     };
-    // An iframe has exactly the given width; windows have a minimum.
+    // An iframe can have exactly the given width; windows have a minimum width.
     let inside = html.replace('&', "&amp;").replace('"', "&quot;");
     let page = format!(
         "<!doctype html><meta charset=\"utf-8\"><title>not measured</title>\n\

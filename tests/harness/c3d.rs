@@ -1,6 +1,6 @@
-//! Writer of C3D files in all six encodings, to test readers on known content.
+//! Writer for C3D files in all six encodings, to test readers with known content.
 
-/// How numbers are laid out.
+/// Representation of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Processor {
     /// Little-endian, IEEE.
@@ -11,10 +11,10 @@ pub enum Processor {
     Mips,
 }
 
-/// All three.
+/// All three representations.
 pub const PROCESSORS: [Processor; 3] = [Processor::Intel, Processor::Dec, Processor::Mips];
 
-/// A trial to be written.
+/// A trial to write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Frames per second.
@@ -23,19 +23,19 @@ pub struct Trial {
     pub units: String,
     /// Names of the points; more than 255 are written to several parameters.
     pub labels: Vec<String>,
-    /// `[frame][point]`, in the unit; `None` where it was not visible.
+    /// Positions as `[frame][point]`, in the unit; `None` where the point was not visible.
     pub frames: Vec<Vec<Option<[f64; 3]>>>,
-    /// Analog values in every frame (written as zeros).
+    /// Number of analog values in every frame, which are written as zeros.
     pub n_analog: u16,
 }
 
-/// The bytes of the file.
+/// Returns the bytes of the file.
 ///
-/// * `integer_scale`: units per step of the integers; reals are written without it.
+/// * `integer_scale`: units per step of the integers; `None` to write reals.
 ///
 /// # Panics
 ///
-/// If the number of points or frames does not fit into 16 bits.
+/// Panics if the number of points or frames does not fit into 16 bits.
 pub fn write(trial: &Trial, processor: Processor, integer_scale: Option<f32>) -> Vec<u8> {
     let out = Out { processor };
     let parameters = parameters(&out, trial, integer_scale.unwrap_or(-1.0));

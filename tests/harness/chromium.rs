@@ -2,11 +2,11 @@
 
 use std::process::Command;
 
-/// Fails if the browser complains about the page. Says so if there is no browser.
+/// Fails if the browser reports a problem with the page. If there is no browser, prints that the test is skipped.
 ///
 /// # Panics
 ///
-/// The browser fails, or the page complains on its console.
+/// Panics if the browser fails, or the page writes an error to its console.
 #[expect(clippy::print_stderr, reason = "a test that is skipped says so")]
 #[expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 pub fn check_in_browser(page: &str) {

@@ -1,14 +1,14 @@
-//! Orientation tags for image files: encoders write none.
+//! Orientation tags for image files, because encoders do not write them.
 
 /// Returns a JPEG or PNG file with an orientation tag.
 ///
-/// * `value`: as EXIF numbers orientations; `6` asks for a rotation by 90 degrees to the right.
+/// * `value`: the number of the orientation in EXIF; `6` requests a rotation by 90 degrees to the right.
 ///
 /// # Panics
 ///
-/// The file is neither.
+/// Panics if the file has neither format.
 pub fn tagged(file: &[u8], value: u8) -> Vec<u8> {
-    // TIFF header, one entry: orientation (0x0112), one short.
+    // A TIFF header with one entry: orientation (0x0112), one short.
     let exif = [
         &b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0"[..],
         &[value],
@@ -21,7 +21,7 @@ pub fn tagged(file: &[u8], value: u8) -> Vec<u8> {
         return [&file[..2], &segment, &file[2..]].concat();
     }
     assert!(file.starts_with(b"\x89PNG"), "neither JPEG nor PNG");
-    // Behind the signature and the chunk `IHDR`.
+    // After the signature and the chunk `IHDR`.
     let (head, rest) = file.split_at(8 + 12 + 13);
     let chunk = [b"eXIf", &exif[..]].concat();
     let mut crc = flate2::Crc::new();

@@ -1,4 +1,4 @@
-//! Helpers for tests only: readers and writers of the files of others, networks, pages as a browser lays them out.
+//! Helpers for tests: readers and writers for files of other programs, small networks, and page layout in a browser.
 #![forbid(unsafe_code)]
 
 pub mod browser;

@@ -5,18 +5,18 @@ use std::io::Read as _;
 use flate2::Compression;
 use flate2::read::ZlibEncoder;
 
-/// A value to be written.
+/// A value to write.
 #[derive(Debug, Clone)]
 pub enum Mat {
-    /// Sizes, and numbers row fastest.
+    /// Sizes, and the numbers with the first index fastest.
     Numbers(Vec<usize>, Vec<f64>),
-    /// One row of structs: the fields' names, and all values element by element.
+    /// One row of structs: the names of the fields, and all values, element by element.
     Structs(Vec<&'static str>, Vec<Self>),
     /// One row of cells.
     Cell(Vec<Self>),
 }
 
-/// The bytes of a file with one variable.
+/// Returns the bytes of a file with one variable.
 pub fn file(name: &str, value: &Mat, compressed: bool) -> Vec<u8> {
     let variable = matrix(name, value);
     if compressed {
@@ -26,11 +26,11 @@ pub fn file(name: &str, value: &Mat, compressed: bool) -> Vec<u8> {
     }
 }
 
-/// The bytes of a file with one compressed variable, which decompresses to `variable`.
+/// Returns the bytes of a file with one compressed variable, which decompresses to `variable`.
 ///
 /// # Panics
 ///
-/// Never: bytes in memory can be read.
+/// Never panics, because bytes in memory can be read.
 #[expect(clippy::expect_used, reason = "bytes in memory can be read")]
 pub fn compressed_file(variable: &[u8]) -> Vec<u8> {
     let mut deflated = Vec::new();
@@ -48,12 +48,12 @@ fn header() -> Vec<u8> {
     bytes
 }
 
-/// A scalar.
+/// Returns a scalar.
 pub fn number(value: f64) -> Mat {
     row(vec![value])
 }
 
-/// A row vector.
+/// Returns a row vector.
 pub fn row(values: Vec<f64>) -> Mat {
     Mat::Numbers(vec![1, values.len()], values)
 }

@@ -1,8 +1,8 @@
-//! Networks whose answers can be computed by hand.
+//! Networks with outputs that can be computed by hand.
 
 use inference::onnx::{Network, Side};
 
-/// Takes a `tile` of 4 x 3 pixels:
+/// Returns a network whose input is a `tile` of 4 x 3 pixels and whose output is
 /// `sigma = means of the three colours x [[1, 2], [10, 20], [100, 200]] + [0.5, 0.25]`.
 pub fn of_colours() -> Network {
     let mut net = Network::default();

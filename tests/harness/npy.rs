@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-/// An array of numbers, whatever type they had in the file.
+/// An array of numbers, converted from any type in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Array {
     /// Length of every axis.
     pub shape: Vec<usize>,
-    /// The numbers, last axis fastest.
+    /// Numbers, with the last axis fastest.
     pub values: Vec<f64>,
 }
 
-/// Why an array could not be read.
+/// Reason why an array could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum NpyError {
     /// The file could not be read.
@@ -22,12 +22,12 @@ pub enum NpyError {
         /// The cause.
         source: std::io::Error,
     },
-    /// The file is not what this reader knows.
+    /// The file has an unsupported form.
     #[error("{path}: {what}")]
     Format {
         /// The file.
         path: String,
-        /// The mistake.
+        /// Description of the problem.
         what: String,
     },
 }
@@ -37,7 +37,7 @@ impl Array {
     ///
     /// # Errors
     ///
-    /// [`NpyError`] if the file cannot be read, or holds something else.
+    /// Fails with [`NpyError`] if the file cannot be read, or contains something else.
     pub fn read(path: &Path) -> Result<Self, NpyError> {
         let shown = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| NpyError::Io {
@@ -47,11 +47,11 @@ impl Array {
         parse(&bytes).map_err(|what| NpyError::Format { path: shown, what })
     }
 
-    /// The number at an index.
+    /// Returns the number at an index.
     ///
     /// # Panics
     ///
-    /// If the index is out of range or has another number of axes.
+    /// Panics if the index is out of range or has another number of axes.
     pub fn at(&self, index: &[usize]) -> f64 {
         assert_eq!(index.len(), self.shape.len(), "one index per axis");
         let flat = index.iter().zip(&self.shape).fold(0, |flat, (at, length)| {

@@ -1,21 +1,21 @@
-"""A headless Chromium that programs drive, and footage that a busy machine can keep up with: for tests/live/view and
+"""A headless Chromium controlled by tests, and footage that is light enough for a busy machine. Used by tests/live/view and
 scripts/bench-view."""
 import base64, json, os, re, shutil, subprocess, sys, time
 
 
 def program():
-    """The browser of this machine, if there is one."""
+    """Returns the browser of this machine, if there is one."""
     return next(filter(None, map(shutil.which, ["chromium", "chromium-browser", "google-chrome"])), None)
 
 
 class Browser:
-    """A headless Chromium, spoken to over a pipe."""
+    """A headless Chromium, controlled through a pipe."""
 
     def __init__(self, program, folder):
         to, self.out = os.pipe()
         self.into, back = os.pipe()
         def give():
-            # By way of numbers that are neither 3 nor 4.
+            # First duplicates the descriptors to numbers other than 3 and 4.
             os.dup2(to, 103); os.dup2(back, 104); os.dup2(103, 3); os.dup2(104, 4)
         flags = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",
                  "--remote-debugging-pipe", f"--user-data-dir={folder}", "--disable-dev-shm-usage"]
@@ -44,7 +44,7 @@ class Browser:
                 return answer["result"]
 
     def page(self, url, width=1280, height=720, scheme="light", own_window=False):
-        """* own_window: shown beside others; of the pages of one window only one is."""
+        """* own_window: opens a new window. In one window, only one page is visible at a time."""
         target = self.ask("Target.createTarget", url="about:blank", newWindow=own_window)["targetId"]
         self.targets.append(target)
         session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -103,7 +103,7 @@ class Page:
 
 
 def children_of(parent):
-    """The words that processes below another were started with, by number."""
+    """Returns the command lines of all descendants of a process, by process id."""
     found = {}
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:
@@ -119,7 +119,7 @@ def children_of(parent):
 
 
 def seconds_of(pid):
-    """Processor time that a process has used."""
+    """Returns the processor time that a process has used, seconds."""
     try:
         stat = open(f"/proc/{pid}/stat").read().rsplit(")", 1)[1].split()
     except OSError:
@@ -127,14 +127,14 @@ def seconds_of(pid):
     return (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
 
 
-# Where the joints of people.jsonl stand among the 26 keypoints of Halpe.
+# Indices of the joints of people.jsonl among the 26 keypoints of Halpe.
 HALPE = [16, 14, 12, 11, 13, 15, 10, 8, 6, 5, 7, 9, 18, 17]
 N_DRAWN = 60
 
 
 def footage(parallax, folder, seconds, rate):
-    """Four cameras around a synthetic person, whose keypoints are known: light enough for a busy machine. The pictures
-    are shown to and fro, as often as is needed."""
+    """Makes a deployment of four cameras around a synthetic person with known keypoints, light enough for a busy machine.
+    The pictures are played forwards and backwards as often as necessary."""
     subprocess.run([f"{parallax}-lab", "synth", f"{folder}.rig", "--rig", "ring:4", "--live", "--quiet"], check=True)
     rig = open(f"{folder}.rig/rig.toml").read()
     for name, by in [("size_px", lambda it: it // 2), ("focal_px", lambda it: it / 2), ("principal_point_px", lambda it: (it - 0.5) / 2)]:

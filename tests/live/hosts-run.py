@@ -1,4 +1,4 @@
-"""The parts of tests/live/hosts: runs on one and on three hosts, faults on the link, and what became of every frame."""
+"""Parts of tests/live/hosts: runs on one and on three hosts, faults of the link, and the counts of all frames."""
 
 import json, math, os, random, re, signal, subprocess, sys, time
 
@@ -7,11 +7,11 @@ n_cameras, seconds, rate = int(n_cameras), int(seconds), float(rate)
 n_frames = int(seconds * rate)
 SET = os.environ.get("SET", "").split()
 if os.environ.get("FILTERS"):
-    # Light enough for a busy machine: small frames, the filters, tracked.
+    # Light enough for a busy machine: tracked filters on small frames.
     SET += ["method=paper", "paper.search=tracked", "capture.scale=0.4", "capture.upright=true"]
     if carry == "poses":
         SET.append("paper.views=pairs")
-# By how much the hosts' monotonic clocks are ahead of the fusing one's, seconds.
+# Offsets of the hosts' monotonic clocks from the fusing host's clock, seconds.
 CLOCKS = {"left": 5000, "right": 900000}
 LIMBS = [("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")]
 LIMBS = [(f"{s} {a}", f"{s} {b}") for s in ("left", "right") for a, b in LIMBS] + [("neck", "head")]
@@ -26,7 +26,7 @@ def say(part, **values):
 
 
 def write(folder, keys):
-    """A deployment of synthetic cameras: half of them at the host that fuses, the others at two more."""
+    """Writes a deployment of synthetic cameras: half of them on the fusing host, the others on two more hosts."""
     sh(f"{parallax}-lab", "synth", folder, "--live", "--frames", str(n_frames), "--rig", f"ring:{n_cameras}",
        "--actions", "walking", "--rate", str(rate))
     text = open(f"{folder}/deployment.toml").read()
@@ -65,7 +65,7 @@ def lines(folder):
 
 
 def joints(line):
-    """Of the person who is followed; none in a frame with nobody."""
+    """Returns the joints of the followed person; empty in a frame without a person."""
     return line["people"][0]["joints"] if line["people"] else {}
 
 
@@ -74,7 +74,7 @@ def position(joint):
 
 
 def score(folder, truth):
-    """PCP3D over the limbs of all frames with a result, and how many frames and limbs."""
+    """Returns PCP3D over the limbs in all frames with a result, and the numbers of frames and limbs."""
     good = total = 0
     for line in lines(folder):
         true = truth[line["frame"]]
@@ -89,7 +89,7 @@ def score(folder, truth):
 
 
 def latency(folder):
-    """Median and 99th percentile from capture to result, and of the computing time of every stage, ms."""
+    """Returns the median and 99th percentile of the latency from capture to result and of every stage's computing time, ms."""
     try:
         it = json.load(open(f"{folder}/latency.json"))
     except OSError:
@@ -112,7 +112,7 @@ def state(folder):
 
 
 def accounted(folder):
-    """Whether used, late, gone and left out make all frames, of every view of another host."""
+    """Checks that used, late, gone and left out frames add up to all frames, for every view of another host."""
     it = state(folder)
     views = [view for host in it["hosts"] for view in host["views"]]
     sums = [view["used"] + view["late"] + view["gone"] + view["left_out"] for view in views]
@@ -130,7 +130,7 @@ def stop(process):
 
 
 def three(file, out, fault=None, far=("left", "right"), records=False):
-    """A run on several hosts; `fault(out, processes)` is called once all views came."""
+    """Runs a deployment on several hosts; `fault(out, processes)` is called when all views have arrived."""
     os.makedirs(out, exist_ok=True)
     log = f"{out}/log"
     recording = lambda name: f"{out}/{name}.mcap" if records else None
@@ -159,7 +159,7 @@ def used(folder, host):
 
 
 def watch(folder, host, restore, after):
-    """Times from a fault: until the host counts as gone, and from its end until messages are used again."""
+    """Returns the time from a fault until the host counts as gone, and from the end of the fault until messages are used again."""
     begin, gone, back, restored, n = time.time(), None, None, None, None
     while time.time() - begin < after + 40:
         now = state(folder)
@@ -217,7 +217,7 @@ def kill_host(folder, processes):
 
 
 def kills(folder, processes):
-    """Hosts killed again and again, each with the link in use."""
+    """Kills hosts repeatedly, each while the link is in use."""
     begin, all = time.time(), []
     while processes["desk"].poll() is None and time.time() - begin < seconds - 20:
         all.append(kill_host(folder, processes))
@@ -226,12 +226,12 @@ def kills(folder, processes):
 
 
 def died(folder):
-    """Processes of the fusing host that died."""
+    """Returns the processes of the fusing host that died."""
     return sum(" ended by signal " in line for line in open(f"{folder}/log"))
 
 
 def descendants(roots):
-    """All processes below these, by their parents."""
+    """Returns all descendants of these processes."""
     below, parents = set(roots), {}
     for name in os.listdir("/proc"):
         if name.isdigit():
@@ -245,7 +245,7 @@ def descendants(roots):
 
 
 def held(roots):
-    """Memory of its own (the proportional share, MB), descriptors and threads, by the processes' names."""
+    """Returns the memory (proportional share, MB), descriptors and threads, by process name."""
     sums = {}
     for it in descendants(roots):
         try:
@@ -265,7 +265,7 @@ def held(roots):
 
 
 def endurance(folder, processes):
-    """Links cut and hosts killed at random until the run is over; what the fusing host holds, every half a minute."""
+    """Cuts links and kills hosts at random until the run ends. Records the resources of the fusing host every half minute."""
     dice, begin, next_sample = random.Random(1), time.time(), 0.0
     faults, samples = [], open(f"{folder}/held.jsonl", "a", buffering=1)
     held_now = {}
@@ -293,7 +293,7 @@ def endurance(folder, processes):
             file.write(json.dumps(faults[-1]) + "\n")
     rows = [json.loads(it) for it in open(f"{folder}/held.jsonl")]
     rows = [it["held"] for it in rows if it["s"] > 120] or [held_now]
-    # The first and the last quarter: what grows shows as a difference of the two.
+    # Growth shows as a difference between the first and the last quarter.
     quarter = max(len(rows) // 4, 1)
     total = lambda row, key: sum(it[key] for it in row.values())
     mean = lambda part, key: round(sum(total(it, key) for it in part) / len(part), 1)
@@ -304,7 +304,7 @@ def endurance(folder, processes):
 
 
 def processor_s(roots):
-    """Processor time of all processes below these, seconds."""
+    """Returns the processor time of all descendants of these processes, seconds."""
     tick, total = os.sysconf("SC_CLK_TCK"), 0
     for it in descendants(roots):
         try:
@@ -316,7 +316,7 @@ def processor_s(roots):
 
 
 def busy(folder, processes):
-    """How many cores each host uses, from when all views came until a few frames before the end."""
+    """Returns the number of cores that each host uses, from the arrival of all views until a few frames before the end."""
     hosts = [it for it in processes if it != "start"]
     spent = lambda: {it: processor_s([processes[it].pid]) for it in hosts}
     before, begin = spent(), time.time()
@@ -326,16 +326,16 @@ def busy(folder, processes):
 
 
 def model(data):
-    """The forecast of `parallax-lab simulate hosts`, from the costs of the run on one host, beside what two and three hosts took."""
+    """Compares the forecast of `parallax-lab simulate hosts`, from the costs of a run on one host, with runs on two and three hosts."""
     near = n_cameras // 2
     for n_hosts, file, far in ((2, "two", ["left"]), (3, "hosts", ["left", "right"])):
         folder = f"{out}/model-{n_hosts}"
-        # These hosts share the cores of one machine.
+        # All hosts share the cores of one machine.
         cores = max(len(os.sched_getaffinity(0)) / n_hosts, 1)
         said = three(f"{data}/{file}.toml", folder, busy, far)
         it = state(folder)
         views = [view for host in it["hosts"] for view in host["views"]]
-        # Codec and bytes are the link's own: of the run itself.
+        # The costs of codec and link are those of the run on several hosts.
         frame = sum(view["bytes"] for view in views) / max(sum(view["used"] for view in views), 1)
         median = lambda key: sum(view[key]["p50_ms"] for view in views) / len(views)
         told = [f"--{'pose' if carry == 'poses' else 'frame'}-bytes", str(frame)]
@@ -352,7 +352,7 @@ def model(data):
 
 
 def record(data, truth):
-    """Hosts that record: the one that fuses has what came to it, one with cameras its own views."""
+    """Records on the hosts. The fusing host records all messages that reach it; a host with cameras records its own views."""
     folder = f"{out}/record"
     said = three(f"{data}/hosts.toml", folder, records=True)
     from_stage = "fuse" if carry == "poses" else "pose"
@@ -371,7 +371,7 @@ def clear():
 
 def main():
     data = f"{out}/data"
-    # Without keys for builds and networks that have none.
+    # Without keys, for builds and networks that do not use them.
     keys = None if os.environ.get("INSECURE") else f"{out}/keys"
     write(data, keys)
     truth = truth_of(data)
@@ -407,7 +407,7 @@ def main():
 
 
 def thief(data):
-    """A host with keys of an authority of its own, and one without any: neither gets in."""
+    """Checks that a host with keys from another authority and a host without keys are both refused."""
     text = open(f"{data}/hosts.toml").read()
     open(f"{data}/thief.toml", "w").write(re.sub(r'keys = ".*"', f'keys = "{out}/keys-thief"', text))
     open(f"{data}/open.toml", "w").write(re.sub(r'keys = ".*"', "insecure = true", text))

@@ -1,4 +1,4 @@
-"""Compares the runs of tests/live/rtsp: which pictures the cameras showed at every instant, by the recording, and the 3D of them.
+"""Compares the runs of tests/live/rtsp: the pictures that the cameras showed at each instant, from the recording, and the 3D joints.
 
 usage: rtsp-compare.py FOLDER REFERENCE.trc
 """
@@ -11,11 +11,11 @@ JOINTS = {"shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist", "hip": "Hi
 LIMBS = {f"{side} {ours}": side[0].upper() + theirs for side in ["right", "left"] for ours, theirs in JOINTS.items()}
 RATE_HZ = 1.0
 SLOWER = 60
-LAST = 65  # the reference is good up to here
+LAST = 65  # the last frame with a valid reference
 
 
 def pictures(file):
-    """Of every camera of a recording: when its pictures were taken (in instants), and which of the file each is."""
+    """Returns, for every camera of a recording, the times of its pictures (in instants) and their numbers in the file."""
     topics, found = {}, {}
     with open(file, "rb") as f:
         data = f.read()
@@ -53,7 +53,7 @@ def pictures(file):
 
 
 def shown(cameras):
-    """At every instant the number of the picture that each camera showed."""
+    """Returns, for every instant, the number of the picture that each camera showed."""
     all_of = {}
     for camera, seen in enumerate(cameras):
         for instant, number in seen:
@@ -68,7 +68,7 @@ def skeletons(file):
     frames = {}
     for line in open(file):
         it = json.loads(line)
-        # Of the person who is followed.
+        # The followed person.
         joints = it["people"][0]["joints"] if it["people"] else {}
         frames[it["frame"]] = {n: joints[n]["position_m"] for n in LIMBS if (joints.get(n) or {}).get("position_m")}
     return frames
@@ -86,7 +86,7 @@ def reference(file):
 
 
 def between(frames, at):
-    """The skeleton at a time between two frames."""
+    """Returns the skeleton at a time between two frames."""
     low = math.floor(at)
     a, b, share = frames.get(low, {}), frames.get(math.ceil(at), {}), at - low
     return {n: [p + share * (q - p) for p, q in zip(a[n], b[n])] for n in a if n in b}
@@ -98,7 +98,7 @@ def differences(first, second):
 
 def line(name, all_mm, n_frames):
     if not all_mm:
-        print(f"{name}: nothing")
+        print(f"{name}: no joints")
         return None
     all_mm = sorted(all_mm)
     median, p90 = [all_mm[int(share * (len(all_mm) - 1))] for share in (0.5, 0.9)]
@@ -131,5 +131,5 @@ for name in ["live", "replay"]:
 mm = [differences(runs["files"].get(k, {}), runs["originals"].get(k, {})) for k in range(1, LAST)]
 line("files compressed again to the originals", sum(mm, []), sum(map(bool, mm)))
 bad = [name for name, error in errors.items() if error is None or error > 1.25 * errors["originals"] + 10]
-print(f"FAILED: {', '.join(bad)}" if bad else "the cameras give what the files give")
+print(f"FAILED: {', '.join(bad)}" if bad else "the cameras give the same results as the files")
 sys.exit(bool(bad))

@@ -1,4 +1,4 @@
-//! The annotated people of PARSE and LSP-extended are all read without faults.
+//! All annotated people of PARSE and LSP-extended are read without faults.
 
 use training::datasets::{ReadOptions, Sample, Selection, SkeletonTable, read};
 

@@ -1,6 +1,6 @@
 //! Four real cameras around a balancing person: the effect of uprighting, facing and candidates.
 //!
-//! Prints the table of errors against the markerless reference, and asserts the figures reached so far.
+//! Prints the table of errors against the markerless reference, and checks the figures reached so far.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,13 +18,13 @@ use viewquality::orientation::{Detector, Network};
 use crate::shared_dir;
 
 pub(crate) const SIZE: [u32; 2] = [272, 480];
-/// Trunk upright, and mostly bent over.
+/// Frames with an upright trunk; below, frames in which the person is mostly bent over.
 const UPRIGHT: [usize; 5] = [0, 5, 10, 15, 20];
 const BENT: [usize; 7] = [5, 15, 25, 35, 45, 55, 65];
-/// The pose of a view is on a wrong object if its torso is further than this from the reference's, pixels.
+/// Distance between the torso of a view's pose and the reference's above which the pose is on a wrong object, pixels.
 const WRONG_PX: f64 = 40.0;
 
-/// The options of one row of the table.
+/// Options of one row of the table.
 #[derive(Clone, Copy)]
 struct Switches {
     upright: bool,
@@ -34,7 +34,7 @@ struct Switches {
     views: Views,
 }
 
-/// Errors of a set of frames.
+/// Errors in a set of frames.
 #[derive(Default)]
 pub(crate) struct Errors {
     pub(crate) joints_cm: Vec<f64>,
@@ -56,7 +56,7 @@ impl Errors {
     }
 }
 
-/// No option, each of the three alone, and all of them.
+/// Rows without any option, with each of the three options alone, and with all of them.
 fn rows() -> [(&'static str, Switches); 7] {
     let row = |upright, facing, candidates| Switches {
         upright,
@@ -86,7 +86,7 @@ fn rows() -> [(&'static str, Switches); 7] {
 
 pub(crate) struct Clip {
     pub(crate) cameras: Vec<Camera>,
-    /// `[view][frame]`, all frames up to the last one needed.
+    /// Pictures as `[view][frame]`, with all frames up to the last one needed.
     pub(crate) frames: Vec<Vec<Vec<u8>>>,
 }
 
@@ -133,21 +133,21 @@ fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached()
     }
 }
 
-/// The four cameras.
+/// Returns the rig with the four cameras.
 pub(crate) fn rig() -> Rig {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let file = root.join("configs/rigs/pose2sim-balancing.toml");
     geometry::files::read(&file, &geometry::files::ReadOptions::default()).unwrap()
 }
 
-/// Returns the detector that tells front from back, as it ships.
+/// Returns the shipped detector that tells front from back.
 fn orientation() -> Arc<Detector> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let bytes = std::fs::read(root.join("configs/models/person.orientation")).unwrap();
     Arc::new(Detector::new(Network::from_bytes(&bytes).unwrap()))
 }
 
-/// Errors over [`UPRIGHT`] and [`BENT`], every frame estimated independently.
+/// Returns the errors over [`UPRIGHT`] and [`BENT`]; every frame is estimated independently.
 fn errors(
     model: &Arc<fmp::Model>,
     rig: &Rig,
@@ -229,7 +229,7 @@ pub(crate) fn compare(
         };
         let single = got.answers[view].as_ref().unwrap();
         let single = estimator.plans()[view].centres(&single.candidates[0]);
-        // A view that has no part in the frame is on no object.
+        // A view without a part in the frame is not on a wrong object.
         let fused = got.skeleton.views[view].as_ref();
         errors.wrong_single += usize::from(off(&single));
         errors.wrong_fused += usize::from(fused.is_some_and(|fused| off(&fused.pose.centres_px)));
@@ -237,12 +237,12 @@ pub(crate) fn compare(
     errors
 }
 
-/// Middle of hips and shoulders.
+/// Returns the middle of hips and shoulders.
 fn torso(joints: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|axis| [2, 3, 8, 9].iter().map(|&i| joints[i][axis]).sum::<f64>() / 4.0)
 }
 
-/// The 14 joints of every frame in the world: TRC(X, Y, Z) is world(y, z, x).
+/// Returns the 14 joints in every frame in the world: TRC(X, Y, Z) is world(y, z, x).
 pub(crate) fn reference(path: &Path) -> Vec<Vec<Point3<f64>>> {
     const NAMES: [&str; 14] = [
         "RAnkle",
@@ -289,7 +289,7 @@ pub(crate) fn clip(data: &Path, rig: &Rig, upright: bool) -> Clip {
         } else {
             0.0
         };
-        // Two of the videos lack eight columns of the calibrated sensor, on the right.
+        // Two of the videos lack the eight rightmost columns of the calibrated sensor.
         let framing = Framing::new(
             camera,
             [size.width as u32, size.height as u32],

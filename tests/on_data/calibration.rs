@@ -14,7 +14,7 @@ use nalgebra::{Point2, Point3, Vector3};
 
 use crate::shared_dir;
 
-/// Markers of the reference by their place in OpenPose's `BODY_25B`.
+/// Markers of the reference, with their indices in OpenPose's `BODY_25B`.
 const OPENPOSE: [(&str, usize); 21] = [
     ("RHip", 12),
     ("RKnee", 14),
@@ -39,7 +39,7 @@ const OPENPOSE: [(&str, usize); 21] = [
     ("LWrist", 9),
 ];
 
-/// The position of each marker of a person in a view.
+/// Position of each marker of a person in a view.
 type Person = [Option<Point2<f64>>; 21];
 
 fn balancing() -> Option<PathBuf> {
@@ -66,7 +66,7 @@ fn median(values: Vec<f64>) -> f64 {
     statistics::Sorted::new(values).upper_median().unwrap()
 }
 
-/// The reference of each frame, in the world of the rig: TRC (X, Y, Z) = world (y, z, x).
+/// Returns the reference in each frame, in the world of the rig: TRC (X, Y, Z) = world (y, z, x).
 fn reference(folder: &Path) -> Vec<[Point3<f64>; 21]> {
     let text = fs::read_to_string(folder.join("reference_0-69.trc")).unwrap();
     let names: Vec<&str> = text.lines().nth(3).unwrap().split_whitespace().skip(2).collect();
@@ -80,7 +80,7 @@ fn reference(folder: &Path) -> Vec<[Point3<f64>; 21]> {
     .collect()
 }
 
-/// The keypoints of every person detected by OpenPose, `None` where the confidence is low.
+/// Returns the keypoints of every person that OpenPose detected; `None` for keypoints with low confidence.
 fn detections(folder: &Path, camera: &str, frame: usize) -> Vec<Person> {
     let path = folder.join(format!("openpose/{camera}_json/{camera}.{frame:04}.json"));
     let file: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
@@ -104,7 +104,7 @@ fn errors(camera: &Camera, truth: &[Point3<f64>; 21], seen: &Person) -> Vec<f64>
         .collect()
 }
 
-/// For each frame and camera the person nearest to the reference, not the bystander.
+/// Returns, for each frame and camera, the person nearest to the reference, not the bystander.
 fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Person>> {
     let nearest = |frame: usize, camera: &Camera| {
         let people = detections(folder, &camera.name, frame).into_iter();
@@ -124,15 +124,15 @@ fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Pe
         .collect()
 }
 
-/// The result of triangulating the detections of all frames.
+/// Result of triangulating the detections in all frames.
 struct Fit {
     /// Median of all reprojection errors, pixels at full size.
     residual_px: f64,
-    /// Median of those of each camera.
+    /// Median reprojection error of each camera.
     by_camera_px: Vec<f64>,
     /// Median distance from the reference, metres.
     distance: f64,
-    /// Joints that could be triangulated, and that could not.
+    /// Number of joints that could be triangulated, and of other joints.
     counts: [usize; 2],
 }
 
@@ -180,7 +180,7 @@ fn fit(folder: &Path, rig: &Rig) -> Fit {
     }
 }
 
-/// The reference on the detections: median error, pixels at full size.
+/// Returns the median distance between the projected reference and the detections, pixels at full size.
 fn reprojection(folder: &Path, rig: &Rig) -> f64 {
     let truth = reference(folder);
     let seen = balancer(folder, rig, &truth);
@@ -299,7 +299,7 @@ fn the_reference_lies_on_the_detections() {
     let px = ["pose2sim-balancing.toml", "pose2sim-balancing-shipped.toml"]
         .map(|name| reprojection(&folder, &our_rig(name)));
     println!("refined {:.2} px, shipped {:.2} px", px[0], px[1]);
-    // 1 cm at the subject is 3.6 px; the reference comes from the shipped calibration and is good to 3 cm.
+    // A displacement of 1 cm at the subject is 3.6 px. The reference is derived from the shipped calibration and accurate to 3 cm.
     assert!(px.iter().all(|px| *px < 12.0));
 }
 
@@ -339,7 +339,7 @@ fn the_rolls_are_those_of_the_reference_runs() {
         .map(|c| geometry::upright_roll(c, &rig).unwrap().to_degrees())
         .collect();
     println!("{rolls:.1?} degrees");
-    // Computed at the mid-hip of a frame, which is not exactly the focus of the rig; with the opposite sign.
+    // Computed at the mid-hip in one frame, which is not exactly the focus of the rig; the sign is opposite.
     let expect: [f64; 4] = [-11.8, 2.3, 0.8, 27.9];
     assert!(
         rolls.iter().zip(expect).all(|(roll, expect)| (roll - expect).abs() < 3.0),
@@ -399,7 +399,7 @@ fn a_caliscope_rig_reproduces_the_spacing_of_its_board() {
 type Corner = (u32, Point2<f64>);
 type Views = Vec<Option<Point2<f64>>>;
 
-/// The position of each corner at each instant in each camera, and the instant and place of the corner on the board.
+/// Returns the positions of the corners at each instant in each camera, and for each corner its instant and its place on the board.
 fn board_corners(path: &Path) -> (Vec<Views>, Vec<Corner>) {
     let mut corners = std::collections::BTreeMap::new();
     for line in fs::read_to_string(path).unwrap().lines().skip(1) {

@@ -1,4 +1,4 @@
-//! Clocks of cameras that are known: the balancing keypoints, shifted and slowed down.
+//! Cameras with known clocks: the balancing keypoints, shifted and slowed down.
 
 use calibration::synchronisation::{Film, Joint, Person, Settings, Shot, estimate};
 use geometry::files::ReadOptions;
@@ -10,7 +10,7 @@ use crate::shared_dir;
 const RATE_HZ: f64 = 60.0;
 const N_SEEDS: u64 = 20;
 
-/// The keypoints of the four cameras, and how many a person has.
+/// Returns the keypoints of the four cameras, and the number of keypoints of a person.
 pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
     let (mut films, mut n_joints) = (Vec::new(), 0);
     for camera in ["cam01", "cam02", "cam03", "cam04"] {
@@ -44,7 +44,7 @@ pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
     (films, n_joints)
 }
 
-/// Returns the film of a camera with another clock: it begins `first` frames later, and its frames are `pace` of a frame apart.
+/// Returns the film of a camera with another clock: it starts `first` frames later, and the distance between its frames is `pace` frames.
 fn resampled(film: &Film, first: f64, pace: f64) -> Film {
     let last = film.shots.len() - 1;
     let times = (0..).map(|nth| first + pace * f64::from(nth));
@@ -63,7 +63,7 @@ fn resampled(film: &Film, first: f64, pace: f64) -> Film {
     }
 }
 
-/// A person between two frames; the one in the next frame is the nearest.
+/// Interpolates a person between two frames; the nearest person in the next frame counts as the same.
 fn between(person: &Person, next: &[Person], share: f64) -> Option<Person> {
     if share < 1e-9 {
         return Some(person.clone());

@@ -1,4 +1,4 @@
-//! The four videos of pose2sim's balancing trial: sizes, counts, first and last frames, and decoding times.
+//! The four videos of Pose2Sim's balancing trial: sizes, counts, first and last frames, and decoding times.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ use crate::shared_dir;
 /// Size of the pipeline's frames.
 const OUTPUT: Size = Size::new(272, 480);
 
-/// A quarter of the size, turned by 28 degrees about the centre: the roll of cam04.
+/// Returns a map to a quarter of the size, with a rotation of 28 degrees about the centre, which is the roll of cam04.
 fn upright(source: Size) -> Affine {
     let (sin, cos) = 28_f64.to_radians().sin_cos();
     let linear = [[4.0 * cos, -4.0 * sin], [4.0 * sin, 4.0 * cos]];
@@ -26,12 +26,12 @@ fn upright(source: Size) -> Affine {
     })
 }
 
-/// Mean grey level.
+/// Returns the mean grey level.
 fn mean(rgb: &[u8]) -> f64 {
     rgb.iter().map(|&rgb| f64::from(rgb)).sum::<f64>() / rgb.len() as f64
 }
 
-/// Reads a video to the end; returns the mean times of decoding and warping a frame.
+/// Reads a video to the end, and returns the mean times for decoding and for warping a frame.
 fn read(path: &str, width: usize) -> [Duration; 2] {
     let mut source = Source::open(&SourceSpec::new(path)).unwrap();
     let info = source.info().clone();
@@ -53,7 +53,7 @@ fn read(path: &str, width: usize) -> [Duration; 2] {
         let began = Instant::now();
         warp.apply(frame.rgb, &mut out);
         warped += began.elapsed();
-        // A bright room, and no frame of a uniform colour.
+        // The room is bright, and no frame has a uniform colour.
         assert!(
             (60.0..200.0).contains(&mean(&out)),
             "{path} {index}: {}",
@@ -68,7 +68,7 @@ fn read(path: &str, width: usize) -> [Duration; 2] {
 #[test]
 fn all_frames_of_all_cameras_are_read() {
     let Some(shared) = shared_dir() else { return };
-    // cam02 is VP9, the others are H.264.
+    // cam02 is VP9; the others are H.264.
     for (name, width) in [
         ("cam01", 1080),
         ("cam02", 1080),

@@ -1,8 +1,8 @@
-//! Alternating solutions of two real views: bounds and threads change no result, and bounds save work.
+//! Alternating solutions of two real views. Bounds and threads do not change any result, and bounds save work.
 //!
-//! Prints a table: milliseconds per iteration, levels that bounds leave, messages that are reused. The pairs and
-//! their settings are those of the tests of accuracy. Both assumptions about facing are solved, the same and the
-//! exchanged, as in a pipeline that decides it.
+//! Prints a table: milliseconds per iteration, levels that remain after bounding, messages that are reused. The pairs and
+//! their settings are those of the accuracy tests. Both assumptions about facing are solved, the same and the
+//! exchanged one, as in a pipeline that decides between them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -106,7 +106,7 @@ impl Case<'_> {
         estimate_pair(self.solver, &settings, &input, evidence, self.start)
     }
 
-    /// The shortest time of `n` iterations from the start, milliseconds.
+    /// Returns the shortest time of `n` iterations from the start, milliseconds.
     fn fastest(&self, pool: &ThreadPool, n: usize) -> f64 {
         let run = |_| {
             let begin = Instant::now();
@@ -116,7 +116,7 @@ impl Case<'_> {
         (0..RUNS).map(run).fold(f64::INFINITY, f64::min)
     }
 
-    /// Checks the solution, prints a row, and returns the number of iterations and their milliseconds on one and
+    /// Checks the solution, prints a row, and returns the number of iterations and their time in milliseconds on one and
     /// two threads.
     fn measure(&self, name: &str, pools: &[ThreadPool; 2]) -> [f64; 3] {
         let before = self.solver.statistics();
@@ -161,7 +161,7 @@ fn describe(effort: &SolveStatistics) -> String {
     format!("{solved:.1} of {offered:.0} ({left:.0} %) | {reused:.0} %")
 }
 
-/// Checks and measures all pairs of some shots from their joint start.
+/// Checks and measures all pairs of some shots, starting from their joint start.
 fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTables>) {
     let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
     let pools = [1, 2].map(pool);
@@ -203,7 +203,7 @@ fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTabl
     println!("| {name}: all | | {n} | | {each:.2} / {each_two:.2} | | {one:.0} / {two:.0} ms |");
 }
 
-/// A picture and its camera at another size.
+/// Returns a picture and its camera at another size.
 fn framed(camera: &Camera, source: [usize; 2], rgb: &[u8], size: [u32; 2]) -> (Camera, Vec<u8>) {
     let out = Size::new(size[0] as usize, size[1] as usize);
     let from = source.map(|source| source as u32);
@@ -215,7 +215,7 @@ fn framed(camera: &Camera, source: [usize; 2], rgb: &[u8], size: [u32; 2]) -> (C
     (framing.camera().clone(), image)
 }
 
-/// Two stills at the size of the paper's pictures and at about 640 x 480.
+/// Measures two stills at the size of the paper's pictures and at about 640 x 480.
 fn stills(
     name: &str,
     model: &Path,

@@ -1,4 +1,4 @@
-//! Keypoints that OpenPose found in the demonstration of Pose2Sim.
+//! Keypoints that OpenPose found in the demo of Pose2Sim.
 
 #![expect(
     clippy::print_stdout,

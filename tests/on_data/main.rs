@@ -1,4 +1,4 @@
-//! Tests on real data: they run only where the data folder lies beside the repository.
+//! Tests on real data. They only run if the data folder is beside the repository.
 //!
 //! `cargo test --workspace --features system-tests/data --test on_data`
 
@@ -29,7 +29,7 @@ mod tracked;
 
 use std::path::{Path, PathBuf};
 
-/// The folder with data and reference numbers; `None`, with a message that the test is skipped, if it is absent.
+/// Returns the folder with data and reference numbers. If it is absent, prints that the test is skipped, and returns `None`.
 fn shared_dir() -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let dir = root.join("../shared");

@@ -1,4 +1,4 @@
-//! The released models, type tables and expected errors agree with their descriptions.
+//! The released models, type tables and expected errors match their descriptions.
 
 use std::fs;
 use std::path::PathBuf;
@@ -73,7 +73,7 @@ fn the_released_models_have_the_documented_values() {
     ] {
         within(linear, -0.035, 0.035);
     }
-    // The description counts anchors from 1.
+    // Anchors in the description are counted from 1.
     assert_eq!(springs.anchor, [[-3, 4], [-2, 6]]);
     within(he.bias_range.unwrap(), -0.031, 0.031);
     within(umpm.bias_range.unwrap(), -0.071, 0.071);

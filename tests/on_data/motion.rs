@@ -11,7 +11,7 @@ fn read(file: &Path) -> C3d {
     C3d::parse(&std::fs::read(file).unwrap()).unwrap()
 }
 
-/// * `step_mm`: the unit of the integers; reals may be more precise.
+/// * `step_mm`: step of the integers; reals may be more precise.
 fn assert_same_points(dir: &Path, files: [&str; 6], step_mm: f64) {
     let trials = files.map(|file| read(&dir.join(file)));
     let first = &trials[0];
@@ -99,7 +99,7 @@ fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
     );
 }
 
-/// The largest height of the person, and the spread of the length of a leg, metres.
+/// Returns the largest height of the person, and the spread of a leg's length, metres.
 fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
     let norm = |a: [f64; 3], b: [f64; 3]| {
         let square = (0..3).map(|i| (a[i] - b[i]).powi(2));
@@ -140,7 +140,7 @@ fn files_of_three_laboratories_are_converted_by_the_presets() {
         assert!(height.contains(&tall), "{file}: {tall}");
         assert!(noise < 0.1, "{file}: {noise}");
     }
-    // Markers are missing for more than a second: the error has the frames, and the frames before can be read.
+    // Markers are missing for more than a second. The error names the frames, and the frames before them can be read.
     let file = data.join("c3d/others/mocap36.c3d");
     let MotionError::Gap { frames, .. } = read_motion(&file, None, &options).unwrap_err() else {
         panic!("a gap")

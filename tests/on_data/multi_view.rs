@@ -34,7 +34,7 @@ fn matrix(rows: &Value) -> Matrix3<f64> {
     Matrix3::from_fn(|row, col| number(&rows[row][col]))
 }
 
-/// A camera without distortion, as in the runs; the file's lengths are millimetres.
+/// Returns a camera without distortion, as in the runs; lengths in the file are in millimetres.
 fn pinhole(
     name: &str,
     focal: [f64; 2],
@@ -60,7 +60,7 @@ fn pinhole(
     }
 }
 
-/// C1 or C2 of HumanEva for subject S1, principal point moved by `shift` pixels.
+/// Returns C1 or C2 of HumanEva for subject S1, with the principal point moved by `shift` pixels.
 pub(crate) fn humaneva(shared: &Path, name: &str, shift: f64) -> Camera {
     let file = json(&shared.join("data/humaneva/calibration.json"));
     let (inside, outside) = (&file["intrinsics"][name], &file["extrinsics"]["S1"][name]);
@@ -70,7 +70,7 @@ pub(crate) fn humaneva(shared: &Path, name: &str, shift: f64) -> Camera {
     pinhole(name, focal, centre, [640, 480], pose)
 }
 
-/// L or R of UMPM, principal point moved by `shift` pixels.
+/// Returns L or R of UMPM, with the principal point moved by `shift` pixels.
 pub(crate) fn umpm(shared: &Path, name: &str, shift: f64) -> Camera {
     let file = json(&shared.join("data/umpm/calibration_derived.json"));
     let it = &file["cams"][name];
@@ -84,10 +84,10 @@ pub(crate) fn umpm(shared: &Path, name: &str, shift: f64) -> Camera {
     )
 }
 
-/// The largest distance of our epipolar lines in B from those of a run, within the image, pixels.
+/// Returns the largest distance between our epipolar lines in B and those of a run, within the image, pixels.
 fn lines_off(cameras: &[Camera; 2], run: &Value) -> f64 {
     let ours = geometry::epipolar::fundamental(&cameras[0], &cameras[1]);
-    // The run's pixels count from 1.
+    // Pixels in the run are counted from 1.
     let from_zero = Matrix3::new(1.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0);
     let theirs = from_zero.transpose() * matrix(&run["F_lineInB_of_pointInA"]) * from_zero;
     let [width, height] = cameras[1].intrinsics.size.map(f64::from);
@@ -121,13 +121,13 @@ fn epipolar_lines_agree_with_the_runs() {
         )
     };
     println!("HumanEva: {:.1e} px, {:.1e} px", off(-1.0), off(0.0));
-    // The runs assumed that HumanEva's principal point counts pixels from 1, ...
+    // The runs assumed that pixels of HumanEva's principal point are counted from 1, ...
     assert!(off(-1.0) < 1e-3 && off(0.0) > 0.3);
     let l_r = run_file(&shared, "umpm_mv_L_R");
     let off = |shift| lines_off(&["l", "r"].map(|name| umpm(&shared, name, shift)), &l_r);
     println!("UMPM: {:.1e} px, {:.1e} px", off(0.0), off(-1.0));
-    // ... and UMPM's from 0. UMPM's rotations have six digits only and are not exactly orthogonal; we
-    // orthogonalise them and the runs did not.
+    // ... and those of UMPM's from 0. UMPM's rotations have only six digits and are not exactly orthogonal; we
+    // orthogonalise them, but the runs did not.
     assert!(off(0.0) < 0.02 && off(-1.0) > 0.3);
 }
 
@@ -147,7 +147,7 @@ fn the_heat_map_of_a_line_agrees_with_the_program() {
     }
 }
 
-/// Two views of one instant, ready to be fused.
+/// Two views of one instant, prepared for fusion.
 struct Pair {
     solver: Solver,
     plans: [ViewPlan; 2],
@@ -224,7 +224,7 @@ impl Pair {
     }
 }
 
-/// The tables of a pair: the file `<first>wrt<second>` holds p(second | first).
+/// Returns the tables of a pair: the file `<first>wrt<second>` contains p(second | first).
 pub(crate) fn tables(shared: &Path, set: &str, [first, second]: [&str; 2]) -> TypeTables {
     let read = |rows: &str, cols: &str| {
         let path = shared.join(format!("data/ptc/{set}_{rows}wrt{cols}.csv"));
@@ -240,7 +240,7 @@ pub(crate) fn tables(shared: &Path, set: &str, [first, second]: [&str; 2]) -> Ty
     }
 }
 
-/// Prints the differences between our run and the program's, and asserts that they are rounding errors.
+/// Prints the differences between our run and the program's, and checks that they are rounding errors.
 fn compare(pair: &Pair, run: &Value, name: &str, ours: &PairEstimate) {
     let theirs = run["iterations"].as_array().unwrap();
     let view = |name: &Value| usize::from(name == "B");
@@ -253,7 +253,7 @@ fn compare(pair: &Pair, run: &Value, name: &str, ours: &PairEstimate) {
         let centres = pair.plans[side].centres(&ours.poses[side]);
         for (part, [x, y]) in centres.into_iter().enumerate() {
             let it = &run["final_pose"][key]["parts"][part];
-            // The program's pixels count from 1.
+            // Pixels in the program are counted from 1.
             let off = (x + 1.0 - number(&it["cx"])).hypot(y + 1.0 - number(&it["cy"]));
             same[side] += usize::from(off <= 1.0);
             if off > 1.0 {

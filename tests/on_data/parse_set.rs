@@ -1,6 +1,6 @@
 //! A hundred images of the PARSE test set, compared with the detections of Yang & Ramanan's program.
 //!
-//! With another JPEG decoder (`image` 0.25) the PCP is 69.8 and 22 detections are the same.
+//! With another JPEG decoder (`image` 0.25), the PCP is 69.8 and 22 detections are the same.
 
 use std::sync::Arc;
 
@@ -15,12 +15,12 @@ use crate::single_view::{Evidence, Picture, json};
 
 type Joints = [[f64; 2]; 14];
 
-/// One image: the joints by each of the two programs, and whether the detection is the same.
+/// Results for one image: the joints from each of the two programs, and whether the detection is the same.
 struct Outcome {
     truth: Joints,
     ours: Joints,
     theirs: Joints,
-    /// The joints of their best detection on the annotated person.
+    /// Joints of their best detection on the annotated person.
     theirs_covering: Joints,
     score_off: f64,
     same_level: bool,
@@ -62,7 +62,7 @@ fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
     let pcp = |report: &Report| {
         [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|rule| report.pcp(rule).percent())
     };
-    // As recorded in the reference; its PCK is recorded for all 205 images only: 73.1.
+    // The value recorded in the reference. Its PCK is only recorded for all 205 images: 73.1.
     assert_eq!(
         pcp(&theirs).map(|value| (value * 10.0).round()),
         [713.0, 634.0]

@@ -1,4 +1,4 @@
-//! Where cameras stand, from a person that they see: the balancing keypoints.
+//! Positions of cameras, calibrated from a person that they see: the balancing keypoints.
 
 use calibration::people::{Recording, Scale, Settings, Vertical, estimate};
 use calibration::synchronisation::{Film, Joint, Person, Shot};
@@ -10,13 +10,13 @@ use statistics::Sorted;
 use crate::clocks::recorded;
 use crate::{balancing, shared_dir};
 
-/// Frames that are drawn for every one of so many samples.
+/// Number of frames in each sample.
 const DRAWN: usize = 42;
 const N_SAMPLES: u64 = 20;
-/// The height of the person, as the bones have it in the rig that comes with the recording, metres.
+/// Height of the person from the bones, in the rig that is part of the recording, metres.
 const HEIGHT_M: f64 = 1.652;
 
-/// The joints in the order of a calibration, and of each the one on the other side.
+/// Returns the joints in the order of a calibration, and for each joint the index of the one on the other side.
 fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
     let set = NameSet::of_set("body-25b").unwrap();
     let names = set.names();
@@ -33,7 +33,7 @@ fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
         let other = mirrored(name).and_then(|other| extra.iter().position(|of| *of.1 == other));
         sides[n + nth] = n + other.unwrap_or(nth);
     }
-    // Every joint is a keypoint of this set.
+    // Every joint is one keypoint of this set.
     assert!(rows.iter().all(|row| row.len() == 1));
     let joint = |person: &Person, row: &[(usize, f64)]| person.joints[row[0].0];
     let person = |person: &Person| Person {
@@ -49,7 +49,7 @@ fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
     (films.iter().map(film).collect(), sides)
 }
 
-/// The same frames of all cameras.
+/// Draws the same frames from all cameras.
 fn sample(films: &[Film], seed: u64) -> Vec<Film> {
     let n = films.iter().map(|film| film.shots.len()).min().unwrap();
     let mut frames: Vec<usize> = (0..n).collect();
@@ -91,7 +91,7 @@ fn the_balancing_cameras_are_found_from_the_person_alone() {
             refused += 1;
             continue;
         }
-        // Nobody stands upright in it, and that is said.
+        // The person does not stand upright in any frame, and the result says so.
         assert_eq!(outcome.vertical, Vertical::Leaning);
         let apart = calibration::differences(&outcome.cameras, rig.cameras(), false);
         let mean = |of: &dyn Fn(&calibration::Difference) -> f64| {

@@ -1,4 +1,4 @@
-//! The model and the network that ship on people they were not trained on.
+//! The shipped model and network on people who are not in their training data.
 
 use std::sync::Arc;
 
@@ -50,7 +50,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
     }
 }
 
-/// PCP by mean of ends and by both ends, from `configs/models/person.md`.
+/// PCP by the mean of ends and by both ends, from `configs/models/person.md`.
 const CARD: [f64; 2] = [73.3, 67.4];
 
 #[test]
@@ -65,7 +65,7 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
     };
     let people = training::datasets::read(&shared.join("data/parse"), &options).unwrap();
     let mut memory = LookMemory::default();
-    // How much the first and the last box have in common with the true one, of every person: too large, beside it.
+    // For each person, the overlap of the first and the last box with the true one; those boxes are too large, or shifted.
     let mut shares = [Vec::new(), Vec::new()];
     for person in &people.people {
         let picture = Picture::read(&person.image).unwrap();

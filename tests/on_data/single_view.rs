@@ -13,7 +13,7 @@ use testkit::npy::Array;
 
 use crate::shared_dir;
 
-/// Pixels of an image file, as input of the detector.
+/// Pixels of an image file, as input for the detector.
 pub(crate) struct Picture {
     width: usize,
     height: usize,
@@ -32,7 +32,7 @@ impl Picture {
 
     /// Reads a JPEG file with libjpeg's arithmetic.
     ///
-    /// Decoders differ by one to three grey levels in a seventh of the samples, which is enough
+    /// Decoders differ by one to three grey levels in a seventh of the samples. This is enough
     /// to change orientation bins and the order of nearly equal detections.
     pub(crate) fn read_as_libjpeg(path: &Path) -> Self {
         let mut image = mozjpeg::Decompress::new_path(path).unwrap().rgb().unwrap();
@@ -52,7 +52,7 @@ impl Picture {
     }
 }
 
-/// The responses of an image, owned.
+/// Responses of an image.
 pub(crate) struct Evidence {
     layout: Layout,
     values: Vec<f32>,
@@ -81,7 +81,7 @@ pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Largest difference between an array `[row, col, ...]` of the reference and ours.
+/// Returns the largest difference between an array `[row, col, ...]` of the reference and ours.
 fn difference(theirs: &Array, ours: impl Fn(&[usize]) -> f64) -> f64 {
     let index = |mut flat: usize| {
         let mut index = vec![0; theirs.shape.len()];
@@ -123,7 +123,7 @@ impl Stages {
         Array::read(&self.vectors.join(format!("{name}.npy"))).unwrap()
     }
 
-    /// All responses of the second level, and its size.
+    /// Returns all responses at the second level, and its size.
     fn responses(&self) -> (Vec<Vec<f64>>, [usize; 2]) {
         let level = &self.layout.levels[1];
         let features = reference::features(&self.model, &self.layout, &self.images[1]);
@@ -301,7 +301,7 @@ fn check_image(shared: &Path, name: &str, picture: &Picture, model: &Arc<Model>)
     }
 }
 
-/// Number of root scores of at least -1, and the largest difference of a level's best score.
+/// Returns the number of root scores of at least -1, and the largest difference between the best scores of a level.
 fn compare_levels(
     name: &str,
     theirs: &Value,

@@ -1,4 +1,4 @@
-//! Who is who among several people: real motion, real cameras, made keypoints.
+//! Association of several people across views: real motion, real cameras, synthetic keypoints.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use statistics::score::Bootstrap;
 use crate::shared_dir;
 
 const N_JOINTS: usize = 14;
-/// Joints of `skeleton::PARSE14` among the 19 of the set; it has no top of the head.
+/// Index of each joint of `skeleton::PARSE14` among the 19 joints of the set, which has no top of the head.
 const JOINTS: [Option<usize>; N_JOINTS] = [
     Some(14),
     Some(13),
@@ -32,26 +32,26 @@ const JOINTS: [Option<usize>; N_JOINTS] = [
 ];
 const HIPS: [usize; 2] = [2, 3];
 const NECK: usize = 12;
-/// Side of the square in which people are, metres, and their least distance.
+/// Side of the square in which the people are, metres; below, their smallest distance.
 const SQUARE_M: f64 = 3.6;
 const APART_M: f64 = 0.45;
-/// A trunk hides what lies behind it so near to its middle line, metres.
+/// Distance from the middle line of a trunk within which the trunk hides joints behind it, metres.
 const TRUNK_M: f64 = 0.15;
 /// Share of the joints that the detector misses.
 const MISSED: f64 = 0.1;
-/// Instants of a clip, and seconds between two.
+/// Number of instants in a clip; below, the seconds between two instants.
 const N_INSTANTS: usize = 20;
-/// The first instant that is judged.
+/// First instant that is evaluated.
 const FIRST: usize = 5;
 const STEP_S: f64 = 1.0 / 29.97;
 
-/// A person's joints, metres.
+/// Joints of a person, metres.
 type Body = [Option<Point3<f64>>; N_JOINTS];
 
-/// Motion and cameras of the set.
+/// Motion and cameras of the data set.
 struct Motion {
     cameras: Vec<Camera>,
-    /// Every person of every stretch, instant by instant.
+    /// Clips of all people in all stretches of the motion, instant by instant.
     clips: Vec<Vec<Body>>,
 }
 
@@ -110,7 +110,7 @@ impl Motion {
         }
     }
 
-    /// Some people in a room: clips turned and moved, not too near to each other.
+    /// Returns some people in a room: clips, rotated and moved, with a minimum distance between people.
     fn people(&self, n: usize, random: &mut Rng) -> Vec<Vec<Body>> {
         let mut people: Vec<Vec<Body>> = Vec::new();
         let mut places: Vec<Vector3<f64>> = Vec::new();
@@ -135,7 +135,7 @@ impl Motion {
     }
 }
 
-/// Says if another's trunk is before a joint.
+/// Returns true if the trunk of another person hides a joint.
 fn is_hidden(camera: &Camera, joint: &Point3<f64>, nth: usize, people: &[Body]) -> bool {
     let from = camera.centre_in_world();
     let ray = (joint - from).try_normalize(1e-9).unwrap();
@@ -155,7 +155,7 @@ fn is_hidden(camera: &Camera, joint: &Point3<f64>, nth: usize, people: &[Body]) 
     })
 }
 
-/// Shows each person to a view; nothing of one who is hidden.
+/// Returns the detection of each person in a view; `None` for a hidden person.
 fn seen(
     camera: &Camera,
     people: &[Body],
@@ -189,13 +189,13 @@ fn seen(
     detections
 }
 
-/// Says if two detections have so many joints in common that they can be compared.
+/// Returns true if two detections have enough joints in common for a comparison.
 fn can_be_compared(a: &Detection, b: &Detection) -> bool {
     let both = a.joints.iter().zip(&b.joints);
     both.filter(|(a, b)| a.is_some() && b.is_some()).count() >= 4
 }
 
-/// Pairs of detections of two views: of one person in truth, as found, and both.
+/// Numbers of pairs of detections in two views: true pairs, found pairs, and pairs that are both.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pairs {
     true_ones: usize,
@@ -203,16 +203,16 @@ struct Pairs {
     right: usize,
 }
 
-/// A detection that a view shows: who each detection is, and whom it was taken for.
+/// A detection in a view: its true person, and the person to whom it was assigned.
 struct Shown<'a> {
     detection: &'a Detection,
     person: usize,
     id: Option<u64>,
 }
 
-/// The detections of every view.
+/// Returns the detections in every view.
 ///
-/// * `who`: the person of each.
+/// * `who`: the true person of each detection.
 fn shown<'a>(views: &'a [View], who: &[Vec<usize>], found: &[Person]) -> Vec<Vec<Shown<'a>>> {
     let id = |view: usize, nth: usize| {
         let is_it = |person: &&Person| person.detections[view] == Some(nth);
@@ -246,7 +246,7 @@ impl Pairs {
         }
     }
 
-    /// F1, precision and recall.
+    /// Returns F1, precision and recall.
     fn scores(&self) -> [f64; 3] {
         let share = |of: usize| self.right as f64 / of as f64;
         let f1 = 2.0 * self.right as f64 / (self.true_ones + self.found) as f64;
@@ -254,7 +254,7 @@ impl Pairs {
     }
 }
 
-/// How many people, views, and how far off the keypoints are.
+/// Number of people, number of views, and error of the keypoints.
 #[derive(Debug, Clone, Copy)]
 struct Setting {
     n_people: usize,
@@ -262,8 +262,8 @@ struct Setting {
     noise_m: f64,
 }
 
-/// Follows people for twenty instants, drawn anew with every seed; counts the pairs of each from the sixth instant on, when who is
-/// seen has been given.
+/// Follows people for twenty instants, with a new draw for every seed. Counts the pairs of each draw from the sixth instant on, after the
+/// people have received their identities.
 fn pairs(motion: &Motion, setting: Setting, n_draws: u64) -> Vec<Pairs> {
     let draw = |seed: u64| {
         let mut random = Rng::with_seed(seed);
@@ -307,7 +307,7 @@ fn two_to_eight_people_are_told_apart_in_the_views_of_real_cameras() {
     let Some(shared) = shared_dir() else { return };
     let motion = Motion::read(&shared.join("data/panoptic_motion"));
     assert_eq!((motion.cameras.len(), motion.clips.len()), (31, 6));
-    // Of 60 draws: people, views, millimetres, and the least F1 of pairs.
+    // For 60 draws: people, views, millimetres, and the smallest F1 of pairs.
     for (n_people, n_views, noise_mm, least) in [
         (8, 5, 20.0, 0.994),
         (8, 5, 50.0, 0.988),

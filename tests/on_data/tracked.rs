@@ -12,12 +12,12 @@ use skeleton::PARSE14;
 use crate::balancing::{Clip, SIZE, clip, compare, reference};
 use crate::shared_dir;
 
-/// Frames of every camera that are searched in order.
+/// Number of consecutive frames of every camera that are searched.
 const N_FRAMES: usize = 60;
-/// The first of these that are fused too.
+/// Number of first frames that are also fused.
 const N_FUSED: usize = 12;
 
-/// Poses by view and frame, and the share of searches that were full.
+/// Poses by view and frame, and the share of full searches.
 struct Searched {
     poses: Vec<Vec<Pose>>,
     full: f64,
@@ -71,7 +71,7 @@ fn tracking_is_nearly_as_accurate_as_a_full_search() {
         );
         reached.push((same, errors));
     }
-    // Reached: 82.9 % of the poses the same, 34.4 px at the median against 34.5 (left and
+    // Reached so far: 82.9 % of the poses are the same, and the median is 34.4 px, compared with 34.5 px (left and
     // right are those of the single view).
     let (share, of_default) = reached[0];
     assert!(share > 0.75, "the same pose in {share} of the frames");
@@ -87,7 +87,7 @@ fn image(clip: &Clip, view: usize, frame: usize) -> Rgb8View<'_> {
     Rgb8View::new(width, height, &clip.frames[view][frame]).unwrap()
 }
 
-/// The best pose of every frame of every view, each view independently.
+/// Returns the best pose in every frame of every view, with each view searched independently.
 fn search(model: &Arc<Model>, clip: &Clip, track: Option<TrackSettings>) -> Searched {
     let settings = ViewSettings {
         track,
@@ -125,14 +125,14 @@ fn search(model: &Arc<Model>, clip: &Clip, track: Option<TrackSettings>) -> Sear
     }
 }
 
-/// Share of frames in which all parts are at the same place and of the same type.
+/// Returns the share of frames in which all parts have the same position and type.
 fn same(a: &Searched, b: &Searched) -> f64 {
     let pairs = a.poses.iter().flatten().zip(b.poses.iter().flatten());
     let same = pairs.filter(|(a, b)| (a.level, &a.parts) == (b.level, &b.parts));
     same.count() as f64 / (a.poses.len() * N_FRAMES) as f64
 }
 
-/// Median and 90th percentile of the distance between joints and the projected reference, pixels.
+/// Returns the median and the 90th percentile of the distance between joints and the projected reference, pixels.
 fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched) -> [f64; 2] {
     let [width, height] = SIZE.map(|size| size as usize);
     let layout = fmp::Layout::new(model, width, height).unwrap();
@@ -151,7 +151,7 @@ fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched
     [0.5, 0.9].map(|share| all.interpolated(share).unwrap())
 }
 
-/// Median and 90th percentile of the joints' errors in the world, all views fused, cm.
+/// Returns the median and the 90th percentile of the joints' errors in the world with all views fused, cm.
 fn fused(
     model: &Arc<Model>,
     rig: &geometry::Rig,

@@ -1,13 +1,13 @@
-//! Files of a crate that need one another, so that none of them can be understood first.
+//! Finds circular dependencies between files of a crate: files that need one another, so that none can be understood first.
 //!
-//! A file needs those that its `use` declarations and the paths in its code (`crate::`, `self::`, `super::`) lead to;
-//! re-exports are followed to the file that defines the name. Tests are left out: whatever `#[cfg(test)]` stands
-//! before, and the files of such modules.
+//! A file needs the files to which its `use` declarations and the paths in its code (`crate::`, `self::`, `super::`) lead.
+//! Re-exports are followed to the file that defines the name. Tests are left out: items after `#[cfg(test)]`, and the files of such
+//! modules.
 //!
-//! A parent module and what is below it count as one place: the parent declares its children, and these may use its
-//! items. So a circle that leads through a parent and back from one of its children is not seen, and none that leads
-//! through the root of the crate. Not seen either: names behind `*`, and what macros write. In a module within a file,
-//! `super` is taken for the one of the file.
+//! A parent module and the modules below it count as one place, because the parent declares its children and these may use its
+//! items. Therefore circles through a parent and back from one of its children are not found, nor are circles through the root
+//! of the crate. Names behind `*` and names in macros are not found either. In a module within a file,
+//! `super` means that file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -16,21 +16,21 @@ use std::path::{Path, PathBuf};
 /// Path of a module below the crate's root; empty for `lib.rs` and `main.rs`.
 type Module = Vec<String>;
 
-/// Where each name that a module re-exports comes from: the module, and the name there.
+/// For each name that a module re-exports, the module that it comes from, and its name there.
 type Exports = BTreeMap<String, (Module, String)>;
 
 /// One name of a `use` declaration.
 struct Import {
     path: Vec<String>,
-    /// The last of the path, or what it is called instead.
+    /// Last component of the path, or its new name after `as`.
     name: String,
     is_public: bool,
 }
 
-/// The circles among the files of a crate, each as the paths of its modules.
+/// Returns the circles among the files of a crate, each as the paths of its modules.
 ///
 /// * `src`: the folder of the crate's root.
-/// * `files`: all in it.
+/// * `files`: all files in this folder.
 pub(crate) fn of_crate(src: &Path, files: &[PathBuf]) -> Vec<Vec<String>> {
     let sources = sources(src, files);
     let exports: BTreeMap<&Module, Exports> =
@@ -49,7 +49,7 @@ pub(crate) fn of_crate(src: &Path, files: &[PathBuf]) -> Vec<Vec<String>> {
     circles(&needs)
 }
 
-/// The code of every module, without tests.
+/// Returns the code of every module, without tests.
 fn sources(src: &Path, files: &[PathBuf]) -> BTreeMap<Module, String> {
     let mut sources = BTreeMap::new();
     let mut of_tests: Vec<Module> = Vec::new();
@@ -74,7 +74,7 @@ fn module_of(file: &Path) -> Module {
     parts
 }
 
-/// The text without comments and tests; and the names of the modules that are for tests.
+/// Returns the text without comments and tests, and the names of the test modules.
 fn code(text: &str) -> (String, Vec<String>) {
     let mut tests = Vec::new();
     let mut kept = String::new();
@@ -86,7 +86,7 @@ fn code(text: &str) -> (String, Vec<String>) {
             kept.push('\n');
             continue;
         }
-        // The item ends in its first line, or with the bracket that stands as far in as it does.
+        // The item ends in its first line, or with the closing bracket at the same indentation.
         let mut is_first = true;
         for line in lines.by_ref() {
             let item = line.get(indent..).unwrap_or_default();
@@ -111,7 +111,7 @@ fn code(text: &str) -> (String, Vec<String>) {
     (kept, tests)
 }
 
-/// The names of the `use` declarations of a text, and the text without them.
+/// Returns the names in the `use` declarations of a text, and the text without these declarations.
 fn imports(text: &str) -> (Vec<Import>, String) {
     let (mut found, mut others) = (Vec::new(), String::new());
     let mut rest = text;
@@ -138,7 +138,7 @@ fn imports(text: &str) -> (Vec<Import>, String) {
     (found, others)
 }
 
-/// Finds the names of a `use` tree that begins with `prefix`.
+/// Finds the names in a `use` tree that starts with `prefix`.
 fn branch(prefix: &[String], tree: &str, is_public: bool, found: &mut Vec<Import>) {
     let (mut depth, mut begin) = (0, 0);
     let mut parts = Vec::new();
@@ -176,7 +176,7 @@ fn branch(prefix: &[String], tree: &str, is_public: bool, found: &mut Vec<Import
     }
 }
 
-/// The names that a module re-exports, and where they come from.
+/// Returns the names that a module re-exports, and where they come from.
 fn exports(module: &Module, text: &str) -> Exports {
     let public = imports(text).0.into_iter().filter(|import| import.is_public);
     public
@@ -206,7 +206,7 @@ fn absolute(path: &[String], module: &Module) -> Module {
     base
 }
 
-/// The paths that a module uses: those of its `use` declarations, and those in its code that begin within the crate.
+/// Returns the paths that a module uses: those in its `use` declarations, and those in its code that start within the crate.
 fn paths(text: &str) -> Vec<Vec<String>> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let (imports, text) = imports(text);
@@ -225,7 +225,7 @@ fn paths(text: &str) -> Vec<Vec<String>> {
     all
 }
 
-/// The module that a path leads to, through re-exports.
+/// Returns the module to which a path leads, through re-exports.
 fn resolve(
     path: &[String],
     module: &Module,
@@ -240,7 +240,7 @@ fn resolve(
     }
     let mut current = Module::new();
     for mut name in absolute(path, module) {
-        // Names that are re-exported in a circle do not compile; the limit is for half-written files.
+        // Names that are re-exported in a circle do not compile; the limit is for unfinished files.
         for _ in 0..10 {
             let below: Module = current.iter().chain([&name]).cloned().collect();
             if sources.contains_key(&below) {
@@ -257,7 +257,7 @@ fn resolve(
     Some(current)
 }
 
-/// Sets of modules that reach one another.
+/// Returns sets of modules that reach one another.
 fn circles(needs: &BTreeMap<&Module, BTreeSet<&Module>>) -> Vec<Vec<String>> {
     let reach = |from: &Module| {
         let mut reached: BTreeSet<&Module> = BTreeSet::new();
@@ -289,7 +289,7 @@ fn circles(needs: &BTreeMap<&Module, BTreeSet<&Module>>) -> Vec<Vec<String>> {
 mod tests {
     use super::*;
 
-    /// Returns the circles of a crate of these files.
+    /// Returns the circles of a crate with these files.
     fn circles_in(files: &[(&str, &str)]) -> Vec<Vec<String>> {
         let folder = tempfile::tempdir().unwrap();
         let write = |(name, text): &(&str, &str)| {

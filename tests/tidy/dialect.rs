@@ -1,10 +1,10 @@
-//! The old dialect of the sources, counted: closure arguments called `it`, functions called `of`, and documentation that begins with
-//! a question word in place of a name or a verb.
+//! Counts the old dialect in the sources: closure arguments called `it`, functions called `of`, and documentation that begins with
+//! a question word instead of a name or a verb.
 
 use std::fs;
 use std::path::PathBuf;
 
-/// Number of places in the old dialect.
+/// Returns the number of places in the old dialect.
 pub(crate) fn count(files: &[PathBuf]) -> usize {
     files
         .iter()

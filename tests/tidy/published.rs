@@ -1,16 +1,16 @@
-//! Crates that are published, and the versions of what is.
+//! Published crates, and the versions of published packages.
 
 use std::fs;
 use std::path::Path;
 
 use toml::Table;
 
-/// Folders of the crates that are published: the client and what it needs.
+/// Folders of the published crates: the client and its dependencies.
 pub(crate) const PUBLISHED: &[&str] = &[
     "client", "failure", "files", "formats", "messages", "runfiles", "runtime",
 ];
 
-/// Says what is wrong with how the crate in a folder is published or kept back.
+/// Returns a description of what is wrong with the publishing settings of the crate in a folder.
 pub(crate) fn fault(name: &str, dir: &Path, dependencies: &[String]) -> Option<String> {
     let manifest = table(&dir.join("Cargo.toml"));
     let package = manifest["package"].as_table().unwrap();
@@ -39,7 +39,7 @@ pub(crate) fn fault(name: &str, dir: &Path, dependencies: &[String]) -> Option<S
     })
 }
 
-/// Versions of the workspace and of the Python package, as each file tells it.
+/// Returns the versions of the workspace and of the Python package, as written in each file.
 pub(crate) fn versions(root: &Path) -> [String; 3] {
     let text = |value: &toml::Value| value.as_str().unwrap().to_owned();
     let workspace = table(&root.join("Cargo.toml"));

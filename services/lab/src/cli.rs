@@ -6,9 +6,9 @@ use terminal::{EXIT_CODES, Globals, completions};
 use crate::commands::{eval, judge, model, simulate, smooth, synth, train};
 
 const LONG_ABOUT: &str = "\
-The laboratory of Parallax: trainings, evaluations, and synthetic sequences with their truth.
+The laboratory of Parallax: trains models, evaluates the method, and makes synthetic sequences with ground truth.
 
-`parallax` runs the rigs; its deployments use the models that are trained here.";
+The other program, `parallax`, runs deployments. They use the models that `parallax-lab` trains.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -18,10 +18,10 @@ Examples:
     parallax-lab model show pose.onnx                   explain a network by its card
     parallax-lab eval HumanEva_I --model he.txt --out out/he    repeat the paper's evaluation
     parallax-lab synth out/walk --actions walking       make synthetic pictures, with the truth
-    parallax-lab simulate hosts --cameras 8 --hosts 2   predict the needs of a deployment of several machines
+    parallax-lab simulate hosts --cameras 8 --hosts 2   predict the resources that several machines need
 ";
 
-/// Trains and judges models, evaluates the method, makes synthetic sequences.
+/// Trains and evaluates models, evaluates the method, and makes synthetic sequences.
 #[derive(Debug, Parser)]
 #[command(
     name = "parallax-lab",
@@ -45,21 +45,21 @@ pub(crate) struct Cli {
 /// The command.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Train a model from annotated people.
+    /// Train a model or a network, or learn multi-view consistency.
     #[command(subcommand)]
     Train(train::Command),
-    /// Evaluate versions of the method on sequences whose joints are known.
+    /// Evaluate versions of the method on sequences with known joints.
     Eval(Box<eval::Arguments>),
     /// Evaluate a model on annotated people: PCP and PCK.
     Judge(judge::Arguments),
-    /// Read, show and convert models.
+    /// Convert and show models and networks.
     #[command(subcommand)]
     Model(model::Command),
-    /// Make synthetic sequences of people, with the truth.
+    /// Make synthetic sequences of people, with ground truth.
     Synth(Box<synth::Arguments>),
-    /// Compare the smoothing methods, applied to a finished run, with the truth.
+    /// Compare the smoothing methods on a finished run with the ground truth.
     Smooth(smooth::Arguments),
-    /// Predict the cores, the network and the latency that a deployment needs.
+    /// Predict the processor cores, network capacity and latency of a deployment.
     #[command(subcommand)]
     Simulate(simulate::Command),
     /// Print the completion script of a shell.

@@ -17,7 +17,7 @@ use terminal::completions;
 
 use crate::cli::{Cli, Command};
 
-/// Runs the command of the command line.
+/// Runs the command given on the command line.
 pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
     init_logging("parallax-lab", cli.globals.level());
     match cli.command {

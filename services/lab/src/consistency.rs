@@ -1,4 +1,4 @@
-//! Common structure of several views of a person, learned from sequences with truth.
+//! Common structure of several views of a person, learned from sequences with ground truth.
 
 mod report;
 mod split;
@@ -12,25 +12,25 @@ use training::datasets::sequences::Sequence;
 use crate::failures::sequence_failure;
 pub use work::{Done, Job, Learning};
 
-/// Sequences that were read.
+/// Sequences, split into those for training and those held out.
 #[derive(Debug)]
 pub struct Sequences {
-    /// Those that are learned from.
+    /// Sequences for training.
     pub train: Vec<Sequence>,
-    /// Those of the subjects that the weights are chosen on.
+    /// Sequences of the held-out subjects, on which the weights are chosen.
     pub held_out: Vec<Sequence>,
 }
 
 impl Sequences {
     /// Reads sequences.
     ///
-    /// * `hold_out`: subjects to hold out; without any the last fourth of them.
+    /// * `hold_out`: subjects to hold out; if empty, the last quarter of the subjects.
     /// * `every`, `frames`: takes the first frame and every `every`-th frame after it, at most `frames` of each sequence.
-    /// * `rig`: what the cameras are called by, if all sequences are of one rig.
+    /// * `rig`: name of the rig, if all sequences are of one rig.
     ///
     /// # Errors
     ///
-    /// A sequence cannot be read; no subject is left to learn from; the sequences are not of one rig.
+    /// Fails if a sequence cannot be read, if no subject is left for training, or if `rig` is given and the sequences have different rigs.
     pub fn read(
         paths: &[PathBuf],
         hold_out: &[String],

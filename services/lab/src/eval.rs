@@ -1,4 +1,4 @@
-//! The evaluation on sequences or pictures whose joints are known: solved, kept, scored, reported.
+//! Evaluation on sequences or pictures with known joints: solves frames, stores results, scores and reports them.
 
 pub mod as_run;
 pub mod evidence;

@@ -1,12 +1,11 @@
-//! Exit status of the errors of data sets, sequences, films and networks.
+//! Exit status for errors of data sets, sequences, films and networks.
 
 use crate::evaluation::FilmError;
 use failure::{ExitKind, Failure};
 use training::datasets::DatasetError;
 use training::datasets::sequences::SequenceError;
 
-/// A data set that cannot be read. A selection without people is a mistake on the command line, all else is one of
-/// the data set.
+/// Converts the error of a data set. A selection without people is a usage error; all other errors are input errors.
 pub fn dataset_failure(error: DatasetError) -> Failure {
     let kind = match error {
         DatasetError::Select(_) => ExitKind::Usage,
@@ -15,7 +14,7 @@ pub fn dataset_failure(error: DatasetError) -> Failure {
     Failure::new(kind, error)
 }
 
-/// A sequence that cannot be read.
+/// Converts the error of a sequence.
 pub fn sequence_failure(error: SequenceError) -> Failure {
     let kind = match &error {
         SequenceError::Rig(geometry::files::RigFileError::Read { .. }) => ExitKind::Input,
@@ -25,7 +24,7 @@ pub fn sequence_failure(error: SequenceError) -> Failure {
     Failure::new(kind, error)
 }
 
-/// Frames of a sequence that cannot be read.
+/// Converts the error of frames that cannot be read.
 pub(crate) fn film_failure(error: FilmError) -> Failure {
     let kind = match &error {
         FilmError::Footage { .. } => ExitKind::Input,

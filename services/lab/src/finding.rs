@@ -1,7 +1,7 @@
-//! The training of the network that finds people in whole pictures: its pictures, and what comes out.
+//! Training of the network that finds people in whole pictures.
 //!
-//! Three sources of pictures: photographs with marked people, in which a teacher (another detector) finds everybody else;
-//! photographs without people; and synthetic scenes, with boxes around everybody.
+//! The pictures come from three sources: photographs of annotated people, photographs without people, and synthetic scenes. In the
+//! photographs of annotated people, a teacher (another detector) finds the people without marks.
 
 mod judge;
 mod photographs;
@@ -24,27 +24,27 @@ pub use crate::trained::{Earlier, Job};
 pub use judge::judge;
 pub use train::{Pass, train};
 
-/// Which pictures are learned from.
+/// Sources of the training pictures.
 #[derive(Debug)]
 pub struct Sources {
-    /// Photographs of marked people.
+    /// Photographs of annotated people.
     pub photographs: Chosen,
-    /// The teacher, once for every thread that asks it, or none.
+    /// The teacher, one copy for each thread; empty if there is no teacher.
     pub teachers: Vec<Detector>,
-    /// A folder of photographs without people.
+    /// Folder of photographs without people.
     pub empty: Option<PathBuf>,
-    /// Scenes that do not exist.
+    /// Synthetic scenes.
     pub scenes: Scenes,
 }
 
-/// One of this many blocks of photographs in a row, and of this many subjects of scenes, is kept apart.
+/// One in this many blocks of photographs, and one in this many subjects of scenes, is held out.
 const KEPT: usize = 12;
-/// Photographs in a row that are kept apart together: neighbours often show the same event.
+/// Number of consecutive photographs that are held out together: neighbours often show the same event.
 const BLOCK: usize = 20;
-/// Amount by which hands, feet and hair reach beyond the joints: share of the longer side, on each side.
+/// Margin for hands, feet and hair around the joints, on each side, as a share of the longer side of the box.
 const BEYOND: f64 = 0.05;
 
-/// The pictures to learn from, and those that are kept apart.
+/// Training pictures and held-out pictures.
 pub type Prepared = crate::prepared::Prepared<Picture>;
 
 impl Example for Picture {
@@ -60,7 +60,7 @@ impl Example for Picture {
 ///
 /// # Errors
 ///
-/// A data set, a picture or a scene cannot be used; it was stopped ([`ExitKind::Interrupted`]).
+/// Fails if a data set, a picture or a scene cannot be used, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn prepare(
     sources: &Sources,
     (stop, console): (&Stop, &dyn Console),
@@ -81,13 +81,11 @@ pub fn prepare(
         prepared.add(picture, subject.is_multiple_of(KEPT as u64));
     }
     let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!(
-        "{learnt} pictures to learn from, {kept} kept apart"
-    ));
+    console.message(&format!("{learnt} pictures for training, {kept} held out"));
     Ok(prepared)
 }
 
-/// The box around joints, and what reaches beyond them; nothing where fewer than two are known.
+/// Returns the box around joints with a margin; `None` if fewer than two are known.
 fn around_joints(joints: impl Iterator<Item = [f64; 2]>) -> Option<[f64; 4]> {
     let known = joints.filter(|at| at.iter().all(|side| side.is_finite()));
     let [left, top, right, bottom] = posenetwork::outline_of(known)?;

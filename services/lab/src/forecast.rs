@@ -1,71 +1,71 @@
-//! Forecast of what cameras on hosts need: processor time, network, latency. For planning, from measured costs.
+//! Forecast of the resources that cameras and hosts need: processor time, network, latency. It is computed from measured costs.
 //!
-//! Every stage is a queue with one server of deterministic service (M/D/1 is not assumed: frames come at a fixed rate, so what waits is what the
-//! other processes of a host take of its cores). A host is full when its processes take all of its cores.
+//! Frames arrive at a fixed rate, so there is no random queueing (as in M/D/1). A process waits only while other processes of its host use
+//! the cores. A host is full when its processes use all of its cores.
 
 use serde::Serialize;
 
-/// Processor time of one frame of one view, milliseconds, and its size.
+/// Processor time for one frame of one view, in milliseconds, and sizes of its messages.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Costs {
-    /// `capture`.
+    /// Time of `capture`.
     pub capture_ms: f64,
-    /// `pose`.
+    /// Time of `pose`.
     pub pose_ms: f64,
-    /// To JPEG, on the host of the camera.
+    /// Time to encode a frame as JPEG, on the host of the camera.
     pub encode_ms: f64,
-    /// From JPEG, on the host that fuses.
+    /// Time to decode a JPEG, on the fusing host.
     pub decode_ms: f64,
-    /// `fuse`, `triangulate` and `results`, for every view of a frame.
+    /// Time of `fuse`, `triangulate` and `results` for each view of a frame.
     pub fuse_ms_per_view: f64,
-    /// The same for every frame, whatever views it has.
+    /// Time of the same processes for each frame, independent of the number of views.
     pub fuse_ms: f64,
-    /// Bytes of a frame as JPEG at search size, with its head.
+    /// Bytes of a frame as JPEG at search size, with its header.
     pub frame_bytes: f64,
-    /// Bytes of the poses of a view, with their head.
+    /// Bytes of the poses of a view, with their header.
     pub pose_bytes: f64,
-    /// Network time of a small message, one way.
+    /// Network time of a small message in one direction.
     pub network_ms: f64,
 }
 
 /// Cameras and hosts to plan for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Load {
-    /// Cameras.
+    /// Number of cameras.
     pub n_cameras: usize,
-    /// Hosts, the one that fuses among them; 1 for one machine without a link.
+    /// Number of hosts, including the fusing host; 1 for a single machine without a link.
     pub n_hosts: usize,
-    /// Cores of each.
+    /// Cores of each host.
     pub n_cores: f64,
     /// Frames per second.
     pub rate_hz: f64,
     /// Bytes per second that a host can send or receive.
     pub network_bytes_s: f64,
-    /// True if poses cross in place of frames.
+    /// True if hosts send poses instead of frames.
     pub with_poses: bool,
-    /// Views of the host that fuses; none where they are to be spread.
+    /// Number of views on the fusing host; `None` to distribute them by cost.
     pub near: Option<usize>,
 }
 
 /// Resources that a load needs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Forecast {
-    /// Views of the host that fuses, and the most of any other.
+    /// Number of views on the fusing host, and the largest number on another host.
     pub views: [usize; 2],
-    /// Cores that are used: on the host that fuses, and the most of any other.
+    /// Cores in use on the fusing host, and the largest number on another host.
     pub cores: [f64; 2],
-    /// Bytes per second that the host that fuses receives, and the most that another sends.
+    /// Bytes per second that the fusing host receives, and the most that another host sends.
     pub bytes_s: [f64; 2],
-    /// From capture to result, milliseconds, where it fits.
+    /// Latency from capture to result in milliseconds, if the load fits.
     pub latency_ms: f64,
-    /// Share of the link in it, codec and network.
+    /// The part of this latency that the link causes: codec and network.
     pub link_ms: f64,
-    /// True if every host has enough cores, and the network enough room.
+    /// True if every host has enough cores and the network has enough capacity.
     pub fits: bool,
 }
 
-/// Returns the resources that cameras on hosts need. Cameras are spread evenly over the hosts, by their cost: the host that fuses gets
-/// fewer where it has more to do, unless its views are given.
+/// Returns the resources that cameras on hosts need. Cameras are distributed evenly by cost: the fusing host gets
+/// fewer of them, because it has more work. If the load has `near`, the fusing host gets this number of views.
 pub fn forecast(costs: &Costs, load: &Load) -> Forecast {
     let n_far = load.n_hosts.saturating_sub(1);
     if let Some(near) = load.near.filter(|near| n_far > 0 && *near <= load.n_cameras) {
@@ -104,7 +104,7 @@ fn with_views(costs: &Costs, load: &Load, near: usize, n_far: usize) -> Forecast
         costs.frame_bytes
     };
     let bytes_s = [far, most_far].map(|views| views as f64 * bytes * load.rate_hz);
-    // Processes of one frame are due together: they share the cores.
+    // The processes of one frame run at the same time and share the cores.
     let rounds = |views: usize, ms: f64| ms * (views as f64 / load.n_cores.max(1.0)).max(1.0);
     let n_poses_here = if load.with_poses {
         near
@@ -190,7 +190,7 @@ mod tests {
         };
         let got = forecast(&COSTS, &with_poses);
         assert!(got.fits, "{got:?}");
-        // Everything is somewhere, and the host that fuses has no more views than the others.
+        // Every view has a host, and the fusing host has no more views than the others.
         assert!(got.views[0] <= got.views[1] && got.views[0] + 2 * got.views[1] >= 16);
         assert!(got.bytes_s[0] < 16.0 * 4_000.0 * 10.0 + 1.0);
     }
@@ -203,7 +203,7 @@ mod tests {
             ..LOAD
         };
         let got = forecast(&COSTS, &load);
-        // All poses are still found on one host: more hosts do not help there.
+        // The fusing host still finds all poses, so more hosts do not help.
         assert!(got.cores[0] > 16.0 * 0.4, "{got:?}");
         assert!(!got.fits);
     }

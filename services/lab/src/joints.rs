@@ -1,4 +1,4 @@
-//! Where joints lie among the parts of a model, learned on photographs of marked people.
+//! Positions of joints relative to the parts of a model, learned on photographs of annotated people.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,32 +15,32 @@ use crate::failures::dataset_failure;
 use crate::judged;
 use crate::person::{Chosen, deal, read_options, sides_of};
 
-/// Fewest people of a data set who were found: fewer cannot be dealt into shares.
+/// Smallest number of people who must be found in a data set; fewer cannot be divided for cross-validation.
 const FEWEST: usize = 20;
 
 /// A learned joint map.
 #[derive(Debug)]
 pub struct Learned {
-    /// The file.
+    /// Content of the file.
     pub file: JointFile,
-    /// Trials: reach, ridge, and the error of every data set on people that were left out.
+    /// Trials: reach, ridge, and the error in every data set on people who were left out.
     pub tried: Vec<multiview::learned::Tried>,
 }
 
-/// A data set, found.
+/// A data set and the people found in it.
 struct Found {
     name: String,
     n_people: usize,
     people: Vec<Marked>,
 }
 
-/// Searches all people, learns their joints, and writes the file; on rayon's current pool.
+/// Searches all people, learns their joints, and writes the file, on rayon's current pool.
 ///
-/// * `fingerprint`: of the model file.
+/// * `fingerprint`: fingerprint of the model file.
 ///
 /// # Errors
 ///
-/// A data set or a picture cannot be read, or too few people were found; the file cannot be written; a stop request
+/// Fails if a data set or a picture cannot be read, if too few people are found, if the file cannot be written, or on a stop request
 /// ([`ExitKind::Interrupted`]).
 pub fn train(
     chosen: &Chosen,
@@ -126,7 +126,7 @@ fn found(
     Ok(sets)
 }
 
-/// The best detection on a person, if there is one.
+/// Returns the best detection on the person, if there is one.
 fn marked(search: &Search, person: &Person) -> Result<Option<Marked>, Failure> {
     let [_, on_person] = judged::find(search, person)?;
     let centres = on_person.and_then(|on_person| on_person.try_into().ok());
@@ -136,7 +136,7 @@ fn marked(search: &Search, person: &Person) -> Result<Option<Marked>, Failure> {
     }))
 }
 
-/// A percentage with four decimals.
+/// Rounds a percentage to four decimals.
 fn rounded(percent: f64) -> f64 {
     (percent * 1e4).round() / 1e4
 }

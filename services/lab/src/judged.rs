@@ -1,4 +1,4 @@
-//! A model on pictures of people whose joints are known.
+//! Evaluation of a model on pictures of people with known joints.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -14,18 +14,18 @@ use statistics::score::{
 };
 use training::datasets::{People, Person, Picture};
 
-/// Most detections that are looked through for the one that lies on the person.
+/// Largest number of detections that are searched for the one on the person.
 const MOST: usize = 10_000;
 
-/// Least share of a person's box that a detection on the person covers.
+/// Smallest share of a person's box that a detection must cover to be on the person.
 const COVERED: f64 = 0.3;
 
-/// A model, and where joints lie among its parts.
+/// A model and its map from parts to joints.
 #[derive(Debug)]
 pub struct Reader {
     /// Searches with the model.
     pub search: Search,
-    /// From parts to the joints of `skeleton::PARSE14`; a choice of parts without it.
+    /// Map from parts to the joints of `skeleton::PARSE14`; without it, each joint is the centre of one part.
     pub joint_map: Option<Arc<JointMap>>,
 }
 
@@ -39,15 +39,15 @@ impl Reader {
     }
 }
 
-/// Tries a model on people, on rayon's current pool.
+/// Evaluates a model on people, on rayon's current pool.
 ///
-/// * `name`: of the data set.
-/// * `stop`: whether to give up, asked before every person.
-/// * `console`: is given a message about everybody who was left out, and every person who is done.
+/// * `name`: name of the data set.
+/// * `stop`: checked before every person.
+/// * `console`: shows every person who was left out, and the progress.
 ///
 /// # Errors
 ///
-/// An image cannot be read; it was given up ([`ExitKind::Interrupted`]).
+/// Fails if an image cannot be read, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn judged(
     reader: &Reader,
     name: &str,
@@ -66,7 +66,7 @@ pub fn judged(
     })
 }
 
-/// Gives up if a stop was requested.
+/// Fails if a stop was requested.
 pub(crate) fn go_on(stop: &Stop) -> Result<(), Failure> {
     if stop.is_requested() {
         return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
@@ -74,9 +74,9 @@ pub(crate) fn go_on(stop: &Stop) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the joints found on people, beside the truth.
+/// Returns the joints found on people, with the ground truth.
 ///
-/// * `find`: the detections of every person; it advances the bar of the console.
+/// * `find`: returns the detections of every person, and advances the progress bar of the console.
 pub(crate) fn pictures(
     name: &str,
     people: &People,
@@ -98,29 +98,29 @@ pub(crate) fn pictures(
     })
 }
 
-/// Refuses a model of other parts.
+/// Refuses a model with another number of parts.
 ///
 /// # Errors
 ///
-/// The model has not 26 parts.
+/// Fails if the model does not have 26 parts.
 pub fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
     let n = model.n_parts();
     if n == N_PARTS {
         return Ok(());
     }
-    let message = format!("{name} has {n} parts, only models of {N_PARTS} can be judged");
+    let message = format!("{name} has {n} parts, but only models with {N_PARTS} can be evaluated");
     Err(Failure::new(ExitKind::Input, message))
 }
 
-/// The joints of a person; there are 14, or the data set would have been refused.
+/// Returns the true joints of a person. There are always 14: data sets with another number are refused.
 pub(crate) fn truth(person: &Person) -> Joints {
     core::array::from_fn(|i| person.joints.get(i).copied().unwrap_or([f64::NAN; 2]))
 }
 
-/// The centres of the parts of a detection.
+/// Centres of the parts of a detection, in pixels.
 pub(crate) type Centres = Vec<[f64; 2]>;
 
-/// The best detection, and the best one on the person.
+/// Returns the best detection, and the best one on the person.
 pub(crate) fn find(search: &Search, person: &Person) -> Result<[Option<Centres>; 2], Failure> {
     let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
     let size = picture.size();
@@ -146,7 +146,7 @@ pub(crate) fn find(search: &Search, person: &Person) -> Result<[Option<Centres>;
     Ok([best.as_ref().map(centres), covering.map(centres)])
 }
 
-/// Score of a pose, and the box around all its parts.
+/// Returns the score of a pose, and the box around all its parts.
 fn around(model: &fmp::Model, pose: &Pose, layout: &Layout) -> (f64, [f64; 4]) {
     let boxes = (0..N_PARTS).map(|i| pose.part_box(model, layout, i));
     let whole = boxes.reduce(|a, b| {
@@ -160,7 +160,7 @@ fn around(model: &fmp::Model, pose: &Pose, layout: &Layout) -> (f64, [f64; 4]) {
     (f64::from(pose.score), whole.unwrap_or([0.0; 4]))
 }
 
-/// A report for programs: percentages.
+/// Returns a report as JSON, in percent.
 pub fn numbers(report: &Report) -> Value {
     let sticks = |rule: PcpRule| {
         let each = PARSE_STICKS.iter().zip(report.sticks(rule));
@@ -192,7 +192,7 @@ pub fn numbers(report: &Report) -> Value {
     })
 }
 
-/// The mean offsets of joints for programs.
+/// Returns the mean offsets of joints as JSON.
 pub fn offset_numbers(offsets: &[Offset]) -> Value {
     let each = offsets.iter().map(|offset| {
         json!({
@@ -208,10 +208,11 @@ pub fn offset_numbers(offsets: &[Offset]) -> Value {
     each.collect()
 }
 
-/// The mean offsets of joints as a table.
+/// Returns the mean offsets of joints as a table.
 pub fn offset_table(offsets: &[Offset]) -> String {
     let mut text =
-        "mean offset, % of the height     found    along the bone          across it".to_owned();
+        "mean offset, % of the height     found    along the bone          across the bone"
+            .to_owned();
     for it in offsets {
         let number = |axis: usize| {
             let [low, high] = it.interval[axis];

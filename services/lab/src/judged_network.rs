@@ -1,4 +1,4 @@
-//! A network on pictures of people whose joints are known: what it finds in their true boxes.
+//! Evaluation of a network on pictures of people with known joints.
 
 use crate::evaluation::{Joints, Pictures};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
@@ -10,18 +10,18 @@ use training::datasets::{People, Person, Picture, Sides};
 
 use crate::judged::{go_on, pictures, truth};
 
-/// Index of the neck in `skeleton::PARSE14`; below, that of the top of the head.
+/// Index of the neck in `skeleton::PARSE14`; `HEAD` is the index of the top of the head.
 const NECK: usize = 12;
 const HEAD: usize = 13;
 
-/// A network, and how its boxes are found.
+/// A network, and the method to find its boxes.
 #[derive(Debug)]
 pub struct NetworkReader {
     /// The network.
     pub network: PoseNetwork,
-    /// Meaning of left and right in the marks.
+    /// Meaning of left and right in the labels.
     pub sides: Sides,
-    /// Finds the boxes; the box around the marked joints is used without it.
+    /// Detector that finds the boxes; without it, the box around the marked joints is used.
     pub finder: Option<Detector>,
 }
 
@@ -30,36 +30,36 @@ pub struct NetworkReader {
 pub struct Seen {
     /// The joints at the maxima of the maps: the first of [`Pictures::found`].
     pub pictures: Pictures,
-    /// Errors of the joints with a mark and a maximum, by person.
+    /// Errors of the joints with a mark and a maximum, for each person.
     pub errors: Vec<Vec<JointError>>,
 }
 
-/// How far a joint at the maximum of its map is off, and how far it was expected to be.
+/// True and expected error of a joint at the maximum of its map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointError {
-    /// Share of the height of the network's window: [`JointMaps::expected_px`].
+    /// Expected error ([`JointMaps::expected_px`]), as a share of the height of the network's window.
     pub expected: f64,
-    /// Share of that height as well.
+    /// True error, as a share of the same height.
     pub error: f64,
-    /// The same distance, lengths of the person's head: from the top of the head to the neck as they are marked.
+    /// True error in head lengths, from the marked top of the head to the marked neck.
     pub in_heads: f64,
 }
 
 impl JointError {
-    /// Returns true if it is off by more than half a head.
+    /// Returns true if the true error is more than half a head.
     pub fn is_far(&self) -> bool {
         self.in_heads > 0.5
     }
 }
 
-/// Tries a network on people, each in the box around the marked joints.
+/// Evaluates a network on people. Each person is shown in the box around the marked joints.
 ///
-/// * `stop`: whether to give up, asked before every person.
-/// * `console`: is given a message about everybody who was left out, and every person who is done.
+/// * `stop`: checked before every person.
+/// * `console`: shows every person who was left out, and the progress.
 ///
 /// # Errors
 ///
-/// An image cannot be read, or the network fails on it; it was given up ([`ExitKind::Interrupted`]).
+/// Fails if an image cannot be read, if the network fails on an image, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn judged(
     reader: &NetworkReader,
     people: &People,
@@ -84,7 +84,7 @@ pub fn judged(
     Ok(Seen { pictures, errors })
 }
 
-/// The errors of the joints of a person; none where the head has no length.
+/// Returns the errors of a person's joints; empty if the length of the head is 0.
 fn errors_of(maps: &JointMaps, truth: &Joints) -> Vec<JointError> {
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let head = distance(truth[NECK], truth[HEAD]);
@@ -135,7 +135,7 @@ impl NetworkReader {
     }
 }
 
-/// The joints at the maxima of their maps; not finite if a joint does not follow from the keypoints.
+/// Returns the joints at the maxima of their maps; not finite if the keypoints do not determine a joint.
 fn at_peaks(peaks: &[Option<Keypoint>]) -> Joints {
     core::array::from_fn(|joint| {
         let peak = peaks.get(joint).copied().flatten();

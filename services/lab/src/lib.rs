@@ -1,7 +1,7 @@
-//! Work from files to files: trainings, evaluations, models tried on pictures, synthetic sequences.
+//! Jobs from files to files: trainings, evaluations, models on pictures, synthetic sequences.
 //!
-//! The algorithms are in crates of their own, but for the [`evaluation`]; here they are given files, threads, a [`Stop`](failure::Stop) and a
-//! [`Console`](failure::Console), and their errors become a [`Failure`](failure::Failure) with an exit status and a hint.
+//! Except for the [`evaluation`], the algorithms are in other crates. This crate supplies files, threads, a [`Stop`](failure::Stop) and a
+//! [`Console`](failure::Console). It turns errors into a [`Failure`](failure::Failure) with an exit status and a hint.
 #![forbid(unsafe_code)]
 
 pub mod evaluation;

@@ -1,5 +1,5 @@
-//! Parallax, the laboratory: trains and judges models, evaluates the method, makes synthetic sequences, and works out what a
-//! deployment will take. `parallax` runs the rigs.
+//! The laboratory of Parallax: trains and evaluates models, evaluates the method, makes synthetic sequences, and predicts the
+//! resources that a deployment needs. The other program, `parallax`, runs deployments.
 #![forbid(unsafe_code)]
 
 mod cli;

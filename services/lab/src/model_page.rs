@@ -1,6 +1,6 @@
-//! A model as one HTML page that explains it to a person: filters, tree, springs, biases, numbers.
+//! A model as one HTML page with explanations: filters, tree, springs, biases, numbers.
 //!
-//! The page has no script. It is well-formed XML too, which is how the tests read it.
+//! The page has no script. It is also well-formed XML, so the tests read it as XML.
 
 mod biases;
 mod colours;
@@ -16,12 +16,13 @@ use figure::Figure;
 
 /// Draws a model.
 ///
-/// * Every filter as a glyph: per cell the positive weights of its nine orientations, as strokes along
-///   the edges that they answer to.
-/// * The whole body twice, in an ordinary posture: as filters, and as a tree with the springs, which are ellipses at a score of [`SPRING_COST`] below the best.
-/// * Per part the springs of all types and the biases of all pairs of types.
+/// * Every filter as a glyph: for each cell, the positive weights of its nine orientations, as strokes along
+///   the edges that they respond to.
+/// * The whole body twice in an ordinary posture: as filters, and as a tree with springs. Springs are ellipses at a score of
+///   [`SPRING_COST`] below the best.
+/// * For each part, the springs of all types and the biases of all pairs of types.
 ///
-/// Parts and types count from 1, as in everything a user sees.
+/// Parts and types are counted from 1, as in everything that users see.
 pub fn html(model: &Model) -> String {
     let title = &model.spec().name;
     let figure = Figure::new(model);
@@ -54,10 +55,10 @@ pub fn html(model: &Model) -> String {
     page.into_page()
 }
 
-/// How much of the score a part loses on the ellipse that is drawn for its spring.
+/// Loss of score on the ellipse that is drawn for a spring.
 pub const SPRING_COST: f64 = 0.05;
 
-/// Styles that only this page needs.
+/// Styles of this page, besides the common ones.
 const MORE_STYLE: &str = "
 body { max-width: 84em; }
 h3 { margin: 0 0 .5em; }
@@ -80,10 +81,10 @@ table.biases td { min-width: 2.7em; height: 1.75em; padding: 0 .2em; text-align:
 table.biases th { font-size: .72em; font-weight: normal; color: var(--quiet); padding: 0 .35em; border: 0; }
 ";
 
-const LEGEND: &str = "<p class=\"legend\">Glyphs: a stroke is an edge that the filter wants there, the brighter the larger its weight \
-(positive weights of both contrasts and of none, added up, relative to the filter's largest). Left: the filters of an ordinary posture \
-(of every part the type that rests nearest to the mean of all of its types), each part where its spring would rest. Right: the same tree; the ellipse of a part is where its spring costs 0.05, dots are \
-where the other types would rest. Axes of the springs are cells from the parent, whose place is the cross.</p>\n";
+const LEGEND: &str = "<p class=\"legend\">Glyphs: a stroke is an edge that the filter responds to; brighter strokes have larger weights \
+(the sum of the positive weights with both contrasts and without contrast, relative to the filter's largest). Left: the filters in an ordinary posture, \
+each part at the rest position of its spring. Each part has the type whose rest position is nearest to the mean of all its types. Right: the same tree. \
+On the ellipse of a part, its spring costs 0.05; dots are the rest positions of other types. The axes of the springs show the distance from the parent (the cross), in cells.</p>\n";
 
 fn numbers(model: &Model) -> Html {
     let summary = describe(model);
@@ -104,15 +105,15 @@ fn numbers(model: &Model) -> Html {
         ("filters", summary.n_filters.to_string()),
         ("largest filter, cells", format!("{rows} \u{d7} {cols}")),
         ("cell, px", summary.cell_px.to_string()),
-        ("levels an octave", summary.interval.to_string()),
+        ("levels per octave", summary.interval.to_string()),
         ("root bias", format!("{:.4}", summary.root_bias)),
         ("trained threshold", format!("{:.4}", summary.threshold)),
         (
-            "detects from",
+            "detection threshold",
             format!("{:.4}", summary.detection_threshold),
         ),
         ("biases", format!("{low:.3} to {high:.3}")),
-        ("springs, one a", kind.to_owned()),
+        ("springs, one per", kind.to_owned()),
         ("mirror", mirror.to_owned()),
     ];
     let mut out = html!("<ul class=\"numbers\">\n");
@@ -127,13 +128,13 @@ fn numbers(model: &Model) -> Html {
     out
 }
 
-/// Everything about one part.
+/// Draws the card of one part.
 fn card(model: &Model, part: usize) -> Html {
     let spec = &model.spec().parts[part];
     let n_types = model.n_types(part);
     let parent = spec.edge.as_ref().map_or("the root".to_owned(), |edge| {
         let name = &model.spec().parts[edge.parent].name;
-        format!("hangs on {} {name}", edge.parent + 1)
+        format!("child of {} {name}", edge.parent + 1)
     });
     let s = if n_types == 1 { "" } else { "s" };
     let mut out = html!(

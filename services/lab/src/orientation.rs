@@ -1,7 +1,7 @@
-//! The network that sees in the picture in which direction a person faces: its samples, and its training.
+//! Training of the network that sees in which direction a person faces.
 //!
-//! Two sources of people whose direction is known: photographs with marked joints, if left and right are marked as
-//! their owner would call them, and scenes that do not exist, searched as the pipeline does.
+//! The people come from two sources: photographs with marked joints, if left and right are sides of the body, and
+//! synthetic scenes, which are searched as in the pipeline.
 
 mod marked;
 mod rendered;
@@ -18,48 +18,48 @@ use viewquality::orientation::{Detector, Network, Score, Settings};
 
 use crate::scenes::Scenes;
 
-/// Data to learn from and to judge on.
+/// Data for training and evaluation.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Annotated people: folders or files.
     pub datasets: Vec<PathBuf>,
-    /// Selections of those who are used, everybody if there is none; each may name its data set: `DATASET=SELECTION`.
+    /// Selections of people to use; all people if empty. A selection may name its data set: `DATASET=SELECTION`.
     pub only: Vec<String>,
-    /// Selections of those who are judged on, and not learned from.
+    /// Selections of people for the evaluation, who are left out of the training.
     pub judge: Vec<String>,
-    /// Scenes that do not exist.
+    /// Synthetic scenes for training.
     pub scenes: Scenes,
-    /// Others, to judge on.
+    /// Synthetic scenes for evaluation.
     pub judge_scenes: Scenes,
     /// Settings of the training.
     pub settings: Settings,
 }
 
-/// How good the network is on people that it has not seen.
+/// Quality of the network on people who are not in the training data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// The data set, or `scenes`.
+    /// Name of the data set, or `scenes`.
     pub on: String,
-    /// People.
+    /// Number of people.
     pub n: usize,
-    /// Share of them for whom it distinguishes the direction from its opposite, from 0 to 1.
+    /// Share of people whose direction the network distinguishes from the opposite one, from 0 to 1.
     pub right: f64,
     /// 95 % interval of that share (Wilson).
     pub interval: [f64; 2],
-    /// Mean surprise, nats; 0.693 for saying nothing.
+    /// Mean surprise in nats; 0.693 if the network gives no information.
     pub surprise: f64,
 }
 
-/// Result of a training and the amount of its data.
+/// Result of a training, and the amount of its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
-    /// Photographs learned from.
+    /// Number of photographs for training.
     pub n_photographs: usize,
-    /// Those of them that show a person from behind.
+    /// Number of these photographs that show a person from behind.
     pub n_behind: usize,
-    /// Pictures of scenes learned from.
+    /// Number of pictures of scenes for training.
     pub n_rendered: usize,
-    /// Every set that was judged on.
+    /// Results on every set of the evaluation.
     pub judged: Vec<Judged>,
 }
 
@@ -69,7 +69,7 @@ struct Work {
 }
 
 impl Work {
-    /// Stops where that was asked for.
+    /// Fails if a stop was requested.
     fn go_on(&self) -> Result<(), Failure> {
         if self.stop.is_requested() {
             return Err(Failure::new(ExitKind::Interrupted, "stopped"));
@@ -78,12 +78,12 @@ impl Work {
     }
 }
 
-/// Trains a network on rayon's current pool, judges it and writes it; it does not depend on the number of threads.
+/// Trains a network on rayon's current pool, evaluates it and writes it. The result does not depend on the number of threads.
 ///
 /// # Errors
 ///
-/// A data set, a picture or a scene that cannot be used; nobody to learn from; the file cannot be written; a stop
-/// request ([`ExitKind::Interrupted`]).
+/// Fails if a data set, a picture or a scene cannot be used, if there are no people to train on, if the file cannot be written, or on a
+/// stop request ([`ExitKind::Interrupted`]).
 pub fn train(
     job: &Job,
     out: &Path,
@@ -114,7 +114,7 @@ pub fn train(
     let network = viewquality::orientation::train(&samples, &job.settings, watch);
     work.go_on()?;
     let network = network.ok_or_else(|| {
-        let message = "nobody to learn from: no person whose direction is known";
+        let message = "no people for training: the direction of no person is known";
         Failure::new(ExitKind::Input, message)
     })?;
     write(out, &network)?;
@@ -141,7 +141,7 @@ fn judged_on(on: String, score: &Score) -> Judged {
     }
 }
 
-/// The 95 % interval of a share (Wilson 1927).
+/// Returns the 95 % interval of a share (Wilson 1927).
 fn wilson(k: usize, n: usize) -> [f64; 2] {
     const Z: f64 = 1.96;
     if n == 0 {

@@ -1,4 +1,4 @@
-//! A model that finds people, trained from annotated people: from data sets to the model's file.
+//! Training of a model that finds people, from annotated people to the model file.
 
 mod alarms;
 mod album;

@@ -1,7 +1,7 @@
-//! The training of the network that finds joints: its people, and what comes out.
+//! Training of the network that finds joints.
 //!
-//! Two sources of people: photographs with marked joints, which a teacher, another network, helps with, and scenes that do not
-//! exist, whose joints and directions are exact.
+//! The people come from two sources: photographs with marked joints, improved by a teacher (another network), and synthetic scenes with
+//! exact joints and directions.
 
 mod crop;
 mod photographs;
@@ -20,25 +20,25 @@ pub use crate::prepared::{read, write};
 pub use crate::trained::{Earlier, Job};
 pub use train::{Pass, train};
 
-/// Who is learned from.
+/// Sources of the people for training.
 #[derive(Debug)]
 pub struct People {
-    /// Photographs of marked people. Left and right are those of the people themselves; where the choice asks for sides as
-    /// seen, the marks say nothing of the direction in which a person faces.
+    /// Photographs of annotated people. Left and right are sides of the body. If the choice has sides as seen, the marks do not
+    /// determine the direction in which a person faces.
     pub photographs: Chosen,
-    /// For every thread that asks them, other networks that help. The first helps with joints without a mark and with marks that
-    /// are wrong; the others with the keypoints that those before them do not know.
+    /// For each thread, the networks that help. The first adds missing joints and corrects wrong marks. The others add the keypoints that
+    /// earlier networks do not have.
     pub teachers: Vec<Vec<PoseNetwork>>,
-    /// Scenes that do not exist.
+    /// Synthetic scenes.
     pub scenes: Scenes,
 }
 
-/// One in this many blocks of people in a row, and of subjects of scenes, is kept apart.
+/// One in this many blocks of consecutive people, and one in this many subjects of scenes, is held out.
 const KEPT: usize = 12;
-/// People in a row of a data set that are kept apart together: neighbours often show the same event.
+/// Number of consecutive people of a data set who are held out together: neighbours often show the same event.
 const BLOCK: usize = 20;
 
-/// The people to learn from, and those who are kept apart: the expected error is learned on these.
+/// People for training, and held-out people, on whom the expected error is learned.
 pub type Prepared = crate::prepared::Prepared<Person>;
 
 impl Example for Person {
@@ -57,7 +57,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Stops where that was asked for.
+    /// Fails if a stop was requested.
     fn go_on(&self) -> Result<(), Failure> {
         if self.stop.is_requested() {
             return Err(Failure::new(ExitKind::Interrupted, "stopped"));
@@ -70,7 +70,7 @@ impl Work<'_> {
 ///
 /// # Errors
 ///
-/// A data set, a picture or a scene cannot be used; it was stopped ([`ExitKind::Interrupted`]).
+/// Fails if a data set, a picture or a scene cannot be used, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn prepare(
     people: &People,
     (stop, console): (Stop, &dyn Console),
@@ -87,7 +87,7 @@ pub fn prepare(
         prepared.add(person, is_kept);
     }
     let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!("{learnt} people to learn from, {kept} kept apart"));
+    console.message(&format!("{learnt} people for training, {kept} held out"));
     Ok(prepared)
 }
 

@@ -1,4 +1,4 @@
-//! Files of prepared examples: what a network learns from, and what is kept apart.
+//! Files of prepared examples: the training examples of a network, and the held-out ones.
 
 use std::io::{BufReader, Read as _, Write as _};
 use std::path::Path;
@@ -6,12 +6,12 @@ use std::path::Path;
 use failure::{ExitKind, Failure};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// The examples to learn from, and those that are kept apart.
+/// Training examples and held-out examples.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Prepared<T> {
-    /// To learn from.
+    /// Training examples.
     pub learnt: Vec<T>,
-    /// Kept apart: the training is watched on them.
+    /// Held-out examples, to monitor the training.
     pub kept: Vec<T>,
 }
 
@@ -36,25 +36,25 @@ impl<T> Prepared<T> {
     }
 }
 
-/// An example of a kind that has files of its own.
+/// A kind of example with its own file format.
 pub trait Example: Serialize + DeserializeOwned {
-    /// How such a file begins.
+    /// First bytes of a file of this kind.
     const KIND: &[u8; 8];
-    /// The command that writes it.
+    /// The command that writes these files.
     const MADE_BY: &str;
 
-    /// Returns whether it has as many pixels as it should.
+    /// Returns true if the example has the right number of pixels.
     fn is_whole(&self) -> bool;
 }
 
-/// How a file ends: one that was cut short lacks it.
+/// Last bytes of a file; a truncated file does not have them.
 const END: &[u8; 8] = b"EVERYONE";
 
-/// Writes prepared examples; the file appears when it is whole.
+/// Writes prepared examples. The file appears only when it is complete.
 ///
 /// # Errors
 ///
-/// The file cannot be written.
+/// Fails if the file cannot be written.
 pub fn write<T: Example>(path: &Path, examples: &Prepared<T>) -> Result<(), Failure> {
     let written = files::replace_by(path, |file| {
         file.write_all(T::KIND)?;
@@ -66,18 +66,18 @@ pub fn write<T: Example>(path: &Path, examples: &Prepared<T>) -> Result<(), Fail
     written.map_err(|error| failure::in_file(path, &error))
 }
 
-/// Returns whether a file holds prepared examples of a kind.
+/// Returns true if a file contains prepared examples of a kind.
 pub fn is_file<T: Example>(path: &Path) -> bool {
     let mut mark = [0; 8];
     let read = files::open(path).and_then(|mut file| file.read_exact(&mut mark));
     read.is_ok() && &mark == T::KIND
 }
 
-/// Reads what [`write()`] wrote.
+/// Reads a file that [`write()`] wrote.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or holds something else.
+/// Fails if the file cannot be read or contains something else.
 pub fn read<T: Example>(path: &Path) -> Result<Prepared<T>, Failure> {
     let fail = |error: std::io::Error| failure::in_file(path, &error);
     let is_other = || {

@@ -1,4 +1,4 @@
-//! The network that predicts the errors of single views: its samples, and its training.
+//! Samples and training of the network that predicts the errors of single views.
 
 pub mod network;
 pub mod samples;

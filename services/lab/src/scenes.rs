@@ -1,4 +1,4 @@
-//! Pictures of people who do not exist.
+//! Pictures of synthetic people.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,25 +8,25 @@ use kernels::Rgb8View;
 use rayon::prelude::*;
 use scene::{Action, Flaws, N_EXTRAS, RigChoice, Scene, Settings, View};
 
-/// Which scenes.
+/// Settings of the scenes.
 #[derive(Debug, Clone)]
 pub struct Scenes {
-    /// How many; each gives some pictures of every camera.
+    /// Number of scenes; each gives several pictures from every camera.
     pub n: u32,
-    /// Numbers of the first and the last of the people in them.
+    /// First and last number of the people in the scenes.
     pub subjects: [u64; 2],
-    /// Frames of every camera of a scene, some seconds apart.
+    /// Frames of every camera in a scene, some seconds apart.
     pub frames: u16,
-    /// Most people beside the subject who stand around, and as many who pass.
+    /// Largest number of other people who stand around the subject, and largest number of people who walk past.
     pub company: u64,
-    /// Photographs without people that stand in the place of every third room.
+    /// Folder of photographs without people; they replace every third room as the background.
     pub backdrop: Option<PathBuf>,
-    /// Seed of everything random.
+    /// Random seed.
     pub seed: u64,
 }
 
 impl Scenes {
-    /// For everything random of a scene.
+    /// Returns the random number generator of a scene.
     fn rng(&self, nth: u32) -> fastrand::Rng {
         fastrand::Rng::with_seed(self.seed.wrapping_mul(1_000_003) + u64::from(nth))
     }
@@ -34,28 +34,29 @@ impl Scenes {
 
 /// One picture of a scene.
 pub(crate) struct Shown<'a> {
-    /// The subject, as a name.
+    /// Name of the subject.
     pub(crate) group: &'a str,
-    /// Content of the picture, as a name.
+    /// Name that describes the content of the picture.
     pub(crate) source: String,
     /// The picture.
     pub(crate) picture: Rgb8View<'a>,
-    /// The joints in it, `skeleton::PARSE14`, pixels; not finite where they are not seen.
+    /// Joints of `skeleton::PARSE14` in the picture, pixels; not finite where they are not visible.
     pub(crate) joints: Vec<[f64; 2]>,
-    /// Nose, heels and big toes in it, as [`Scene::extras`] orders them, pixels; not finite behind the camera.
+    /// Nose, heels and big toes in the picture, in the order of [`Scene::extras`], pixels; not finite behind the camera.
     pub(crate) extras: [[f64; 2]; N_EXTRAS],
-    /// The joints in the world, metres.
+    /// The joints in world coordinates, metres.
     pub(crate) in_world: Vec<[f64; 3]>,
     /// The camera.
     pub(crate) camera: &'a geometry::Camera,
-    /// The joints in the picture of everybody, the subject first, and how many pixels show the person; not finite behind the camera.
+    /// Joints of all people in the picture and the number of pixels that show each person, the subject first. Joints are not finite behind
+    /// the camera.
     pub(crate) everybody: Vec<(Vec<[f64; 2]>, f64)>,
 }
 
-/// Makes something of every picture of all scenes, in the order of the scenes, whatever the threads.
+/// Calls a function on every picture of all scenes, and returns the results in the order of the scenes, whatever the number of threads.
 ///
-/// * `make`: of one picture; nothing if it is of no use.
-/// * `watch`: called with the number of pictures of a camera, and the number of useless ones.
+/// * `make`: returns the result of one picture; `None` if the picture cannot be used.
+/// * `watch`: called with the number of pictures from a camera, and the number of unusable ones among them.
 pub(crate) fn of_pictures<T: Send>(
     scenes: &Scenes,
     make: impl Fn(&Shown<'_>) -> Result<Option<T>, Failure> + Sync,
@@ -68,7 +69,7 @@ pub(crate) fn of_pictures<T: Send>(
     Ok(made?.into_iter().flatten().collect())
 }
 
-/// Returns the settings of a scene, by its number: actions and subjects in turn, all else by chance.
+/// Returns the settings of a scene by its number. Actions and subjects alternate; everything else is random.
 fn settings(scenes: &Scenes, nth: u32) -> Settings {
     let mut rng = scenes.rng(nth);
     let [from, to] = scenes.subjects;
@@ -100,7 +101,7 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
         passers: others(),
         action: Action::ALL[rng.usize(0..Action::ALL.len())],
         seed: rng.u64(1..1 << 32),
-        // One frame in three quarters of a second: no two show the same pose.
+        // One frame in three quarters of a second, so that no two frames show the same pose.
         rate_hz: 4.0 / 3.0,
         backdrop: scenes.backdrop.clone().filter(|_| is_photo),
         flaws: if is_bad { flaws } else { Flaws::default() },
@@ -151,7 +152,7 @@ fn of_scene<T>(
     Ok(all)
 }
 
-/// Everybody in the last picture of a view, the subject first.
+/// Returns all people in the last picture of a view, the subject first.
 fn everybody(
     scene: &Scene,
     camera: &geometry::Camera,

@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use fmp::{ImageTooSmall, Layout, Model};
 use pipeline::{ViewSettings, ViewStep};
 
-/// Number of sizes for which prepared searches are kept: the pictures of a data set have many sizes.
+/// Number of sizes whose prepared searches are kept: the pictures of a data set have many sizes.
 const MOST_SIZES: usize = 8;
 
 /// Searches with one model, by the size of the picture.
 #[derive(Debug)]
 pub(crate) struct Searches {
     model: Arc<Model>,
-    /// By width and height.
+    /// Prepared searches by width and height.
     steps: Mutex<BTreeMap<[usize; 2], Arc<ViewStep>>>,
 }
 
@@ -25,7 +25,7 @@ impl Searches {
         }
     }
 
-    /// The search of pictures of a size.
+    /// Returns the search for pictures of a size.
     pub(crate) fn of_size(
         &self,
         [width, height]: [usize; 2],

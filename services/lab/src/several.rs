@@ -1,4 +1,4 @@
-//! Several people: who is who and where, from what a detector found, judged by the truth.
+//! Evaluation with several people: compares identities and positions with the ground truth, from given detections.
 
 mod everybody;
 mod judge;
@@ -14,21 +14,21 @@ pub use judge::{Put, Score};
 pub use report::{ActorReport, Measured, Report};
 pub use shelf::{Shelf, ShelfError, TruePerson, is_one};
 
-/// Frames a second of the set.
+/// Frame rate of the set.
 const RATE_HZ: f64 = 25.0;
-/// Fewer views do not give a person a place.
+/// Smallest number of views that determines a person's position.
 const LEAST_VIEWS: usize = 2;
 
-/// A run over a set.
+/// Result of a run over a set.
 #[derive(Debug, Clone, Default)]
 pub struct Run {
     /// The score.
     pub score: Score,
-    /// Time of the association alone, frame by frame.
+    /// Duration of the association alone, for each frame.
     pub association: Vec<Duration>,
 }
 
-/// Follows and solves the people of a set, frame after frame, with nothing but the frames before.
+/// Follows and solves the people of a set, frame by frame; each frame uses earlier frames only.
 pub fn run(set: &Shelf) -> Run {
     let settings = Settings {
         max: 8,

@@ -1,4 +1,4 @@
-//! Ways to smooth a finished run beside each other, against the truth, at the same instants.
+//! Comparison of smoothing methods on a finished run with the ground truth, at the same instants.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 use statistics::score::{Bootstrap, Share};
 
-/// Methods that are compared, in the order of tables.
+/// Compared methods, in the order of the tables.
 const METHODS: [&str; 5] = ["raw", "rts", "rts, constant bones", "butterworth", "kalman"];
 
 /// A mean and its 95 % interval.
@@ -24,11 +24,11 @@ pub struct Mean {
     pub interval: [f64; 2],
 }
 
-/// How far a method is from the truth. The numbers are means over joints and instants that every method has, but for those of
+/// Errors of a method against the ground truth. Means are over joints and instants that every method has, except for
 /// filled positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Its name.
+    /// Name of the method.
     pub method: &'static str,
     /// Distance from the true position, mm.
     pub position_mm: Option<Mean>,
@@ -36,34 +36,34 @@ pub struct Row {
     pub velocity_m_s: Option<Mean>,
     /// Error of the acceleration by second differences, m/s².
     pub acceleration_m_s2: Option<Mean>,
-    /// Change of the error from instant to instant, mm.
+    /// Change of the error between consecutive instants, mm.
     pub jitter_mm: Option<Mean>,
-    /// Amount by which it is late, ms.
+    /// Delay of the method, ms.
     pub lag_ms: Option<Mean>,
-    /// Distance from the true position where nothing was measured and it has a position, mm.
+    /// Distance from the true position at instants without a measurement for which the method has a position, mm.
     pub filled_mm: Option<Mean>,
 }
 
 /// All methods against the truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// Joints times instants that are compared.
+    /// Number of compared positions: joints times instants.
     pub n_compared: usize,
     /// A row for every method that has positions.
     pub rows: Vec<Row>,
 }
 
-/// The errors of a method at an instant, and the distances where it filled.
+/// The errors of a method at an instant, and the distances at filled positions.
 type Tried = (Errors, Sum);
 
-/// Compares what a finished run measured of the person with the lowest identity, and every method, with the truth of a sequence, which is of
-/// one person.
+/// Compares every smoothing method, and the raw measurements of a finished run, with the ground truth. The truth is of one person; it is
+/// compared with the person who has the lowest identity.
 ///
-/// * `truth`: what `parallax-lab eval` takes: a folder of `parallax-lab synth`, or a description.
+/// * `truth`: a sequence for `parallax-lab eval`: a folder of `parallax-lab synth`, or a description file.
 ///
 /// # Errors
 ///
-/// The truth cannot be read, is of several sequences, or of none of the frames or joints.
+/// Fails if the truth cannot be read, has several sequences, or has none of the frames or joints of the run.
 pub fn against(
     run: &Run,
     settings: &finished::Settings,
@@ -77,7 +77,7 @@ pub fn against(
     Ok(compare(&person.recorded, settings, &truth))
 }
 
-/// The true joints of every instant, in the order of the joints; `None` where one is not known.
+/// Returns the true joints at every instant, in the order of the joints; `None` for an unknown joint.
 fn truth(
     path: &Path,
     recorded: &Recorded,
@@ -94,7 +94,9 @@ fn truth(
             path.display(),
             sequences.len()
         );
-        return Err(Failure::new(ExitKind::Usage, what).with_hint("name the folder of one of them"));
+        return Err(
+            Failure::new(ExitKind::Usage, what).with_hint("name the folder of one sequence")
+        );
     };
     let first = sequence.views.first().map_or(0, |view| view.first);
     let mut all = vec![vec![None; frames.len()]; recorded.joints.len()];
@@ -129,9 +131,9 @@ fn truth(
 
 /// Compares all methods.
 ///
-/// Intervals are found by drawing blocks of one second.
+/// The bootstrap for the intervals draws blocks of one second.
 ///
-/// * `truth`: of every joint and instant.
+/// * `truth`: true positions, by joint and instant.
 pub fn compare(
     recorded: &Recorded,
     settings: &finished::Settings,
@@ -154,7 +156,7 @@ pub fn compare(
     }
 }
 
-/// The errors of every method at every instant.
+/// Returns the errors of every method at every instant.
 fn tried(
     recorded: &Recorded,
     settings: &finished::Settings,
@@ -202,9 +204,9 @@ fn tried(
     all
 }
 
-/// The row of every method that has positions.
+/// Returns a row for every method that has positions.
 ///
-/// * `tried`: of every method the errors at every instant.
+/// * `tried`: errors by method and instant.
 fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
     let row = |(method, tried): (&&'static str, &Vec<Tried>)| {
         let mean = |factor: f64, of: &dyn Fn(&Tried) -> Sum| {
@@ -240,7 +242,7 @@ fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
 }
 
 impl Row {
-    /// Its numbers with their names and units.
+    /// Returns the numbers with their names and units.
     pub fn numbers(&self) -> [(&'static str, Option<Mean>); 6] {
         [
             ("position_mm", self.position_mm),
@@ -252,7 +254,7 @@ impl Row {
         ]
     }
 
-    /// For programs.
+    /// Returns the comparison as JSON.
     pub fn to_json(&self) -> Value {
         let mut value = json!({ "method": self.method });
         for (name, mean) in self.numbers() {
@@ -265,7 +267,7 @@ impl Row {
     }
 }
 
-/// A table of rows for people.
+/// Returns rows as a text table.
 pub fn table(rows: &[Row]) -> String {
     let mut table = Table::new([
         "<",

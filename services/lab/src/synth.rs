@@ -1,4 +1,4 @@
-//! Sequences of people who do not exist, with the truth: pictures, masks, rigs, annotations, deployments.
+//! Sequences of synthetic people with ground truth: pictures, masks, rigs, annotations, deployments.
 
 mod files;
 mod motion;
@@ -17,73 +17,74 @@ pub use motion::{marker_table, n_frames, recording};
 use people::People;
 use sequence::Sequence;
 
-/// Who does what before which cameras, and what is written of it.
+/// Description of the sequences to make: people, actions, cameras, and files.
 #[derive(Debug)]
 pub struct Job {
-    /// The folder to write; it is there, and empty.
+    /// Output folder, which must exist and be empty.
     pub out: PathBuf,
     /// The cameras.
     pub rig: RigChoice,
     /// Numbers of the subjects.
     pub subjects: Vec<u64>,
-    /// How many other people stand around.
+    /// Number of other people who stand around the subject.
     pub others: u64,
-    /// How many people walk and pass the subject.
+    /// Number of people who walk past the subject.
     pub passers: u64,
-    /// Actions of the people, one after the other; unused with `recording`.
+    /// Actions, one sequence for each; unused with `recording`.
     pub actions: Vec<Action>,
-    /// Recorded motion in the place of an action.
+    /// Recorded motion that replaces an action.
     pub recording: Option<Recording>,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     pub seed: u64,
-    /// Frames of every camera.
+    /// Number of frames per camera.
     pub n_frames: u64,
-    /// Frames a second.
+    /// Frames per second.
     pub rate_hz: f64,
-    /// How pictures are stored.
+    /// File format of pictures.
     pub format: Format,
     /// True if masks are written.
     pub with_masks: bool,
-    /// Folder of photographs that stand in the place of a room.
+    /// Folder of photographs that replace the room as the background.
     pub backdrop: Option<PathBuf>,
-    /// The model that the deployment names; none if not given.
+    /// Model that the deployment names; `None` to name no model.
     pub model: Option<PathBuf>,
-    /// True if no pictures are written, and cameras of the deployment make them while it runs.
+    /// True to write no pictures: the cameras of the deployment render them during the run.
     pub live: bool,
-    /// Flaws of the cameras.
+    /// Simulated flaws of the cameras.
     pub flaws: Flaws,
-    /// How long after the instants of the frames every camera takes its pictures, milliseconds; at most one for each of the rig.
+    /// Delay of each camera's pictures after the nominal instants of the frames, milliseconds; at most one value for each camera of the
+    /// rig.
     pub skews_ms: Vec<f64>,
 }
 
-/// All sequences that were written.
+/// All written sequences.
 #[derive(Debug)]
 pub struct Done {
     /// The sequences, subject by subject.
     pub sequences: Vec<Written>,
-    /// How long it took.
+    /// Total time, seconds.
     pub seconds: f64,
 }
 
-/// A sequence that was written.
+/// A written sequence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
-    /// Where it is.
+    /// Folder of the sequence.
     pub folder: PathBuf,
     /// Number of the subject.
     pub subject: u64,
     /// Action of the subject.
     pub action: String,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     pub seed: u64,
-    /// Pictures of all cameras; those that cameras make later, too.
+    /// Number of pictures from all cameras, including pictures that the cameras render later.
     pub n_pictures: u64,
-    /// People who were annotated.
+    /// Number of annotated people.
     pub n_people: usize,
 }
 
 impl Written {
-    /// For programs.
+    /// Returns the summary as JSON.
     pub fn json(&self) -> Value {
         json!({
             "folder": self.folder,
@@ -98,11 +99,12 @@ impl Written {
 
 /// Writes all sequences, on rayon's current pool; the files do not depend on the number of threads.
 ///
-/// One sequence lies in the folder itself, several in folders of it, with the annotated people of all beside them.
+/// A single sequence is written to the folder itself. Several sequences have one folder each, and the annotated people of all of them are
+/// beside these folders.
 ///
 /// # Errors
 ///
-/// A rig, a backdrop or a flaw that cannot be used; a file that cannot be written; a stop request
+/// Fails if a rig, a backdrop or a flaw cannot be used, if a file cannot be written, or on a stop request
 /// ([`ExitKind::Interrupted`]).
 pub fn write(job: &Job, stop: &Stop, console: &dyn Console) -> Result<Done, Failure> {
     let begin = Instant::now();
@@ -144,7 +146,7 @@ pub fn write(job: &Job, stop: &Stop, console: &dyn Console) -> Result<Done, Fail
 }
 
 impl Job {
-    /// The actions, one of which stands for what was recorded.
+    /// Returns the actions; with recorded motion, a single action represents it.
     fn actions(&self) -> &[Action] {
         match self.recording {
             Some(_) => &[Action::Walking],
@@ -156,7 +158,7 @@ impl Job {
         self.subjects.len() * self.actions().len()
     }
 
-    /// The name of a sequence.
+    /// Returns the name of a sequence.
     fn name(&self, subject: u64, action: Action) -> String {
         let recorded = self.recording.as_ref().map(|recording| recording.name.as_str());
         format!("s{subject}-{}", recorded.unwrap_or(action.name()))
@@ -178,7 +180,7 @@ impl Job {
     }
 }
 
-/// A rig that is found from any working folder.
+/// Makes the path of a rig file absolute, so that it is valid in any working folder.
 fn absolute(rig: &RigChoice) -> RigChoice {
     match rig {
         RigChoice::File(path) => RigChoice::File(absolute_path(path)),
@@ -190,7 +192,7 @@ fn absolute_path(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// A missing rig is a failure of the input; a rig without an upward direction cannot be used.
+/// Converts the error of a rig: a missing rig is an input error, and a rig without an upward direction cannot be used.
 pub fn rig_failure(error: RigChoiceError) -> Failure {
     let kind = match error {
         RigChoiceError::NoUp | RigChoiceError::Rig(_) => ExitKind::Calibration,

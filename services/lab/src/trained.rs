@@ -1,4 +1,4 @@
-//! The training of a network that finds something: steps, checkpoints, curves, progress.
+//! Training of a network that finds people or joints: steps, checkpoints, curves, progress.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -6,40 +6,40 @@ use std::time::Instant;
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use training::networks::{Backend, Pass, Task, TrainError, Trainer};
 
-/// A network that was trained before.
+/// A network from an earlier training.
 #[derive(Debug, Clone)]
 pub struct Earlier {
-    /// Its file, for errors.
+    /// File of the network, for error messages.
     pub file: PathBuf,
-    /// The bytes of the file.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
-/// A training: which file it writes, and how.
+/// Output file and options of a training.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// The ONNX file.
+    /// The ONNX file to write.
     pub out: PathBuf,
-    /// A network that was trained before, to go on from.
+    /// Network from an earlier training to start from.
     pub from: Option<Earlier>,
-    /// Goes on from the checkpoint of an interrupted training.
+    /// True to continue from the checkpoint of an interrupted training.
     pub resume: bool,
     /// The library that computes.
     pub backend: Backend,
 }
 
-/// The results of some steps of a task.
+/// Results of some steps of a task.
 type PassOf<T> = Pass<<T as Task>::Cost, <T as Task>::Score>;
 
-/// How passes are shown.
+/// Functions that display passes.
 pub(crate) struct Shown<'a, T: Task> {
-    /// The curves of all passes, SVG.
+    /// Draws the curves of all passes as SVG.
     pub(crate) curves: &'a dyn Fn(&[PassOf<T>]) -> String,
-    /// A pass in words, after its step.
+    /// Describes a pass in a line of text, which follows the number of the step.
     pub(crate) words: &'a dyn Fn(&PassOf<T>) -> String,
 }
 
-/// A file beside the one that is written.
+/// Returns the path of a file beside the output file.
 fn beside(out: &Path, ending: &str) -> PathBuf {
     let mut name = out.as_os_str().to_owned();
     name.push(ending);
@@ -50,13 +50,13 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     files::replace(path, bytes).map_err(|error| failure::in_file(path, &error))
 }
 
-/// Trains until the task is done; a checkpoint, and curves (`.svg`), follow every pass.
+/// Trains until the task is done. After every pass, a checkpoint and the curves (`.svg`) are written.
 ///
-/// * `written`: the file of the trained network; the checkpoint goes when it is written.
+/// * `written`: returns the content of the network's file; the checkpoint is removed after this file is written.
 ///
 /// # Errors
 ///
-/// The checkpoint is of another training; a file cannot be written; it was stopped ([`ExitKind::Interrupted`]).
+/// Fails if the checkpoint is from another training, if a file cannot be written, or on a stop request ([`ExitKind::Interrupted`]).
 pub(crate) fn run<T: Task>(
     job: &Job,
     task: T,
@@ -68,8 +68,8 @@ pub(crate) fn run<T: Task>(
     let kept = match files::read(&file, files::RESULTS) {
         Ok(bytes) if job.resume => Some(bytes),
         Ok(_) => {
-            let message = format!("{} is of an interrupted training", file.display());
-            let hint = "go on from it with --resume, or delete it";
+            let message = format!("{} is from an interrupted training", file.display());
+            let hint = "continue from it with --resume, or delete it";
             return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
         }
         Err(_) => None,
@@ -87,7 +87,7 @@ pub(crate) fn run<T: Task>(
     while !trainer.is_done() {
         if !trainer.pass(&mut |_| !stop.is_requested()) {
             let message = format!("stopped after step {}", trainer.step());
-            let hint = "go on with --resume";
+            let hint = "continue with --resume";
             return Err(Failure::new(ExitKind::Interrupted, message).with_hint(hint));
         }
         write(&file, &trainer.checkpoint().or_fail(ExitKind::Run)?)?;

@@ -1,4 +1,5 @@
-//! `parallax-lab eval`, and `parallax-lab train consistency` before it, as a user starts them: their files, continuation after an interruption, and refusals.
+//! `parallax-lab eval`, preceded by `parallax-lab train consistency`, as a user starts them: files, resuming after an interruption, and
+//! errors.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -9,7 +10,7 @@ use std::path::PathBuf;
 use common::{Case, Ended, PLAIN, planted};
 use serde_json::Value;
 
-/// Three views of a synthetic walking figure, as a sequence of `n_frames` with ground truth.
+/// Makes a sequence of `n_frames` with ground truth: three views of a synthetic walking figure.
 fn case(n_frames: usize, n_true: usize) -> Case {
     let case = Case::new("eval", &[n_frames; 3], PLAIN);
     let markers: Vec<String> = (0..14).map(|i| format!("M{i}")).collect();
@@ -35,7 +36,7 @@ fn case(n_frames: usize, n_true: usize) -> Case {
     case
 }
 
-/// Two synthetic people, each in one frame of three cameras.
+/// Makes a sequence of two synthetic people, each in one frame of three cameras.
 fn two_people() -> Case {
     let case = Case::new("consistency", &[1; 2], PLAIN);
     let who = ["synth", "people", "--rig", "ring:3", "--subjects", "1-2"];
@@ -73,7 +74,7 @@ fn poses(case: &Case) -> PathBuf {
     case.path("out/poses/planted-walk.jsonl")
 }
 
-/// The figure in three frames of each view, as annotated people.
+/// Writes the figure in three frames of each view as annotated people.
 fn people(case: &Case) -> &'static str {
     let mut lines = String::new();
     for camera in planted::rig(3).cameras() {
@@ -128,9 +129,9 @@ fn options_of_sequences_are_refused_for_single_pictures_and_vice_versa() {
     let case = case(1, 1);
     let people = people(&case);
     for (words, expected) in [
-        (&[people, "--oracle"][..], "--oracle has no meaning"),
-        (&[people, "--resume"], "--resume has no meaning"),
-        (&[people, "walk.toml"], "not judged in one run"),
+        (&[people, "--oracle"][..], "--oracle has no effect"),
+        (&[people, "--resume"], "--resume has no effect"),
+        (&[people, "walk.toml"], "cannot be evaluated in one run"),
         (&["walk.toml", "--only", "1"], "there are none"),
         (&[people, people], "people is given twice"),
     ] {
@@ -170,7 +171,7 @@ fn a_report_has_every_version_and_is_continued_after_an_interruption() {
     assert_eq!(again.status.code(), Some(2), "{}", again.stderr);
     assert!(again.stderr.contains("--resume"), "{}", again.stderr);
 
-    // As after kill -9: one complete frame, and half of another.
+    // The file as after `kill -9`: one complete frame, and half of another.
     let kept = fs::read_to_string(poses(&case)).unwrap();
     let lines: Vec<&str> = kept.lines().collect();
     let half = &lines[2][..lines[2].len() / 2];
@@ -192,9 +193,8 @@ fn footage_that_ends_before_the_ground_truth_is_reported() {
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert!(ended.stderr.contains("2 frames"), "{}", ended.stderr);
     assert!(ended.stdout.contains("planted walk"), "{}", ended.stdout);
-    // The person of these pictures is lower than models of people want.
-    let height =
-        "px high in the frames of planted, where the filters want 150 to 250: see --scale 2";
+    // The person in these pictures is smaller than models of people require.
+    let height = "px tall in the frames of planted, but the filters need 150 to 250: use --scale 2";
     assert!(ended.stderr.contains(height), "{}", ended.stderr);
 }
 
@@ -207,7 +207,7 @@ fn impossible_evaluations_are_refused() {
         (&["--versions", "adaptive"][..], 2, "--oracle"),
         (&["--versions", "fnp"], 2, "fnp"),
         (&["--size", "12"], 2, "WIDTHxHEIGHT"),
-        (&["--share", "1-0.5"], 2, "nothing lies between"),
+        (&["--share", "1-0.5"], 2, "there is nothing between"),
         (&["--paper", "wrong.toml"], 3, "alhpa"),
         (&["--paper", "beyond.toml"], 3, "`paper.alpha` is -1"),
         (&["--paper", "none.toml"], 4, "none.toml"),
@@ -270,7 +270,11 @@ fn an_unusable_consistency_file_is_refused() {
     ];
     let ended = case.start(&out).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("nobody is left"), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("no subject is left"),
+        "{}",
+        ended.stderr
+    );
     let ended = case.start(&[&out[..], &["--hold-out", "eve"]].concat()).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(
@@ -280,7 +284,7 @@ fn an_unusable_consistency_file_is_refused() {
     );
 }
 
-/// Tests that take long; see `.ci/run`.
+/// Tests that take a long time; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     use super::*;

@@ -1,4 +1,4 @@
-//! Sequences judged on the keypoints of a network, with networks small enough to be written here.
+//! Evaluation of the keypoints of networks on sequences, with networks that are small enough to be written here.
 
 use crate::common;
 
@@ -21,7 +21,7 @@ codec = "heat-map"
 set = "lsp-14"
 "#;
 
-/// Fourteen mixtures of the means of red, green and blue in blocks of four by four pixels.
+/// Returns a network with fourteen outputs, which are mixtures of the mean red, green and blue in blocks of four by four pixels.
 fn network() -> Network {
     let mut net = Network::default();
     net.inputs.push(("picture".to_owned(), sides([1, 3, 64, 48])));
@@ -36,12 +36,12 @@ fn network() -> Network {
     net
 }
 
-/// One box of a picture, whatever it shows: its score is `score` and a ten-thousandth of the mean colour.
+/// Returns a detector that finds one box in every picture. Its score is `score` plus a ten-thousandth of the mean colour.
 fn detector(score: f32) -> Network {
     detector_of([20.0, 4.0, 44.0, 50.0], score)
 }
 
-/// Three views of a synthetic person, the networks and their cards.
+/// Makes three views of a synthetic person, the networks and their cards.
 fn case(name: &str, score: f32) -> Case {
     let case = Case::new(name, &[1, 1], PLAIN);
     let made = case.start(&["synth", "people", "--rig", "ring:3", "--frames", "2"]).wait();
@@ -88,7 +88,7 @@ fn every_stress_has_a_row_for_every_way_of_solving() {
     for name in ["covered:2", "cameras dropped", "maps and bones"] {
         assert!(text.contains(name), "{text}");
     }
-    // The same again gives the same numbers.
+    // A repetition gives the same numbers.
     let again = eval(&case, &["--stress", "covered:1,exchanged", "--json"]);
     let again: Vec<Value> = serde_json::from_str(again.stdout.trim()).unwrap();
     assert_eq!(again[..4], rows[4..8]);
@@ -125,7 +125,7 @@ fn what_cannot_be_judged_is_refused() {
         2,
         "\"dirty\" is not one of clean, covered:N",
     );
-    // What only the versions of the method have is not passed over.
+    // Options that only apply to versions of the method are refused, not ignored.
     refused(&["--versions", "geometry"], 2, "--versions");
     refused(&["--resume"], 2, "--resume");
     refused(&["--detector-card", "none.toml"], 4, "none.toml");

@@ -1,4 +1,4 @@
-//! The laboratory, run as a user would. One test binary, because linking takes longer than most tests.
+//! Tests of the laboratory, run as a user would run it. There is one test binary, because linking takes longer than most tests.
 
 #[path = "../../parallax/tests/common/mod.rs"]
 mod common;

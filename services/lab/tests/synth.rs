@@ -11,7 +11,7 @@ use common::{Case, Ended};
 use geometry::files::ReadOptions;
 use scene::truth::{Frame, Header};
 
-/// A folder with a model that takes milliseconds.
+/// Creates a folder with a model that takes milliseconds.
 fn case(name: &str) -> Case {
     Case::new(name, &[1, 1], "")
 }
@@ -21,7 +21,7 @@ fn synth(case: &Case, arguments: &[&str]) -> Ended {
     case.start(&all).wait()
 }
 
-/// Two cameras, three frames, and the planted model.
+/// Options for two cameras, three frames, and the planted model.
 const SMALL: [&str; 8] = [
     "--rig",
     "ring:2",
@@ -33,7 +33,7 @@ const SMALL: [&str; 8] = [
     "10",
 ];
 
-/// Runs a written deployment with small frames; its 2D results.
+/// Runs a written deployment with small frames, and returns its 2D results.
 fn run(case: &Case, folder: &str, more: &[&str]) -> (Ended, String) {
     let file = format!("{folder}/deployment.toml");
     case.edit(&file, "synth-s1-walking-1", &case.name);
@@ -57,7 +57,7 @@ fn a_written_deployment_runs_and_a_live_scene_gives_the_same_bits() {
     let ended = synth(&case, &[&["files"], &SMALL[..]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let (ended, from_files) = run(&case, "files", &[]);
-    // The planted model finds nobody in rendered pictures, which the verdict says: what is compared is bits.
+    // The planted model finds no person in rendered pictures, so the run is degraded. The comparison is of the bits in the results.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert_eq!(from_files.lines().count(), 6, "three frames of two views");
 
@@ -136,7 +136,7 @@ fn a_run_among_others_follows_one_person_and_counts_all() {
         let place = [0, 1, 2].map(|axis| neck[axis].as_f64().unwrap_or(f64::NAN));
         if let Some(before) = last.replace(place) {
             let moved: f64 = before.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum();
-            // The two stand two metres apart.
+            // The two people are two metres apart.
             assert!(
                 moved.sqrt() < 1.0,
                 "frame {}: {before:?} {place:?}",
@@ -150,13 +150,13 @@ fn a_run_among_others_follows_one_person_and_counts_all() {
     );
 }
 
-/// On any machine: no picture is taken before its time, and pictures without enough time are skipped.
+/// On every machine, no picture is taken before its time, and late pictures are skipped.
 #[test]
 fn a_live_scene_keeps_up_with_the_clock() {
     let case = case("synth-clock");
     let ended = synth(&case, &[&["live", "--live"], &SMALL[..]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    // Runs until there are results; then it is stopped.
+    // Runs until there are results, then stops.
     case.edit("live/deployment.toml", "frames=3", "frames=100000");
     let file = "live/deployment.toml";
     case.edit(file, "synth-s1-walking-1", &case.name);
@@ -194,7 +194,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(130), "{}", ended.stderr);
     for (frame, captured_ms) in shots() {
-        // Ten per second; the clock of a run starts before its cameras.
+        // Ten frames per second. The clock of a run starts before its cameras.
         assert!(
             captured_ms >= 100.0 * frame,
             "frame {frame}: {captured_ms} ms"
@@ -236,7 +236,7 @@ fn the_ground_truth_is_the_projection_by_the_exact_rig() {
                 let projected = camera.project(&joint.into()).unwrap();
                 let [x, y] = pixel.unwrap();
                 let error = (x - projected.x).hypot(y - projected.y);
-                // A camera with the right clock sees the joints at their positions at the nominal time.
+                // A camera with the correct clock sees the joints at their positions at the nominal time.
                 assert_eq!(error < 1e-6, late == 0.0, "{}: {error} px", view.camera);
             }
         }
@@ -307,7 +307,7 @@ fn several_sequences_have_a_folder_each_and_one_list_of_people() {
     }
 }
 
-/// The joints of a sequence as a TRC file has them, y up.
+/// Returns the joints of a sequence as a TRC file, with y up.
 fn trc(case: &Case, folder: &str, rate: u32) -> String {
     let names = skeleton::PARSE14.joints.iter();
     let names: Vec<String> = names.map(|name| name.name.replace(' ', "_")).collect();

@@ -1,4 +1,4 @@
-//! `parallax-lab train fmp` as real processes, on figures that are drawn here.
+//! `parallax-lab train fmp` as real processes, on figures drawn by the tests.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod finder;
@@ -22,7 +22,7 @@ const SIZE: Size = Size {
     height: 136,
 };
 
-/// Where the joints of a figure are, in the order of PARSE.
+/// Positions of a figure's joints, in the order of PARSE.
 const FIGURE: [[f64; 2]; 14] = [
     [41.0, 118.0],
     [42.0, 94.0],
@@ -40,7 +40,7 @@ const FIGURE: [[f64; 2]; 14] = [
     [49.0, 18.0],
 ];
 
-/// Limbs, and how thick and bright they are drawn.
+/// Limbs, with their thickness and brightness.
 const LIMBS: [([usize; 2], f64, u8); 11] = [
     ([0, 1], 5.0, 250),
     ([1, 2], 7.0, 20),
@@ -55,7 +55,7 @@ const LIMBS: [([usize; 2], f64, u8); 11] = [
     ([12, 13], 9.0, 30),
 ];
 
-/// Settings with which a training takes seconds.
+/// Settings for a training of a few seconds.
 const SETTINGS: &str = "\
 n-types = 2
 cluster-starts = 3
@@ -125,7 +125,7 @@ impl Drawn {
         self.start(&[&fixed[..], &settings, more].concat())
     }
 
-    /// Starts a training and waits until its second step is done, but not for more.
+    /// Starts a training and waits until its second step is done.
     fn begun(&self, out: &str) -> Started {
         let mut started = self.train(out, &["--threads", "1"]);
         let checkpoint = self.path(&format!("{out}.checkpoint"));
@@ -199,7 +199,7 @@ fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
     signal("KILL", killed.id());
     assert_eq!(killed.wait().status.code(), None);
     let resumed = drawn.train("killed/m.fmp", &["--resume"]).wait();
-    assert_ended(&resumed, 0, &["going on after step"]);
+    assert_ended(&resumed, 0, &["continuing after step"]);
     assert!(drawn.model("one/m.fmp") == drawn.model("killed/m.fmp"));
     assert!(is_gone(&drawn.path("killed/m.fmp.checkpoint")));
 
@@ -220,7 +220,7 @@ fn an_interrupted_training_reports_how_to_continue_and_refuses_foreign_state() {
     let stopped = drawn.begun("m.fmp");
     signal("INT", stopped.id());
     let stopped = stopped.wait();
-    assert_ended(&stopped, 130, &["stopped after", "--resume goes on from"]);
+    assert_ended(&stopped, 130, &["stopped after", "--resume continues from"]);
     assert!(is_gone(&drawn.path("m.fmp")));
     let checkpoint = drawn.model("m.fmp.checkpoint");
 
@@ -233,11 +233,11 @@ fn an_interrupted_training_reports_how_to_continue_and_refuses_foreign_state() {
     for damage in [&checkpoint[..checkpoint.len() - 1], b"PLXMODEL", b""] {
         drawn.write("m.fmp.checkpoint", damage);
         let damaged = drawn.train("m.fmp", &["--resume"]).wait();
-        assert_ended(&damaged, 4, &["is no sound checkpoint", "delete"]);
+        assert_ended(&damaged, 4, &["is not a valid checkpoint", "delete"]);
     }
 }
 
-/// Adds a bad line at the beginning, and one line for every kind of bad label at the end.
+/// Adds a bad line at the beginning, and one line for each kind of bad label at the end.
 fn add_bad_labels(drawn: &Drawn) {
     let sound = fs::read_to_string(drawn.path("people.jsonl")).unwrap();
     let outside = FIGURE.map(|figure| [figure[0] + 60.0, figure[1]]);

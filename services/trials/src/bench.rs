@@ -1,4 +1,4 @@
-//! Benchmarks of the transport between processes, and of whole deployments under load, and of the GPU.
+//! Benchmarks of the transport between processes, of whole deployments under load, and of the GPU.
 
 mod gpu;
 mod hop;

@@ -40,27 +40,27 @@ pub use host_fault::HostFault;
 pub use options::{Limits, Options};
 pub use scenario::Scenario;
 
-/// The hang limit of the `spin-...` scenarios with lossless delivery: a main loop reports progress every second, and three
-/// reports may be missing. With realtime delivery the processor time of an iteration counts.
+/// The hang limit of the `spin-...` scenarios with lossless delivery. A main loop reports progress every second, and three
+/// reports may be missing. With realtime delivery, the processor time of an iteration is limited instead.
 const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 
-/// The outcome of the scenarios.
+/// Outcome of the scenarios.
 #[derive(Debug)]
 pub struct Outcome {
     /// True if all limits held.
     pub is_held: bool,
-    /// The report as JSON; the content of `chaos.json`.
+    /// The report as JSON, which is the content of `chaos.json`.
     pub json: Value,
     /// The report as text: a table of the scenarios, with the missed limits of each.
     pub table: String,
 }
 
-/// Runs the scenarios, checks their limits, and writes `chaos.json`. `None` if it was interrupted; then nothing is
+/// Runs the scenarios, checks their limits, and writes `chaos.json`. `None` if the trial was interrupted; then no file is
 /// written.
 ///
 /// # Errors
 ///
-/// The deployment cannot be read or used, or lacks the process of a requested scenario; the report cannot be written.
+/// Fails if the deployment cannot be read or used, if it lacks the process of a requested scenario, or if the report cannot be written.
 /// A run that fails is not an error but a missed limit.
 pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, Failure> {
     let testbed = Testbed::new(options, verbosity)?;
@@ -90,7 +90,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     }))
 }
 
-/// The requested scenarios; if none are requested, all that are possible with the processes of the deployment.
+/// Returns the requested scenarios; if none are requested, all that are possible with the processes of the deployment.
 fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Failure> {
     if requested.is_empty() {
         let mut all = Scenario::all();
@@ -102,7 +102,7 @@ fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>,
         Some(it) => {
             let why = match it {
                 Scenario::Host(_) if !bridge::HAS_LINK => {
-                    "this build has no hosts: build it with `--features hosts`"
+                    "this build does not support hosts: build with `--features hosts`"
                 }
                 Scenario::Host(_) => "the deployment has fewer than four cameras",
                 _ => "the deployment has no such process",
@@ -194,7 +194,7 @@ fn supervisor(testbed: &Testbed, options: &Options) -> Result<Verdict, Failure> 
     })
 }
 
-/// Plans a run in which a process enters an endless loop, once it has sent a message about a frame after `after_frame`.
+/// Plans a run in which a process enters an endless loop after it has sent a message about a frame later than `after_frame`.
 fn spinning(
     testbed: &Testbed,
     scenario: &str,

@@ -1,4 +1,4 @@
-//! The demo: a whole deployment with four synthetic cameras, one of whose processes is killed, and a report.
+//! The demo: a whole deployment with four synthetic cameras, one of which is killed, and a report.
 
 mod limits;
 mod machine;
@@ -24,12 +24,12 @@ use run::{Run, VICTIM};
 
 pub use options::{Limits, Options};
 
-/// How long a stage waits for a late view, milliseconds, at least; see [`Options::setup`].
+/// Minimum time that a stage waits for a late view, milliseconds; see [`Options::setup`].
 const DEADLINE_MS: u64 = 500;
 
 /// Default duration of the run, seconds.
 const DEFAULT_S: f64 = 20.0;
-/// The least number of frames by default.
+/// Smallest default number of frames.
 const MIN_FRAMES: u64 = 30;
 
 impl Options {
@@ -42,7 +42,7 @@ impl Options {
         }
     }
 
-    /// The settings of the synthetic deployment.
+    /// Returns the settings of the synthetic deployment.
     ///
     /// * `machine`: the measured speed of this machine, if it was measured.
     fn setup(&self, machine: Option<&Machine>) -> SyntheticSetup<'_> {
@@ -70,22 +70,22 @@ const REPORTS: [&str; 2] = ["report.json", "report.html"];
 /// The camera's process is killed after this share of the frames.
 const KILL_AFTER: f64 = 0.4;
 
-/// The outcome of the demo.
+/// Outcome of the demo.
 #[derive(Debug)]
 pub struct Outcome {
     /// True if all limits held.
     pub is_held: bool,
-    /// The report as JSON; the content of `report.json`.
+    /// The report as JSON, which is the content of `report.json`.
     pub json: Value,
     /// The report as text.
     pub text: String,
 }
 
-/// Runs the demo, checks its limits, and writes its reports. `None` if it was interrupted; then no report is written.
+/// Runs the demo, checks its limits, and writes its reports. `None` if the demo was interrupted; then no report is written.
 ///
 /// # Errors
 ///
-/// The folder cannot be written to, or the run fails.
+/// Fails if the folder cannot be written to, or the run fails.
 pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, Failure> {
     let folder = synthetic::absolute(&options.out)?;
     let mut gauge = gauge(options, &folder, verbosity)?;
@@ -138,7 +138,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     conclude(options, &synthetic, (&run, &loaded.deployment.output)).map(Some)
 }
 
-/// Prepares the measurement of this machine's speed; none if the frame rate is given.
+/// Prepares the measurement of this machine's speed; `None` if the frame rate is given.
 fn gauge(options: &Options, folder: &Path, verbosity: Verbosity) -> Result<Option<Gauge>, Failure> {
     if options.rate_hz.is_some() {
         return Ok(None);
@@ -211,7 +211,7 @@ fn announce(
     }
     let (frames, rate) = (setup.n_frames, setup.rate_hz);
     output::message(format_args!(
-        "{n_processes} processes and their supervisor; {frames} frames at {rate} a second; results in {}",
+        "{n_processes} processes and their supervisor; {frames} frames at {rate} per second; results in {}",
         synthetic.folder.display()
     ));
 }

@@ -1,13 +1,13 @@
-//! Trials of whole deployments: fault injection, benchmarks and the demo, with limits that are checked.
+//! Trials of whole deployments: fault injection, benchmarks and the demo. Their limits are checked.
 //!
-//! | trial | what is run | what is checked |
+//! | trial | what it runs | what it checks |
 //! |---|---|---|
-//! | [`chaos`] | a process is killed, stopped or made to loop endlessly; a camera fails or was moved | detection, recovery and losses |
+//! | [`chaos`] | a process is killed, stopped or put into an endless loop; a camera fails or was moved | detection, recovery and losses |
 //! | [`mod@bench`] | messages between two processes; deployments under load | latency and throughput |
-//! | [`demo`] | synthetic cameras, one of whose processes is killed | accuracy of the results, recovery and losses |
+//! | [`demo`] | synthetic cameras, one of which is killed | accuracy of the results, recovery and losses |
 //!
-//! Every run uses real processes, started as `parallax run` starts them. The command line provides the options of a trial
-//! and prints what it returns; progress is shown during the run.
+//! Every run uses real processes, started as by `parallax run`. The command line passes the options of a trial
+//! and prints its report. Progress is shown during the run.
 #![forbid(unsafe_code)]
 
 mod spread;

@@ -19,7 +19,7 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// The percentiles of some values, by nearest rank; none if there are no values.
+    /// Returns the percentiles of values, by nearest rank; `None` if there are no values.
     pub(crate) fn of(values: Vec<f64>) -> Option<Self> {
         let sorted = Sorted::new(values);
         Some(Self {
@@ -31,7 +31,7 @@ impl Spread {
         })
     }
 
-    /// The four percentiles as cells of a table; `-` if there are none.
+    /// Returns the four percentiles as cells of a table; `-` if there are none.
     pub(crate) fn cells(spread: Option<Self>, digits: usize) -> [String; 4] {
         let Some(spread) = spread else {
             return ["-"; 4].map(str::to_owned);

@@ -1,4 +1,4 @@
-// The connection to the view process: opened again whenever it is lost, or nothing has come for long.
+// The connection to the view process. It is reopened if it is lost, or if no message arrives for a long time.
 const SILENCE_MS = 6000;
 const FIRST_PAUSE_MS = 300;
 const LONGEST_PAUSE_MS = 2000;
@@ -10,7 +10,7 @@ export class Link {
     this.pause = FIRST_PAUSE_MS;
     this.heard = 0;
     this.open();
-    // A page that a browser has put to sleep hears nothing.
+    // A page that the browser has suspended receives no messages.
     setInterval(() => {
       const isDeaf = this.isOpen() && this.expects && performance.now() - this.heard > SILENCE_MS;
       if (isDeaf && !document.hidden) this.socket.close();
@@ -26,7 +26,7 @@ export class Link {
     const socket = new WebSocket(`${scheme}//${location.host}/ws${location.search}`);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
-    // Whether something comes again and again.
+    // True if messages arrive regularly.
     this.expects = false;
     socket.onopen = () => {
       this.pause = FIRST_PAUSE_MS;
@@ -47,7 +47,7 @@ export class Link {
       this.on.picture({ view: head.getUint8(1), frame, isDrawn: head.getUint8(2) === 1, jpeg: new Blob([data.slice(16)], { type: "image/jpeg" }) });
     };
     socket.onclose = () => {
-      this.on.state("no connection, trying again", "lost");
+      this.on.state("no connection, retrying", "lost");
       setTimeout(() => this.open(), this.pause);
       this.pause = Math.min(LONGEST_PAUSE_MS, 1.5 * this.pause);
     };

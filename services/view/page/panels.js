@@ -1,4 +1,4 @@
-// Numbers and words: processes, what has happened, the facts in the head of the page.
+// Numbers and texts: processes, events, and the facts at the top of the page.
 const MOST_LINES = 200;
 
 const digits = (value, n) => (Number.isFinite(value) ? value.toFixed(n) : "–");
@@ -12,7 +12,7 @@ function cells(row, kind, values) {
   }
 }
 
-// The percentiles of a stage of a process; nothing if it was not measured.
+// Returns the percentiles of a stage of a process; undefined if it was not measured.
 function stage(process, ...names) {
   const times = process.measured?.times || [];
   return names.map((name) => times.find((it) => it.stage === name)).find(Boolean);
@@ -20,7 +20,7 @@ function stage(process, ...names) {
 
 export function showProcesses(table, processes) {
   table.replaceChildren();
-  cells(table.createTHead().insertRow(), "th", [["process"], ["state"], ["a second"], ["p50 ms"], ["p99 ms"], ["lost"], ["starts"], ["MB"]]);
+  cells(table.createTHead().insertRow(), "th", [["process"], ["state"], ["per second"], ["p50 ms"], ["p99 ms"], ["lost"], ["starts"], ["MB"]]);
   const body = table.createTBody();
   for (const it of processes) {
     const computing = stage(it, "computing");
@@ -39,7 +39,7 @@ export function showProcesses(table, processes) {
   }
 }
 
-// Rate and latency of the results, and the processes that are away.
+// Shows rate and latency of the results, and the processes that are dead or silent.
 export function showFacts(place, processes) {
   const last = processes.find((it) => it.process === "triangulate");
   const latency = last && stage(last, "end_to_end", "since_capture");
@@ -49,10 +49,10 @@ export function showFacts(place, processes) {
     value.textContent = text;
     parts.push(...(parts.length ? [" · "] : []), `${label} `, value);
   };
-  if (last?.measured) fact("results a second", digits(last.measured.sent_per_second, 1));
+  if (last?.measured) fact("results per second", digits(last.measured.sent_per_second, 1));
   if (latency) fact("latency", `${digits(latency.p50_ms, 0)} ms, 99 % below ${digits(latency.p99_ms, 0)} ms`);
   const away = processes.filter((it) => ["dead", "silent"].includes(it.state)).map((it) => it.process);
-  if (away.length) fact("away:", away.join(", "));
+  if (away.length) fact("missing:", away.join(", "));
   place.replaceChildren(...parts);
 }
 
@@ -68,7 +68,7 @@ export function showEvent(list, event) {
   while (list.children.length > MOST_LINES) list.lastChild.remove();
 }
 
-// The time line of a finished run: where there are skeletons.
+// Draws the time line of a finished run, which shows the frames with skeletons.
 export function showLine(canvas, line, colours) {
   const pen = canvas.getContext("2d");
   canvas.width = Math.max(line.length, 1);

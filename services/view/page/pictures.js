@@ -1,16 +1,16 @@
 // The pictures of all cameras, with the poses found in them and epipolar lines.
 import { COLOURS, colourOf, sideOf } from "./stage.js";
 
-// Pictures that wait for the result of their frame, and results that are remembered.
+// Largest number of pictures that wait for the result of their frame, and of results that are kept.
 const MOST_WAITING = 8;
 const MOST_MOMENTS = 120;
-// A click so near to a joint means it, in shares of the picture's width.
+// Distance up to which a click selects a joint, as a share of the picture's width.
 const NEAR = 0.05;
-// A question about lines that was not answered for so long is asked again.
+// Time after which a request for lines is repeated if there is no answer.
 const PATIENCE_MS = 1000;
 
 export class Pictures {
-  // ask: of the link; marked: called with the joint that was clicked, or nothing for a point without one
+  // ask: sends a request; marked: called with the clicked joint, or null for a point without a joint
   constructor(place, ask, marked) {
     this.place = place;
     this.ask = ask;
@@ -19,14 +19,14 @@ export class Pictures {
     this.moments = new Map();
     this.newest = null;
     this.lines = [];
-    // How often the lines have changed.
+    // Number of changes of the lines.
     this.nLines = 0;
     this.point = null;
     this.large = null;
     this.poses = true;
     this.on = true;
     this.isLive = true;
-    // When lines were asked for that have not come yet, and whether what to ask for has changed since.
+    // Time of the pending request for lines, and whether other lines are wanted since then.
     this.asked = null;
     this.isChanged = false;
   }
@@ -93,15 +93,15 @@ export class Pictures {
     this.nLines++;
   }
 
-  // The lines that were asked for.
+  // Takes the requested lines.
   answer(lines) {
     this.asked = null;
     if (this.point || Number.isInteger(this.joint)) this.takeLines(lines);
     if (this.isChanged) this.askForLines();
   }
 
-  // The lines of a joint as it lies in all views, or of a point. One question is on its way at a time: lines come as often as
-  // results where all have time for that, and nothing piles up where they have not.
+  // Requests the lines of a joint at its positions in all views, or of a point. Only one request is pending at a time, so
+  // requests do not pile up on a slow machine. On a fast machine, lines come as often as results.
   askForLines() {
     const now = performance.now();
     this.isChanged = this.asked !== null && now - this.asked < PATIENCE_MS;
@@ -113,7 +113,7 @@ export class Pictures {
       points = this.views.map((_, k) => [k, at(k)]).filter((it) => it[1]);
     }
     if (!points.length) {
-      // Pictures are drawn again only where there were lines.
+      // Pictures are drawn again only if there were lines.
       if (this.lines.length) this.takeLines([]);
       return;
     }
@@ -146,7 +146,7 @@ export class Pictures {
     this.arrived?.();
   }
 
-  // The result that is drawn over the picture of a view: that of its frame, or the last before.
+  // Returns the result to draw over the picture of a view: the result of its frame, or the last one before.
   momentOf(nth) {
     const shown = this.views[nth]?.shown;
     if (!shown || !this.isLive) return this.newest;
@@ -156,7 +156,7 @@ export class Pictures {
     return best;
   }
 
-  // Takes the newest picture whose frame has a result; where results are late or stay away, the newest.
+  // Takes the newest picture whose frame has a result. If results are late or missing, takes the newest picture.
   choose(it) {
     const { waiting } = it;
     if (!waiting.length) return;
@@ -185,7 +185,7 @@ export class Pictures {
       const width = Math.max(240, Math.min(960, Math.round((canvas.clientWidth || 480) * (window.devicePixelRatio || 1))));
       const height = Math.round(width * ratio);
       const moment = this.momentOf(nth);
-      // Drawn again only where something has changed.
+      // Draws again only after a change.
       const state = [shown?.frame, moment?.frame, moment?.at, this.nLines, this.joint, this.point, this.poses, this.on, width, height].join();
       if (state === it.state) return;
       it.state = state;

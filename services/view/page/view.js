@@ -6,26 +6,27 @@ import { showEvent, showFacts, showLine, showProcesses } from "./panels.js";
 
 const element = (name) => document.getElementById(name);
 const NOWHERE = { joints: [], limbs: [], views: [], eyes: [], up: [0, 0, 1] };
-// Points that the floor is found by, and how fast the middle of the stage follows.
+// Number of feet positions from which the floor is estimated, and speed at which the centre of the stage follows the person.
 const MOST_FEET = 400;
 const PULL = 0.06;
 
 let hello = null;
 let scene = NOWHERE;
 let moment = null;
-// What runs is shown as it comes, or a finished run is played.
+// True while a live run is shown as it arrives, or a finished run is played.
 let playing = true;
 let dirty = true;
 let feet = [];
 let floor = null;
-// Of a finished run: the frame that was asked for and is not there yet, and the next to ask for.
+// Frame of a finished run that was requested and has not arrived yet.
 let asked = null;
-// Identity of the person who is shown in full; none: the one who is followed.
+// Identity of the person who is shown in full; null for the followed person.
 let chosen = null;
+// Frame of a finished run to request next.
 let next = null;
 let clock = null;
 let drawn = 0;
-// What a test reads.
+// Counts for tests.
 const counts = { moments: 0, pictures: 0, lines: 0, hellos: 0, opened: 0 };
 
 const redraw = () => { dirty = true; };
@@ -76,7 +77,7 @@ function begin(value) {
   for (const name of ["state", "happened"]) element(name).hidden = isFinished;
   element("time").hidden = !isFinished;
   if (!isSame) show(value);
-  // Pictures come with the frames that are asked for after them.
+  // Pictures come with the frames that are requested after this.
   askForPictures();
   if (isFinished) beginFinished(value, isSame);
   redraw();
@@ -89,7 +90,7 @@ function show(value) {
   stage.show(scene);
   const at = scene.eyes.map((it) => stage.along(it.at));
   const mean = (k) => (at.length ? at.reduce((sum, it) => sum + it[k], 0) / at.length : 0);
-  // Until somebody is seen: between the cameras, at the height of a person.
+  // Until a person is seen, the centre is between the cameras, at the height of a person.
   stage.middle = stage.place(mean(0), mean(1), at.length ? Math.min(...at.map((it) => it[2])) - 0.6 : 0.9);
   const reach = at.map((it) => Math.hypot(it[0] - mean(0), it[1] - mean(1)));
   stage.view.far = Math.min(14, Math.max(5, 1.45 * Math.max(0, ...reach)));
@@ -109,7 +110,7 @@ function beginFinished(value, isSame) {
   go(isSame && moment ? moment.at : 0);
 }
 
-// Puts the person who was chosen in the place of the one who is followed, if both are there.
+// Exchanges the chosen person with the followed person, if the chosen person is in the frame.
 function choose(value) {
   const nth = value.others.findIndex((it) => it.id === chosen);
   if (nth < 0) return;
@@ -120,7 +121,7 @@ function choose(value) {
   value.views.forEach((it, k) => { it.joints = other.views[k] ?? null; it.behind = false; });
 }
 
-// Names the people to choose from; somebody who was chosen stays there while nobody sees them.
+// Lists the people to choose from. The chosen person stays in the list while no view sees them.
 function name(value) {
   const ids = [value.id, ...value.others.map((it) => it.id), chosen].filter((id) => id !== null);
   const all = [...new Set(ids)].sort((a, b) => a - b);
@@ -148,7 +149,7 @@ function arrive(value) {
   redraw();
 }
 
-// The stage goes with the person, slowly; its floor is where feet were lowest.
+// The stage follows the person slowly. Its floor is at the lowest positions of the feet.
 function follow(value) {
   const points = value.joints.filter(Boolean).map((it) => stage.along(it));
   if (!points.length) return;
@@ -168,12 +169,12 @@ function showState(value) {
   const button = element("record");
   button.setAttribute("aria-pressed", String(Boolean(value.recording)));
   button.textContent = value.recording ? `recording ${value.recording.seconds} s, ${(value.recording.bytes / 1e6).toFixed(0)} MB` : "record";
-  button.title = value.recording?.file || "record what runs (R)";
+  button.title = value.recording?.file || "record the run (R)";
 }
 
 function empty(why) {
   element("empty").hidden = !why;
-  element("empty").textContent = why ? `${why} – this page goes on by itself` : "";
+  element("empty").textContent = why ? `${why} – this page will continue automatically` : "";
 }
 
 function say(text) {
@@ -207,7 +208,7 @@ function draw() {
 
 function turn(now) {
   if (hello?.mode === "finished" && playing && moment) play(now / 1000);
-  // Thirty times a second is enough, and leaves time for what comes.
+  // Thirty times a second is enough, and leaves time for messages.
   if (dirty && now - drawn > 30) {
     drawn = now;
     draw();
@@ -215,7 +216,7 @@ function turn(now) {
   requestAnimationFrame(turn);
 }
 
-// Plays a finished run at the speed at which it was taken: asks for the frame that is due.
+// Plays a finished run at its original speed: requests the frame that is due.
 function play(seconds) {
   if (moment.at >= hello.n - 1) return hold(true);
   const rate = scene.rate || 10;
@@ -225,7 +226,7 @@ function play(seconds) {
   if (due > moment.at && asked === null) go(Math.min(due, hello.n - 1));
 }
 
-// Asks for a frame of a finished run; while one is on its way, only the last that was wanted is remembered.
+// Requests a frame of a finished run. While a request is pending, only the last further one is remembered.
 function go(at) {
   if (hello?.mode !== "finished") return;
   at = Math.min(Math.max(0, at), hello.n - 1);
@@ -241,7 +242,7 @@ function go(at) {
 function hold(on) {
   playing = !on;
   clock = null;
-  element("play").textContent = on ? "play" : "hold";
+  element("play").textContent = on ? "play" : "pause";
   redraw();
 }
 
@@ -303,7 +304,7 @@ const keys = {
   Escape: () => { pictures.point = null; choosePart(null); if (pictures.large !== null) enlarge(null); },
 };
 
-// What has been drawn stays until the next frame; a finished run is asked for its frame again.
+// The drawing stays until the next frame arrives. For a finished run, the same frame is requested again.
 function choosePerson(id) {
   chosen = id;
   element("who").value = id === null ? "" : String(id);
@@ -332,7 +333,7 @@ document.addEventListener("keydown", (event) => {
     event.preventDefault();
     return stage.turn(...turned);
   }
-  // A button and a box take the space key themselves.
+  // Buttons and checkboxes handle the space key themselves.
   if (event.key === " " && event.target.matches("button, input")) return;
   if (/^[1-9]$/.test(event.key)) return enlarge(Number(event.key) - 1);
   const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];

@@ -1,4 +1,4 @@
-//! The newest of everything that pages show. One thread puts it there; every page takes what it has not seen.
+//! The newest content for the pages. One thread updates it; every page takes the messages that it has not seen yet.
 
 use std::collections::VecDeque;
 use std::io;
@@ -14,17 +14,17 @@ use tungstenite::Message;
 use crate::date::unix_ms;
 use crate::scene::Scene;
 
-/// Events that are kept for pages that open later.
+/// Largest number of events that are kept for pages that open later.
 const MOST_EVENTS: usize = 200;
 
-/// How much an event matters.
+/// Severity of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Weight {
-    /// Good to know.
+    /// Information.
     Note,
-    /// Something is lost.
+    /// Data was lost.
     Warning,
-    /// Something has failed.
+    /// Something failed.
     Error,
 }
 
@@ -38,11 +38,11 @@ impl Weight {
     }
 }
 
-/// The newest of everything.
+/// The newest content for the pages.
 #[derive(Debug)]
 pub(crate) struct Board {
     inner: Mutex<Inner>,
-    /// Pages that show the pictures of a view.
+    /// Number of pages that show the pictures of each view.
     wanted: [AtomicUsize; MAX_VIEWS],
     n_pages: Arc<AtomicUsize>,
     n_opened: AtomicUsize,
@@ -57,15 +57,15 @@ struct Inner {
     pictures: [Slot; MAX_VIEWS],
     events: VecDeque<(u64, Message)>,
     scene: Option<Arc<Scene>>,
-    /// Rung after every change.
+    /// Event files that are signalled after every change.
     bells: Vec<Weak<OwnedFd>>,
-    /// Request to begin or end a recording; taken by the thread that looks on.
+    /// Request to start or end a recording, for the thread that follows the deployment.
     record: Option<bool>,
-    /// The page that has asked for it last.
+    /// The page that last requested a recording.
     recorder: Option<usize>,
 }
 
-/// A message to all pages, and the number of the change that brought it.
+/// A message to all pages, and the number of the change that added it.
 #[derive(Debug, Clone, Default)]
 struct Slot {
     version: u64,
@@ -73,7 +73,7 @@ struct Slot {
 }
 
 impl Board {
-    /// Empty.
+    /// Creates an empty board.
     pub(crate) fn new() -> Self {
         Self {
             inner: Mutex::default(),
@@ -83,7 +83,7 @@ impl Board {
         }
     }
 
-    /// Shows another run, or that there is none; what was shown of the last one goes.
+    /// Shows another run, or the message that no run exists. Content of the previous run is removed.
     pub(crate) fn begin(&self, hello: &Value, scene: Option<Arc<Scene>>) {
         self.change(|inner, version| {
             inner.hello = Slot::new(version, text(hello));
@@ -117,7 +117,7 @@ impl Board {
         });
     }
 
-    /// Says what has happened.
+    /// Adds an event.
     pub(crate) fn event(&self, weight: Weight, what: &str) {
         let event = json!({
             "type": "event", "weight": weight.name(), "unix_ms": unix_ms(), "what": what,
@@ -130,9 +130,9 @@ impl Board {
         });
     }
 
-    /// Returns the messages that are new since a change, and the number of the last change.
+    /// Returns the messages that were added after a change, and the number of the last change.
     ///
-    /// * `pictures`: whether the page shows the pictures of a view.
+    /// * `pictures`: for each view, true if the page shows its pictures.
     pub(crate) fn since(&self, seen: u64, pictures: &[bool; MAX_VIEWS]) -> (u64, Vec<Message>) {
         let inner = self.lock();
         let mut new = Vec::new();
@@ -151,41 +151,41 @@ impl Board {
         (inner.version, new)
     }
 
-    /// Returns a file that can be read after every change, until it is dropped.
+    /// Returns an event file that becomes readable after every change, until it is dropped.
     ///
     /// # Errors
     ///
-    /// The system gives none.
+    /// Fails if the system cannot create an event file.
     pub(crate) fn bell(&self) -> io::Result<Arc<OwnedFd>> {
         let bell = Arc::new(eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?);
         self.lock().bells.push(Arc::downgrade(&bell));
         Ok(bell)
     }
 
-    /// The cameras and joints that are shown.
+    /// Returns the cameras and joints of the run.
     pub(crate) fn scene(&self) -> Option<Arc<Scene>> {
         self.lock().scene.clone()
     }
 
-    /// Asks for what runs to be recorded, or no more, on behalf of a page.
+    /// Requests to start or end a recording of the run, on behalf of a page.
     pub(crate) fn ask_to_record(&self, on: bool, page: usize) {
         let mut inner = self.lock();
         inner.record = Some(on);
         inner.recorder = on.then_some(page);
     }
 
-    /// Asks again for the recording if it could not be begun yet.
+    /// Repeats the request for a recording that could not be started yet.
     pub(crate) fn ask_again(&self) {
         let mut inner = self.lock();
         inner.record = inner.recorder.map(|_| true);
     }
 
-    /// Number of a page that opens.
+    /// Returns a number for a new page.
     pub(crate) fn open_page(&self) -> usize {
         self.n_opened.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Ends the recording that a page has asked for, as it goes.
+    /// Ends the recording that a page requested, when the page closes.
     pub(crate) fn leave_page(&self, page: usize) {
         let mut inner = self.lock();
         if inner.recorder == Some(page) {
@@ -194,12 +194,12 @@ impl Board {
         }
     }
 
-    /// Returns the request about recording since the last call.
+    /// Returns the request for a recording that arrived since the last call.
     pub(crate) fn take_record(&self) -> Option<bool> {
         self.lock().record.take()
     }
 
-    /// Counts pages.
+    /// Returns the counter of open pages.
     pub(crate) fn pages(&self) -> &Arc<AtomicUsize> {
         &self.n_pages
     }
@@ -209,7 +209,7 @@ impl Board {
         self.n_pages.load(Ordering::Relaxed) > 0
     }
 
-    /// Counts the pages that show the pictures of a view; `None` for a view that does not exist.
+    /// Returns the counter of pages that show the pictures of a view; `None` for a view that does not exist.
     pub(crate) fn wanted(&self, view: usize) -> Option<&AtomicUsize> {
         self.wanted.get(view)
     }
@@ -232,7 +232,7 @@ impl Board {
     }
 }
 
-/// Rings a bell. One that is full has been rung already.
+/// Signals an event file. If its counter is full, it has already been signalled.
 fn ring(bell: &OwnedFd) -> bool {
     match rustix::io::write(bell, &1_u64.to_ne_bytes()) {
         Ok(_) | Err(rustix::io::Errno::AGAIN | rustix::io::Errno::INTR) => true,

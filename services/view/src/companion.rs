@@ -1,4 +1,4 @@
-//! A view beside a run: a process of its own, started again if it dies, which ends with the run.
+//! A view beside a run: a separate process that ends with the run, and is restarted if it dies.
 
 use core::net::SocketAddr;
 use core::time::Duration;
@@ -14,14 +14,14 @@ use failure::{ExitKind, Failure, OrFail as _};
 
 use crate::options::Listen;
 
-/// Pause before a view that has died is started again.
+/// Pause before a view that died is restarted.
 const PAUSE: Duration = Duration::from_millis(500);
-/// How often it is looked at.
+/// Time between two checks of the process.
 const TURN: Duration = Duration::from_millis(100);
-/// How often it is started again.
+/// Largest number of starts.
 const MOST_STARTS: u32 = 100;
 
-/// A view beside a run. It ends when this is dropped, or when this process ends in any other way.
+/// A view beside a run. The view ends when this value is dropped, and also when this process ends in any other way.
 #[derive(Debug)]
 pub struct Companion {
     over: Arc<AtomicBool>,
@@ -29,20 +29,20 @@ pub struct Companion {
 }
 
 impl Companion {
-    /// Starts it: `executable view --deployment NAME --port PORT --with-parent`.
+    /// Starts the view: `executable view --deployment NAME --port PORT --with-parent`.
     ///
-    /// * `name`: of the deployment.
+    /// * `name`: name of the deployment.
     ///
     /// # Errors
     ///
-    /// No port is free, or the thread that watches it cannot be started.
+    /// Fails if no port is free, or the thread that watches the view cannot be started.
     pub fn start(executable: &Path, name: &str) -> Result<Self, Failure> {
         let port = free_port().or_fail(ExitKind::Run)?;
         let mut command = Command::new(executable);
         command
             .args(["view", "--deployment", name, "--with-parent", "--port"])
             .arg(port.to_string())
-            // It ends when this pipe does. Ctrl-C is for the run.
+            // The view ends when this pipe is closed. Ctrl-C must only reach the run.
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .process_group(0);
@@ -68,7 +68,7 @@ impl Drop for Companion {
     }
 }
 
-/// The usual port, or another that is free now.
+/// Returns the usual port, or another one that is free now.
 fn free_port() -> std::io::Result<u16> {
     let usual = Listen::usual().address;
     let bound = TcpListener::bind(usual);
@@ -76,7 +76,7 @@ fn free_port() -> std::io::Result<u16> {
     Ok(bound?.local_addr()?.port())
 }
 
-/// Keeps it running.
+/// Keeps the view running.
 fn watch(mut command: Command, over: &AtomicBool) {
     for _ in 0..MOST_STARTS {
         let mut child = match command.spawn() {
@@ -90,7 +90,7 @@ fn watch(mut command: Command, over: &AtomicBool) {
             match child.try_wait() {
                 Ok(None) => std::thread::sleep(TURN),
                 Ok(Some(status)) => {
-                    tracing::warn!(%status, "the view has ended; it is started again");
+                    tracing::warn!(%status, "the view ended and will be restarted");
                     break;
                 }
                 Err(error) => {

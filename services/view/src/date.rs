@@ -1,18 +1,18 @@
-//! The time of day for names of files.
+//! Date and time for file names.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Milliseconds since 1970.
+/// Returns the milliseconds since 1970.
 pub(crate) fn unix_ms() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |since| since.as_millis() as u64)
 }
 
-/// A time in UTC as `20260131-235959`.
+/// Formats a time in UTC as `20260131-235959`.
 pub(crate) fn stamp(unix_ms: u64) -> String {
     let seconds = unix_ms / 1000;
     let (days, of_day) = (seconds / 86_400, seconds % 86_400);
-    // Days from civil, H. Hinnant, "chrono-compatible low-level date algorithms"; years begin in March.
+    // From H. Hinnant, "chrono-compatible low-level date algorithms", days from civil. Years start in March.
     let shifted = days + 719_468;
     let (era, of_era) = (shifted / 146_097, shifted % 146_097);
     let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;

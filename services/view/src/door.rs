@@ -1,4 +1,4 @@
-//! Connections: how many, how long, and of which user.
+//! Connections: their number, their lifetime, and the user at the other end.
 
 use core::net::SocketAddr;
 use core::sync::atomic::{AtomicUsize, Ordering};
@@ -12,18 +12,18 @@ use failure::Stop;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::geteuid;
 
-/// Most connections at the same time.
+/// Largest number of simultaneous connections.
 const MOST_CONNECTIONS: usize = 256;
-/// How long a connection without a page lives: a request that is not finished by then never will be.
+/// Longest time for a request; connections that take longer are closed.
 pub(crate) const LONGEST_REQUEST: Duration = Duration::from_secs(10);
-/// Pause after a failure to accept, for example for want of descriptors.
+/// Pause after a failure to accept a connection, for example if there are no free file descriptors.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Accepts connections, up to a limit, until a stop is requested; `talk` has a thread for each.
+/// Accepts connections, up to a limit, until a stop is requested. `talk` runs in a new thread for each connection.
 ///
 /// # Errors
 ///
-/// The listener cannot be used.
+/// Fails if the listener cannot be used.
 pub(crate) fn open(
     listener: &TcpListener,
     stop: &Stop,
@@ -34,7 +34,7 @@ pub(crate) fn open(
     while !stop.is_requested() {
         match listener.accept() {
             Ok((stream, _)) => {
-                // One that is not counted is closed by being dropped.
+                // A connection above the limit is closed because it is dropped here.
                 let Some(seat) = Seat::take(&n_open, MOST_CONNECTIONS) else {
                     continue;
                 };
@@ -45,7 +45,7 @@ pub(crate) fn open(
                     drop(seat);
                 });
                 if let Err(error) = started {
-                    tracing::debug!(%error, "a connection is closed: there is no thread for it");
+                    tracing::debug!(%error, "a connection was closed: cannot start a thread for it");
                 }
             }
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => wait(listener, stop),
@@ -68,12 +68,12 @@ fn wait(listener: &TcpListener, stop: &Stop) {
     }
 }
 
-/// A place among a limited number, until it is dropped.
+/// One of a limited number of places; dropping it frees the place.
 #[derive(Debug)]
 pub(crate) struct Seat(Arc<AtomicUsize>);
 
 impl Seat {
-    /// A place, if fewer than `most` are taken.
+    /// Takes a place, if fewer than `most` are taken.
     pub(crate) fn take(taken: &Arc<AtomicUsize>, most: usize) -> Option<Self> {
         let more = |n: usize| (n < most).then_some(n + 1);
         let before = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more);
@@ -95,9 +95,11 @@ pub(crate) struct Peer {
 }
 
 impl Peer {
+    /// Returns the addresses of a connection.
+    ///
     /// # Errors
     ///
-    /// The connection has ended.
+    /// Fails if the connection has ended.
     pub(crate) fn new(stream: &TcpStream) -> io::Result<Self> {
         Ok(Self {
             own: stream.local_addr()?,
@@ -105,7 +107,7 @@ impl Peer {
         })
     }
 
-    /// Returns true if the other end is a process of the same user on this machine, or of root.
+    /// Returns true if the other end is a process on this machine of the same user or of root.
     pub(crate) fn is_same_user(self) -> bool {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
         let owner = tables.iter().find_map(|table| {
@@ -116,9 +118,10 @@ impl Peer {
     }
 }
 
-/// User of the socket at one end of a connection, by the table of the kernel (`man 5 proc_net_tcp`).
+/// Returns the user of the socket at one end of a connection, from the kernel's table (`man 5 proc_net_tcp`).
 ///
-/// * `local`, `remote`: the address of that end, and of the other.
+/// * `local`: address of this end.
+/// * `remote`: address of the other end.
 fn owner(table: &str, local: SocketAddr, remote: SocketAddr) -> Option<u32> {
     let (local, remote) = (in_hex(local), in_hex(remote));
     table.lines().find_map(|line| {
@@ -128,7 +131,7 @@ fn owner(table: &str, local: SocketAddr, remote: SocketAddr) -> Option<u32> {
     })
 }
 
-/// An address as the kernel writes it: words of 32 bits in the order of this machine.
+/// Formats an address as in the kernel's table: groups of 32 bits in the byte order of this machine.
 fn in_hex(address: SocketAddr) -> String {
     let octets = match address {
         SocketAddr::V4(address) => address.ip().octets().to_vec(),

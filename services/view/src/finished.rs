@@ -1,4 +1,4 @@
-//! A finished run, which pages look at frame by frame: its folder, or its recording.
+//! A finished run for display frame by frame, from its folder or its recording.
 
 mod folder;
 mod tape;
@@ -14,38 +14,38 @@ use crate::scene::Scene;
 use folder::Folder;
 use tape::Tape;
 
-/// Most pieces of the time line that the page gets.
+/// Largest number of pieces in the time line of a page.
 const MOST_PIECES: usize = 600;
 
 /// A finished run.
 #[derive(Debug)]
 pub(crate) enum Finished {
-    /// The folder of its results.
+    /// Folder with the results of the run.
     Folder(Folder),
-    /// Its recording.
+    /// Recording of the run.
     Tape(Tape),
 }
 
 impl Finished {
-    /// Opens the folder of a run, also of one that was cut short.
+    /// Opens the folder of a run, even if the run was cut short.
     ///
     /// # Errors
     ///
-    /// There is no result in it.
+    /// Fails if the folder has no result.
     pub(crate) fn folder(path: &Path) -> Result<Self, Failure> {
         Folder::open(path).map(Self::Folder)
     }
 
-    /// Opens a recording, also one that was cut off.
+    /// Opens a recording, even if it was cut off.
     ///
     /// # Errors
     ///
-    /// The file is not a recording, or has no result.
+    /// Fails if the file is not a recording or has no result.
     pub(crate) fn tape(path: &Path) -> Result<Self, Failure> {
         Tape::open(path).map(Self::Tape)
     }
 
-    /// Its cameras and joints.
+    /// Returns the cameras and joints of the run.
     pub(crate) fn scene(&self) -> Arc<Scene> {
         match self {
             Self::Folder(it) => it.scene(),
@@ -67,13 +67,13 @@ impl Finished {
         })
     }
 
-    /// A frame.
+    /// Returns a frame.
     ///
-    /// * `at`: from 0; beyond the end it is the last.
+    /// * `at`: index of the frame; the last frame if the index is too large.
     ///
     /// # Errors
     ///
-    /// It cannot be read.
+    /// Fails if the frame cannot be read.
     pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
         match self {
             Self::Folder(it) => it.moment(at),
@@ -81,7 +81,8 @@ impl Finished {
         }
     }
 
-    /// The picture of a view at a frame ([`crate::picture::message`]), or the last one before; none if there is none.
+    /// Returns the picture of a view at a frame ([`crate::picture::message`]), or the last picture before it; `None` if there is no
+    /// picture.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         match self {
             Self::Folder(it) => it.picture(frame, view),
@@ -93,15 +94,16 @@ impl Finished {
 /// A frame of a finished run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Frame {
-    /// Its number.
+    /// Number of the frame.
     pub number: u64,
-    /// True if it has a skeleton, where that is known without reading it.
+    /// True if the frame has a skeleton; `None` if the frame must be read to know this.
     pub has_pose: Option<bool>,
-    /// Where it lies: bytes from the beginning of its file, or the number of its message.
+    /// Position of the frame: the offset in bytes in its file, or the number of its message.
     pub place: u64,
 }
 
-/// The time line in pieces, a letter each: `1` skeletons, `0` none, `?` some, or not known.
+/// Returns the time line with one character per piece: `1` if all frames have skeletons, `0` if none has, `?` if only some have or it is
+/// unknown.
 fn pieces(frames: &[Frame]) -> String {
     let per = frames.len().div_ceil(MOST_PIECES).max(1);
     let piece = |frames: &[Frame]| {

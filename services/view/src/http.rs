@@ -1,4 +1,4 @@
-//! Requests and answers of HTTP, as far as a page of a few files needs them: one request a connection.
+//! The part of HTTP that a page of a few files needs: one request and one response per connection.
 
 use core::time::Duration;
 use std::io::{self, Read, Write};
@@ -8,10 +8,10 @@ use std::time::Instant;
 use tungstenite::handshake::machine::TryParse as _;
 use tungstenite::handshake::server::Request;
 
-/// The largest request, bytes.
+/// Largest size of a request, bytes.
 const LARGEST_REQUEST: usize = 16 << 10;
 
-/// A connection that lives until a time, whatever the other end does.
+/// A connection with a fixed deadline, whatever the other end does.
 #[derive(Debug)]
 pub(crate) struct Timed<'s> {
     pub(crate) stream: &'s TcpStream,
@@ -46,18 +46,18 @@ impl Write for Timed<'_> {
     }
 }
 
-/// A request, and bytes that came behind it.
+/// A request, and the bytes that follow it.
 #[derive(Debug)]
 pub(crate) struct Asked {
     pub(crate) request: Request,
     pub(crate) rest: Vec<u8>,
 }
 
-/// Reads a request, or returns the answer to something that is not a request.
+/// Reads a request, or returns the response to invalid data.
 ///
 /// # Errors
 ///
-/// The connection ended or failed.
+/// Fails if the connection ended or failed.
 pub(crate) fn read(from: &mut impl Read) -> io::Result<Result<Asked, Answer>> {
     let mut bytes = Vec::new();
     let mut buffer = [0; 2048];
@@ -80,7 +80,7 @@ pub(crate) fn read(from: &mut impl Read) -> io::Result<Result<Asked, Answer>> {
     }
 }
 
-/// An answer.
+/// A response.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Answer {
     pub(crate) status: u16,
@@ -89,9 +89,9 @@ pub(crate) struct Answer {
 }
 
 impl Answer {
-    /// A file.
+    /// Creates a response with a text file.
     ///
-    /// * `kind`: of its text, as `text/css`.
+    /// * `kind`: media type of the text, for example `text/css`.
     pub(crate) fn file(kind: &'static str, content: &str) -> Self {
         Self {
             status: 200,
@@ -100,7 +100,7 @@ impl Answer {
         }
     }
 
-    /// A sentence, for example why something is refused.
+    /// Creates a response with a sentence, for example the reason for a refusal.
     pub(crate) fn text(status: u16, content: &str) -> Self {
         Self {
             status,
@@ -109,11 +109,11 @@ impl Answer {
         }
     }
 
-    /// Writes it, with more headers, and that nothing follows.
+    /// Writes the response with additional headers, and announces that the connection will close.
     ///
     /// # Errors
     ///
-    /// The connection failed.
+    /// Fails if the connection failed.
     pub(crate) fn write(&self, to: &mut impl Write, more: &[(&str, &str)]) -> io::Result<()> {
         let reason = match self.status {
             200 => "OK",

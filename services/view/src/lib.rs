@@ -1,21 +1,21 @@
-//! A page in the browser that shows a deployment while it runs, or a finished one: the skeleton in space with its
-//! uncertainty, every camera's picture, rates, latency, who is missing, errors.
+//! A page in the browser that shows a deployment while it runs, or a finished run. It shows the skeleton in space with its
+//! uncertainty, the pictures of all cameras, rates, latency, missing processes, and errors.
 //!
-//! A thread looks on ([`runtime::Bus::as_onlooker`]) and puts the newest of everything on a board; every open page has a
-//! thread that sends what is new on the board. So no sender of the deployment waits for the page, a page that is slow misses
-//! frames, and the memory does not grow with the number of frames or with what a page does not take.
+//! A thread follows the deployment ([`runtime::Bus::as_onlooker`]) and puts the newest messages on a board. Every open page has a
+//! thread that sends the new messages from the board. Therefore no process of the deployment waits for a page, and a slow page misses
+//! frames. The memory does not grow with the number of frames or with the messages that a page does not take.
 //!
-//! | part | where |
+//! | part | module |
 //! |---|---|
-//! | what to show and where to listen | [`Options`], [`run`] |
-//! | cameras, joints, what the numbers mean | `scene` |
+//! | subject of the page, and listening address | [`Options`], [`run`] |
+//! | cameras, joints, meaning of the numbers | `scene` |
 //! | one frame as text for the page | `moment` |
-//! | a picture made small, as JPEG | `picture` |
+//! | a reduced picture as JPEG | `picture` |
 //! | a running deployment | `live` |
-//! | a finished one: its folder, its recording | `finished` |
-//! | who may ask, and the files of the page | `server` |
+//! | a finished run: its folder or its recording | `finished` |
+//! | access rules, and the files of the page | `server` |
 //! | connections and requests | `door`, `http` |
-//! | the conversation with one page | `socket` |
+//! | the messages to and from one page | `socket` |
 #![forbid(unsafe_code)]
 
 mod board;

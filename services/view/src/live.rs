@@ -1,4 +1,4 @@
-//! Looks on at a running deployment, and puts what it sees on the board.
+//! Follows a running deployment, and puts its messages on the board.
 
 mod events;
 mod session;
@@ -13,17 +13,17 @@ use serde_json::{Value, json};
 use crate::board::{Board, Weight};
 use session::{Look, Session};
 
-/// Pause between two looks while a page is open: shorter than any camera's.
+/// Pause between two looks at the deployment while a page is open; shorter than the frame period of any camera.
 const TURN: Duration = Duration::from_millis(12);
-/// Pause between two looks while none is.
+/// Pause between two looks at the deployment while no page is open.
 const IDLE_TURN: Duration = Duration::from_millis(150);
 /// Pause between two attempts to find the deployment.
 const ABSENT: Duration = Duration::from_millis(250);
 
-/// Follows a deployment until a stop is requested: waits until it runs, looks on until it ends, and waits for the next run.
+/// Follows a deployment until a stop is requested: waits for a run, follows it until it ends, and waits for the next run.
 ///
-/// * `named`: its name; the only one that runs if there is none.
-/// * `pictures_per_second`: most pictures of a view.
+/// * `named`: name of the deployment; if `None`, the only one that runs.
+/// * `pictures_per_second`: largest number of pictures per second for each view.
 pub(crate) fn follow(named: Option<&str>, pictures_per_second: u32, board: &Board, stop: &Stop) {
     let mut said = None;
     while !stop.is_requested() {
@@ -44,15 +44,15 @@ pub(crate) fn follow(named: Option<&str>, pictures_per_second: u32, board: &Boar
     }
 }
 
-/// Returns the first message to a page while nothing runs.
+/// Returns the first message to a page while no deployment runs.
 fn waiting(named: Option<&str>, why: &str) -> Value {
     json!({ "type": "hello", "mode": "waiting", "name": named, "why": why })
 }
 
-/// Looks on until the deployment ends.
+/// Follows the deployment until it ends.
 fn watch(mut session: Session, board: &Board, stop: &Stop) -> Result<(), Failure> {
     board.begin(&session.hello(), Some(session.scene()));
-    board.event(Weight::Note, "looking on");
+    board.event(Weight::Note, "connected to the deployment");
     while !stop.is_requested() {
         let turned = Instant::now();
         if session.look(board)? == Look::Over {

@@ -1,75 +1,75 @@
-//! One frame as the page draws it: the person who is followed, and the others.
+//! One frame as the page draws it, with the followed person and other people.
 
 use messages::{FusedView, Joint3d, MAX_PARTS, SkeletonMessage, Skeletons, Status};
 use serde::Serialize;
 
 use crate::scene::Scene;
 
-/// One frame: the skeleton in space, the pose in every view, and who is missing.
+/// One frame: the skeletons in space, the pose in every view, and reasons for missing data.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Moment {
     /// Always `moment`.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Its place in a finished run, from 0.
+    /// Index of the frame in a finished run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<usize>,
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// When it was taken, seconds after frame 0, where known.
+    /// Time of the frame in seconds after frame 0; `None` if unknown.
     pub seconds: Option<f64>,
-    /// Why there is no skeleton; none if there is one.
+    /// Reason for a missing skeleton; `None` if there is a skeleton.
     pub why: Option<String>,
-    /// Identity of the person who is followed; none without one.
+    /// Identity of the followed person; `None` if no person is followed.
     pub id: Option<u64>,
     /// The other people.
     pub others: Vec<Other>,
-    /// Every joint in the world, metres.
+    /// Position of every joint in world coordinates, metres; `None` for an unknown joint.
     pub joints: Vec<Option<[f64; 3]>>,
     /// Covariance of every joint, square metres: xx, xy, xz, yy, yz, zz.
     pub spread: Vec<Option<[f64; 6]>>,
-    /// Every view.
+    /// Pose in every view.
     pub views: Vec<Seen>,
-    /// How many people the views agree on, if that was counted.
+    /// Number of people that the views agree on; `None` if they were not counted.
     pub people: Option<u32>,
-    /// Height of the person standing upright, metres, where known.
+    /// Height of the person standing upright, metres; `None` if unknown.
     pub stature: Option<f64>,
-    /// From the capture to the result, milliseconds, where known.
+    /// Latency from capture to result, milliseconds; `None` if unknown.
     pub latency_ms: Option<f64>,
 }
 
 /// A person other than the followed one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Other {
-    /// Identity.
+    /// Identity of the person.
     pub id: u64,
-    /// As in [`Moment`].
+    /// Position of every joint in world coordinates, metres; `None` for an unknown joint.
     pub joints: Vec<Option<[f64; 3]>>,
-    /// As in [`Moment`].
+    /// Height of the person standing upright, metres; `None` if unknown.
     pub stature: Option<f64>,
-    /// The joints in every view, pixels; none without a pose.
+    /// Joints in every view, pixels; `None` if a view has no pose.
     pub views: Vec<Option<Vec<[f64; 2]>>>,
 }
 
-/// The pose in one view.
+/// Pose in one view.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Seen {
-    /// The joints, pixels; none without a pose.
+    /// Joints, pixels; `None` if there is no pose.
     pub joints: Option<Vec<[f64; 2]>>,
-    /// Why the view has no part in the result; none if it has one.
+    /// Reason why the view has no part in the result; `None` if it has one.
     pub why: Option<String>,
-    /// True if it sees the person from behind.
+    /// True if the view sees the person from behind.
     pub behind: bool,
 }
 
 impl Moment {
-    /// The name of its type.
+    /// Name of the message type.
     pub(crate) const KIND: &'static str = "moment";
 
-    /// The frame that a message speaks of, with the person who is followed. Check the message first.
+    /// Converts a message about a frame, with the followed person first. The message must have been checked.
     pub(crate) fn of_message(scene: &Scene, message: &Skeletons) -> Self {
         let person = message.followed();
-        // Of nobody no joint is anywhere.
+        // Without a person, no joint has a position.
         let nowhere = vec![Joint3d::default(); scene.joints.joints.len()];
         let joints = person.map_or(&nowhere[..], SkeletonMessage::listed_joints);
         let found = |joint: &&Joint3d| person.is_some() && joint.status == Status::OK;
@@ -99,9 +99,9 @@ impl Moment {
         }
     }
 
-    /// As a message to the page.
+    /// Returns the frame as a message to the page.
     pub(crate) fn text(&self) -> String {
-        // Numbers that are not finite become null; there is no other error.
+        // Numbers that are not finite become null; no other error is possible.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
@@ -122,7 +122,7 @@ impl Other {
     }
 }
 
-/// Every joint in the world; `None` where it is not known.
+/// Returns the position of every joint in world coordinates; `None` for an unknown joint.
 fn places(joints: &[Joint3d], is_somebody: bool) -> Vec<Option<[f64; 3]>> {
     let place = |joint: &Joint3d| {
         let is_known = is_somebody && joint.status == Status::OK;
@@ -131,12 +131,12 @@ fn places(joints: &[Joint3d], is_somebody: bool) -> Vec<Option<[f64; 3]>> {
     joints.iter().map(place).collect()
 }
 
-/// The height of a person, metres; `None` where it is not known.
+/// Returns the height of a person, metres; `None` if unknown.
 fn stature(person: &SkeletonMessage) -> Option<f64> {
     Some(rounded(person.stature_m, 1e3)).filter(|metres| *metres > 0.0)
 }
 
-/// The joints in a view, pixels.
+/// Returns the joints in a view, pixels.
 fn in_pixels(scene: &Scene, fused: &FusedView) -> Option<Vec<[f64; 2]>> {
     let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
     let joints = scene.joints_of(&fused.centres_px[..n_parts])?;
@@ -152,7 +152,7 @@ fn seen(scene: &Scene, message: &Skeletons, view: usize) -> Seen {
         let why = if is_there || status != Status::NO_DETECTION {
             status.reason()
         } else {
-            "nothing in time"
+            "no frame in time"
         };
         return Seen {
             why: Some(why.to_owned()),
@@ -166,22 +166,22 @@ fn seen(scene: &Scene, message: &Skeletons, view: usize) -> Seen {
     }
 }
 
-/// Rounded to a fraction.
+/// Rounds a value to a multiple of 1 / `per`.
 pub(crate) fn rounded(value: f64, per: f64) -> f64 {
     (value * per).round() / per
 }
 
-/// To a tenth of a millimetre.
+/// Rounds a position to a tenth of a millimetre.
 pub(crate) fn in_world(point: [f64; 3]) -> [f64; 3] {
     point.map(|point| rounded(point, 1e4))
 }
 
-/// To a tenth of a pixel.
+/// Rounds a position to a tenth of a pixel.
 pub(crate) fn in_view(point: [f64; 2]) -> [f64; 2] {
     point.map(|point| rounded(point, 10.0))
 }
 
-/// To a hundredth of a square millimetre; none where it is not known.
+/// Rounds a covariance to a hundredth of a square millimetre; `None` if it is unknown.
 pub(crate) fn spread(covariance: [f64; 6]) -> Option<[f64; 6]> {
     let is_known = covariance.iter().all(|value| value.is_finite());
     is_known.then(|| covariance.map(|covariance| rounded(covariance, 1e8)))
@@ -194,7 +194,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::scene::View;
 
-    /// A run of one view.
+    /// Returns the scene of a run with one view.
     pub(crate) fn scene() -> Scene {
         Scene {
             name: "test".to_owned(),
@@ -233,6 +233,6 @@ pub(crate) mod tests {
         let moment = Moment::of_message(&scene(), &message);
         assert_eq!((moment.joints, moment.stature), (vec![None; 14], None));
         assert_eq!(moment.why.as_deref(), Some("too few views"));
-        assert_eq!(moment.views[0].why.as_deref(), Some("nothing in time"));
+        assert_eq!(moment.views[0].why.as_deref(), Some("no frame in time"));
     }
 }

@@ -1,4 +1,4 @@
-//! Options: subject of the page, and address to listen on.
+//! Options: subject of the page, and listening address.
 
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -6,30 +6,30 @@ use std::path::PathBuf;
 /// Subject of a page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Subject {
-    /// A deployment while it runs, by its name; the only one that runs if there is no name.
+    /// A deployment while it runs, by its name; `None` for the only one that runs.
     Deployment(Option<String>),
-    /// The folder that a run left.
+    /// Folder with the results of a run.
     Folder(PathBuf),
-    /// A recording.
+    /// Recording file.
     Recording(PathBuf),
 }
 
-/// Where the page is served.
+/// Address at which the page is served.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Listen {
-    /// The address; the port is 0 for any free one.
+    /// Address to listen on; port 0 means any free port.
     pub address: SocketAddr,
-    /// True if another port is taken where this one is in use.
+    /// True to use another port if this one is in use.
     pub may_move: bool,
-    /// Token that a page must know; none only on the loopback.
+    /// Token that a page must know; `None` only on the loopback.
     pub token: Option<String>,
 }
 
 impl Listen {
-    /// The port that is tried first, if none is given.
+    /// Port that is tried first if none is given.
     pub const PORT: u16 = 7878;
 
-    /// The loopback, at the usual port or another.
+    /// Returns the loopback address with the usual port, or another port if it is in use.
     pub fn usual() -> Self {
         Self {
             address: SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), Self::PORT),
@@ -39,13 +39,13 @@ impl Listen {
     }
 }
 
-/// The options of a view.
+/// Options of a view.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
     /// Subject of the page.
     pub subject: Subject,
-    /// Where to listen.
+    /// Listening address.
     pub listen: Listen,
-    /// Most pictures of a camera that are sent in a second.
+    /// Largest number of pictures per second that are sent for each camera.
     pub pictures_per_second: u32,
 }

@@ -1,21 +1,21 @@
-//! A picture for a page: small, as JPEG.
+//! A reduced picture as JPEG, for a page.
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
-/// The longest side of a picture, pixels.
+/// Longest side of a picture, pixels.
 pub(crate) const LONGEST: usize = 480;
 /// Quality of the JPEG files, percent.
 const QUALITY: u8 = 72;
-/// Bytes before the JPEG file in a message to the page.
+/// Number of bytes before the JPEG file in a message to the page.
 const HEAD_BYTES: usize = 16;
 
-/// A message to the page with one picture: 1, the view, whether poses are drawn in it, five zeros, the number of the frame
-/// (64 bits, little endian), and a JPEG file. None for a picture without pixels, and one that cannot be encoded.
+/// Returns a message to the page with one picture. It contains 1, the view, whether poses are drawn in the picture, five zeros, the number
+/// of the frame (64 bits, little endian), and a JPEG file. `None` if the picture has no pixels or cannot be encoded.
 ///
 /// * `size`: width and height, pixels.
 /// * `rgb`: `width * height * 3` bytes.
-/// * `is_drawn`: whether poses are drawn in it already.
+/// * `is_drawn`: true if poses are already drawn in the picture.
 pub(crate) fn message(
     view: usize,
     frame: u64,
@@ -35,7 +35,7 @@ pub(crate) fn message(
     encoded.is_ok().then_some(out)
 }
 
-/// The picture divided by the smallest whole number that makes it small enough: every pixel is the mean of a square.
+/// Reduces a picture by the smallest whole factor that makes it small enough; every pixel is the mean of a square.
 fn reduced(size: [usize; 2], rgb: &[u8]) -> Option<([usize; 2], Vec<u8>)> {
     let [width, height] = size;
     let fits = width.checked_mul(height)?.checked_mul(3)? == rgb.len();
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_large_picture_becomes_the_means_of_squares() {
-        // Columns of 0 and 200 in turn, 1000 pixels wide: three by three of them have a mean of 67 or 133.
+        // Columns alternate between 0 and 200, with a width of 1000 pixels, so three by three of them have a mean of 67 or 133.
         let rgb: Vec<u8> = (0..1000 * 6).flat_map(|i| [200 * (i % 2) as u8, 9, 255]).collect();
         let (size, small) = reduced([1000, 6], &rgb).unwrap();
         assert_eq!(size, [333, 2]);

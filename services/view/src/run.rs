@@ -17,14 +17,14 @@ use crate::site::Site;
 
 /// Serves a page until a stop is requested.
 ///
-/// The process gives way to those of the deployment: where processors are scarce, the page is what has to wait.
+/// The process has a lower priority than the deployment: if processor time is scarce, the page waits.
 ///
-/// * `say`: is called once with the address of the page, when it can be opened.
+/// * `say`: called once with the address of the page, when the page can be opened.
 ///
 /// # Errors
 ///
-/// The folder or recording cannot be read, the address is in use or not this machine's, or it is not the loopback and there
-/// is no token.
+/// Fails if the folder or recording cannot be read, if the address is in use or does not belong to this machine, or if it is not the
+/// loopback and there is no token.
 pub fn run(options: &Options, stop: &Stop, say: &mut dyn FnMut(&str)) -> Result<(), Failure> {
     check(&options.listen)?;
     let finished = match &options.subject {
@@ -75,7 +75,7 @@ fn check(listen: &Listen) -> Result<(), Failure> {
         return Ok(());
     }
     let text = format!(
-        "{} is not the loopback, and there is no token",
+        "{} is not a loopback address, so a token is needed",
         listen.address
     );
     Err(Failure::new(ExitKind::Usage, text))
@@ -89,11 +89,11 @@ fn bind(listen: &Listen) -> Result<TcpListener, Failure> {
     }
     bound.map_err(|error| {
         let text = format!("cannot listen on {}: {error}", listen.address);
-        Failure::new(ExitKind::Run, text).with_hint("--port 0 takes any free port")
+        Failure::new(ExitKind::Run, text).with_hint("--port 0 uses any free port")
     })
 }
 
-/// The address of the page for a browser.
+/// Returns the URL of the page.
 fn url(address: SocketAddr, token: Option<&str>) -> String {
     let token = token.map_or_else(String::new, |token| format!("?token={token}"));
     format!("http://{address}/{token}")

@@ -1,4 +1,4 @@
-//! Meaning of the numbers about a run: its cameras and joints.
+//! Cameras and joints of a run, which give the numbers their meaning.
 
 use failure::Failure;
 use geometry::Camera;
@@ -8,45 +8,45 @@ use nalgebra::Point2;
 use serde_json::{Value, json};
 use skeleton::{JointSet, PARSE14};
 
-/// Points of one epipolar line.
+/// Number of points in an epipolar line.
 const N_POINTS: usize = 40;
 
 /// The cameras and joints of a run.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
-    /// The name of the deployment.
+    /// Name of the deployment.
     pub name: String,
-    /// The views, as messages number them.
+    /// Views, in the order of their numbers in messages.
     pub views: Vec<View>,
-    /// The joints of the result.
+    /// Joints of the result.
     pub joints: &'static JointSet,
-    /// Against gravity, of length 1.
+    /// Upward direction in the world, a unit vector.
     pub up: [f64; 3],
-    /// Frames per second of the footage, where known.
+    /// Frames per second of the footage; `None` if unknown.
     pub frame_rate_hz: Option<f64>,
-    /// True if results say which views see the person from behind: those of the filters do.
+    /// True if results say which views see the person from behind. This is the case for results of the filters.
     pub tells_facing: bool,
-    /// Why the cameras are not known, if they are not.
+    /// Reason why the cameras are unknown; `None` if they are known.
     pub problem: Option<String>,
 }
 
 /// One view.
 #[derive(Debug, Clone)]
 pub(crate) struct View {
-    /// The camera's name.
+    /// Name of the camera.
     pub name: String,
     /// Width and height of the pictures that coordinates refer to, pixels.
     pub size: [u32; 2],
-    /// The camera that sees the world as those pictures show it, where it is known.
+    /// Camera with the calibration of those pictures; `None` if unknown.
     pub camera: Option<Camera>,
 }
 
 impl Scene {
-    /// The scene of a run, in pixels of its frames.
+    /// Creates the scene of a run, in pixels of its frames.
     ///
     /// # Errors
     ///
-    /// The model or the calibration cannot be read or used.
+    /// Fails if the model or the calibration cannot be read or used.
     pub(crate) fn of_frames(resolved: &Resolved) -> Result<Self, Failure> {
         let prepared = Prepared::new(resolved)?;
         let views = prepared.views.iter().map(|view| {
@@ -69,7 +69,8 @@ impl Scene {
         })
     }
 
-    /// The same, and without its cameras if they cannot be read: a run may be looked at where its calibration is not.
+    /// Creates the same scene as `of_frames`. If the cameras cannot be read, it has none, so that a run can be shown without its
+    /// calibration.
     pub(crate) fn of_finished(resolved: &Resolved) -> Self {
         Self::of_frames(resolved).unwrap_or_else(|why| {
             let cameras = resolved.deployment.cameras.iter().zip(&resolved.footage);
@@ -90,7 +91,7 @@ impl Scene {
         })
     }
 
-    /// Returns the facts about the scene that the page needs.
+    /// Returns the data about the scene that the page needs.
     pub(crate) fn json(&self) -> Value {
         let joints = self.joints.joints.iter().map(|joint| joint.name);
         let views = self.views.iter().map(|view| {
@@ -110,17 +111,17 @@ impl Scene {
         })
     }
 
-    /// The joints of a pose in a view; none if its parts are not those of the joints.
+    /// Returns the joints of a pose in a view; `None` if the pose has too few parts.
     ///
-    /// * `centres`: of the parts, pixels.
+    /// * `centres`: centres of the parts, pixels.
     pub(crate) fn joints_of(&self, centres: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
         let last = self.joints.joints.iter().flat_map(|joint| joint.parts).max()?;
         (centres.len() > *last).then(|| self.joints.from_parts(centres))
     }
 
-    /// Where points of views may lie in all other views: `[view of the point, other view, pixels along the line]`.
+    /// Returns the epipolar lines of points in all other views: `[view of the point, other view, pixels along the line]`.
     ///
-    /// * `points`: a view and a pixel in it; those that do not exist are left out.
+    /// * `points`: a view and a pixel in this view; points in views that do not exist are ignored.
     pub(crate) fn epipolar_lines(
         &self,
         points: &[(usize, [f64; 2])],

@@ -1,9 +1,9 @@
-//! Who may ask, and the files of the page.
+//! Access rules, and the files of the page.
 //!
-//! On the loopback any process of this machine may ask, but no page of another site: the name in `Host` has to be that of
-//! the loopback, which a site cannot have even if it makes its own name mean 127.0.0.1, and what a browser asks for on behalf
-//! of another site has that site in `Origin`. With a token, which is needed on any other address, pages have to know it
-//! instead. The files of the page hold no data: what does, goes over the one web socket.
+//! On the loopback, any process of this machine can request the page, but pages of other sites cannot. The name in `Host` must be
+//! a name of the loopback; this refuses other host names that resolve to 127.0.0.1. If a browser makes a request for another site,
+//! `Origin` names that site, and the request is refused. With a token, which is required on any other address, pages must know the token
+//! instead. The files of the page contain no data; all data is sent through the web socket.
 
 use core::net::IpAddr;
 
@@ -20,12 +20,12 @@ use crate::http::{self, Answer, Asked, Timed};
 use crate::site::Site;
 use crate::socket::Opened;
 
-/// Most pages at the same time.
+/// Largest number of simultaneous pages.
 pub(crate) const MOST_PAGES: usize = 64;
 
 const INDEX: &str = include_str!("../page/index.html");
 const STYLE: &str = include_str!("../page/view.css");
-/// The modules of the page, but for the stage that it shares with reports.
+/// Modules of the page, except the stage, which reports use too.
 const MODULES: [(&str, &str); 4] = [
     ("/view.js", include_str!("../page/view.js")),
     ("/pictures.js", include_str!("../page/pictures.js")),
@@ -36,7 +36,7 @@ const MODULES: [(&str, &str); 4] = [
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Headers of every answer.
+/// Headers of every response.
 const HEADERS: [(&str, &str); 5] = [
     ("Content-Security-Policy", POLICY),
     ("X-Content-Type-Options", "nosniff"),
@@ -45,7 +45,7 @@ const HEADERS: [(&str, &str); 5] = [
     ("Cache-Control", "no-store"),
 ];
 
-/// Answers the request of a connection; that of a page becomes its conversation.
+/// Responds to the request of a connection. If the request opens a page, messages are exchanged until the page closes.
 pub(crate) fn talk(stream: TcpStream, site: &Site) {
     let mut timed = Timed {
         stream: &stream,
@@ -68,11 +68,11 @@ pub(crate) fn talk(stream: TcpStream, site: &Site) {
     match page {
         Ok(Some(page)) => page.talk(stream, site.clone()),
         Ok(None) => {}
-        Err(error) => tracing::debug!(%error, "a connection ended before its answer"),
+        Err(error) => tracing::debug!(%error, "a connection ended before its response"),
     }
 }
 
-/// Opens a page, or returns another answer.
+/// Opens a page, or returns another response.
 fn answer(stream: &TcpStream, asked: Asked, site: &Site) -> Result<Opened, Answer> {
     let request = &asked.request;
     check(request.headers(), site.token.is_some()).map_err(|why| Answer::text(403, why))?;
@@ -111,30 +111,30 @@ fn file(path: &str) -> Answer {
     }
 }
 
-/// The token in the query after `?`; tokens have no characters that are escaped there.
+/// Returns the token in the query string; tokens have no characters that need escaping.
 fn token_in(query: Option<&str>) -> &str {
     let pairs = query.unwrap_or_default().split('&');
     let mut tokens = pairs.filter_map(|pair| pair.strip_prefix("token="));
     tokens.next().unwrap_or_default()
 }
 
-/// Compares in a time that does not reveal how many characters are right.
+/// Compares tokens in a time that does not reveal the number of correct characters.
 fn is_same(token: &str, other: &str) -> bool {
     let differences = token.bytes().zip(other.bytes());
     let differences = differences.fold(0, |sum, (a, b)| sum | (a ^ b));
     token.len() == other.len() && differences == 0
 }
 
-/// Refuses what a page of another site asks for.
+/// Refuses requests that pages of other sites make.
 ///
-/// * `has_token`: whether pages have to know a token, so that any name of this machine will do.
+/// * `has_token`: true if pages must know a token; then any host name of this machine is allowed.
 fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
     let mut hosts = headers.get_all(HOST).iter();
     let host = hosts.next().and_then(|host| host.to_str().ok());
     let host = host.filter(|_| hosts.next().is_none());
-    let host = host.ok_or("the request has no host, or several")?;
+    let host = host.ok_or("the request must have exactly one Host header")?;
     if !has_token && !is_loopback(host) {
-        return Err("this page is for this machine: ask for it as localhost or 127.0.0.1");
+        return Err("this page is only for this machine: open it as localhost or 127.0.0.1");
     }
     let Some(origin) = headers.get(ORIGIN) else {
         return Ok(());
@@ -144,11 +144,11 @@ fn check(headers: &HeaderMap, has_token: bool) -> Result<(), &'static str> {
     if site == Some(host) {
         Ok(())
     } else {
-        Err("pages of other sites may not ask")
+        Err("requests from pages of other sites are refused")
     }
 }
 
-/// Returns true if a host, with its port, is a name of the loopback. Any port: a tunnel has its own.
+/// Returns true if a host, with an optional port, is a name of the loopback. Any port is allowed, because tunnels use their own.
 fn is_loopback(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,

@@ -1,19 +1,19 @@
-//! Source of the answers to every page.
+//! Data for the responses to every page.
 
 use std::sync::{Arc, Mutex};
 
 use crate::board::Board;
 use crate::finished::Finished;
 
-/// Content that is served.
+/// Data that is served.
 #[derive(Debug, Clone)]
 pub(crate) struct Site {
-    /// The newest of everything.
+    /// The newest content for the pages.
     pub board: Arc<Board>,
-    /// The finished run, if it is one.
+    /// The finished run; `None` for a live run.
     pub finished: Option<Arc<Finished>>,
-    /// Held while a frame of it is read: pages take turns.
+    /// Lock that is held while a frame of the finished run is read, so that pages read one after the other.
     pub reading: Arc<Mutex<()>>,
-    /// Token that a page must know; none only on the loopback.
+    /// Token that a page must know; `None` only on the loopback.
     pub token: Option<String>,
 }

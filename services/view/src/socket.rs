@@ -1,4 +1,4 @@
-//! The conversation with one page.
+//! Messages to and from one page.
 
 use core::sync::atomic::Ordering;
 use core::time::Duration;
@@ -21,36 +21,36 @@ use crate::door::Seat;
 use crate::finished::Finished;
 use crate::site::Site;
 
-/// How long a page may take to accept a message.
+/// Longest time that a page may take to accept a message.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// The largest message of a page, bytes.
+/// Largest size of a message from a page, bytes.
 const LARGEST_QUESTION: usize = 16 << 10;
-/// Longest sleep: nothing is asked and nothing changes.
+/// Longest wait if the page requests nothing and nothing changes.
 const LONGEST_SLEEP: Duration = Duration::from_secs(10);
-/// Messages that make no sense before a page is left.
+/// Number of invalid messages after which the connection is closed.
 const MOST_REFUSED: u32 = 20;
-/// Most points whose lines are asked for at once.
+/// Largest number of points in one request for lines.
 const MOST_POINTS: usize = 64;
 
-/// Question of a page; everything that it leaves out stays.
+/// Request of a page; fields that are left out do not change.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Question {
-    /// The views whose pictures it shows.
+    /// Views whose pictures the page shows.
     pictures: Option<Vec<usize>>,
-    /// The frame of a finished run that it shows, from 0.
+    /// Index of the frame of a finished run that the page shows.
     at: Option<usize>,
-    /// Request to begin (true) or end a recording.
+    /// True to start a recording, false to end it.
     record: Option<bool>,
-    /// Points whose lines in other views it shows: view, and pixel in it.
+    /// Points whose lines in other views the page shows: view, and pixel in this view.
     epipolar: Option<Vec<(usize, [f64; 2])>>,
 }
 
-/// A page while it is open.
+/// An open page.
 struct Page {
     site: Site,
     number: usize,
-    /// True if it may begin and end recordings: the others are of another user, and have no token.
+    /// True if the page may start and end recordings. Pages of another user without a token may not.
     may_record: bool,
     shown: [bool; MAX_VIEWS],
     seen: u64,
@@ -64,21 +64,21 @@ impl Drop for Page {
     }
 }
 
-/// A page that may be talked with.
+/// A page that has passed the access rules.
 #[derive(Debug)]
 pub(crate) struct Opened {
     /// First response to the page.
     pub(crate) response: Response,
-    /// Bytes that it has sent already.
+    /// Bytes that the page has already sent.
     pub(crate) rest: Vec<u8>,
     /// Counts the page while it is open.
     pub(crate) seat: Seat,
-    /// True if it may begin and end recordings.
+    /// True if the page may start and end recordings.
     pub(crate) may_record: bool,
 }
 
 impl Opened {
-    /// Talks with a page until it goes, takes too long, or makes no sense.
+    /// Exchanges messages with a page until it closes, takes too long, or sends too many invalid messages.
     pub(crate) fn talk(self, stream: TcpStream, site: Site) {
         let bell = stream
             .set_nonblocking(true)
@@ -87,7 +87,7 @@ impl Opened {
         let bell = match bell {
             Ok(bell) => bell,
             Err(error) => {
-                tracing::debug!(%error, "a page cannot be talked with");
+                tracing::debug!(%error, "cannot exchange messages with a page");
                 return;
             }
         };
@@ -109,7 +109,7 @@ impl Opened {
     }
 }
 
-/// Sends a message, unless the page does not take it in time.
+/// Sends a message; fails if the page does not accept it in time.
 fn send(socket: &mut WebSocket<TcpStream>, message: Message) -> Result<(), Error> {
     let until = Instant::now() + PATIENCE;
     let mut sent = socket.write(message);
@@ -128,7 +128,7 @@ fn send(socket: &mut WebSocket<TcpStream>, message: Message) -> Result<(), Error
     }
 }
 
-/// Waits for one of several files, or for time to pass.
+/// Waits for one of several files, but not longer than `limit`.
 fn wait(files: &[(BorrowedFd<'_>, PollFlags)], limit: Duration) -> io::Result<()> {
     let watched = files.iter().map(|(file, flags)| PollFd::new(file, *flags));
     let mut watched: Vec<PollFd<'_>> = watched.collect();
@@ -148,11 +148,11 @@ impl Page {
         &self.site.board
     }
 
-    /// Sends what is new, and answers what is asked or waits.
+    /// Sends new messages and responds to requests. If there are none, waits.
     ///
-    /// * `bell`: is rung when there is something new.
+    /// * `bell`: event file that is signalled when the board has changed.
     fn turn(&mut self, socket: &mut WebSocket<TcpStream>, bell: &OwnedFd) -> Result<(), Error> {
-        // Before the board is read: what changes later rings again.
+        // The event file is cleared before the board is read, so later changes signal it again.
         let _rung = rustix::io::read(bell, &mut [0; 8]).is_ok();
         let (seen, new) = self.board().since(self.seen, &self.shown);
         self.seen = seen;
@@ -186,7 +186,7 @@ impl Page {
             Ok(question) => question,
             Err(why) => {
                 self.n_refused += 1;
-                let why = format!("not a question: {why}");
+                let why = format!("not a valid request: {why}");
                 return vec![text(&json!({ "type": "refused", "why": why }))];
             }
         };
@@ -198,7 +198,7 @@ impl Page {
             Some(on) if self.may_record => self.board().ask_to_record(on, self.number),
             Some(_) => answers.push(text(&json!({
                 "type": "refused",
-                "why": "recording is for the user whose run this is, or for pages with a token (`--token`)",
+                "why": "only the user who runs the view, or a page with a token (`--token`), can record",
             }))),
             None => {}
         }
@@ -235,7 +235,7 @@ impl Page {
     }
 }
 
-/// A frame of a finished run and its pictures, the frame last: with it the answer is complete.
+/// Reads a frame of a finished run and its pictures. The frame is last and completes the response.
 fn read(finished: &Arc<Finished>, at: usize, shown: &[bool; MAX_VIEWS]) -> Vec<Message> {
     let moment = match finished.moment(at) {
         Ok(moment) => moment,
@@ -262,7 +262,7 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, View};
 
-    /// Questions of pages.
+    /// Requests of pages.
     const QUESTIONS: [&str; 8] = [
         r#"{"pictures":[0,1]}"#,
         r#"{"pictures":[]}"#,
@@ -321,7 +321,7 @@ mod tests {
         }
     }
 
-    /// The answers to a question; they must be JSON, and only what is no question is refused.
+    /// Returns the responses to a request. They must be JSON, and only invalid requests are refused.
     fn ask(page: &mut Page, question: &str) -> Vec<Value> {
         let refused_before = page.n_refused;
         let answers = page.answer(question);

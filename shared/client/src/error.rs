@@ -28,7 +28,7 @@ pub enum ClientError {
         cameras: Vec<String>,
     },
     /// The [`Wish`](crate::Wish) requests nothing.
-    #[error("nothing is requested: neither skeletons nor poses nor pictures")]
+    #[error("nothing is requested: choose skeletons, poses or pictures")]
     NoWish,
     /// A message cannot be received.
     #[error(transparent)]

@@ -4,7 +4,7 @@
 use messages::{Metrics, MetricsRow, Span};
 use runtime::metrics::Reading;
 
-/// Whatever bytes lie in shared memory, as the numbers that they are; zeros after the last.
+/// Any bytes in shared memory, read as numbers; zeros after the end.
 struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {

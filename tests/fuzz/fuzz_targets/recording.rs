@@ -1,4 +1,4 @@
-//! Recordings of runs: whatever is found in a file can be read, or is refused.
+//! Recordings of runs: every message in a file can be read, or is refused.
 #![no_main]
 
 use std::io::Cursor;

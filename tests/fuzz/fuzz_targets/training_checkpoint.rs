@@ -1,4 +1,4 @@
-//! The payload of the checkpoints of trainings, under a right checksum.
+//! Payload of training checkpoints, with a correct checksum.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|input: &[u8]| properties::training_checkpoint(input));

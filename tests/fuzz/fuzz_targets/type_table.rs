@@ -1,4 +1,4 @@
-//! Part-type tables, and the joint of two of them.
+//! Part-type tables, and two joined tables.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|input: &[u8]| properties::type_table(input));

@@ -1,4 +1,4 @@
-//! Messages, each changed in every field.
+//! Messages with changes in all fields.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|input: &[u8]| properties::wire_messages(input));

@@ -1,4 +1,4 @@
-//! Properties that hold for every reader of files, whatever is in them.
+//! Properties of every reader of files, for any content.
 
 use deployment::{AnyMachine, Loaded, Stage, Topology};
 use exports::{FILES, Gathering, Trial};
@@ -20,13 +20,13 @@ use training::Checkpoint;
 use training::datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use viewquality::{Card, Network, Table, Tau};
 
-/// A payload behind our own header, of version 1.
+/// Returns a payload after our own header of version 1.
 fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
     formats::checksum::Envelope { magic, version: 1 }.seal(payload)
 }
 /// Deployment files; the first line may be an option of the command line.
 ///
-/// Accepted text shows all its keys, is accepted again as it was written out, and has processes that fit together.
+/// Accepted text shows all its keys, is accepted again after it is written, and has processes that fit together.
 pub fn deployment_text(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -85,7 +85,7 @@ pub fn model_mat(input: &[u8]) {
     }
 }
 
-/// The payload of our own model files, under a right checksum.
+/// Payload of our own model files, with a correct checksum.
 pub fn model_own(payload: &[u8]) {
     let file = with_checksum(own::MAGIC, payload);
     if let Ok(Ok(model)) = own::decode(&file).map(Model::new) {
@@ -107,7 +107,7 @@ pub fn quality_table(input: &[u8]) {
     }
 }
 
-/// Networks that predict errors: what their files say of themselves, and the files themselves.
+/// Networks that predict errors: the metadata of their files, and the files themselves.
 pub fn quality_network(input: &[u8]) {
     if let Ok(text) = core::str::from_utf8(input) {
         let entries = text.lines().filter_map(|line| line.split_once('='));
@@ -120,7 +120,7 @@ pub fn quality_network(input: &[u8]) {
     let _outcome = Network::parse(input.to_vec(), 2);
 }
 
-/// Part-type tables, and the joint of two of them.
+/// Part-type tables, and two joined tables.
 pub fn type_table(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -134,7 +134,7 @@ pub fn type_table(input: &[u8]) {
     }
 }
 
-/// The learned consistency of several views: the file, and the tables that are made of it.
+/// Learned consistency of several views: the file, and the tables made from it.
 pub fn consistency(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -157,7 +157,7 @@ pub fn consistency(input: &[u8]) {
     }
 }
 
-/// The card of a network, or of a detector: what is read holds numbers that can be used, and its window shows a box.
+/// Card of a network or of a detector. The numbers in an accepted card can be used, and its window shows a box.
 pub fn network_card(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -189,7 +189,7 @@ pub fn network_card(input: &[u8]) {
     assert!(values.iter().all(|value| !value.is_nan()));
 }
 
-/// Keypoints of other programs, in either layout: what is read has as many keypoints as names, in their limits.
+/// Keypoints from other programs, in both layouts. Accepted data has as many keypoints as names, within their limits.
 pub fn keypoint_files(input: &[u8]) {
     let given = NameSet::of_set("mpii-16").expect("a set");
     let check = |people: &[SeenKeypoints], n: usize| {
@@ -221,7 +221,7 @@ pub fn keypoint_files(input: &[u8]) {
     }
 }
 
-/// Where joints lie among the parts: the file, and the map to every set of joints; the parts of a point are that point.
+/// Maps from the parts of a model to joints: the file, and the map to every joint set. If all parts are at one point, so are the joints.
 pub fn joint_file(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -240,7 +240,7 @@ pub fn joint_file(input: &[u8]) {
     }
 }
 
-/// Every calibration format that is one text.
+/// Every calibration format that consists of one text file.
 pub fn calibration(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -261,9 +261,9 @@ pub fn calibration(input: &[u8]) {
     let _opencv = opencv::parse(&[("cam01", input)], &options);
 }
 
-/// Tables of corners of boards, as other programs write them.
+/// Tables of board corners, as other programs write them.
 ///
-/// An accepted table is written as it would be after it was read again.
+/// An accepted table is the same after it is written and read again.
 pub fn board_corners(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -276,7 +276,7 @@ pub fn board_corners(input: &[u8]) {
     }
 }
 
-/// Our own annotation file, line by line, and skeletons.
+/// Our own annotation file, line by line, and skeleton tables.
 pub fn people_lines(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -310,7 +310,7 @@ pub fn people_mat(input: &[u8]) {
     }
 }
 
-/// The payload of the checkpoints of trainings, under a right checksum.
+/// Payload of training checkpoints, with a correct checksum.
 pub fn training_checkpoint(payload: &[u8]) {
     let file = with_checksum(*b"PLXTRAIN", payload);
     if let Ok((checkpoint, stamp)) = Checkpoint::from_bytes(&file) {
@@ -331,7 +331,7 @@ pub fn motion_c3d(input: &[u8]) {
     }
 }
 
-/// Addresses of scenes, and lines of their truth.
+/// Addresses of scenes, and lines of their truth files.
 pub fn scene_text(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -356,7 +356,7 @@ pub fn scene_text(input: &[u8]) {
     }
 }
 
-/// Whatever lines a run has, every format is written, or refuses them.
+/// For any lines of a run, every export format is written or refuses them.
 fn exported(input: &str) {
     let mut all = Gathering::default();
     for line in runfiles::lines::<FrameLine>(input).flatten().take(20) {
@@ -370,9 +370,9 @@ fn exported(input: &str) {
     trials.iter().for_each(written);
 }
 
-/// Every format of one file is written, or refuses a trial.
+/// Every single-file format is written or refuses a trial.
 fn written(trial: &Trial) {
-    // Frames may be as far apart as they like; what lies between is empty.
+    // Frames may be very far apart; the slots between them are empty.
     for format in FILES.iter().filter(|_| trial.slots.len() < 1000) {
         let mut file = Vec::new();
         if (format.write)(trial, &mut file).is_ok() && format.name == "c3d" {
@@ -382,7 +382,7 @@ fn written(trial: &Trial) {
     }
 }
 
-/// Lines of results as a person over time: what is smoothed are numbers, however wrong what was measured.
+/// Lines of results as one person over time. Smoothed values are finite, however wrong the measurements are.
 fn smoothed(input: &str) {
     let mut recorded = Recorded::default();
     for line in runfiles::lines::<FrameLine>(input).flatten() {
@@ -430,7 +430,7 @@ fn smoothed(input: &str) {
     }
 }
 
-/// The files that a run leaves behind: what was read is written so that it reads back to the same text.
+/// Files that a run leaves behind. Accepted data is written so that it reads back to the same text.
 pub fn run_files(input: &[u8]) {
     fn lines<L: Line>(input: &str) {
         for line in runfiles::lines::<L>(input).flatten() {

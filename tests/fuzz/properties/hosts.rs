@@ -1,4 +1,4 @@
-//! Messages of another host: packets, maps, signals, introductions.
+//! Messages from another host: packets, maps, signals, introductions.
 
 use bridge::hosts::{
     Answer, Clock, Content, Exchange, Expected, Head, Hello, Maps, Packet, Signal,
@@ -11,7 +11,7 @@ const EXPECTED: Expected<'static> = Expected {
     max_body: 4096,
 };
 
-/// Bytes from another host: whatever they are, they are taken whole or refused.
+/// Any bytes from another host: they are accepted completely or refused.
 pub fn host_messages(input: &[u8]) {
     if let Ok(packet) = Packet::parse(input, &EXPECTED) {
         assert_eq!(packet.to_bytes(), input);
@@ -39,7 +39,7 @@ pub fn host_messages(input: &[u8]) {
     clock_of(numbers);
 }
 
-/// Any numbers in a packet whose hash is right: refused, or what was sent.
+/// Any numbers in a packet with a correct hash: the packet is refused, or read as it was sent.
 fn packet_of(mut it: Numbers<'_>, body: &[u8]) {
     let contents = [Content::Frame, Content::ViewPose, Content::ViewQuality];
     let head = Head {
@@ -66,7 +66,7 @@ fn packet_of(mut it: Numbers<'_>, body: &[u8]) {
     }
 }
 
-/// Any times of another clock.
+/// Any times of another host's clock.
 fn clock_of(mut it: Numbers<'_>) {
     let mut clock = Clock::default();
     for _ in 0..8 {

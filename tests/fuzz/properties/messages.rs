@@ -1,5 +1,5 @@
-//! Properties that hold for every decoder of messages: each begins with messages that are right, and the input
-//! says what in them is changed, ten bytes a change: field, entry, and the value.
+//! Properties of every decoder of messages. Each starts from valid messages, and the input describes changes in them.
+//! A change has ten bytes: field, entry, and value.
 
 use std::sync::{Arc, OnceLock};
 
@@ -25,7 +25,7 @@ const EXPECTED: Expected = Expected {
     now_nanos: 1_000_000_000,
 };
 
-/// One number of a message is to be another one.
+/// A change of one number in a message.
 #[derive(Clone, Copy)]
 struct Change {
     field: u8,
@@ -57,7 +57,7 @@ impl Change {
     }
 }
 
-/// Three parts in a chain with one, two and three types, seen by two cameras.
+/// A chain of three parts with one, two and three types, seen by two cameras.
 struct World {
     model: Arc<Model>,
     plans: Vec<Arc<ViewPlan>>,
@@ -184,7 +184,7 @@ fn change_pose(pose: &mut PoseMessage, field: u8, it: Change) {
     }
 }
 
-/// Every message that is copied, and frames: what is let through lies where it says.
+/// Every message that is copied, and frames. The data in an accepted message is where the message says.
 pub fn wire_messages(input: &[u8]) {
     frame(input);
     candidates(input);
@@ -221,7 +221,7 @@ fn frame(input: &[u8]) {
     }
 }
 
-/// Candidates as they come, changed.
+/// Returns valid candidates with changes.
 fn view_pose(input: &[u8]) -> ViewPose {
     let mut message = wire::candidates_to_message(&[pose(), pose()], SIZE).expect("they fit");
     let extras = [Some(([3.0, 4.0], 1.0)), None, Some(([5.0, 6.0], 2.0)), None];
@@ -271,7 +271,7 @@ fn candidates(input: &[u8]) {
     }
 }
 
-/// Expected errors as they come, changed.
+/// Returns valid expected errors with changes.
 fn view_quality(input: &[u8]) -> ViewQuality {
     let mut message = wire::sigma_to_message(Some(&[1.0, 2.0, 3.0])).expect("they fit");
     for it in Change::all(input) {
@@ -299,7 +299,7 @@ fn expected_errors(input: &[u8]) {
     }
 }
 
-/// The answer of a pair as it comes, changed.
+/// Returns a valid result of a pair with changes.
 fn pair_pose(input: &[u8]) -> PairPose {
     let mut message = wire::pair_to_message([0, 1], None, 3).expect("it fits");
     (message.stamp, message.timing) = stamp();
@@ -393,8 +393,8 @@ fn result(input: &[u8]) {
     }
 }
 
-/// Evidence, candidates, expected errors and pairs of one frame, up to the skeleton: what is let through
-/// is computed with.
+/// Evidence, candidates, expected errors and pairs of one frame, up to the skeleton. Accepted messages are used
+/// for the computation.
 pub fn wire_fusion(input: &[u8]) {
     let World { model, plans, fuse } = world();
     let (input, pairs) = input.split_at(input.len() / 2);
@@ -438,7 +438,7 @@ pub fn wire_fusion(input: &[u8]) {
         let evidence = [&first.responses(), &second.responses()];
         let answer = fuse.pair([0, 1], &answers, evidence, &start);
         let sent = wire::pair_to_message([0, 1], answer.as_ref(), 3);
-        // Responses that are no numbers may make an energy that is none, which is not sent.
+        // Responses that are not finite can give an energy that is not finite; it is not sent.
         if let Some(read) = sent.ok().map(|sent| wire::pair_from_message(&sent, plans)) {
             found.extend(read.expect("it was written"));
         }
@@ -455,7 +455,7 @@ pub fn wire_fusion(input: &[u8]) {
     assert_eq!(message.people[0].n_views, 2);
 }
 
-/// Every part is a joint: the joint sets of people have more parts than the chain.
+/// Every part is a joint, because the joint sets of people have more parts than this chain.
 fn settings() -> SkeletonSettings {
     static PARTS: [skeleton::Joint; 3] = [
         skeleton::Joint {
@@ -482,7 +482,7 @@ fn settings() -> SkeletonSettings {
     }
 }
 
-/// Response maps as they come, changed.
+/// Returns valid response maps with changes.
 fn evidence(input: &[u8]) -> (EvidenceHeader, Vec<f32>) {
     let layout = world().plans[0].layout();
     let n_levels = layout.levels.len();

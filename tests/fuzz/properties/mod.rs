@@ -1,5 +1,5 @@
-//! Properties that hold for every reader and decoder, whatever it is given: the body of every fuzz target, also
-//! run by a plain test over the seeds and their mutations.
+//! Properties of every reader and decoder, for any input. They are the bodies of all fuzz targets. A plain test also
+//! runs them over the seeds and their mutations.
 
 mod files;
 mod hosts;
@@ -13,7 +13,7 @@ pub use files::{
 pub use hosts::host_messages;
 pub use messages::{wire_fusion, wire_messages};
 
-/// A target by name.
+/// Name of a target, and its property.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.

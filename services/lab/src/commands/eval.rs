@@ -31,40 +31,39 @@ use terminal::{Globals, Terminal};
 const BAR: &str = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";
 
 const HELP: &str = "\
-SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax-lab synth`, or a description \
-(configs/sequences/); or single pictures (below). Every frame is solved separately: every view alone, then by each version.
+SEQUENCE is a folder of HumanEva-I (all of it or one subject), of UMPM or of `parallax-lab synth`, a description file \
+(configs/sequences/), or a set of single pictures (below). In every frame, each view is first solved alone. Then each version solves the frame.
 
-Versions: fmp (every view alone, then triangulation), geometry, appearance (also part types), adaptive \
-(parts of large expected error switched off). They combine pairs of views by their mean, as in the paper. \
-geometry+consensus takes the poses that most views support; geometry+all-views supports each view by all others at \
-once, geometry+all-views-mean by the mean of their terms. Without --versions: all versions whose inputs are given \
-(tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), with pairs and with all views.
+Versions: fmp (each view alone, then triangulation); geometry (adds distances to epipolar lines); appearance (adds part types); \
+adaptive (switches off parts with a large expected error). They solve pairs of views and take the mean of the results, as in the paper. \
+A suffix changes this: geometry+consensus uses the poses that most views support. In geometry+all-views, all other views \
+support each view at once; geometry+all-views-mean uses the mean of their terms. Without --versions, all versions whose inputs are given \
+run, with pairs and with all views. appearance needs tables of part types or --consistency; adaptive needs --network, --sigma or --oracle.
 
---network FILE predicts the errors of the same single views, as the service `quality` does. The report then has its accuracy: \
-area under the ROC and rank correlation, part by part. Its thresholds are used if --paper sets no tau; \
-without any, a tenth of the person's size.
+--network FILE predicts the errors of the single views, as the service `quality` does. The report then shows how accurate the predictions \
+are for each part: area under the ROC curve and rank correlation. The network's thresholds apply if --paper sets no tau. \
+If the network has none either, the threshold is a tenth of the person's size.
 
---paper FILE is the [paper] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
+--paper FILE is a file with the keys of a deployment's [paper] section: energy, alpha, beta, compatibility, tau, facing ...
 
-Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged like in `judge`, \
-with the same numbers: PCP and PCK of the best detection of a picture, and of the best one on the person, with \
-intervals. --only and --without select pictures. Pictures and sequences cannot be mixed in one run.
+Single pictures of people with 14 joints (the folders of PARSE and LSP, or JSON lines) are evaluated as in `judge`. \
+The report has PCP and PCK of the best detection in a picture and of the best detection on the person, with \
+intervals. --only and --without select pictures. One run cannot mix pictures and sequences.
 
-OUT holds report.html, report.json, report.tex, and poses/ with the poses of every frame. \
---resume keeps solved frames; other settings are refused. --json prints the report's \
-numbers.
+OUT contains report.html, report.json, report.tex, and the poses of every frame in poses/. \
+--resume continues an interrupted run with the same settings and keeps the frames that are solved. --json prints the numbers of the report.
 
-A folder of several people in the layout of Shelf (calibration.json, detection/, gt.txt) is judged for who is who: detections \
-are grouped into people, followed and solved, and compared by PCP3D as in 4D Association, with its rule for the head. --views \
-selects cameras. --run RUN judges all people in a finished run of a folder of `parallax-lab synth`: PCP3D by person, mean error, average precision at \
-25 to 150 mm, recall, changes of ids, people found against people present. OUT then holds people.json.
+For a folder of several people in the layout of Shelf (calibration.json, detection/, gt.txt), the evaluation covers identities too: \
+detections are grouped into people, who are followed and solved. PCP3D is measured as in 4D Association, with its rule for the head. --views \
+selects cameras. --run RUN evaluates all people in a finished run of a folder of `parallax-lab synth`: PCP3D of each person, mean error, \
+average precision at 25 to 150 mm, recall, id changes, and people found against people present. OUT then contains people.json.
 
---network-evidence FILE [--detector FILE] judges the keypoints of a network (docs/networks.md): by plain \
-triangulation, with cameras left out, and in space over its maps, without and with the bones of a body. \
---stress adds problems of real rooms. OUT then holds evidence.txt and evidence.json.
+--network-evidence FILE [--detector FILE] evaluates the keypoints of a network (docs/networks.md) with four methods: plain \
+triangulation, triangulation that leaves out cameras, and the solution in space over the network's maps, without and with bones. \
+--stress adds problems that occur in real rooms. OUT then contains evidence.txt and evidence.json.
 
 Exit codes: 0 done; 2 the command line is wrong; 3 a setting is wrong; 4 a sequence or a model cannot be used; 5 a \
-calibration cannot be used; 7 done, but footage ended before the truth; 130 interrupted.
+calibration cannot be used; 7 done, but the footage ended before the ground truth; 130 interrupted.
 
 Examples:
     parallax-lab eval configs/sequences/pose2sim-balancing.toml --model parse.mat --size 272x480 --every 5 --out out/eval
@@ -79,60 +78,60 @@ Examples:
     reason = "each is a switch of the command line"
 )]
 pub(crate) struct Arguments {
-    /// The sequences.
+    /// Sequences to evaluate, see below.
     #[arg(required = true, value_name = "SEQUENCE")]
     sequences: Vec<PathBuf>,
-    /// The model file; the person model that ships with Parallax if not given.
+    /// Model file; the shipped person model if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The folder for the report.
+    /// Folder for the report.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The versions to compare, separated by commas; each is compared with the first.
+    /// Versions to compare, separated by commas; the first is the baseline of the comparison.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     versions: Vec<Version>,
-    /// File with settings of fusion.
+    /// Settings of fusion: a TOML file with the keys of `[paper]`.
     #[arg(long, value_name = "FILE")]
     paper: Option<PathBuf>,
-    /// Learned consistency (`train consistency`), instead of that of --paper; "shipped": the one that ships.
+    /// Learned consistency (a file of `train consistency`), instead of the one in --paper; "shipped" for the shipped file.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// Network that sees in which direction people face, for left and right (`train orientation`); "shipped": the one
-    /// that ships; "none": no network.
+    /// Network that sees in which direction people face, to tell left from right (`train orientation`); "shipped" for the shipped
+    /// network, "none" for no network.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     orientation: PathBuf,
-    /// Table of expected errors, in the authors' format.
+    /// Table of expected errors, in the format of the paper's authors.
     #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
     sigma: Option<PathBuf>,
-    /// Network that predicts the expected errors, an ONNX file; "shipped": the one that ships.
+    /// Network that predicts the expected errors, an ONNX file; "shipped" for the shipped network.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
     network: Option<PathBuf>,
-    /// Places of joints among the parts: a file of `train joints`; "shipped": the one for the model that ships; "none": a joint
-    /// is the centre of its part, as for other models.
+    /// Map from parts to joints (a file of `train joints`); "shipped" for the map of the shipped model. With "none", or for other models, a
+    /// joint is the centre of its part.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     joint_map: PathBuf,
-    /// Use the true errors: a part is switched off if its error exceeds a tenth of the person's size.
+    /// Use the true errors as the expected errors: switch off parts whose error exceeds a tenth of the person's size.
     #[arg(long)]
     oracle: bool,
     /// Size of the frames.
     #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "scale")]
     size: Option<[u32; 2]>,
-    /// Size of the frames as a share of that of the footage.
+    /// Size of the frames as a share of the footage's size.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Do not turn the frames upright.
+    /// Do not rotate the frames upright.
     #[arg(long)]
     no_upright: bool,
-    /// Maximal number of candidates per view.
+    /// Largest number of candidates per view.
     #[arg(long, value_name = "N", default_value_t = 8)]
     candidates: usize,
-    /// Use the first and every n-th frame after it.
+    /// Use the first frame and every n-th frame after it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     every: usize,
-    /// Maximal number of frames per sequence.
+    /// Largest number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Single pictures: the people to evaluate, all if not given.
+    /// Single pictures: the people to evaluate; all if not given.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     only: Option<Selection>,
     /// Single pictures: the people to leave out.
@@ -141,19 +140,19 @@ pub(crate) struct Arguments {
     /// The part of each sequence to use: 0.8-1 is the last fifth.
     #[arg(long, value_name = "FROM-TO", value_parser = share)]
     share: Option<[f64; 2]>,
-    /// Several people: the views to use, from 0, separated by commas; all if not given.
+    /// Several people: the views to use, counted from 0, separated by commas; all if not given.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     views: Vec<usize>,
-    /// Judge all people in a finished run of the sequence: the folder of its results.
+    /// Evaluate all people in a finished run of the sequence; DIR is the folder with the run's results.
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
-    /// UMPM: compare every frame with the pose of the frame before, as the released tools do.
+    /// UMPM: compare every frame with the pose of the previous frame, as the released tools do.
     #[arg(long)]
     umpm_late: bool,
     /// Length of the blocks of frames that the bootstrap draws for confidence intervals.
     #[arg(long, value_name = "N", default_value_t = 1)]
     block: usize,
-    /// Threads; one per core if not given. The numbers do not depend on it.
+    /// Number of threads; one per core if not given. It does not affect the numbers.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Continue an interrupted run.
@@ -176,13 +175,13 @@ fn share(text: &str) -> Result<[f64; 2], String> {
     let (from, to) = text.split_once('-').ok_or("expected FROM-TO, as 0.8-1")?;
     let end = |text: &str| match text.parse::<f64>() {
         Ok(end) if (0.0..=1.0).contains(&end) => Ok(end),
-        _ => Err(format!("{text:?} is no share from 0 to 1")),
+        _ => Err(format!("{text:?} is not a share from 0 to 1")),
     };
     let [from, to] = [end(from)?, end(to)?];
     if from < to {
         Ok([from, to])
     } else {
-        Err(format!("nothing lies between {from} and {to}"))
+        Err(format!("there is nothing between {from} and {to}"))
     }
 }
 
@@ -207,7 +206,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
 }
 
-/// Judges the versions of the method on sequences.
+/// Evaluates the versions of the method on sequences.
 fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<ExitCode, Failure> {
     let sequences = sequences(arguments)?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
@@ -262,7 +261,7 @@ fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<E
     outcome(&done)
 }
 
-/// Reads the table of expected errors, and the network that predicts them, if they are given.
+/// Reads the table of expected errors and the network that predicts them, if they are given.
 fn expected(
     arguments: &Arguments,
     n_parts: usize,
@@ -278,9 +277,7 @@ fn expected(
     Ok((sigma, network))
 }
 
-/// The settings and part-type tables for a sequence.
-///
-/// * `scale`: pixels of the frame per pixel of the footage.
+/// Returns the settings and part-type tables for a sequence.
 fn fusion(
     (config, learned, model): (&Config, Option<&Learned>, &Model),
     sequence: &Sequence,
@@ -296,14 +293,14 @@ fn fusion(
     Ok((settings, tables))
 }
 
-/// The exit status: an error if frames were left out or no frame was evaluated.
+/// Returns the exit status: an error if frames were left out or no frame was evaluated.
 fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     match done.n_missing {
         0 => {
             let is_judged = done.sequences.iter().any(|sequence| !sequence.1.is_empty());
             failure::require_results(
                 is_judged,
-                "no frame was judged: there is none, or --only and --every leave none",
+                "no frame was evaluated: there is none, or --only and --every leave none",
             )
         }
         n => {
@@ -313,7 +310,7 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Returns true if single pictures are evaluated; refuses pictures together with sequences.
+/// Returns true if single pictures are evaluated; refuses pictures and sequences in the same run.
 fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
     let n = arguments
         .sequences
@@ -323,13 +320,13 @@ fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
     let selects = arguments.only.is_some() || arguments.without.is_some();
     let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));
     if n == 0 && selects {
-        return refuse("--only and --without choose single pictures, and there are none");
+        return refuse("--only and --without select single pictures, but there are none");
     }
     if n > 0 && arguments.evidence.network_evidence.is_some() {
-        return refuse("--network-evidence judges sequences, not single pictures");
+        return refuse("--network-evidence is for sequences, not for single pictures");
     }
     if n > 0 && n < arguments.sequences.len() {
-        return refuse("single pictures and sequences are not judged in one run");
+        return refuse("single pictures and sequences cannot be evaluated in one run");
     }
     Ok(n > 0)
 }
@@ -358,7 +355,7 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
             all.push(sequence);
         }
     }
-    // A network does without the filters.
+    // The evaluation of a network does not use the filters.
     if arguments.evidence.network_evidence.is_none() {
         for warning in height::warnings(&all, arguments.size, arguments.scale) {
             tracing::warn!("{warning}");
@@ -386,7 +383,7 @@ fn consistency_file(config: &Config) -> Option<&PathBuf> {
     config.consistency.as_ref().map(Consistency::file)
 }
 
-/// Reads a section `[paper]` from a file; the defaults if there is none.
+/// Reads the `[paper]` settings from a file; the defaults if there is none.
 fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
     let Some(file) = file else {
         return Ok(Config::default());
@@ -404,7 +401,7 @@ fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
     Ok(config)
 }
 
-/// The versions to compare: the requested ones, or all that are possible with the given inputs.
+/// Returns the versions to compare: the requested ones, or all for which inputs are given.
 fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
     let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {
@@ -431,7 +428,7 @@ fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Fail
     Ok(versions)
 }
 
-/// A text with all settings that the poses depend on, besides the sequence and its frames.
+/// Returns a text with all settings that the poses depend on, except the sequence and its frames.
 fn settings_text(
     arguments: &Arguments,
     config: &Config,

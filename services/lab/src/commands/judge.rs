@@ -19,37 +19,36 @@ use statistics::score::Bootstrap;
 use terminal::{Globals, Terminal, output};
 use training::datasets::{People, ReadOptions, Selection, Sides, SkeletonTable};
 
-/// The progress bar.
+/// Template of the progress bar.
 pub(super) const BAR: &str =
     "{elapsed_precise} {bar:20} {pos}/{len} people, {per_sec}{left} {prefix}";
 
 /// Options of `parallax-lab judge`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-DATASET and SELECTION are those of `parallax-lab train fmp`. Two detections of an image are judged: for PCP the \
-best one of the image, as published, and for PCK the best one that covers 30 % of the box \
-around the person's joints (Yang & Ramanan). Bad labels are reported and left out.
+DATASET and SELECTION have the same form as in `parallax-lab train fmp`. Two detections in each image are evaluated, as published. \
+PCP uses the best detection in the image. PCK uses the best detection that covers 30 % of the box \
+around the person's joints (Yang & Ramanan). People with bad labels are reported and left out.
 
-On a terminal a bar shows the progress. Ctrl-C ends the command after the current person (exit code 130), and nothing \
-is printed.
+On a terminal, a bar shows the progress. Ctrl-C ends the command after the current person (exit code 130); it then prints no results.
 
-With --json one object:
+--json prints one object:
     {\"images\", \"left_out\", \"best\" | \"on_person\":
      {\"missed\", \"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}}
-The values are percentages, of every stick or joint, and of all in \"total\".
+The values are percentages for every stick or joint; \"total\" is over all of them.
 
-\"joints\" has the places of joints among the parts. With --offsets also \"offsets\": for every joint of the best detection on the
-person, found within 0.2 of the person's size, the mean along its bone (positive beyond the mark, seen from the trunk) and
-across it (positive outwards), percent of the height of the person, and their intervals.
+\"joints\" describes how joints follow from the parts. --offsets adds \"offsets\": the mean offset of every joint in the best \
+detection on the person, along and across its bone, with intervals, in percent of the person's height. Offsets are positive beyond the mark as \
+seen from the trunk, and outwards. Only joints within 0.2 of the person's size from their marks count.
 
-A network that finds keypoints (.onnx, docs/networks.md) looks at every person in the box around the marked joints, widened
-by 5 % on each side. \"peaks\" are the joints at the maxima of its maps. With --json they replace \"best\" and \"on_person\", also with \"intervals\": of the totals, 95 %
-over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}. \"expected_errors\" says how well the \
-height of the maxima predicts errors of the joints: {\"joints\", \"off_by_half_a_head\", \"auc\" (of predicting these), \
-\"auc_interval\", \"rank_correlation\"}.
+A network that finds keypoints (.onnx, docs/networks.md) sees each person in the box around the marked joints, widened \
+by 5 % on each side. \"peaks\" are the joints at the maxima of its maps. In the JSON they replace \"best\" and \"on_person\". \
+\"intervals\" has the 95 % intervals of the totals: {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}. \
+\"expected_errors\" shows how well the height of the maxima predicts the errors of the joints: {\"joints\", \"off_by_half_a_head\", \
+\"auc\" (for errors above half a head), \"auc_interval\", \"rank_correlation\"}.
 
-A detector of people (.onnx) is judged on the pictures that `parallax-lab train finder-pictures` kept apart (its file is DATASET): the share of
-people found, and false boxes. A box finds a person if the two boxes share half of their union.
+A detector of people (.onnx) is evaluated on the held-out pictures in a file of `parallax-lab train finder-pictures`, which is DATASET. \
+The output is the share of people found and the number of false boxes. A box finds a person if the two boxes share half of their union.
 
 Examples:
     parallax-lab judge person.fmp PARSE --only 101-200
@@ -60,11 +59,11 @@ Examples:
     reason = "each is a switch of the command line"
 )]
 pub(crate) struct Arguments {
-    /// The model file, of 26 parts; or a network that finds keypoints or people (.onnx).
+    /// Model file with 26 parts, or a network that finds keypoints or people (.onnx).
     model: PathBuf,
-    /// The data set: people with 14 joints; for a detector, pictures of `train finder-pictures`.
+    /// Data set of people with 14 joints; for a detector, a file of `train finder-pictures`.
     dataset: PathBuf,
-    /// The people to evaluate, all if not given.
+    /// The people to evaluate; all if not given.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     only: Option<Selection>,
     /// The people to leave out.
@@ -73,20 +72,20 @@ pub(crate) struct Arguments {
     /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
     #[arg(long, value_name = "SIDES", default_value = "marked")]
     sides: Sides,
-    /// Places of joints among the parts: a file of `train joints`; "shipped": the one for the model that ships; "none": a joint
-    /// is the centre of its part, as for other models.
+    /// Map from parts to joints (a file of `train joints`); "shipped" for the map of the shipped model. With "none", or for other models, a
+    /// joint is the centre of its part.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     joint_map: PathBuf,
     /// Also print the mean offset of every joint along and across its bone, with 95 % intervals.
     #[arg(long)]
     offsets: bool,
-    /// The card of a network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
+    /// Card of a network; if not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
     #[arg(long, value_name = "CARD")]
     card: Option<PathBuf>,
-    /// Give a network only the picture: it looks into the boxes that the detector that ships finds.
+    /// Use the boxes that the shipped detector finds, instead of the boxes around the marked joints; for networks.
     #[arg(long)]
     find_boxes: bool,
-    /// Also show the mirror image of every person to a network, and use the mean: more exact, twice the time.
+    /// Evaluate the mirror image of every person too, and use the mean; for networks. More exact, but takes twice the time.
     #[arg(long)]
     mirror: bool,
     /// Print JSON.
@@ -95,7 +94,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// The people to evaluate.
+    /// Reads the people to evaluate.
     fn people(&self) -> Result<People, Failure> {
         let options = options(self.only.as_ref(), self.without.as_ref());
         let read = training::datasets::read(&self.dataset, &options);
@@ -165,7 +164,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Options for reading the people to evaluate, with 14 joints.
+/// Returns the options for reading the people to evaluate, with 14 joints.
 pub(super) fn options(only: Option<&Selection>, without: Option<&Selection>) -> ReadOptions {
     ReadOptions {
         only: only.cloned(),

@@ -12,12 +12,12 @@ use terminal::output;
 
 use super::network;
 
-/// Help on what `show` prints of networks.
+/// Help on the output of `show` for networks.
 const NETWORKS: &str = "\
-For a network (.onnx) it prints inputs and outputs and, by its card, their meaning: preparation, codec, keypoints, the resulting \
-joints, licence. For a detector of people it prints the rule for boxes, and with --image the boxes. A network that \
-does not fit its card is refused with the differences, and the exit code is 4. Without a card it names the nearest \
-card of configs/networks and configs/detectors. Cards: docs/networks.md.
+For a network (.onnx), the command prints the inputs and outputs, and what its card says about them: preparation, codec, keypoints, \
+the resulting joints, licence. For a detector of people, it prints the rule for boxes; with --image also the boxes it finds. If a network \
+does not fit its card, the command prints the differences and exits with code 4. Without a card, it names the closest \
+card in configs/networks and configs/detectors. docs/networks.md describes the cards.
 
 Examples:
     parallax-lab model show person.fmp
@@ -28,7 +28,7 @@ Examples:
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Convert a model (Yang & Ramanan's .mat, the authors' .txt) into Parallax's own format.
+    /// Convert a model (Yang & Ramanan's .mat, or the authors' .txt) to Parallax's own format.
     Import {
         /// The model to convert.
         file: PathBuf,
@@ -36,16 +36,16 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Print the structure of a model, or draw it; explain a network that finds keypoints or people (.onnx).
+    /// Print or draw the structure of a model, or describe a network that finds keypoints or people (.onnx).
     #[command(after_help = NETWORKS)]
     Show {
-        /// The model file, or the network.
+        /// Model file or network.
         file: PathBuf,
         /// Print JSON.
         #[arg(long)]
         json: bool,
         /// Draw the model into this HTML file instead: the filters of every part and type, the tree with its springs,
-        /// the biases.
+        /// and the biases.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         html: Option<PathBuf>,
         /// Options for networks.
@@ -82,7 +82,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Returns true if a file has the ending of networks.
+/// Returns true if the file name has the extension of a network.
 fn is_network(file: &Path) -> bool {
     let ending = file.extension();
     ending.is_some_and(|ending| ending.eq_ignore_ascii_case("onnx"))
@@ -113,7 +113,7 @@ fn show(file: &Path, as_json: bool) -> Result<ExitCode, Failure> {
     let [rows, cols] = model.max_filter();
     output::line(format_args!("{}: {}", file.display(), spec.name))?;
     output::line(format_args!(
-        "  {} parts, {} filters of up to {rows}x{cols} cells of {} px, {} levels an octave",
+        "  {} parts, {} filters of up to {rows}x{cols} cells of {} px, {} levels per octave",
         model.n_parts(),
         model.n_filters(),
         spec.cell_px,
@@ -143,7 +143,7 @@ fn show(file: &Path, as_json: bool) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The structure of a model as JSON. Parts and parents count from 1, as in the published tables.
+/// Returns the structure of a model as JSON. Parts and parents are counted from 1, as in the published tables.
 fn description(file: &Path, model: &Model) -> Value {
     let spec = model.spec();
     let parts: Vec<Value> = spec

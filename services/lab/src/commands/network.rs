@@ -1,4 +1,4 @@
-//! `parallax-lab model show` of a network that finds keypoints: what it takes and gives, its card, what it sees in a picture.
+//! `parallax-lab model show` for a network that finds keypoints: its inputs and outputs, its card, and its keypoints in a picture.
 
 mod detector;
 
@@ -21,11 +21,10 @@ use terminal::{Outline, outline, output};
 /// Options of `model show` for networks.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Card of a network (.onnx); if not given, the file beside the network whose ending is .toml, or the entry `parallax.card`
-    /// of the network.
+    /// Card of a network (.onnx); if not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
     #[arg(long, value_name = "CARD", conflicts_with = "html")]
     card: Option<PathBuf>,
-    /// Picture of a person to show to a network, or of people to show to a detector.
+    /// Picture to apply the network to: of one person for keypoints, or of people for a detector.
     #[arg(
         long,
         value_name = "PICTURE",
@@ -33,7 +32,7 @@ pub(crate) struct Arguments {
         conflicts_with = "html"
     )]
     image: Option<PathBuf>,
-    /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the whole picture.
+    /// Box around the person, in pixels of the picture: left, top, right, bottom; the whole picture if not given.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "image", allow_hyphen_values = true)]
     outline: Option<Outline>,
     /// Draw the joints and their maps, or the boxes of a detector, into this PNG file.
@@ -42,13 +41,13 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Returns true if any is given.
+    /// Returns true if any option is given.
     pub(crate) fn is_given(&self) -> bool {
         self.card.is_some() || self.image.is_some()
     }
 }
 
-/// Shows a network or a detector, whichever its card says that it is.
+/// Shows a network or a detector, depending on its card.
 pub(crate) fn show(file: &Path, as_json: bool, arguments: &Arguments) -> Result<ExitCode, Failure> {
     match Described::open(file, arguments.card.as_deref())? {
         Described::Network(it) => show_network(file, it, as_json, arguments),
@@ -110,15 +109,15 @@ fn show_network(
     let fitted = fitted?;
     if fitted.is_none() && arguments.image.is_some() {
         let message = format!(
-            "{}: a network without a card cannot look at a picture",
+            "{}: a network without a card cannot be applied to a picture",
             file.display()
         );
-        return Err(Failure::new(ExitKind::Input, message).with_hint("give one with --card"));
+        return Err(Failure::new(ExitKind::Input, message).with_hint("give a card with --card"));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// The keypoints that a network finds in a picture, which is drawn.
+/// Returns the keypoints that a network finds in a picture, and draws them.
 fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Vec<Value>, Failure> {
     let picture = first_picture(image)?;
     let whole = [picture.size.width as f64, picture.size.height as f64];
@@ -133,7 +132,7 @@ fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Ve
     network::keypoints_json(&sight)
 }
 
-/// The picture of a file, or its first one.
+/// Reads a picture file, or the first picture of a file with several.
 fn first_picture(file: &Path) -> Result<Picture, Failure> {
     let one = Frames {
         every: 1,
@@ -206,7 +205,7 @@ fn ports_in_words(description: &Description) -> Result<(), Failure> {
     ] {
         for it in ports {
             let sides = match &it.sides[..] {
-                [] => "of a shape that the file does not give".to_owned(),
+                [] => "of unknown shape".to_owned(),
                 sides => written(sides),
             };
             output::line(format_args!("  {what:<6} `{}` {sides}", it.name))?;
@@ -219,14 +218,14 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
     let mut entries = description.metadata.iter();
     if entries.any(|entry| entry.0 == viewquality::key::VERSION) {
         return output::line(
-            "  it predicts the errors of single views (`errors` in [paper] of a deployment), and finds no keypoints",
+            "  it predicts the errors of single views (`errors` in [paper] of a deployment) and does not find keypoints",
         );
     }
-    output::line("  no card: none beside it, none in it, none given")?;
+    output::line("  no card: none was given, and there is none in the network or beside it")?;
     let networks = network::nearest(description);
     let detectors = network::nearest_detectors(description);
     if networks.is_empty() && detectors.is_empty() {
-        output::line("  no card in configs/networks or configs/detectors comes near")?;
+        output::line("  no card in configs/networks or configs/detectors is similar")?;
     }
     for (folder, of, nearest) in [
         ("networks", "networks that find keypoints", networks),
@@ -238,16 +237,16 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
             .collect();
         let come = match &files[..] {
             [] => continue,
-            [_] => "comes nearest",
-            _ => "come equally near",
+            [_] => "is the closest",
+            _ => "are equally close",
         };
         output::line(format_args!(
-            "  of the cards of {of} {} {come}, by the shapes of input and outputs",
+            "  among the cards of {of}, {} {come}, by the shapes of inputs and outputs",
             files.join(", ")
         ))?;
     }
     output::line(format_args!(
-        "  copy one to {}, change what differs (docs/networks.md), and show the network again",
+        "  copy a card to {}, change the differences (see docs/networks.md), and show the network again",
         file.with_extension("toml").display()
     ))
 }
@@ -285,7 +284,7 @@ fn given(card: &Card) -> String {
             further,
             ..
         } => format!(
-            "a map for every keypoint and {further} further ones; corner cells on corner pixels: {udp}; cells in the middle of \
+            "a map for every keypoint and {further} further maps; corner cells on corner pixels: {udp}; cells in the middle of \
              their pixels: {centred}; maxima refined: {}; \
              values: {}",
             word(&json!(refine)),
@@ -296,7 +295,7 @@ fn given(card: &Card) -> String {
             y,
             bins_per_pixel,
             ..
-        } => format!("`{x}` for columns, `{y}` for rows, {bins_per_pixel} bins for a pixel"),
+        } => format!("`{x}` for columns, `{y}` for rows, {bins_per_pixel} bins per pixel"),
         Codec::Keypoints {
             fields,
             unit,
@@ -315,7 +314,7 @@ fn given(card: &Card) -> String {
     }
 }
 
-/// A value of a card as it is written there.
+/// Returns a value as it is spelled in a card.
 fn word(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! `parallax-lab simulate`: what a deployment will take, worked out from measured costs.
+//! `parallax-lab simulate`: predicts the resources of a deployment from measured costs.
 
 mod report;
 
@@ -12,7 +12,7 @@ use lab::forecast::{Costs, Forecast, Load, forecast};
 use serde_json::json;
 use terminal::output;
 
-/// The costs of the machine that the guide names, with the network that ships.
+/// Costs of the machine in the guide, with the shipped network.
 const DEFAULT: Costs = Costs {
     capture_ms: 3.0,
     pose_ms: 30.0,
@@ -28,16 +28,17 @@ const DEFAULT: Costs = Costs {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Work out the cores, the network and the latency of cameras on several machines.
+    /// Predict the processor cores, network capacity and latency of cameras on several machines.
     Hosts(Arguments),
 }
 
 /// Options of `parallax-lab simulate hosts`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-This is a model, not a measurement: it multiplies the costs of one frame of one view. Without --report they are those of the machine that the guide measured.
-With --report they are those of your run, of a minute or more: processor time of every stage, and for a run with hosts
-also the bytes and times of the link. Values of single options take precedence.
+The result is a prediction, not a measurement. It is computed from the costs of one frame of one view.
+Without --report, these are the costs of the machine in the guide. With --report, they come from a run of yours, which
+should last at least a minute: the processor time of every stage and, with several hosts, the bytes and times of the link.
+Options for single costs, such as --pose-ms, take precedence.
 
 Examples:
     parallax run my.toml --json > run.json
@@ -62,7 +63,7 @@ pub(crate) struct Arguments {
     /// Capacity of the network, megabits per second.
     #[arg(long, value_name = "MBIT", default_value_t = 1000.0)]
     network: f64,
-    /// The costs of a run: the output of `parallax run --json`; with several hosts, that of the fusing one.
+    /// Costs of a run: the output of `parallax run --json`; with several hosts, the output on the fusing host.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Processor time of `capture` for a frame of a view, milliseconds.
@@ -71,22 +72,22 @@ pub(crate) struct Arguments {
     /// Processor time of `pose` for a frame of a view, milliseconds.
     #[arg(long, value_name = "MS")]
     pose_ms: Option<f64>,
-    /// Processor time to make a JPEG of a frame, milliseconds.
+    /// Processor time to encode a frame as JPEG, milliseconds.
     #[arg(long, value_name = "MS")]
     encode_ms: Option<f64>,
     /// Processor time to decode a frame from JPEG, milliseconds.
     #[arg(long, value_name = "MS")]
     decode_ms: Option<f64>,
-    /// Processor time of fusion for every view of a frame, milliseconds.
+    /// Processor time of fusion for each view of a frame, milliseconds.
     #[arg(long, value_name = "MS")]
     fuse_ms: Option<f64>,
-    /// A frame as JPEG, bytes.
+    /// Size of a frame as JPEG, bytes.
     #[arg(long, value_name = "N")]
     frame_bytes: Option<f64>,
-    /// The poses of a view, bytes.
+    /// Size of the poses of a view, bytes.
     #[arg(long, value_name = "N")]
     pose_bytes: Option<f64>,
-    /// Print as JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
 }

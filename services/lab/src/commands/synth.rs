@@ -1,4 +1,4 @@
-//! `parallax-lab synth`: makes synthetic sequences of people, with the truth.
+//! `parallax-lab synth`: makes synthetic sequences of people, with ground truth.
 
 mod motion;
 mod parse;
@@ -17,31 +17,31 @@ use motion::MotionArguments;
 use parse::{actions, rig, subjects};
 
 const HELP: &str = "\
-OUT holds a recording with its truth: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
-(cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and in every picture, visibility, capture \
-times) and people.jsonl (the same scenes in the format of annotated people, for `train fmp` and `judge`; people-as-seen.jsonl with left \
-and right as published models define them). The format is in shared/scene/TRUTH.md. For several subjects or actions, each has a \
-folder, OUT/s1-walking, and people.jsonl has all.
+OUT contains deployment.toml (start it by `parallax run OUT/deployment.toml`), rig.toml, the pictures \
+(cameras/NAME/000000.png), the masks, and two files of ground truth. truth.jsonl has the joints in 3D and in every picture, visibility, and \
+capture times; shared/scene/TRUTH.md describes the format. people.jsonl has the same scenes as annotated people, for `train fmp` and `judge`. \
+In people-as-seen.jsonl, left and right are as in published models. With several subjects or actions, each sequence has \
+its own folder, for example OUT/s1-walking, and people.jsonl covers all of them.
 
-The same options give the same files, bit for bit, on any number of threads. A subject is a person by number: shape, \
-clothes, way of moving. The seed determines the motion, the room and the lighting.
+The same options give the same files, bit for bit, on any number of threads. The number of a subject determines a person's body shape, \
+clothes and style of movement. The seed determines the motion, the room and the lighting.
 
 RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]] (metres; 4.2 and 1.5 if not \
 given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
 
-With --motion the subjects move as recorded in a C3D or TRC file: limbs have the recorded directions and the lengths of \
-the subject, and the path is moved to the middle of the room. The angles of the joints are not limited. A table (--markers) maps \
-markers to joints. Gaps up to --motion-gap seconds are interpolated. Longer ones are refused, with their frames, and so \
-are impossible motions: implausible lengths of the legs, a head below the feet, knees that bend forward.
+With --motion, the subjects move as recorded in a C3D or TRC file. Limbs have the recorded directions, but the lengths of \
+the subject. The path is moved to the middle of the room. Joint angles are not limited. A table (--markers) maps \
+markers to joints. Gaps of up to --motion-gap seconds are interpolated. Longer gaps are refused; the message names the frames. So \
+are impossible motions: implausible leg lengths, a head below the feet, or knees that bend forward.
 
-With --live no pictures are written: the sources of the deployment's cameras are synth://RIG?camera=C1&action=..., \
-each capture process renders its pictures during the run, and the truth is that of the same pictures.
+With --live, no pictures are written. The cameras of the deployment have the source synth://RIG?camera=C1&action=..., \
+and each capture process renders its pictures during the run. The ground truth is that of these pictures.
 
-With --json one object: {\"schema_version\", \"sequences\": [{\"folder\", \"subject\", \"action\", \"seed\", \
+--json prints one object: {\"schema_version\", \"sequences\": [{\"folder\", \"subject\", \"action\", \"seed\", \
 \"pictures\", \"people\"}], \"seconds\", \"pictures_per_second\"}.
 
-Exit codes: 0 done; 2 the command line is wrong, or OUT is not empty; 4 a rig file, a backdrop or the output folder; \
-5 the rig does not say which way is up; 130 stopped by Ctrl-C.
+Exit codes: 0 done; 2 the command line is wrong, or OUT is not empty; 4 a rig file, a backdrop or the output folder cannot be used; \
+5 the rig does not define the upward direction; 130 stopped by Ctrl-C.
 
 Examples:
     parallax-lab synth out/walk && parallax run out/walk/deployment.toml
@@ -57,7 +57,7 @@ Examples:
 enum Format {
     /// Lossless.
     Png,
-    /// Smaller, as most cameras store them (quality 95).
+    /// Smaller; most cameras use this format (quality 95).
     Jpg,
 }
 
@@ -74,19 +74,19 @@ impl From<Format> for synth::Format {
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The folder to write, which must be empty or absent.
+    /// Folder to write, which must be empty or absent.
     out: PathBuf,
-    /// The cameras: humaneva, umpm, a ring (ring:N, ring:N:RADIUS, ring:N:RADIUS:HEIGHT), or a rig file.
+    /// Cameras: humaneva, umpm, a ring (ring:N, ring:N:RADIUS, ring:N:RADIUS:HEIGHT), or a rig file.
     #[arg(long, value_name = "RIG", default_value = "humaneva", value_parser = rig)]
     rig: RigChoice,
-    /// Numbers of the subjects: 3, or 1-20,25.
+    /// Numbers of the subjects, for example 3 or 1-20,25.
     #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
     subjects: Subjects,
     /// Number of other people who stand around the subject, at most 4.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     others: u64,
-    /// Number of other people who walk past the subject and each other, at most 4. The truth has the joints of all people; masks
-    /// and visible joints are the subject's alone.
+    /// Number of other people who walk past the subject and each other, at most 4. The truth has the joints of all people, but masks
+    /// and visible joints of the subject only.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     passers: u64,
     /// Actions of the subjects: names separated by commas, or all.
@@ -95,13 +95,13 @@ pub(crate) struct Arguments {
     /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Frames per camera; if not given, 60, or those of the recorded motion.
+    /// Frames per camera; if not given, 60, or the length of the recorded motion.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     frames: Option<u64>,
-    /// Frames per second; at a low rate successive pictures differ more.
+    /// Frames per second; at a lower rate, successive pictures differ more.
     #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = terminal::rate)]
     rate: f64,
-    /// The file format of pictures.
+    /// File format of pictures.
     #[arg(long, value_enum, default_value_t = Format::Png)]
     format: Format,
     /// Write no masks.
@@ -110,14 +110,14 @@ pub(crate) struct Arguments {
     /// Use photographs from this folder as the background, instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
-    /// The model for the deployment file; the person model that ships with Parallax if not given.
+    /// Model for the deployment file; the shipped person model if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Write no pictures: the capture processes of the deployment render them during the run.
     #[arg(long)]
     live: bool,
-    /// Time from the instants of the frames to the pictures of each camera, milliseconds, in the order of the rig: 0,5,11,16;
-    /// negative for earlier pictures. The deployment contains these times, and a run moves the joints to the instants.
+    /// Delay of each camera's pictures after the nominal instants of the frames, milliseconds, in the order of the rig: 0,5,11,16.
+    /// Negative values mean earlier pictures. The deployment contains these times, and a run corrects the joints for them.
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = parse::skews)]
     skew_ms: Skews,
     /// Recorded motion.
@@ -126,7 +126,7 @@ pub(crate) struct Arguments {
     /// Flaws of the cameras.
     #[command(flatten)]
     flaws: FlawArguments,
-    /// Threads; one per core if not given. The files do not depend on it.
+    /// Number of threads; one per core if not given. It does not affect the files.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print a summary as JSON.
@@ -148,7 +148,7 @@ struct FlawArguments {
     /// Standard deviation of the blur, pixels.
     #[arg(long, value_name = "PX", default_value_t = 0.0)]
     blur: f64,
-    /// Change of the exposure, stops; negative is darker.
+    /// Change of the exposure in stops; negative values are darker.
     #[arg(
         long,
         value_name = "STOPS",
@@ -156,16 +156,16 @@ struct FlawArguments {
         allow_hyphen_values = true
     )]
     exposure: f64,
-    /// Largest clock offset of all cameras except the first, seconds.
+    /// Largest clock offset of the cameras, except for the first, seconds.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     desync: f64,
-    /// Share of frames that a camera drops; each is replaced by the picture before.
+    /// Share of frames that a camera drops; each is replaced by the previous picture.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     drop: f64,
-    /// Rotation error of every camera in rig.toml, degrees; the truth is exact.
+    /// Rotation error of every camera in rig.toml, degrees. The ground truth remains exact.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
     calibration_degrees: f64,
-    /// Position error of every camera in rig.toml, millimetres; the truth is exact.
+    /// Position error of every camera in rig.toml, millimetres. The ground truth remains exact.
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     calibration_mm: f64,
 }
@@ -235,11 +235,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// The skews of the cameras; none if all are 0.
+/// Checks the skews of the cameras; empty if all are 0.
 fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
     if skews_ms.len() > n_cameras {
         let message = format!(
-            "--skew-ms names {}, the rig has {n_cameras} cameras",
+            "--skew-ms has {} values, but the rig has {n_cameras} cameras",
             skews_ms.len()
         );
         return Err(Failure::new(ExitKind::Usage, message));
@@ -252,7 +252,7 @@ fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
     })
 }
 
-/// Creates the folder; refuses one that is not empty.
+/// Creates the folder; refuses a folder that is not empty.
 fn create_folder(out: &Path) -> Result<(), Failure> {
     inputs::make_folder(out)?;
     let mut inside = std::fs::read_dir(out).map_err(|error| failure::in_file(out, &error))?;
@@ -284,7 +284,7 @@ fn report(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Fa
             "pictures"
         };
         output::message(format_args!(
-            "{out}: {n} sequences, {pictures} {what} in {seconds:.1} s ({rate:.1} a second)"
+            "{out}: {n} sequences, {pictures} {what} in {seconds:.1} s ({rate:.1} per second)"
         ));
     }
     Ok(())

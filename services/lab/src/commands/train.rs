@@ -27,32 +27,30 @@ const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} images{msg}";
 
 const HELP: &str = "\
 DATASET is a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a file of \
-JSON lines, one person each, image paths relative to the file:
+JSON lines. Each line describes one person; image paths are relative to the file:
     {\"image\": \"7.jpg\", \"joints\": [[31.5, 80.0], ...], \"visible\": [true, ...], \"name\": \"ann\"}
-`visible` and `name` may be left out; the centre of the top-left pixel is (0, 0). Unless --skeleton \
-says otherwise the joints are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, \
+`visible` and `name` are optional. The centre of the top-left pixel is (0, 0). Unless --skeleton \
+names other joints, they are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, \
 ankle, right wrist, elbow, shoulder, left shoulder, elbow, wrist, neck, top of the head.
 
-The model knows left and right by the side of the picture, as PARSE is marked. LSP and \
-LSP-extended mark people seen from behind by their own sides; --sides LSP=seen \
-corrects that.
+In the model, left and right are sides of the picture, as in the labels of PARSE. For people seen from behind, LSP and \
+LSP-extended label the sides of the body instead; --sides LSP=seen corrects that.
 
-Rows of a data set count from 1. With several data sets, --only, --without, --rotate and --sides name one of them, as \
-written on the command line: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
-a file with a row, a range of rows or the file name of an image on each line; all of these must exist.
+Rows of a data set are counted from 1. With several data sets, the values of --only, --without, --rotate and --sides begin with a data set as \
+written on the command line: --only PARSE=1-100. A selection is a list of rows (1-100,150) or a file. Each line of the \
+file has a row, a range of rows or the file name of an image; all of these must exist.
 
-The training is a list of steps. After each one its state is in OUT.checkpoint. After Ctrl-C or a kill, \
---resume continues from the last finished step, and \
-ends with the same model, bit for bit, on any number of threads.
+The training consists of many steps. After each step, its state is saved in OUT.checkpoint. After Ctrl-C or a kill, \
+--resume continues from the last finished step. The resulting model is the same, bit for bit, on any number of threads.
 
 Kinds of bad labels, for --fatal: syntax, count, unknown, not-finite, zero-size, image, outside, \
-twice, same-name. People with faults of other kinds are reported with file and row, and left out.
+twice, same-name. People with bad labels of other kinds are reported with file and row, and left out.
 
-With --json, one object a line on standard output, nothing else:
+With --json, standard output has one object per line and nothing else:
     {\"event\": \"left-out\" | \"unreadable\" | \"data\" | \"resumed\" | \"step\" | \"summary\", ...}
 
 Exit codes: 0 the model is written; 2 the command line is wrong, or an interrupted training is in \
-the way; 3 a setting is wrong; 4 a data set or the checkpoint cannot be used, or a label is wrong in a way that --fatal names; 130 stopped by Ctrl-C.
+the way; 3 a setting is wrong; 4 a data set or the checkpoint cannot be used, or a label is bad in a way that --fatal lists; 130 stopped by Ctrl-C.
 
 Examples:
     parallax-lab train fmp PARSE --only 1-100 --rotate -15,-7.5,7.5,15 \\
@@ -68,11 +66,11 @@ Examples:
 pub(crate) enum Command {
     /// Train a flexible mixture of parts: the model that finds people in single views.
     Fmp(Box<Arguments>),
-    /// Learn the consistency of several views of a person: part types, weights, thresholds, joints.
+    /// Learn the consistency between several views of a person: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
-    /// Train the network that sees in which direction a person faces, for left and right.
+    /// Train the network that sees in which direction a person faces, to tell left from right.
     Orientation(Box<orientation::Arguments>),
-    /// Learn where joints lie among the parts of a model, on photographs of marked people.
+    /// Learn the positions of joints relative to the parts of a model, on photographs of annotated people.
     Joints(Box<joints::Arguments>),
     /// Prepare people for training the network that finds joints.
     NetworkPeople(Box<network::people::Arguments>),
@@ -84,7 +82,7 @@ pub(crate) enum Command {
     Finder(Box<finder::learn::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),
-    /// Search pictures with known joints, and write the samples for training the quality network.
+    /// Search pictures with known joints, and write samples to train the quality network.
     QualitySamples(Box<quality::samples::Arguments>),
 }
 
@@ -92,28 +90,28 @@ pub(crate) enum Command {
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The data.
+    /// Options for the training data.
     #[command(flatten)]
     data: People,
-    /// The model file to write.
+    /// Model file to write.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     out: Option<PathBuf>,
-    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
+    /// Settings of the training, as TOML; --print-settings shows the keys and their defaults.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Print the settings that would be used, as TOML, and exit.
+    /// Print the settings of the training as TOML, and exit.
     #[arg(long)]
     print_settings: bool,
-    /// Random seed, instead of that of the settings.
+    /// Random seed; overrides the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Threads; one per core if not given. The model does not depend on it.
+    /// Number of threads; one per core if not given. It does not affect the model.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-    /// Folder of images without people on which false alarms are counted at the end; the negatives if not given.
+    /// Folder of images without people, to count false alarms after the training; the negatives if not given.
     #[arg(long, value_name = "DIR")]
     judge: Option<PathBuf>,
-    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
+    /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.
     #[arg(long)]
     resume: bool,
     /// Print events and the summary as JSON, one object per line.
@@ -185,7 +183,7 @@ fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
     if let Some(seed) = arguments.seed {
         settings.seed = u64::from(seed);
     }
-    // Without mirrored images left and right parts need not be symmetric.
+    // Without mirrored images, left and right parts need not be symmetric.
     settings.symmetric &= arguments.data.with_mirror();
     settings.check().or_fail(ExitKind::Config)?;
     Ok(settings)

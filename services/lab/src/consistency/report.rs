@@ -7,20 +7,20 @@ use serde_json::{Value, json};
 use super::work::Done;
 use multiview::learned::{Appearance, Point};
 
-/// Version of the JSON.
+/// Schema version of the JSON.
 const SCHEMA: u32 = 1;
 
 impl Done {
-    /// For programs.
+    /// Returns the report as JSON.
     ///
-    /// * `out`: the file that was written.
+    /// * `out`: the written file.
     pub fn json(&self, out: &Path) -> Value {
         json(out, self)
     }
 
-    /// For people.
+    /// Returns the report as text.
     ///
-    /// * `out`: the file that was written.
+    /// * `out`: the written file.
     pub fn text(&self, out: &Path) -> String {
         text(out, self)
     }
@@ -46,7 +46,7 @@ fn json(out: &Path, done: &Done) -> Value {
 fn text(out: &Path, done: &Done) -> String {
     let from = done.learned.learned;
     let mut lines = vec![format!(
-        "{}: {} views of {} instants, weights chosen on {} more, in {:.0} s",
+        "{}: learned from {} views of {} instants, weights chosen on {} more instants, in {:.0} s",
         out.display(),
         from.views,
         from.instants,
@@ -54,17 +54,17 @@ fn text(out: &Path, done: &Done) -> String {
         done.seconds
     )];
     lines.push(
-        "bins of half the circle, and the score of tables with that many on people held out:"
+        "number of bins in half the circle, and the score of tables with this number on held-out people:"
             .to_owned(),
     );
     for (n, lift) in &done.bins {
         let lift = lift.map_or_else(|| "-".to_owned(), |lift| format!("{lift:.4}"));
         lines.push(format!("    {n:3}  {lift}"));
     }
-    lines.push("joints: error in sizes of the person".to_owned());
+    lines.push("joints: error relative to the person's size".to_owned());
     for (ridge, error) in &done.joints {
         let ridge = ridge.map_or_else(
-            || "parts alone".to_owned(),
+            || "parts only".to_owned(),
             |ridge| format!("ridge {ridge:e}"),
         );
         lines.push(format!("    {ridge:12} {error:.4}"));

@@ -1,9 +1,9 @@
-//! The sequences that are learned from, and those that are held out.
+//! Split of sequences into training and held-out sequences.
 
 use failure::{ExitKind, Failure};
 use training::datasets::sequences::Sequence;
 
-/// Those that are learned from, and those that the weights are chosen on.
+/// Splits sequences into training sequences and held-out ones, on which the weights are chosen.
 pub(super) fn split(
     all: Vec<Sequence>,
     hold_out: &[String],
@@ -26,14 +26,14 @@ pub(super) fn split(
     let (held, train): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|sequence| held.contains(&sequence.subject));
     if train.is_empty() {
-        let message = "all subjects are held out: nobody is left to learn from";
+        let message = "all subjects are held out: no subject is left for training";
         let failure = Failure::new(ExitKind::Usage, message);
         return Err(failure.with_hint("sequences of at least two subjects are needed"));
     }
     Ok((train, held))
 }
 
-/// Sees that all sequences have the same cameras.
+/// Checks that all sequences have the same cameras.
 pub(super) fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
     let cameras = |sequence: &Sequence| -> Vec<String> {
         let views = sequence.views.iter();
@@ -43,7 +43,7 @@ pub(super) fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
         if cameras(pair[0]) != cameras(pair[1]) {
             let other = pair[1];
             let message = format!(
-                "--rig {rig}: {} {} has other cameras than the sequence before it",
+                "--rig {rig}: {} {} has other cameras than the previous sequence",
                 other.dataset, other.name
             );
             return Err(Failure::new(ExitKind::Usage, message));
@@ -59,7 +59,7 @@ mod tests {
 
     use super::*;
 
-    /// One camera; what it sees does not matter here.
+    /// A rig with one camera; its picture is irrelevant here.
     fn rig() -> Rig {
         let camera = geometry::Camera {
             name: "c1".to_owned(),
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn somebody_must_be_left_to_learn_from() {
-        assert!(held(&["s1"], &[]).unwrap_err().contains("nobody is left"));
+        assert!(held(&["s1"], &[]).unwrap_err().contains("no subject is left"));
         let said = held(&["s1", "s2"], &["s3"]).unwrap_err();
         assert!(said.contains("no subject \"s3\", only s1, s2"), "{said}");
     }

@@ -1,4 +1,4 @@
-//! From sequences to what was learned: look at all people, then try weights on those held out.
+//! Learning from sequences: learns from all people, then tries weights on held-out people.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,27 +16,27 @@ use training::datasets::sequences::{Frame, Sequence};
 
 use crate::failures::film_failure;
 
-/// Numbers of bins that are compared.
+/// Numbers of bins to compare.
 const BINS: [usize; 5] = [3, 6, 9, 12, 18];
-/// Ridges that are compared, in squared sizes of the person.
+/// Ridges to compare, in squared sizes of the person.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
 /// Settings of a training of consistency.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Most instants of the subjects held out that weights are tried on, evenly over all of them.
+    /// Largest number of held-out instants for trying weights, evenly spaced over all of them.
     pub tries: usize,
-    /// Learn the pairs of the cameras of this rig by name too.
+    /// Name of the rig whose camera pairs are also learned by name.
     pub rig: Option<String>,
-    /// True if joints are learned as a map of the parts.
+    /// True to learn joints as a map of the parts.
     pub with_joints: bool,
-    /// How the frames are made.
+    /// Settings of the frames.
     pub film: FilmSettings,
     /// Identity of the model in the file.
     pub fingerprint: String,
 }
 
-/// A run of learning.
+/// A training of consistency.
 #[derive(Debug)]
 pub struct Learning<'a> {
     job: &'a Job,
@@ -51,20 +51,20 @@ pub struct Learning<'a> {
 pub struct Done {
     /// Content of the file.
     pub learned: Learned,
-    /// Number of bins, and the score of tables with that many bins on the types of people held out.
+    /// Number of bins, and the score of tables with this number on the part types of held-out people.
     pub bins: Vec<(usize, Option<f64>)>,
-    /// Ridge, and root mean square error of joints of people held out; without a map the first one.
+    /// Ridge, and root mean square error of the joints of held-out people. The first entry is without a map.
     pub joints: Vec<(Option<f64>, f64)>,
-    /// Every view alone.
+    /// Score with every view alone.
     pub single: Option<Point>,
-    /// All weights that were tried.
+    /// All weights that were tried, with their scores.
     pub surface: Vec<Point>,
-    /// How long it took.
+    /// Total time, seconds.
     pub seconds: f64,
 }
 
 impl<'a> Learning<'a> {
-    /// Prepares the run; its time begins.
+    /// Prepares the training; its time starts here.
     pub fn new(job: &'a Job, console: &'a dyn Console, model: Arc<Model>, stop: Stop) -> Self {
         Self {
             job,
@@ -75,14 +75,14 @@ impl<'a> Learning<'a> {
         }
     }
 
-    /// Learns, and chooses.
+    /// Learns the tables, and chooses the weights.
     ///
-    /// * `keep`: is given what was learned before the weights are chosen, with those of the settings, and after.
+    /// * `keep`: stores results. It is called twice: with the default weights before weights are tried, and with the chosen weights.
     ///
     /// # Errors
     ///
-    /// Frames cannot be read; nothing can be learned from them; a stop request ([`ExitKind::Interrupted`]); those of
-    /// `keep`.
+    /// Fails if frames cannot be read, if nothing can be learned from them, if `keep` fails, or on a stop request
+    /// ([`ExitKind::Interrupted`]).
     pub fn run(
         &self,
         train: &[Sequence],
@@ -90,7 +90,7 @@ impl<'a> Learning<'a> {
         keep: &dyn Fn(&Learned) -> Result<(), Failure>,
     ) -> Result<Done, Failure> {
         let learners = self.look(train, "learning")?;
-        let others = self.look(held, "looking at people held out")?;
+        let others = self.look(held, "processing held-out people")?;
         let known = learners.iter().zip(&others);
         let bins: Vec<(usize, Option<f64>)> = BINS
             .iter()
@@ -119,7 +119,7 @@ impl<'a> Learning<'a> {
         })
     }
 
-    /// Some instants of people held out, evenly over all of them.
+    /// Returns some of the held-out instants, evenly spaced over all of them.
     fn thinned(&self, held: &[Sequence]) -> Vec<Sequence> {
         let n: usize = held.iter().map(|held| held.frames.len()).sum();
         let most = self.job.tries.min(n);
@@ -128,7 +128,7 @@ impl<'a> Learning<'a> {
             let mut sequence = sequence.clone();
             sequence.frames.retain(|_| {
                 seen += 1;
-                // Whether the share that is wanted has grown by a whole instant.
+                // True if the wanted share has grown by a whole instant.
                 seen * most / n > (seen - 1) * most / n
             });
             sequence
@@ -147,7 +147,7 @@ impl<'a> Learning<'a> {
         learned.or_fail(ExitKind::Input)
     }
 
-    /// Learns from single views, for every number of bins.
+    /// Learns from single views, for each number of bins.
     fn look(&self, sequences: &[Sequence], what: &str) -> Result<Vec<Learner>, Failure> {
         let shape = Shape::of(&self.model);
         let learner = |n_bins: usize| {
@@ -166,7 +166,7 @@ impl<'a> Learning<'a> {
         Ok(learners)
     }
 
-    /// Tries weights on people held out: geometry first, then appearance beside the best.
+    /// Tries weights on held-out people: first for geometry, then for appearance with the best geometry.
     fn choose(
         &self,
         held: &[Sequence],
@@ -222,7 +222,7 @@ impl<'a> Learning<'a> {
         Ok(points.map(|(tally, weights)| tally.point(*weights)).collect())
     }
 
-    /// Every frame of all sequences.
+    /// Calls a function on every frame of all sequences.
     fn frames(
         &self,
         sequences: &[Sequence],
@@ -239,7 +239,7 @@ impl<'a> Learning<'a> {
                 if self.stop.is_requested() {
                     let failure = Failure::new(ExitKind::Interrupted, "interrupted");
                     return Err(failure.with_hint(
-                        "if the command had begun to try weights, OUT has what it learned so far",
+                        "if weights were being tried, OUT contains the tables learned so far",
                     ));
                 }
                 let images = film.at(frame.index).map_err(film_failure)?;
@@ -292,7 +292,7 @@ fn fusion(weights: &Weights) -> multiview::Settings {
     }
 }
 
-/// Root mean square error of joints of people held out, by ridge; without a map first.
+/// Returns the root mean square error of the joints of held-out people for each ridge; the first entry is without a map.
 fn joint_errors(learner: &Learner, other: &Learner) -> Vec<(Option<f64>, f64)> {
     let theirs = other.joints();
     let none = multiview::learned::JointFit::default();
@@ -307,7 +307,7 @@ fn smallest(errors: &[(Option<f64>, f64)]) -> Option<f64> {
     errors.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0
 }
 
-/// The place of the largest number; of the first among equals, or where none is known.
+/// Returns the index of the largest value; of the first if several are equal or no value is known.
 fn largest(values: impl Iterator<Item = Option<f64>>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
     for (nth, value) in values.enumerate() {

@@ -1,4 +1,4 @@
-//! Sequences judged as `parallax run` solves them: every step of the method of networks, from frame to frame.
+//! Evaluation of sequences as `parallax run` solves them: all steps of the network's method, from frame to frame.
 
 use std::sync::Arc;
 
@@ -16,28 +16,28 @@ use skeleton::PARSE14;
 use statistics::score::Point;
 use training::datasets::sequences::Sequence;
 
-/// Opens what every view has for itself.
+/// Opens the networks of a view.
 pub trait OpenView {
-    /// The network.
+    /// Opens the network that finds keypoints.
     ///
     /// # Errors
     ///
-    /// It cannot be read.
+    /// Fails if the network cannot be read.
     fn network(&self) -> Result<PoseNetwork, Failure>;
 
-    /// The detector of people.
+    /// Opens the detector of people.
     ///
     /// # Errors
     ///
-    /// It cannot be read.
+    /// Fails if the detector cannot be read.
     fn detector(&self) -> Result<Detector, Failure>;
 }
 
-/// How sequences are solved.
+/// Settings for solving sequences as `parallax run` does.
 pub struct AsRun<'a> {
     /// Opens the networks of a view.
     pub open: &'a dyn OpenView,
-    /// The model of parts, by which views are planned.
+    /// The model of parts, from which views are planned.
     pub model: Arc<Model>,
 }
 
@@ -48,11 +48,12 @@ impl core::fmt::Debug for AsRun<'_> {
 }
 
 impl AsRun<'_> {
-    /// The pipeline of a sequence. People are looked for in every frame: those of a sequence may be of any time.
+    /// Returns the pipeline for a sequence. People are searched for in every frame, because the frames of a sequence can be far apart in
+    /// time.
     ///
     /// # Errors
     ///
-    /// A network cannot be read, or frames are too small.
+    /// Fails if a network cannot be read, or frames are too small.
     pub fn estimator(
         &self,
         sequence: &Sequence,
@@ -86,13 +87,13 @@ impl AsRun<'_> {
     }
 }
 
-/// The joints of `skeleton::PARSE14` in a frame of a film.
+/// Returns the joints of `skeleton::PARSE14` in a frame of a film.
 ///
-/// * `index`: of the frame, larger than before.
+/// * `index`: index of the frame, larger than in the previous call.
 ///
 /// # Errors
 ///
-/// Footage cannot be read, or the network fails.
+/// Fails if the footage cannot be read, or the network fails.
 pub fn joints(
     estimator: &mut NetworkEstimator,
     film: &mut Film,

@@ -1,4 +1,5 @@
-//! Sequences judged on the keypoints of a network, undisturbed and under stress: in space, and by what everyone does.
+//! Evaluation of the keypoints of a network on sequences, with and without disturbances: compares the solution in space with common
+//! methods.
 
 use crate::evaluation::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
@@ -16,43 +17,44 @@ use training::datasets::sequences::{Frame, Sequence};
 
 use super::as_run::{self, AsRun};
 
-/// Least share of a segment's length at which it is not found (eq. 13 of the paper).
+/// Error of a segment's ends above which the segment is not found, as a share of its length (eq. 13 of the paper).
 const GAMMA: f64 = 0.5;
-/// Largest error of a joint that counts, metres: a joint that is not there counts as this.
+/// Largest error of a joint, metres; a missing joint has this error.
 const MOST_M: f64 = 2.0;
-/// The limbs' joints are the first of `skeleton::PARSE14`.
+/// Number of joints of the limbs, which are the first of `skeleton::PARSE14`.
 const N_LIMB_JOINTS: usize = 12;
-/// Reprojection error above which cameras are left out, as a share of the picture's height (15 px of 1080 are Pose2Sim's default).
+/// Reprojection error above which cameras are left out, as a share of the picture's height. Pose2Sim's default is 15 px, at a height of
+/// 1080.
 const LIMIT: f64 = 15.0 / 1080.0;
 
-/// Name of the row of what `run` gives.
+/// Name of the table row for the result of `parallax run`.
 const AS_RUN: &str = "as run";
 
-/// Methods and disturbances to judge.
+/// Methods and disturbances to evaluate.
 #[derive(Debug)]
 pub struct EvidenceJob<'a> {
     /// The network that finds keypoints.
     pub network: &'a PoseNetwork,
-    /// Detector of the boxes.
+    /// Detector that finds the boxes.
     pub detector: &'a Detector,
-    /// Solves the undisturbed sequences as `run` does, beside the methods that are compared.
+    /// Solves the undisturbed sequences as `parallax run` does, for comparison.
     pub as_run: &'a AsRun<'a>,
-    /// Disturbances.
+    /// Disturbances to add.
     pub stress: &'a [Stress],
-    /// How the frames are derived.
+    /// Settings of the frames.
     pub film: FilmSettings,
-    /// How intervals are found.
+    /// Bootstrap for the intervals.
     pub bootstrap: Bootstrap,
-    /// Ends the run.
+    /// Stop request.
     pub stop: Stop,
 }
 
-/// The scores of one method under one stress.
+/// Scores of one method with one disturbance.
 #[derive(Debug, Clone, Default)]
 struct Tally {
-    /// Segments found in every frame.
+    /// Share of segments that were found, in percent, for each frame.
     found: Vec<Share>,
-    /// Errors of the limbs' joints in every frame, millimetres.
+    /// Errors of the joints of the limbs, millimetres, for each frame.
     errors: Vec<Share>,
 }
 
@@ -61,42 +63,42 @@ struct Tally {
 pub struct EvidenceRow {
     /// Name of the disturbance.
     pub stress: String,
-    /// How the joints were found.
+    /// Name of the method.
     pub method: &'static str,
     /// Number of frames.
     pub n_frames: usize,
-    /// Segments found (PCP3D), per cent.
+    /// Segments found (PCP3D), percent.
     pub pcp3d: f64,
-    /// Its interval.
+    /// Confidence interval of `pcp3d`.
     pub pcp3d_interval: [f64; 2],
-    /// Mean error of the limbs' twelve joints, millimetres.
+    /// Mean error of the twelve joints of the limbs, millimetres.
     pub limbs_mm: f64,
-    /// Its interval.
+    /// Confidence interval of `limbs_mm`.
     pub limbs_mm_interval: [f64; 2],
-    /// Amount by which the last method of the table finds more, per cent, and the interval over the same frames.
+    /// Difference in PCP3D between the last method of the table and this one, percentage points, and its interval over the same frames.
     pub last_finds_more: [f64; 3],
-    /// By how many millimetres it errs less, and the interval.
+    /// Amount by which the last method's mean error is smaller than this one's, millimetres, and its interval.
     pub last_errs_less_mm: [f64; 3],
 }
 
-/// A person whom the network sees in a view, and what it sees.
+/// A person found by the network in a view, and the network's evidence about this person.
 type Seen = (SeenPerson, NetworkView);
 
-/// A frame before it is disturbed.
+/// A frame before a disturbance is added.
 struct Instant<'a> {
     nth: usize,
     images: Vec<Option<Rgb8View<'a>>>,
     cameras: &'a [Camera],
-    /// Joints of `skeleton::PARSE14`.
+    /// True joints of `skeleton::PARSE14`.
     truth: Vec<Option<Point>>,
 }
 
 impl EvidenceJob<'_> {
-    /// Judges all frames.
+    /// Evaluates all frames.
     ///
     /// # Errors
     ///
-    /// Footage cannot be read, or the network cannot be run.
+    /// Fails if footage cannot be read, or the network cannot be run.
     pub fn run(
         &self,
         sequences: &[Sequence],
@@ -136,7 +138,7 @@ impl EvidenceJob<'_> {
         Ok(rows)
     }
 
-    /// Solves all frames as `run` does.
+    /// Solves all frames as `parallax run` does.
     fn as_run(&self, sequences: &[Sequence], console: &dyn Console) -> Result<Tally, Failure> {
         let n_frames: usize = sequences.iter().map(|sequence| sequence.frames.len()).sum();
         console.begin("frames as run", "");
@@ -193,9 +195,9 @@ impl EvidenceJob<'_> {
         Ok(())
     }
 
-    /// The people whom the network sees in a view.
+    /// Returns the people that the network finds in a view.
     ///
-    /// * `covered`: which half of the person is covered.
+    /// * `covered`: the half of the person that is covered.
     fn people(
         &self,
         instant: &Instant<'_>,
@@ -249,7 +251,7 @@ impl EvidenceJob<'_> {
         rows
     }
 
-    /// * `last`: the method that others are compared with.
+    /// * `last`: the method with which the others are compared.
     fn row(
         &self,
         stress: &Stress,
@@ -284,10 +286,10 @@ impl EvidenceJob<'_> {
     }
 }
 
-/// Most people of a view that the network looks at.
+/// Largest number of people in a view that the network is applied to.
 const MOST_PEOPLE: usize = 4;
 
-/// The person in every view that shows the same one, with the calibration that the stress leaves; disturbed.
+/// Chooses the same person in every view, and adds the disturbance. Also returns the cameras as the disturbance leaves them.
 fn chosen(
     instant: &Instant<'_>,
     seen: Vec<(usize, Vec<Seen>)>,
@@ -325,12 +327,12 @@ fn chosen(
     seen.into_iter().zip(same).filter_map(of_view).collect()
 }
 
-/// The true joints of `skeleton::PARSE14`.
+/// Returns the true joints of `skeleton::PARSE14`.
 fn truth(sequence: &Sequence, frame: &Frame) -> Vec<Option<Point>> {
     parse14(sequence.joints, &frame.joints)
 }
 
-/// The box around the true joints in a view, pixels of the frame.
+/// Returns the box around the true joints in a view, in pixels of the frame.
 fn outline(instant: &Instant<'_>, view: usize) -> Option<[f64; 4]> {
     let joints = projected(&instant.cameras[view], [0.0; 2], &instant.truth)?;
     let far = [f64::INFINITY, f64::NEG_INFINITY];
@@ -355,7 +357,7 @@ impl Tally {
     }
 }
 
-/// The table as text.
+/// Returns the table as text.
 pub fn evidence_text(rows: &[EvidenceRow]) -> String {
     use core::fmt::Write as _;
     let mut text = format!(

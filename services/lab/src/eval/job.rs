@@ -1,4 +1,4 @@
-//! All sequences, frame by frame, and what is kept of them.
+//! Evaluation of all sequences, frame by frame, with the results stored in files.
 
 use std::fs::File;
 use std::io::{Seek as _, SeekFrom, Write as _};
@@ -21,62 +21,62 @@ use viewquality::{ForecastInput, Forecaster, Table};
 use super::progress::Progress;
 use crate::failures::film_failure;
 
-/// How the views of a sequence are solved together, and the part-type tables of its cameras.
+/// Settings for solving the views of a sequence together, and the part-type tables of its cameras.
 pub type Fusion = (multiview::Settings, PairTables);
 
 /// Evaluation of every sequence.
 pub struct Job<'a> {
     /// The single-view model.
     pub model: Arc<Model>,
-    /// Gives the fusion of a sequence, by the mean of its pixels of the frame per pixel of the footage.
+    /// Returns the fusion settings of a sequence. The number is the mean over its views of frame pixels per pixel of the footage.
     pub fusion: &'a (dyn Fn(&Sequence, f32) -> Result<Fusion, Failure> + Sync),
-    /// True if the direction in which a person faces is decided for every view.
+    /// True to decide for every view whether the person is seen from the front or from behind.
     pub facing: bool,
-    /// Gives the map from parts to the joints of a set; a joint is a choice of parts without it.
+    /// Returns the map from parts to the joints of a set; without a map, each joint is the centre of one part.
     pub joint_map: &'a (dyn Fn(&JointSet) -> Option<Arc<JointMap>> + Sync),
-    /// Learned relations of several views.
+    /// Learned consistency between views.
     pub learned: Option<&'a Learned>,
-    /// The signal to compare.
+    /// The versions to compare.
     pub versions: Vec<Version>,
-    /// All settings that what is found depends on: a run goes on only with the same.
+    /// All settings that the results depend on; a run is resumed only with the same settings.
     pub settings: String,
-    /// How the frames are made.
+    /// Settings of the frames.
     pub film: FilmSettings,
-    /// Most candidates of a view.
+    /// Largest number of candidates in a view.
     pub n_candidates: usize,
     /// Detector of the direction in which a person faces.
     pub orientation: Option<Arc<Detector>>,
     /// Expected errors, pixels of the footage.
     pub sigma: Option<Table>,
-    /// Thresholds of the settings, pixels of the footage; empty without any.
+    /// Thresholds from the settings, pixels of the footage; empty if there are none.
     pub tau_px: Vec<f32>,
-    /// Predicts the errors.
+    /// Network that predicts the errors.
     pub forecaster: Option<Mutex<Forecaster>>,
-    /// True if the true errors are expected.
+    /// True to use the true errors as the expected errors.
     pub oracle: bool,
-    /// True to go on with the contents of `poses`.
+    /// True to continue with the contents of `poses`.
     pub resume: bool,
-    /// The folder for what is found in every frame.
+    /// Folder for the results of every frame.
     pub poses: PathBuf,
-    /// Ends the run after a frame.
+    /// Stop request, checked after every frame.
     pub stop: Stop,
 }
 
 /// Results of an evaluation.
 #[derive(Debug, Default)]
 pub struct Done {
-    /// The sequences that were begun, and their frames.
+    /// Sequences that were started, with their results.
     pub sequences: Vec<(Sequence, Vec<Record>)>,
-    /// Frames whose footage was not there.
+    /// Number of frames without footage.
     pub n_missing: usize,
 }
 
 impl Job<'_> {
-    /// Solves all sequences, until it is asked to stop, on rayon's current pool.
+    /// Solves all sequences on rayon's current pool, until a stop is requested.
     ///
     /// # Errors
     ///
-    /// Footage or cameras that cannot be used; a file of what is found that cannot be written, or is of another run.
+    /// Fails if footage or cameras cannot be used, or if a file of results cannot be written or is from another run.
     pub fn run(&self, sequences: &[Sequence], console: &dyn Console) -> Result<Done, Failure> {
         let n_frames = sequences.iter().map(|sequence| sequence.frames.len()).sum();
         let mut progress = Progress::new(console, n_frames);
@@ -155,7 +155,7 @@ impl Job<'_> {
         Ok((records, n_missing))
     }
 
-    /// Returns the errors that the table expects of a view.
+    /// Returns the expected errors of a view from the table.
     fn looked_up(
         &self,
         sequence: &Sequence,
@@ -173,9 +173,9 @@ impl Job<'_> {
         })
     }
 
-    /// Returns the errors that the network expects of a view, and these beside the truth, where it is known.
+    /// Returns the errors that the network predicts for a view; if the truth is known, also the same errors together with the true ones.
     ///
-    /// * `joints`: the true ones in the frame.
+    /// * `joints`: the true joints in the frame.
     /// * `frame_scale`: pixels of the frame per pixel of the footage.
     fn forecast(
         &self,
@@ -193,7 +193,7 @@ impl Job<'_> {
         };
         let mut forecaster = forecaster.lock().unwrap_or_else(PoisonError::into_inner);
         let forecast = forecaster.run(&seen).inspect_err(
-            |error| tracing::warn!(view = look.view, %error, "the network says nothing"),
+            |error| tracing::warn!(view = look.view, %error, "the network gives no prediction"),
         );
         let forecast = forecast.ok()?;
         let tenth = joints.map(|joint| tenth_of(joint));
@@ -221,7 +221,7 @@ impl Job<'_> {
         Some((expectation, judged))
     }
 
-    /// The file that what is found goes to, and what is in it already.
+    /// Opens the file for the results of a sequence, and reads the results that it already contains.
     fn keep(&self, sequence: &Sequence) -> Result<(File, Vec<Record>), Failure> {
         let name = format!("{} {}", sequence.dataset, sequence.name);
         let safe = |letter: char| {
@@ -238,7 +238,7 @@ impl Job<'_> {
         let (mut records, mut n_bytes) = (Vec::new(), 0);
         if file.exists() {
             if !self.resume {
-                let message = format!("{} is there already", file.display());
+                let message = format!("{} already exists", file.display());
                 let failure = Failure::new(ExitKind::Usage, message);
                 return Err(failure.with_hint("continue it with --resume, or choose another --out"));
             }
@@ -288,7 +288,7 @@ impl Job<'_> {
                 joints: sequence.joints,
                 joint_map: (self.joint_map)(sequence.joints),
                 facing: fuse.facing,
-                // The true errors only switch: they are no lengths in the frame.
+                // The true errors only switch parts on and off: they are not lengths in the frame.
                 error_weight: f64::from(u8::from(!self.oracle)),
                 ..SkeletonSettings::default()
             },
@@ -297,8 +297,7 @@ impl Job<'_> {
         Bench::new(setup, &film.cameras(), up, maps).or_fail(ExitKind::Input)
     }
 
-    /// The true joints in the frames of every view, where expected errors are taken from them or judged
-    /// by them.
+    /// Returns the true joints in the frames of every view, if expected errors are derived from them or compared with them.
     fn truth(
         &self,
         sequence: &Sequence,

@@ -1,4 +1,4 @@
-//! Single pictures of annotated people: PARSE, LSP, and JSON lines of one's own.
+//! Single pictures of annotated people: PARSE, LSP, and JSON lines.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,7 +12,7 @@ use training::datasets::People;
 
 use crate::judged;
 
-/// Returns true if a path is a data set of single pictures, by the files in it.
+/// Returns true if the files in a path are a data set of single pictures.
 pub fn is_one(path: &Path) -> bool {
     if path.is_dir() {
         let has = |name: &str| path.join(name).is_file();
@@ -22,7 +22,7 @@ pub fn is_one(path: &Path) -> bool {
     ending == "jsonl" || ending == "mat"
 }
 
-/// The last word of a path, with that before where it is a file of a known name.
+/// Returns the last component of a path. If this is a file with a well-known name, the component before it is included.
 pub fn name(path: &Path) -> String {
     let is_known = path
         .file_name()
@@ -37,19 +37,19 @@ pub fn name(path: &Path) -> String {
     }
 }
 
-/// Writes what was found on a data set, a line a person.
+/// Writes the results on a data set, one line per person.
 ///
-/// * `folder`: the file in it is called by the data set.
+/// * `folder`: folder of the file, whose name is that of the data set.
 ///
 /// # Errors
 ///
-/// The file cannot be written.
+/// Fails if the file cannot be written.
 pub fn write_found(folder: &Path, people: &People, set: &Pictures) -> Result<(), Failure> {
     let file = folder.join(format!("{}.jsonl", set.name));
     put(&file, &lines(people, set))
 }
 
-/// Returns the joints found, a line a person.
+/// Returns the joints that were found, one line per person.
 fn lines(people: &People, set: &Pictures) -> String {
     let each = people.people.iter().zip(&set.found);
     let mut text = String::new();
@@ -63,13 +63,13 @@ fn lines(people: &People, set: &Pictures) -> String {
 
 /// Writes `report.json`, `report.html` and `report.tex`.
 ///
-/// * `out`: the folder for them.
-/// * `model`: its name, for people.
-/// * Returns the numbers, as they are in `report.json`.
+/// * `out`: folder for these files.
+/// * `model`: name of the model, for readers of the report.
+/// * Returns the numbers, as in `report.json`.
 ///
 /// # Errors
 ///
-/// A file cannot be written.
+/// Fails if a file cannot be written.
 pub fn write_report(
     out: &Path,
     model: &str,
@@ -94,7 +94,7 @@ pub fn write_report(
     Ok(numbers)
 }
 
-/// One data set for programs: as `judge` has it, with intervals.
+/// Returns the numbers of one data set as JSON, as in `judge`, with intervals.
 fn numbers(set: &Pictures, bootstrap: &Bootstrap) -> Value {
     let of = |which: Judged| {
         let mut value = judged::numbers(&set.report(which));

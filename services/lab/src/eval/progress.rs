@@ -1,13 +1,13 @@
-//! Frames done, and the time that is left.
+//! Progress display: frames done, and the remaining time.
 
 use std::time::{Duration, Instant};
 
 use failure::Console;
 
-/// How long a line of progress lasts where there is no bar.
+/// Time between two lines of progress if there is no bar.
 const EVERY: Duration = Duration::from_secs(10);
 
-/// Shows on a console how far the run is: by a bar, or by a message now and then if there is no bar.
+/// Shows progress on a console: with a bar, or otherwise with a message now and then.
 pub(super) struct Progress<'a> {
     console: &'a dyn Console,
     begin: Instant,
@@ -40,7 +40,7 @@ impl<'a> Progress<'a> {
         let each = self.begin.elapsed().as_secs_f64() / self.n_solved as f64;
         let left = self.n_frames - self.n_solved - self.n_passed;
         let minutes = each * left as f64 / 60.0;
-        let text = format!("{sequence}: {each:.2} s a frame, {minutes:.1} minutes left");
+        let text = format!("{sequence}: {each:.2} s per frame, {minutes:.1} minutes left");
         self.console.details(&text);
         self.console.advance(1);
         if !self.console.shows_bar() && self.said.elapsed() >= EVERY {

@@ -1,4 +1,4 @@
-//! Reports for people, for programs and for papers.
+//! Reports as HTML, JSON and LaTeX.
 
 use std::path::Path;
 
@@ -12,9 +12,9 @@ use statistics::score::Bootstrap;
 use super::Done;
 
 impl Done {
-    /// Scores what was found.
+    /// Scores the results.
     ///
-    /// * `versions`: those that were compared.
+    /// * `versions`: the compared versions.
     pub fn summary(&self, versions: &[Version], bootstrap: &Bootstrap) -> Summary {
         let versions: Vec<String> = versions.iter().map(ToString::to_string).collect();
         let records = self.sequences.iter().flat_map(|sequence| &sequence.1);
@@ -29,12 +29,12 @@ impl Done {
 
 /// Writes `report.json`, `report.html` and `report.tex`.
 ///
-/// * `out`: the folder for them.
-/// * `about`: what was evaluated and how, as names and values for people.
+/// * `out`: folder for these files.
+/// * `about`: description of the evaluation for readers, as names and values.
 ///
 /// # Errors
 ///
-/// A file cannot be written.
+/// Fails if a file cannot be written.
 pub fn write_report(
     out: &Path,
     summary: &Summary,
@@ -78,7 +78,7 @@ fn measured(done: &Done) -> Vec<Measured> {
     all
 }
 
-/// The short form for people: PCP3D of every group, and the gain over the first version.
+/// Returns a short text report: PCP3D of every group, and the gain over the first version.
 pub fn text(summary: &Summary, versions: &[Version]) -> String {
     let mut head = vec![format!("{:<28} {:>6}", "PCP3D at 0.5, %", "frames")];
     head.extend(versions.iter().map(|version| format!("{:>22}", version.to_string())));
@@ -90,7 +90,7 @@ pub fn text(summary: &Summary, versions: &[Version]) -> String {
         };
         let [auc, correlation] = [it.auc, it.rank_correlation].map(number);
         lines.push(format!(
-            "expected errors, mean over parts: area under the ROC {auc}, rank correlation {correlation}"
+            "expected errors, mean over parts: area under the ROC curve {auc}, rank correlation {correlation}"
         ));
     }
     lines.join("\n")

@@ -19,16 +19,16 @@ use skeleton::{JointMap, PARSE14};
 
 use crate::evaluation::{Combining, FrameResult, Terms, Version};
 
-/// The configuration without the cameras.
+/// Configuration of the bench, without the cameras.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// The model.
+    /// The single-view model.
     pub model: Arc<Model>,
     /// Settings of the single-view step.
     pub view: ViewSettings,
     /// Settings of the skeleton step.
     pub skeleton: SkeletonSettings,
-    /// From parts to the joints of `skeleton::PARSE14` that are judged in images; a choice of parts without it.
+    /// Map from parts to the joints of `skeleton::PARSE14` that are evaluated in images; without it, each joint is the centre of one part.
     pub joint_map: Option<Arc<JointMap>>,
     /// The versions to compare.
     pub trials: Vec<Trial>,
@@ -37,9 +37,9 @@ pub struct Setup {
 /// A version and its settings.
 #[derive(Debug, Clone)]
 pub struct Trial {
-    /// Which version.
+    /// The version.
     pub version: Version,
-    /// Settings of fusion. Thresholds in the unit of the expected errors.
+    /// Settings of fusion. Thresholds have the unit of the expected errors.
     pub fuse: multiview::Settings,
     /// Part-type tables.
     pub tables: PairTables,
@@ -59,31 +59,31 @@ impl Trial {
 /// One view of an instant: its frame and its single-view poses.
 #[derive(Debug, Clone, Copy)]
 pub struct SingleView<'a> {
-    /// The view.
+    /// Index of the view.
     pub view: usize,
-    /// Its frame.
+    /// Frame of the view.
     pub image: Rgb8View<'a>,
-    /// Its pyramid, and the model.
+    /// Pyramid of the view, and the model.
     pub plan: &'a ViewPlan,
     /// The single-view candidates, at least one.
     pub found: &'a ViewEstimate,
-    /// Centres of the 26 parts of the best pose, pixels of the frame.
+    /// Centres of the 26 parts in the best pose, pixels of the frame.
     pub centres: &'a [[f64; 2]],
 }
 
-/// The expected error of every part of a view.
+/// Expected error of every part in a view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Expectation {
-    /// In the unit of the thresholds.
+    /// Expected errors, in the unit of the thresholds.
     pub sigma: Vec<f32>,
-    /// Thresholds of this view, where those of the settings are empty.
+    /// Thresholds of this view, used if those of the settings are empty.
     pub tau: Option<Vec<f32>>,
 }
 
-/// Predicts the expected error of every part of a view.
+/// Predicts the expected error of every part in a view.
 pub type ErrorPredictor<'a> = dyn Fn(&SingleView<'_>) -> Option<Expectation> + Sync + 'a;
 
-/// The versions, ready for the frames of one rig.
+/// The versions, prepared for the frames of one rig.
 #[derive(Debug)]
 pub struct Bench {
     setup: Setup,
@@ -91,12 +91,12 @@ pub struct Bench {
     plans: Vec<Arc<ViewPlan>>,
     views: Vec<ViewStep>,
     responses: Vec<Vec<f32>>,
-    /// One for each version.
+    /// Fusion step of each version.
     fuse: Vec<FuseStep>,
     footage_from_frame: Vec<[[f64; 3]; 2]>,
 }
 
-/// The evidence of all views for one frame.
+/// Evidence of all views for one frame.
 struct Evidence<'a> {
     answers: Vec<Option<ViewResult>>,
     evidence: Vec<Option<Responses<'a>>>,
@@ -105,12 +105,12 @@ struct Evidence<'a> {
 impl Bench {
     /// Prepares the versions for a rig.
     ///
-    /// * `cameras`: of the frames, in the order of the views.
-    /// * `footage_from_frame`: for each of them; see [`Film::footage_from_frame`](crate::evaluation::Film::footage_from_frame).
+    /// * `cameras`: cameras of the frames, in the order of the views.
+    /// * `footage_from_frame`: map for each camera; see [`Film::footage_from_frame`](crate::evaluation::Film::footage_from_frame).
     ///
     /// # Errors
     ///
-    /// [`EstimatorError`].
+    /// Fails with [`EstimatorError`].
     pub fn new(
         setup: Setup,
         cameras: &[Camera],
@@ -147,7 +147,7 @@ impl Bench {
         })
     }
 
-    /// The cameras of the frames.
+    /// Returns the cameras of the frames.
     pub fn cameras(&self) -> impl Iterator<Item = &Camera> {
         self.plans.iter().map(|plan| plan.camera())
     }
@@ -155,12 +155,12 @@ impl Bench {
     /// Solves a frame, on rayon's current pool. Frames are independent, so the result depends only on the
     /// images.
     ///
-    /// * `images`: one for each view; `None` for a view that is missing.
-    /// * Returns what each version found, in the order of the setup.
+    /// * `images`: one image for each view; `None` for a missing view.
+    /// * Returns the result of each version, in the order of the setup.
     ///
     /// # Panics
     ///
-    /// If the number of images, or the size of one, is not that of the rig.
+    /// Panics if the number of images or the size of an image does not match the rig.
     pub fn solve(
         &mut self,
         images: &[Option<Rgb8View<'_>>],
@@ -237,13 +237,13 @@ impl Bench {
             .iter()
             .map(|answer| {
                 let mut answer = answer.clone()?;
-                // Without adaptive selection there are no expected errors: the candidate with the better
+                // Without adaptive selection there are no expected errors: the candidate with the best
                 // score comes first.
                 answer.sigma_px = answer.sigma_px.filter(|_| version.terms == Terms::Adaptive);
                 Some(answer)
             })
             .collect();
-        // Frames are independent: nobody was followed before.
+        // Frames are independent, so no person was followed before.
         let others = Following::default().others(&self.plans, &answers);
         let combine = match version.combining {
             Combining::Consensus => Combine::Consensus,
@@ -320,7 +320,7 @@ impl Bench {
     }
 }
 
-/// The computing effort of a version.
+/// Computing effort of a version.
 #[derive(Debug, Default)]
 struct Effort {
     iterations: Vec<u32>,
@@ -367,7 +367,7 @@ impl Effort {
     }
 }
 
-/// The settings of a version: those of all terms, without the terms it does not have.
+/// Returns the settings of a version: the settings with all terms, without the terms that the version does not have.
 fn settings_of(all: &multiview::Settings, terms: Terms) -> multiview::Settings {
     let mut settings = all.clone();
     if terms < Terms::Appearance {

@@ -1,4 +1,4 @@
-//! One frame by the keypoints of a network, in the ways that are compared.
+//! Solution of one frame from the keypoints of a network, by each of the compared methods.
 
 use geometry::Camera;
 use multiview::{
@@ -11,12 +11,12 @@ use statistics::score::Point;
 
 use crate::evaluation::plain::{Sighting, dropping, linear};
 
-/// Number of joints: those of `skeleton::PARSE14`.
+/// Number of joints of `skeleton::PARSE14`.
 const N: usize = 14;
-/// Maxima of a joint's map that may be the joint.
+/// Number of maxima in a joint's map that are candidates for the joint.
 const N_MAXIMA: usize = 3;
 
-/// A way from the views to the joints in space.
+/// A method to compute joints in space from the views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Plain triangulation of the maxima ([`linear`]).
@@ -25,15 +25,15 @@ pub enum Method {
     Dropping,
     /// The solution in space over the maps, without springs.
     Maps,
-    /// The solution in space over the maps ([`solve_person`]).
+    /// The solution in space over the maps, with springs ([`solve_person`]).
     Space,
 }
 
 impl Method {
-    /// All, in the order of the table.
+    /// All methods, in the order of the table.
     pub const ALL: [Self; 4] = [Self::Linear, Self::Dropping, Self::Maps, Self::Space];
 
-    /// Its name in tables and files.
+    /// Returns the name of the method in tables and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "triangulated",
@@ -44,17 +44,17 @@ impl Method {
     }
 }
 
-/// Evidence of a network about a person in a view.
+/// A network's evidence about a person in a view.
 #[derive(Debug, Clone)]
 pub struct NetworkView {
     maps: JointMaps,
     maxima: Vec<Vec<([f64; 2], f32)>>,
-    /// Evidence of the network on the direction in which the person faces.
+    /// Evidence about the direction in which the person faces.
     front: Option<FrontEvidence>,
 }
 
 impl NetworkView {
-    /// Takes the maps of a view.
+    /// Creates the evidence from the maps of a view.
     pub fn new(maps: JointMaps) -> Self {
         let maxima = |joint: usize| {
             let mut found = maps.maxima(joint, N_MAXIMA);
@@ -70,18 +70,18 @@ impl NetworkView {
         }
     }
 
-    /// The view with the direction in which the person faces, as the network gives it.
+    /// Adds the network's evidence about the direction in which the person faces.
     #[must_use]
     pub fn with_front(self, front: Option<FrontEvidence>) -> Self {
         Self { front, ..self }
     }
 
-    /// Returns the evidence on that direction.
+    /// Returns the evidence about the direction in which the person faces.
     pub fn front(&self) -> Option<FrontEvidence> {
         self.front
     }
 
-    /// The maps.
+    /// Returns the maps.
     pub fn maps(&self) -> &JointMaps {
         &self.maps
     }
@@ -92,9 +92,9 @@ impl NetworkView {
         *self = Self::new(maps).with_front(self.front);
     }
 
-    /// The person, to be found again in other views.
+    /// Returns the person, for finding the same person in other views.
     ///
-    /// * `height`: of the box, as a share of that of the picture.
+    /// * `height`: height of the box, as a share of the picture's height.
     pub fn person(&self, height: f64) -> SeenPerson {
         let joint = |keypoint: &Option<keypoints::Keypoint>| {
             keypoint.map(|keypoint| (keypoint.at, keypoint.score))
@@ -120,10 +120,10 @@ impl JointEvidence for NetworkView {
     }
 }
 
-/// Gives left and right in views that have them as seen the names of the body's own sides: which views have them exchanged against the
-/// others by the solution in space, and then all of them by what the views tell of the front, of this frame alone.
+/// Converts left and right from sides of the picture to sides of the body, in this frame alone. First, the solution in space shows which
+/// views have them exchanged relative to the others. Then the views' evidence about the front decides whether to exchange all of them.
 ///
-/// * Returns the log-likelihood ratio of the choice over its opposite, nats; 0 where nothing was chosen.
+/// * Returns the log-likelihood ratio of the choice to its opposite, nats; 0 without a solution.
 pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
     let settings = SpaceSettings {
         as_seen: true,
@@ -156,9 +156,9 @@ pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
     ratio.abs()
 }
 
-/// The joints of `skeleton::PARSE14` in space, metres.
+/// Returns the joints of `skeleton::PARSE14` in space, metres.
 ///
-/// * `limit_px`: of [`dropping`].
+/// * `limit_px`: limit for [`dropping`].
 pub fn joints_by(
     method: Method,
     views: &[(&Camera, &NetworkView)],
@@ -192,7 +192,7 @@ pub fn joints_by(
     }
 }
 
-/// Where the views see a joint. One that is sure of nothing still tells a direction.
+/// Returns the positions of a joint in the views. Views with a score near 0 still contribute a direction.
 fn sightings<'a>(views: &[(&'a Camera, &NetworkView)], joint: usize) -> Vec<Sighting<'a>> {
     let peak = |view: &NetworkView| view.maps.peaks()[joint];
     views

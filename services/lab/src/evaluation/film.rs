@@ -1,46 +1,46 @@
-//! The frames of a sequence, all views in step, framed as the pipeline takes them.
+//! Frames of a sequence, with all views in step, prepared as in the pipeline.
 
 use footage::{Fill, FootageError, Size, Source, SourceSpec, Warp, WarpError};
 use geometry::{Camera, Framing, FramingError, OutSize, upright_roll};
 use kernels::Rgb8View;
 use training::datasets::sequences::Sequence;
 
-/// How frames are derived from footage.
+/// Settings to derive frames from footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilmSettings {
-    /// Width and height of the frames; the footage's size times `scale`, if not given.
+    /// Width and height of the frames; if `None`, the footage's size times `scale`.
     pub size: Option<[u32; 2]>,
     /// Pixels of a frame per pixel of the footage.
     pub scale: f64,
-    /// Rotate frames upright, if the rig knows the vertical.
+    /// True to rotate frames upright, if the rig knows the vertical.
     pub upright: bool,
 }
 
-/// Why frames cannot be read.
+/// Reason why frames cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FilmError {
     /// Footage cannot be read.
     #[error("camera {camera:?}")]
     Footage {
-        /// The camera.
+        /// Name of the camera.
         camera: String,
-        /// Why.
+        /// Cause of the error.
         source: FootageError,
     },
     /// Footage does not match the calibration.
     #[error("camera {camera:?}")]
     Framing {
-        /// The camera.
+        /// Name of the camera.
         camera: String,
-        /// Why.
+        /// Cause of the error.
         source: FramingError,
     },
     /// Frames cannot be derived.
     #[error("camera {camera:?}")]
     Warp {
-        /// The camera.
+        /// Name of the camera.
         camera: String,
-        /// Why.
+        /// Cause of the error.
         source: WarpError,
     },
 }
@@ -57,7 +57,7 @@ struct Reel {
     source: Source,
     warp: Warp,
     framing: Framing,
-    /// Frame of the sequence that is read next.
+    /// Index of the next frame to read.
     next: u64,
     decoded: Vec<u8>,
     frame: Vec<u8>,
@@ -69,7 +69,7 @@ impl Film {
     ///
     /// # Errors
     ///
-    /// [`FilmError`], which names the camera.
+    /// Fails with [`FilmError`], which names the camera.
     pub fn open(sequence: &Sequence, settings: &FilmSettings) -> Result<Self, FilmError> {
         let views = sequence.views.iter().zip(sequence.rig.cameras());
         let reel = |(view, camera): (&training::datasets::sequences::View, &Camera)| {
@@ -120,23 +120,23 @@ impl Film {
         })
     }
 
-    /// The cameras of the frames.
+    /// Returns the cameras of the frames.
     pub fn cameras(&self) -> Vec<Camera> {
         self.reels.iter().map(|reel| reel.framing.camera().clone()).collect()
     }
 
-    /// From pixels of the frames to those of the footage, for every view.
+    /// Returns the map from pixels of the frames to pixels of the footage, for every view.
     pub fn footage_from_frame(&self) -> Vec<[[f64; 3]; 2]> {
         self.reels.iter().map(|reel| reel.framing.source_from_output()).collect()
     }
 
-    /// The images of all views at a frame of the sequence; `None` for a view whose footage has ended.
+    /// Returns the images of all views at a frame of the sequence; `None` for a view whose footage has ended.
     ///
-    /// * `index`: in ascending order; skipped frames cannot be read any more.
+    /// * `index`: must increase from call to call; skipped frames cannot be read later.
     ///
     /// # Errors
     ///
-    /// [`FilmError::Footage`].
+    /// Fails with [`FilmError::Footage`].
     pub fn at(&mut self, index: u64) -> Result<Vec<Option<Rgb8View<'_>>>, FilmError> {
         for reel in &mut self.reels {
             reel.seek(index).map_err(|source| FilmError::Footage {

@@ -1,13 +1,13 @@
-//! The paper's tables for LaTeX.
+//! The paper's tables as LaTeX.
 
 use statistics::score::{Bootstrap, SEGMENT_NAMES};
 
 use crate::evaluation::{Group, Pictures, Summary, Version, published};
 
-/// Tables of PCP3D: a row for each group, then a row for each version with all parts; the paper's numbers in
-/// parentheses, where it has any.
+/// Returns tables of PCP3D: a row for each group, then a row for each version with all parts. The paper's numbers are in
+/// parentheses, where they exist.
 ///
-/// * `versions`: those of the summary.
+/// * `versions`: the versions of the summary.
 pub fn latex(summary: &Summary, versions: &[Version]) -> String {
     let mut out = String::new();
     let titles: Vec<String> = versions.iter().map(|version| version.title()).collect();
@@ -41,7 +41,7 @@ pub fn latex(summary: &Summary, versions: &[Version]) -> String {
     out.replace('–', "--")
 }
 
-/// The tables of single pictures.
+/// Returns the tables for single pictures.
 pub fn pictures_latex(sets: &[Pictures], bootstrap: &Bootstrap) -> String {
     let mut out = String::new();
     for table in sets.iter().flat_map(|set| set.tables(bootstrap)) {
@@ -58,12 +58,12 @@ pub fn pictures_latex(sets: &[Pictures], bootstrap: &Bootstrap) -> String {
     out
 }
 
-/// A number with `digits` digits after the point, or a dash.
+/// Formats a number with `digits` digits after the point; a dash for `None`.
 pub fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
 }
 
-/// The largest group of every data set.
+/// Returns the largest group of every data set.
 pub fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
     let last = |(nth, it): &(usize, &Group)| {
         summary.groups[nth + 1..].iter().all(|other| other.dataset != it.dataset)
@@ -71,7 +71,7 @@ pub fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
     summary.groups.iter().enumerate().filter(last).map(|group| group.1)
 }
 
-/// Ours, and the paper's in parentheses.
+/// Returns our numbers, with the paper's in parentheses.
 fn cells(group: &Group, versions: &[Version]) -> Vec<String> {
     let cell = |(version, it): (&Version, &crate::evaluation::Numbers)| {
         let ours = number(it.pcp3d, 2);

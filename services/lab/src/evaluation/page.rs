@@ -1,4 +1,4 @@
-//! An evaluation as one HTML page: what was run, the tables with the paper's numbers beside ours, the figures.
+//! An evaluation as one HTML page: a description of the run, tables with the paper's numbers beside ours, and figures.
 
 mod figure;
 mod pictures;
@@ -12,18 +12,18 @@ use figure::{bars, colour, curves, histogram};
 
 pub use pictures::pictures_html;
 
-/// The content of the page.
+/// Content of the page.
 #[derive(Debug, Clone)]
 pub struct Page<'a> {
-    /// The numbers.
+    /// The numbers to show.
     pub summary: &'a Summary,
-    /// The versions of the summary.
+    /// The versions in the summary.
     pub versions: &'a [Version],
-    /// Description of the run: key and value.
+    /// Description of the run, as keys and values.
     pub about: &'a [(String, String)],
 }
 
-/// One self-contained page.
+/// Returns one self-contained page.
 pub fn html(page: &Page<'_>) -> String {
     let titles: Vec<String> = page.versions.iter().map(|version| version.title()).collect();
     let mut out = begin("Parallax: evaluation");
@@ -55,13 +55,13 @@ pub fn html(page: &Page<'_>) -> String {
     out.into_page()
 }
 
-/// The paper's main tables: PCP3D by group, with the published values.
+/// Adds the paper's main tables: PCP3D by group, with the published values.
 fn scores(out: &mut Html, page: &Page<'_>, titles: &[String]) {
     let confidence = 100.0 * page.summary.confidence;
     put!(
         out,
-        "<h2>PCP3D at 0.5, %</h2>\n<p><small>Below: the {confidence:.0} % interval over frames, and what the \
-         paper prints.</small></p>\n<div class=\"scroll\"><table>\n<tr><th>data set<th class=\"name\">subject\
+        "<h2>PCP3D at 0.5, %</h2>\n<p><small>The small numbers are the {confidence:.0} % interval over frames, and the \
+         value in the paper.</small></p>\n<div class=\"scroll\"><table>\n<tr><th>data set<th class=\"name\">subject\
          <th class=\"name\">sequence<th>frames",
         [confidence]
     );
@@ -102,13 +102,13 @@ fn interval(ends: Option<[f64; 2]>, digits: usize) -> Html {
     })
 }
 
-/// All other measures of a group, a column for each version.
+/// Adds all other measures of a group, with a column for each version.
 fn measures(out: &mut Html, group: &Group, titles: &[String]) {
-    /// A number, its interval, and how many decimals both have.
+    /// Returns a number, its interval, and the number of decimals of both.
     type Cell = fn(&Numbers) -> (Option<f64>, Option<[f64; 2]>, usize);
     let rows: [(&str, Cell); 17] = [
         ("PCP3D at 0.5, %", |own| (own.pcp3d, own.pcp3d_interval, 2)),
-        ("gain over the first, points", |own| {
+        ("gain over the first version, points", |own| {
             (own.gain, own.gain_interval, 2)
         }),
         ("MPJPE, mm", |own| (own.mpjpe_mm, own.mpjpe_interval, 1)),
@@ -127,9 +127,11 @@ fn measures(out: &mut Html, group: &Group, titles: &[String]) {
         ("images: PCK at 0.2, %", |own| {
             (own.pck2d.map(|pck2d| pck2d[1]), None, 1)
         }),
-        ("iterations until settled", |own| (own.iterations, None, 2)),
-        ("not settled, %", |own| (own.unsettled, None, 2)),
-        ("solutions a frame", |own| (own.solutions, None, 1)),
+        ("iterations until convergence", |own| {
+            (own.iterations, None, 2)
+        }),
+        ("not converged, %", |own| (own.unsettled, None, 2)),
+        ("solutions per frame", |own| (own.solutions, None, 1)),
         ("terms switched off, %", |own| (own.off, None, 1)),
         ("joints in images improved, %", |own| {
             (Some(own.changes.improved), None, 1)
@@ -162,16 +164,16 @@ fn measures(out: &mut Html, group: &Group, titles: &[String]) {
     put!(out, "</table></div>\n");
 }
 
-/// Quality of the expected errors.
+/// Adds the quality of the expected errors.
 fn predictions(out: &mut Html, summary: &Summary) {
     if summary.predictions.is_empty() {
         return;
     }
     put!(
         out,
-        "<h2>Expected errors</h2>\n<p><small>Views: those judged. Above: the true error exceeds the threshold. \
-         Area: under the ROC of that, by the expected error; 0.5 tells nothing. Correlation: of ranks \
-         (Spearman).</small></p>\n<div class=\"scroll\"><table>\n<tr><th>part<th>views<th>above, %<th>of \
+        "<h2>Expected errors</h2>\n<p><small>Views: evaluated views. Above: share in which the true error exceeds the threshold. \
+         Area: area under the ROC curve for predicting this from the expected error; 0.5 means no information. Correlation: Spearman's rank \
+         correlation.</small></p>\n<div class=\"scroll\"><table>\n<tr><th>part<th>views<th>above, %<th>of \
          these switched off, %<th>of the others, %<th>area<th>correlation</tr>\n"
     );
     for it in &summary.predictions {
@@ -201,7 +203,7 @@ fn figures(out: &mut Html, group: &Group, titles: &[String]) {
     for (title, it) in titles.iter().zip(&group.versions).skip(1) {
         put!(
             out,
-            "<h3>Changes in images against {}: {}</h3>\n{}\n",
+            "<h3>Changes in images relative to {}: {}</h3>\n{}\n",
             titles[0],
             title,
             histogram(&it.changes)

@@ -11,28 +11,28 @@ use crate::evaluation::Joints;
 pub struct Pictures {
     /// Name of the data set.
     pub name: String,
-    /// People who could not be used.
+    /// Number of people who could not be used.
     pub n_left_out: usize,
     /// The true joints of every person.
     pub truths: Vec<Joints>,
-    /// For each person the detections of [`Judged`]; `None` if there is none.
+    /// The detections of each person, in the order of [`Judged::ALL`]; `None` for a missing detection.
     pub found: Vec<[Option<Joints>; 2]>,
 }
 
-/// Which detection of a picture is judged.
+/// Kind of detection to evaluate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judged {
-    /// The best one of the picture, as for published PCP.
+    /// The best detection in the picture, as for published PCP.
     Best,
-    /// The best one that covers the person, as for published PCK.
+    /// The best detection that covers the person, as for published PCK.
     OnPerson,
 }
 
 impl Judged {
-    /// Both, in the order of [`Pictures::found`].
+    /// Both kinds, in the order of [`Pictures::found`].
     pub const ALL: [Self; 2] = [Self::Best, Self::OnPerson];
 
-    /// Its title.
+    /// Returns the title of the kind.
     pub fn title(self) -> &'static str {
         match self {
             Self::Best => "best detection of every image",
@@ -41,22 +41,22 @@ impl Judged {
     }
 }
 
-/// Confidence intervals over pictures, percent; `None` without a picture.
+/// Confidence intervals over pictures, percent; `None` if there are no pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intervals {
-    /// Intervals of PCP by the mean of both ends, and by both ends.
+    /// Intervals of PCP by the two rules: the mean of both ends, and both ends.
     pub pcp: [Option<[f64; 2]>; 2],
     /// Interval of PCK at each of [`PCK_SHARES`].
     pub pck: [Option<[f64; 2]>; 2],
 }
 
 impl Pictures {
-    /// The numbers of one kind of detection.
+    /// Returns the numbers for one kind of detection.
     pub fn report(&self, which: Judged) -> Report {
         evaluate(self.pairs(which))
     }
 
-    /// Their confidence intervals, by resampling pictures.
+    /// Returns the confidence intervals of these numbers, by resampling pictures.
     pub fn intervals(&self, which: Judged, bootstrap: &Bootstrap) -> Intervals {
         let each: Vec<Report> = self.pairs(which).map(|pair| evaluate([pair])).collect();
         let over = |count: &dyn Fn(&Report) -> Pcp| {
@@ -75,12 +75,12 @@ impl Pictures {
         }
     }
 
-    /// The mean offset of every joint of the best detection on the person, along and across its bone.
+    /// Returns the mean offset of every joint of the best detection on the person, along and across its bone.
     pub fn offsets(&self, bootstrap: &Bootstrap) -> Vec<Offset> {
         offsets(self.pairs(Judged::OnPerson), bootstrap)
     }
 
-    /// The tables of the data set: PCP and PCK of either kind of detection, percent.
+    /// Returns the tables of the data set: PCP and PCK of both kinds of detection, percent.
     pub fn tables(&self, bootstrap: &Bootstrap) -> Vec<Table> {
         tables(self, bootstrap)
     }
@@ -92,7 +92,7 @@ impl Pictures {
     }
 }
 
-/// The rules of PCP and their names.
+/// Rules of PCP, and their names.
 const RULES: [(PcpRule, &str); 2] = [
     (PcpRule::MeanOfEnds, "mean of ends"),
     (PcpRule::BothEnds, "both ends"),
@@ -101,11 +101,11 @@ const RULES: [(PcpRule, &str); 2] = [
 /// A table of percentages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Its title.
+    /// Title of the table.
     pub title: String,
-    /// The names of its columns.
+    /// Names of the columns.
     pub columns: Vec<String>,
-    /// Its rows: name, a number for every column, and the confidence interval of the last.
+    /// Rows: name, a number for every column, and the confidence interval of the last number.
     pub rows: Vec<(String, Vec<f64>, Option<[f64; 2]>)>,
 }
 
@@ -118,7 +118,7 @@ fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
             let (n, missed) = (report.n_images(), report.n_missed());
             let judged = which.title();
             format!(
-                "{}: {what}, {judged}; {n} images, nothing found on {missed}",
+                "{}: {what}, {judged}; {n} images, no detection in {missed}",
                 set.name
             )
         };
@@ -165,7 +165,7 @@ mod tests {
         core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64])
     }
 
-    /// The person is detected on two of three pictures; on one of them the best detection is elsewhere.
+    /// Three pictures. The person is detected in two of them; in one of these, the best detection is elsewhere.
     fn pictures() -> Pictures {
         let (here, there) = (Some(person(0.0)), Some(person(500.0)));
         Pictures {

@@ -1,11 +1,11 @@
-//! Usual ways to solve keypoints of a network: plain triangulation, and triangulation that leaves out cameras.
+//! Common methods to triangulate keypoints of a network: plain triangulation, and triangulation that leaves out cameras.
 //!
-//! These are what the solution in space is compared with; nothing in the pipeline uses them.
+//! The solution in space is compared with these methods. The pipeline does not use them.
 
 use geometry::Camera;
 use nalgebra::{Matrix4, Point2, Point3};
 
-/// A keypoint in a view: the camera, where it is (pixels), and its score.
+/// A keypoint in a view: the camera, the position in pixels, and the score.
 pub type Sighting<'a> = (&'a Camera, [f64; 2], f64);
 
 /// Weighted linear triangulation (DLT; Hartley & Zisserman 2003, section 12.2) of undistorted, normalised keypoints.
@@ -31,8 +31,8 @@ pub fn linear(views: &[Sighting<'_>]) -> Option<Point3<f64>> {
     point.iter().all(|value| value.is_finite()).then_some(point)
 }
 
-/// The same, leaving out as few views as are needed for a mean reprojection error below `limit_px` (as Pose2Sim does); of
-/// equally many the best ones.
+/// Linear triangulation that leaves out as few views as necessary for a mean reprojection error below `limit_px`, as Pose2Sim does. Among
+/// sets of the same size, it uses the one with the smallest error.
 pub fn dropping(views: &[Sighting<'_>], limit_px: f64) -> Option<Point3<f64>> {
     let n = views.len().min(16);
     let mut best: Option<(f64, Point3<f64>)> = None;
@@ -67,7 +67,7 @@ mod tests {
 
     use super::*;
 
-    /// A camera on a circle about the origin that looks at it.
+    /// Returns a camera on a circle around the origin that points at the origin.
     fn camera(angle: f64) -> Camera {
         let eye = Point3::new(5.0 * angle.sin(), 0.0, 5.0 * angle.cos());
         Camera {

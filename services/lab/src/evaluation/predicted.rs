@@ -1,45 +1,45 @@
-//! Quality of the expected errors, on which adaptive selection depends.
+//! Quality of the expected errors, which adaptive selection depends on.
 
 use serde::{Deserialize, Serialize};
 use skeleton::{N_PARTS, PART_NAMES};
 use statistics::score::{area_under_roc, rank_correlation};
 
-/// Expected and true errors of one view; one number per part, pixels of the frame.
+/// Expected and true errors of one view: one number per part, pixels of the frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Predicted {
     /// Expected errors.
     pub sigma_px: Vec<f32>,
-    /// Errors beyond which parts are switched off; empty if there are no thresholds.
+    /// Errors above which parts are switched off; empty if there are no thresholds.
     pub tau_px: Vec<f32>,
     /// True errors of the single-view pose.
     pub error_px: Vec<f32>,
 }
 
-/// The quality of the predictions of a part, or of all parts.
+/// Quality of the predictions for a part, or for all parts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judgement {
-    /// The part; `mean` of the parts.
+    /// Name of the part; `mean` for the mean of the parts.
     pub part: String,
-    /// Views that were judged.
+    /// Number of evaluated views.
     pub n: usize,
-    /// Share of them in which the error is above the threshold, percent.
+    /// Share of views in which the error is above the threshold, percent.
     pub above: Option<f64>,
-    /// Those of them that are switched off, percent.
+    /// Share of the views above the threshold in which the part is switched off, percent.
     pub caught: Option<f64>,
-    /// Those below the threshold that are switched off, percent.
+    /// Share of the views below the threshold in which the part is switched off, percent.
     pub wasted: Option<f64>,
-    /// Area under the ROC of "error above the threshold" by the expected error per threshold.
+    /// Area under the ROC curve for "error above the threshold", predicted by the expected error divided by the threshold.
     pub auc: Option<f64>,
-    /// Spearman's rank correlation of expected and true error, both per threshold.
+    /// Spearman's rank correlation between expected and true error, both divided by the threshold.
     pub rank_correlation: Option<f64>,
 }
 
-/// Evaluates predictions: every part, and the mean over the parts with a value.
+/// Evaluates predictions for every part, and their mean over the parts with a value.
 ///
 /// Errors are divided by their threshold, since thresholds may depend on the person's size.
 ///
-/// * Returns nothing if no view has thresholds.
+/// * Returns an empty list if no view has thresholds.
 pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
     let parts: Vec<Judgement> = (0..N_PARTS)
         .map(|part| {
@@ -68,7 +68,7 @@ pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
     std::iter::once(all).chain(parts).collect()
 }
 
-/// Expected and true error of a part, per threshold.
+/// Returns the expected and the true error of a part, divided by the threshold.
 fn sample(view: &Predicted, part: usize) -> Option<(f64, f64)> {
     let at = |values: &[f32]| values.get(part).map(|value| f64::from(*value));
     let tau = at(&view.tau_px).filter(|value| *value > 0.0)?;
@@ -100,7 +100,7 @@ fn of_part(name: &str, samples: impl Iterator<Item = (f64, f64)>) -> Judgement {
 mod tests {
     use super::*;
 
-    /// A view with the same values for all parts.
+    /// Returns a view with the same values for all parts.
     fn view(sigma: f32, tau: f32, error: f32) -> Predicted {
         let all = |value: f32| vec![value; N_PARTS];
         Predicted {
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn predictions_are_judged_by_the_threshold_of_their_own_view() {
-        // The last person is twice as large as the others, and so is its threshold.
+        // The last person is twice as large as the others, and so is the threshold.
         let views = [
             view(5.0, 10.0, 4.0),
             view(15.0, 10.0, 12.0),

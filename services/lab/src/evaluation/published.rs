@@ -25,9 +25,9 @@ const PCP3D: [Row; 16] = [
     ("UMPM", "All", "Overall", [73.07, 75.91, 76.37, 80.04]),
 ];
 
-/// The paper's value for a row of its tables, percent; `None` if it has none.
+/// Returns the paper's value for a row of its tables, percent; `None` if it has none.
 ///
-/// UMPM's rows are of all people: the sequence of one subject represents its action.
+/// The rows of UMPM are for all people, so the sequence of one subject represents its action.
 pub fn published(dataset: &str, subject: &str, action: &str, version: Version) -> Option<f64> {
     if version.combining != Combining::Pairs {
         return None;

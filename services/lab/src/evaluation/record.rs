@@ -1,4 +1,4 @@
-//! Results frame by frame, as they are stored on disk so that a run can be resumed.
+//! Results of each frame, in the form stored on disk for resuming a run.
 
 use serde::{Deserialize, Serialize};
 use statistics::score::Point;
@@ -9,20 +9,20 @@ use crate::evaluation::Predicted;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
-    /// `parallax-eval`.
+    /// Always `parallax-eval`.
     pub format: String,
-    /// 1.
+    /// Version of the format: 1.
     pub version: u32,
     /// Name of the sequence.
     pub sequence: String,
-    /// All settings that the results depend on: a run is resumed only with the same.
+    /// All settings that the results depend on; a run is resumed only with the same settings.
     pub settings: String,
     /// The versions, in the order of [`Record::found`].
     pub versions: Vec<String>,
 }
 
 impl Header {
-    /// A header of the current format.
+    /// Creates a header of the current format.
     pub fn new(sequence: &str, settings: &str, versions: Vec<String>) -> Self {
         Self {
             format: "parallax-eval".to_owned(),
@@ -34,11 +34,11 @@ impl Header {
     }
 }
 
-/// One frame.
+/// Results of one frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// Number, as the data set counts.
+    /// Number of the frame in the data set.
     pub frame: u64,
     /// The result of each version.
     pub found: Vec<FrameResult>,
@@ -51,36 +51,36 @@ pub struct Record {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameResult {
-    /// Joints of the sequence's joint set, metres; `None` where one could not be triangulated.
+    /// Joints of the sequence's joint set, metres; `None` for a joint that could not be triangulated.
     pub joints: Vec<Option<Point>>,
-    /// For each view the 14 joints of `skeleton::PARSE14`, pixels of the footage, left and right those of
-    /// the person; `None` where no person was found.
+    /// For each view, the 14 joints of `skeleton::PARSE14`, pixels of the footage; left and right are sides of
+    /// the body. `None` if no person was found.
     pub views: Vec<Option<Vec<[f64; 2]>>>,
     /// Single-view solutions of each pair, or of all views at once.
     pub iterations: Vec<u32>,
-    /// How many of these had not converged at the end.
+    /// Number of pairs (or of all-views solutions) that had not converged at the end.
     pub unsettled: u32,
-    /// Single-view solutions in all, including those of rejected hypotheses.
+    /// Total number of single-view solutions, including those of rejected hypotheses.
     pub solutions: u32,
-    /// Share of the consistency terms that were switched on, if there were any.
+    /// Share of the consistency terms that were switched on; `None` if there were no terms.
     pub on: Option<f64>,
 }
 
-/// Why records cannot be used.
+/// Reason why records cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The first line is not a header.
     #[error("line 1 is not the header of a file of records")]
     Header(#[source] serde_json::Error),
-    /// They come from a run with other settings.
-    #[error("they come from a run with other settings or versions")]
+    /// The records are from a run with other settings.
+    #[error("the records are from a run with other settings or versions")]
     Other,
     /// A line before the last is damaged.
     #[error("line {line}")]
     Line {
-        /// Line, from 1.
+        /// Number of the line, counted from 1.
         line: usize,
-        /// Why.
+        /// Cause of the error.
         source: serde_json::Error,
     },
 }
@@ -89,11 +89,11 @@ pub enum RecordError {
 ///
 /// A truncated last line is left out.
 ///
-/// * Returns them with their length in bytes, so that a resumed run can cut off the rest.
+/// * Returns the records and their length in bytes, so that a resumed run can cut off the rest.
 ///
 /// # Errors
 ///
-/// [`RecordError`]; none for an empty text.
+/// Fails with [`RecordError`], but never for an empty text.
 pub fn read_records(text: &str, expected: &Header) -> Result<(Vec<Record>, usize), RecordError> {
     let mut records = Vec::new();
     let mut n_bytes = 0;

@@ -1,4 +1,4 @@
-//! Scores the result of one version on one frame.
+//! Scores of the result of one version on one frame.
 
 use geometry::Camera;
 use nalgebra::Point3;
@@ -8,25 +8,25 @@ use training::datasets::sequences::{Frame, Sequence};
 
 use crate::evaluation::{FrameResult, parse14};
 
-/// The errors of one version on one frame.
+/// Errors of one version on one frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameScore {
     /// Errors of the twelve segments, as shares of their length ([`segment_errors`]).
     pub segments: Vec<Option<f64>>,
-    /// Errors of the joints, metres; infinite where one was not found.
+    /// Errors of the joints, metres; infinite for a joint that was not found.
     pub joints_m: Vec<Option<f64>>,
-    /// The same after the best alignment; empty where there is none.
+    /// Errors of the joints after the best alignment, metres; empty if there is no alignment.
     pub aligned_m: Vec<Option<f64>>,
-    /// True if the body fits the truth better with left and right exchanged; `None` without joints to compare.
+    /// True if the body fits the truth better with left and right exchanged; `None` if there are no joints to compare.
     pub is_exchanged: Option<bool>,
-    /// For each view the 14 joints that were found (if any) and the true ones, pixels of the footage; `None`
+    /// For each view, the 14 joints that were found (if any) and the true ones, pixels of the footage. `None`
     /// if a true joint is unknown or behind the camera.
     pub views: Vec<Option<(Option<Joints>, Joints)>>,
     /// Single-view solutions of each pair, or of all views at once.
     pub iterations: Vec<u32>,
-    /// How many of these had not converged.
+    /// Number of these that had not converged.
     pub unsettled: u32,
-    /// Single-view solutions in all.
+    /// Total number of single-view solutions.
     pub solutions: u32,
     /// Share of the consistency terms that were switched on.
     pub on: Option<f64>,
@@ -37,7 +37,7 @@ pub type Joints = [[f64; 2]; 14];
 
 /// Compares a result with the truth.
 ///
-/// * `frame`: of the sequence, the one that was solved.
+/// * `frame`: the solved frame of the sequence.
 pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameScore {
     let truth = &frame.joints;
     let segments = segments(sequence.joints).map_or_else(Vec::new, Vec::from);
@@ -65,11 +65,10 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
     }
 }
 
-/// Returns true if the joints on the right are nearer to the true ones on the left, and the other way round, than as
-/// they are named: by the sum of the distances.
+/// Returns true if the joints fit the truth better with left and right exchanged, by the sum of the distances.
 ///
-/// * `found`, `truth`: of `skeleton::PARSE14`, metres.
-/// * Returns `None` if no pair of joints of both sides is found and known.
+/// * `found`, `truth`: joints of `skeleton::PARSE14`, metres.
+/// * Returns `None` if no pair of left and right joints is both found and known.
 fn is_exchanged(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<bool> {
     let distance = |a: Point, b: Point| (Point3::from(a) - Point3::from(b)).norm();
     let (mut n, mut as_named, mut exchanged) = (0, 0.0, 0.0);
@@ -84,10 +83,10 @@ fn is_exchanged(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<bool
     (n > 0).then_some(exchanged < as_named)
 }
 
-/// The true joints in an image; `None` if one is not known, or behind the camera.
+/// Returns the true joints in an image; `None` if a joint is unknown or behind the camera.
 ///
-/// * `offset`: the calibrated pixel of the image's top-left pixel.
-/// * `joints`: of `skeleton::PARSE14`, metres.
+/// * `offset`: calibrated pixel at the image's top-left pixel.
+/// * `joints`: joints of `skeleton::PARSE14`, metres.
 pub fn projected(camera: &Camera, offset: [f64; 2], joints: &[Option<Point>]) -> Option<Joints> {
     let mut pixels = [[0.0; 2]; 14];
     for (pixel, joint) in pixels.iter_mut().zip(joints) {

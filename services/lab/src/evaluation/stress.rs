@@ -1,29 +1,29 @@
-//! Disturbances of real rooms, made on purpose: part of a view is covered, a camera is turned, a view looks at another person.
+//! Disturbances as in real rooms, added on purpose: part of a person is covered, a camera is rotated, a view shows another person.
 
 use core::fmt;
 use core::str::FromStr;
 
 use geometry::Camera;
 
-/// One thing that goes wrong.
+/// One disturbance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stress {
-    /// Nothing.
+    /// No disturbance.
     Clean,
-    /// In this many views half of the person is covered by grey: the left, right, upper or lower half in turn.
+    /// Half of the person is covered with grey in this many views: in turn the left, right, upper or lower half.
     Covered(usize),
-    /// Only this many views exist, others from frame to frame.
+    /// Only this many views exist; they change from frame to frame.
     Views(usize),
-    /// One camera was turned by this many degrees about its vertical axis since it was calibrated.
+    /// One camera was rotated by this many degrees about its vertical axis after the calibration.
     Turned(f64),
-    /// One view looks at another person: the same person, half a height beside.
+    /// One view shows another person: the same person, shifted sideways by half the person's height.
     Bystander,
-    /// One view names left and right the wrong way.
+    /// Left and right are exchanged in one view.
     Exchanged,
 }
 
 impl Stress {
-    /// The set that `--stress all` means.
+    /// The disturbances of `--stress all`.
     pub const ALL: [Self; 7] = [
         Self::Clean,
         Self::Covered(1),
@@ -34,9 +34,9 @@ impl Stress {
         Self::Exchanged,
     ];
 
-    /// The views that are used at a frame.
+    /// Returns the views to use at a frame.
     ///
-    /// * `nth`: number of the frame, from 0.
+    /// * `nth`: number of the frame, counted from 0.
     pub fn views(self, nth: usize, n_views: usize) -> Vec<usize> {
         match self {
             Self::Views(n) => (0..n.min(n_views)).map(|i| (i + nth) % n_views).collect(),
@@ -44,7 +44,7 @@ impl Stress {
         }
     }
 
-    /// Returns true if a view is disturbed at a frame: each in turn.
+    /// Returns true if a view is disturbed at a frame; the views take turns.
     pub fn hits(self, nth: usize, view: usize, n_views: usize) -> bool {
         let place = (view + nth) % n_views.max(1);
         match self {
@@ -54,7 +54,7 @@ impl Stress {
         }
     }
 
-    /// The camera as the calibration has it, once it was turned.
+    /// Returns the camera with the calibration from before it was rotated.
     pub fn calibrated(self, camera: &Camera) -> Camera {
         let Self::Turned(degrees) = self else {
             return camera.clone();
@@ -69,9 +69,9 @@ impl Stress {
 
 /// Covers half of a person with grey.
 ///
-/// * `rgb`: the picture, three bytes for a pixel; `size` is its width and height.
-/// * `outline`: of the person: left, top, right, bottom, pixels; a margin of 15 % of its height is added.
-/// * `nth`: which half: left, right, upper or lower in turn.
+/// * `rgb`: the picture, three bytes per pixel; `size` is its width and height.
+/// * `outline`: box of the person: left, top, right, bottom, pixels. A margin of 15 % of its height is added.
+/// * `nth`: selects the half: in turn left, right, upper or lower.
 pub fn cover_half(rgb: &mut [u8], size: [usize; 2], outline: [f64; 4], nth: usize) {
     const GREY: u8 = 127;
     let margin = 0.15 * (outline[3] - outline[1]);
@@ -106,7 +106,7 @@ impl fmt::Display for Stress {
     }
 }
 
-/// The text names no stress.
+/// Error: the text does not name a disturbance.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{0:?} is not one of clean, covered:N, views:N (N from 2), turned:DEGREES, bystander, exchanged"

@@ -5,21 +5,21 @@ use statistics::score::{Bootstrap, Changes, PcpRule, Report, Share};
 
 use crate::evaluation::{FrameScore, Judgement};
 
-/// Error in 3D up to which a joint counts as found, metres.
+/// Error in 3D up to which a joint counts as correct, metres.
 const PCK_M: f64 = 0.15;
-/// The paper's threshold of eq. 13.
+/// The paper's threshold in eq. 13.
 const GAMMA: f64 = 0.5;
-/// Thresholds of the curves: from 0 in steps of 0.05.
+/// Number of thresholds in the curves: from 0 in steps of 0.05.
 const N_GAMMAS: usize = 21;
-/// The histogram of changes: to both sides, pixels, and its bins.
+/// Range of the histogram of changes in both directions, pixels; below, the number of its bins.
 const REACH_PX: f64 = 50.0;
 const N_BINS: usize = 40;
-/// Smaller changes count as none, pixels.
+/// Change below which a joint counts as unchanged, pixels.
 const SAME_PX: f64 = 1.0;
-/// Larger deteriorations are counted separately, pixels.
+/// Deterioration above which a joint is also counted separately, pixels.
 const FAR_PX: f64 = 5.0;
 
-/// The scores of one sequence.
+/// Scores of one sequence.
 #[derive(Debug, Clone)]
 pub struct Measured {
     /// Name of the data set.
@@ -28,24 +28,24 @@ pub struct Measured {
     pub subject: String,
     /// The action.
     pub action: String,
-    /// `[frame][version]`.
+    /// Scores as `[frame][version]`.
     pub scores: Vec<Vec<FrameScore>>,
 }
 
-/// Everything that is reported.
+/// All numbers of a report.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Version of this layout.
+    /// Version of the report format.
     pub schema_version: u32,
     /// Names of the versions, in the order of [`Group::versions`].
     pub versions: Vec<String>,
-    /// The baseline of the gains and changes; none if there is only one version.
+    /// Baseline of the gains and changes; `None` if there is only one version.
     pub compared_with: Option<String>,
     /// Confidence level of the intervals.
     pub confidence: f64,
-    /// The sequences, then the groups of them.
+    /// Groups: first the sequences, then sets of several sequences.
     pub groups: Vec<Group>,
-    /// Quality of the expected errors: the mean over parts, then each; empty without a network.
+    /// Quality of the expected errors: first the mean over the parts, then each part; empty without a network.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Judgement>,
 }
@@ -59,7 +59,7 @@ pub struct Group {
     pub subject: String,
     /// The action; `Overall` for several.
     pub action: String,
-    /// Frames of each camera.
+    /// Number of frames per camera.
     pub frames: usize,
     /// The numbers of every version.
     pub versions: Vec<Numbers>,
@@ -68,64 +68,65 @@ pub struct Group {
 /// The numbers of one version on one group.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Numbers {
-    /// Eq. 13 at 0.5, percent of all segments.
+    /// Segments found (eq. 13 at 0.5), percent.
     pub pcp3d: Option<f64>,
-    /// Its confidence interval over frames.
+    /// Confidence interval of `pcp3d` over frames.
     pub pcp3d_interval: Option<[f64; 2]>,
     /// Gain over the first version, percentage points.
     pub gain: Option<f64>,
-    /// Its confidence interval, frame by frame against the first version.
+    /// Confidence interval of `gain`, from frame-by-frame differences from the first version.
     pub gain_interval: Option<[f64; 2]>,
-    /// Percent of each segment, in the order of `statistics::score::SEGMENT_NAMES`.
+    /// PCP3D of each segment, percent, in the order of `statistics::score::SEGMENT_NAMES`.
     pub parts: Vec<Option<f64>>,
-    /// Threshold and percent.
+    /// PCP3D over the threshold: pairs of threshold and percent.
     pub curve: Vec<[f64; 2]>,
     /// Mean error of the joints that were found, mm.
     pub mpjpe_mm: Option<f64>,
-    /// Its confidence interval.
+    /// Confidence interval of `mpjpe_mm`.
     pub mpjpe_interval: Option<[f64; 2]>,
-    /// The same after the best alignment of every frame, mm.
+    /// Mean error of the joints after the best alignment of every frame, mm.
     pub aligned_mpjpe_mm: Option<f64>,
-    /// Frames whose left and right are exchanged, of the whole body, percent.
+    /// Frames in which left and right of the whole body are exchanged, percent.
     pub exchanged: Option<f64>,
-    /// Its confidence interval.
+    /// Confidence interval of `exchanged`.
     pub exchanged_interval: Option<[f64; 2]>,
-    /// Joints within 150 mm, percent; those that were not found are not.
+    /// Joints with an error of at most 150 mm, percent; joints that were not found count as wrong.
     pub pck3d: Option<f64>,
     /// Joints that could not be triangulated, percent.
     pub lost: Option<f64>,
-    /// Images: PCP by the mean of both ends, percent.
+    /// PCP in images by the mean of both ends, percent.
     pub pcp2d: Option<f64>,
-    /// Images: PCK at a tenth and a fifth of the person, percent.
+    /// PCK in images at a tenth and a fifth of the person's size, percent.
     pub pck2d: Option<[f64; 2]>,
     /// Mean number of single-view solutions until a pair, or all views, converged.
     pub iterations: Option<f64>,
-    /// How many did not converge, percent.
+    /// Share of these that did not converge, percent.
     pub unsettled: Option<f64>,
     /// Single-view solutions per frame, over all pairs and hypotheses.
     pub solutions: Option<f64>,
     /// Consistency terms that were switched off, percent.
     pub off: Option<f64>,
-    /// Against the first version, image by image and joint by joint.
+    /// Changes from the first version, for each joint in each image.
     pub changes: ChangesOf,
 }
 
-/// Improvements and deteriorations.
+/// Improvements and deteriorations relative to the first version.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangesOf {
-    /// Joints in images that moved towards the truth by more than a pixel, percent.
+    /// Joints in images that moved more than a pixel towards the truth, percent.
     pub improved: f64,
-    /// Away from it.
+    /// Joints in images that moved more than a pixel away from the truth, percent.
     pub deteriorated: f64,
-    /// Away from it by more than five pixels.
+    /// Joints in images that moved more than five pixels away from the truth, percent.
     pub deteriorated_5px: f64,
-    /// Lower edge (pixels; above 0 is better) and percent; the outermost include everything beyond.
+    /// Bins of the histogram: lower edge in pixels (positive values are improvements), and percent. The outermost bins include all larger
+    /// changes.
     pub bins: Vec<[f64; 2]>,
 }
 
 /// Aggregates scores.
 ///
-/// * `versions`: their names; the first is what the others are compared with.
+/// * `versions`: names of the versions; the first is the baseline.
 pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootstrap) -> Summary {
     let mut groups: Vec<Group> = Vec::new();
     let add = |groups: &mut Vec<Group>, names: [&str; 3], of: Vec<&Measured>| {
@@ -178,7 +179,7 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
     }
 }
 
-/// Different names, in the order in which they come.
+/// Returns the different names, in the order of their first occurrence.
 fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
     let mut all: Vec<&str> = Vec::new();
     for name in names {
@@ -189,13 +190,13 @@ fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
     all
 }
 
-/// Eq. 13 in one frame, percent.
+/// Returns the segments found in one frame (eq. 13), percent.
 fn correct(frame: &FrameScore) -> Share {
     let judged = frame.segments.iter().flatten();
     Share::of(judged.map(|judged| percent(*judged <= GAMMA)))
 }
 
-/// The gain of one version over another in a frame, percent.
+/// Returns the gain of one version over another in a frame, percentage points.
 fn gain(own: &FrameScore, first: &FrameScore) -> Share {
     let (own, first) = (correct(own), correct(first));
     Share {
@@ -204,7 +205,7 @@ fn gain(own: &FrameScore, first: &FrameScore) -> Share {
     }
 }
 
-/// Errors of the joints that were found, mm.
+/// Returns the errors of the joints that were found, mm.
 fn errors_mm(errors: &[Option<f64>]) -> Share {
     let found = errors.iter().flatten().filter(|error| error.is_finite());
     Share::of(found.map(|value| 1000.0 * value))
@@ -270,7 +271,7 @@ fn curve(frames: &[&FrameScore]) -> Vec<[f64; 2]> {
         .collect();
     let point = |nth: usize| {
         let gamma = 0.05 * nth as f64;
-        // The steps are not exact in binary, and 0.5 has to agree with the tables.
+        // The steps are not exact in binary, but the value at 0.5 must agree with the tables.
         let gamma = (gamma * 100.0).round() / 100.0;
         let n = errors.iter().filter(|error| **error <= gamma).count();
         [gamma, 100.0 * n as f64 / errors.len().max(1) as f64]
@@ -314,7 +315,7 @@ fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
 mod tests {
     use super::*;
 
-    /// Returns a frame whose first `n_right` of twelve segments are right, the next half as far off again as is allowed.
+    /// Returns a frame in which the first `n_right` of twelve segments are within the threshold; the others exceed it by half.
     fn frame(n_right: usize) -> FrameScore {
         let error = |nth: usize| Some(if nth < n_right { 0.25 } else { 0.75 });
         let truth = [[5.0, 5.0]; 14];

@@ -1,11 +1,11 @@
-//! An evaluation with made-up numbers, for the tests of what shows one: of this crate, and with the feature `testing` of
+//! An evaluation with invented numbers, for tests of reports in this crate and, with the feature `testing`, in
 //! others.
 
 use statistics::score::Bootstrap;
 
 use crate::evaluation::{Combining, FrameScore, Measured, Summary, Terms, Version, summarise};
 
-/// Two subjects of `HumanEva` who box, 5 frames each, by three versions, each better than the one before it.
+/// Two subjects of `HumanEva` who box, 5 frames each, and three versions, each better than the previous one.
 pub(crate) fn made_up() -> (Summary, Vec<Version>) {
     let geometry = |combining| Version {
         terms: Terms::Geometry,

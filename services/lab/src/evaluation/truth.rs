@@ -1,11 +1,11 @@
-//! The 14 true joints that all joint sets share, and true positions of the 26 parts.
+//! The 14 true joints that all joint sets have in common, and the true positions of the 26 parts.
 
 use skeleton::{JointSet, MIRROR, N_PARTS, PARSE14};
 use statistics::score::Point;
 
-/// The 14 joints of `skeleton::PARSE14`, out of those of another set.
+/// Returns the 14 joints of `skeleton::PARSE14` from the joints of another set.
 ///
-/// * Returns `None` for a joint that is not known, or that the set does not have.
+/// * `None` for a joint that is unknown or that the set does not have.
 pub fn parse14(set: &JointSet, joints: &[Option<Point>]) -> Vec<Option<Point>> {
     let joint = |parts: &[usize]| {
         let at = set.joints.iter().position(|joint| joint.parts == parts)?;
@@ -14,9 +14,9 @@ pub fn parse14(set: &JointSet, joints: &[Option<Point>]) -> Vec<Option<Point>> {
     PARSE14.joints.iter().map(|joint_of_set| joint(joint_of_set.parts)).collect()
 }
 
-/// The parts of the right side that lie between two joints (as parts), and the share of the second.
+/// Parts of the right side between two joints: part, the parts of both joints, and the weight of the second joint.
 ///
-/// Source: the annotation of the published models (`PARSE_data`); the left side mirrors them.
+/// Source: the annotation of the published models (`PARSE_data`). The left side is a mirror image.
 const BETWEEN: [(usize, usize, usize, f64); 6] = [
     (3, 2, 4, 0.5),
     (5, 4, 6, 0.5),
@@ -26,9 +26,9 @@ const BETWEEN: [(usize, usize, usize, f64); 6] = [
     (12, 11, 13, 0.5),
 ];
 
-/// True positions of the 26 parts in an image, pixels; NaN where a joint is not known.
+/// Returns the true positions of the 26 parts in an image, pixels; NaN where a joint is unknown.
 ///
-/// * `joints`: of `skeleton::PARSE14`.
+/// * `joints`: joints of `skeleton::PARSE14`.
 fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
     let mut parts = [[f64::NAN; 2]; N_PARTS];
     for (joint, at) in PARSE14.joints.iter().zip(joints) {
@@ -43,7 +43,7 @@ fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
     parts
 }
 
-/// A tenth of the longer side of the rectangle around joints, in their unit.
+/// Returns a tenth of the longer side of the rectangle around joints, in the unit of the joints.
 pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
         let values = joints.iter().map(|joint| joint[axis]);
@@ -55,16 +55,16 @@ pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
     0.1 * side(0).max(side(1))
 }
 
-/// The true error of every part of a pose, in tenths of the person's size: the longer side of the
+/// Returns the true error of every part in a pose, in tenths of the person's size. This size is the longer side of the
 /// rectangle around the true joints.
 ///
-/// Used for [adaptive selection](crate::evaluation::Terms::Adaptive) with the truth instead of a network: with thresholds
-/// of 1 a part is switched off if its error exceeds a tenth of the person's size. Where the model's left and
-/// right may be exchanged (a person seen from behind), the better of the two readings counts.
+/// [Adaptive selection](crate::evaluation::Terms::Adaptive) uses these errors if the truth replaces the network. With thresholds
+/// of 1, a part is switched off if its error exceeds a tenth of the person's size. If the model's left and
+/// right may be exchanged (a person seen from behind), the assignment with the smaller errors counts.
 ///
-/// * `centres`: of the 26 parts, pixels.
-/// * `joints`: the true ones of `skeleton::PARSE14`, pixels of the same image.
-/// * Returns `None` if a joint is not known.
+/// * `centres`: centres of the 26 parts, pixels.
+/// * `joints`: the true joints of `skeleton::PARSE14`, pixels of the same image.
+/// * Returns `None` if a joint is unknown.
 pub fn part_errors(
     centres: &[[f64; 2]],
     joints: &[[f64; 2]],
@@ -74,7 +74,7 @@ pub fn part_errors(
     Some(errors)
 }
 
-/// The same, and whether left and right are exchanged.
+/// Returns the same as [`part_errors`], and whether left and right are exchanged.
 pub fn part_errors_and_facing(
     centres: &[[f64; 2]],
     joints: &[[f64; 2]],
@@ -106,7 +106,7 @@ pub fn part_errors_and_facing(
     })
 }
 
-/// The size of a person: the longer side of the rectangle around the joints, pixels.
+/// Returns the size of a person: the longer side of the rectangle around the joints, pixels.
 pub fn size(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
         let values = joints.iter().map(|joint| joint[axis]);

@@ -1,22 +1,22 @@
-//! The versions of the method that are compared.
+//! Versions of the method to compare.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// The terms between views; each includes those before it.
+/// Terms between views; each variant includes the terms of the previous ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Terms {
-    /// None: flexible mixtures of parts in every view, then triangulation.
+    /// No terms: flexible mixtures of parts in every view, then triangulation.
     Single,
     /// Distances to epipolar lines.
     Geometry,
     /// Part types.
     Appearance,
-    /// Parts switched off where their expected error is large.
+    /// Adaptive selection: parts with a large expected error are switched off.
     Adaptive,
 }
 
-/// How more than two views are combined.
+/// Method to combine more than two views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Combining {
     /// Pairs of views, and the mean of their results, as in the paper.
@@ -25,20 +25,20 @@ pub enum Combining {
     Consensus,
     /// All views at once, the terms of all pairs added up.
     AllViews,
-    /// All views at once, each supported by the mean of the terms of the others.
+    /// All views at once; each view is supported by the mean of the other views' terms.
     AllViewsMean,
 }
 
 /// One version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
-    /// Which terms.
+    /// The terms between views.
     pub terms: Terms,
-    /// How views are combined.
+    /// The method to combine views.
     pub combining: Combining,
 }
 
-/// A text that is not a version.
+/// Error: the text does not name a version.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{text:?}: a version is fmp, geometry, appearance or adaptive, and of the last three \
@@ -74,7 +74,7 @@ impl Version {
         combining: Combining::Pairs,
     };
 
-    /// Its title in the paper's tables.
+    /// Returns the title of the version in the paper's tables.
     pub fn title(self) -> String {
         let terms = TERMS.iter().find(|term| term.0 == self.terms);
         let combining = COMBINING.iter().find(|known| known.0 == self.combining);
@@ -87,7 +87,7 @@ impl Version {
 }
 
 impl fmt::Display for Version {
-    /// Its name in settings: `geometry+all-views`.
+    /// Writes the name of the version in settings, for example `geometry+all-views`.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let terms = TERMS.iter().find(|term| term.0 == self.terms);
         let combining = COMBINING.iter().find(|known| known.0 == self.combining);

@@ -1,4 +1,4 @@
-//! A detector of people on the pictures that are kept apart.
+//! Evaluation of a detector of people on the held-out pictures.
 
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use kernels::Rgb8View;
@@ -7,11 +7,11 @@ use training::networks::finder::{Score, Tally};
 
 use super::Prepared;
 
-/// Judges a detector on the pictures that are kept apart.
+/// Evaluates a detector on the held-out pictures.
 ///
 /// # Errors
 ///
-/// The detector fails on a picture; it was stopped ([`ExitKind::Interrupted`]).
+/// Fails if the detector fails on a picture, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn judge(
     detector: &Detector,
     pictures: &Prepared,

@@ -1,4 +1,4 @@
-//! Photographs of marked people, to whom a teacher adds everybody else, and photographs without people.
+//! Photographs of annotated people, to which a teacher adds the other people, and photographs without people.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,21 +14,21 @@ use super::{Sources, around_joints};
 use crate::failures::dataset_failure;
 use crate::person::read_options;
 
-/// Score of the teacher above which its box is a person; below, nobody knows.
+/// Score of the teacher above which its box counts as a person; boxes with a lower score are ignored.
 const SURE: f64 = 0.4;
-/// Share of their union above which a box of the teacher is that of a marked person, or of the teacher's box that lies within the
-/// marked one's.
+/// Overlap above which a box of the teacher shows a marked person: the shared area as a share of the union of both boxes. A box of the
+/// teacher that is mostly within a marked box is also the marked person's.
 const SAME: f64 = 0.4;
-/// Joints of clicked people that are marked as invisible lie anywhere.
+/// Invisible joints of manually marked people can be at any position, even outside the picture.
 const ANYWHERE_PX: f64 = 1e5;
 
-/// A photograph, and the boxes of its marked people; nothing where there is nobody in it.
+/// A photograph, and the boxes of the marked people; `None` if it shows no people.
 struct Photograph {
     file: PathBuf,
     marked: Option<Vec<[f64; 4]>>,
 }
 
-/// The photographs of every data set, then those without people.
+/// Returns the photographs of every data set, then those without people.
 pub(super) fn pictures(
     sources: &Sources,
     go_on: &(dyn Fn() -> Result<(), Failure> + Sync),
@@ -64,7 +64,7 @@ pub(super) fn pictures(
     Ok(pictures)
 }
 
-/// Photographs with the boxes of everybody who is marked in them.
+/// Returns photographs with the boxes of all people marked in them.
 fn photographs(people: &[Person]) -> Vec<Photograph> {
     let mut all: Vec<Photograph> = Vec::new();
     for person in people {
@@ -86,7 +86,7 @@ fn photographs(people: &[Person]) -> Vec<Photograph> {
     all
 }
 
-/// Reads photographs, on threads of their own: see `posetraining`.
+/// Reads photographs on its own threads; `posetraining` explains why.
 fn read_all(
     photographs: &[Photograph],
     teachers: &[Detector],
@@ -117,7 +117,7 @@ fn read_all(
         let died = || {
             Err(Failure::new(
                 ExitKind::Run,
-                "a thread that read photographs died",
+                "a thread that reads photographs has panicked",
             ))
         };
         let join =
@@ -149,7 +149,7 @@ fn name(file: &Path) -> String {
     file.display().to_string()
 }
 
-/// The boxes of the teacher that are nobody's who is marked.
+/// Returns the boxes of the teacher that do not show a marked person.
 fn added(marked: &[[f64; 4]], found: &[PersonBox]) -> Vec<Box4> {
     let others = found.iter().filter(|found| {
         let mut marked = marked.iter();

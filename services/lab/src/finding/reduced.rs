@@ -1,12 +1,12 @@
-//! A picture as it is kept: no longer than it has to be.
+//! A picture in the form in which it is stored: not larger than necessary.
 
 use kernels::Rgb8View;
 use training::networks::finder::{Around, Picture, SIDE};
 
-/// A box around a person, pixels, and whether that person should be found.
+/// A box around a person, in pixels, and whether this person should be found.
 pub(super) type Box4 = ([f64; 4], bool);
 
-/// A picture with its boxes, reduced until its longer side is at most [`SIDE`]: every pixel is the mean of those that it covers.
+/// Reduces a picture and its boxes until the longer side is at most [`SIDE`]; every pixel is the mean of the pixels that it covers.
 pub(super) fn reduced(name: String, picture: Rgb8View<'_>, people: &[Box4]) -> Picture {
     let whole = [picture.width(), picture.height()];
     let step = (whole[0].max(whole[1]) as f64 / SIDE as f64).max(1.0);

@@ -1,4 +1,4 @@
-//! Scenes that do not exist.
+//! Pictures of synthetic scenes.
 
 use failure::{Console, Failure};
 use training::networks::finder::Picture;
@@ -7,10 +7,10 @@ use super::around_joints;
 use super::reduced::reduced;
 use crate::scenes::{Scenes, Shown, of_pictures};
 
-/// Share of a box that shows its person, below which the person is hidden; it is about a third if nothing is hidden.
+/// Share of a box's pixels that show its person, below which the person counts as hidden. Without occlusion it is about a third.
 const HIDDEN: f64 = 0.08;
 
-/// The pictures of all scenes, with the numbers of the subjects.
+/// Returns the pictures of all scenes, with the numbers of the subjects.
 pub(super) fn pictures(
     scenes: &Scenes,
     go_on: &(dyn Fn() -> Result<(), Failure> + Sync),

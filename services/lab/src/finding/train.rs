@@ -1,4 +1,4 @@
-//! The training itself: from prepared pictures to an ONNX file with its card.
+//! The training: from prepared pictures to an ONNX file with its card.
 
 use exports::report::curves::{self, Line, Panel};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
@@ -9,15 +9,15 @@ use training::networks::finder::{self, About, Cost, FinderTask, Score, Settings}
 use super::Prepared;
 use crate::trained::{self, Earlier, Job, Shown};
 
-/// The results of a hundred steps.
+/// Results of a hundred steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
 
-/// Trains a network on prepared pictures, and writes it; a checkpoint, and curves (`.svg`), follow every hundred steps.
+/// Trains a network on prepared pictures, and writes it. After every hundred steps, a checkpoint and the curves (`.svg`) are written.
 ///
 /// # Errors
 ///
-/// Nothing to learn from, or nothing kept apart; the checkpoint is of another training; a file cannot be written; it was stopped
-/// ([`ExitKind::Interrupted`]).
+/// Fails if there are no training pictures or no held-out pictures, if the checkpoint is from another training, if a file cannot be
+/// written, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn train(
     (job, settings): (&Job, &Settings),
     pictures: &Prepared,
@@ -27,8 +27,7 @@ pub fn train(
     let begun = |from: &Earlier| {
         let begun = finder::begun(&settings.shape, settings.seed, &from.bytes);
         begun.map_err(|error| {
-            let hint =
-                "--from takes a network of `train finder` that has the `shape` of the settings";
+            let hint = "--from needs a network of `train finder` with the `shape` of the settings";
             failure::in_file(&from.file, &error).with_hint(hint)
         })
     };
@@ -52,7 +51,7 @@ pub fn train(
     trained::run(job, task, &shown, &written, (stop, console))
 }
 
-/// Draws the costs, and how good the network is on pictures that are kept apart.
+/// Draws the costs, and the quality of the network on held-out pictures.
 fn drawn(passes: &[Pass]) -> String {
     let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
         name,
@@ -73,18 +72,18 @@ fn drawn(passes: &[Pass]) -> String {
             ],
         ),
         panel(
-            "pictures kept apart",
+            "held-out pictures",
             vec![
                 score("recall", &|score| score.recall),
-                score("false boxes a picture", &|score| score.false_boxes),
-                score("nobody found where nobody is", &|score| score.quiet),
+                score("false boxes per picture", &|score| score.false_boxes),
+                score("empty pictures without a box", &|score| score.quiet),
             ],
         ),
     ];
     curves::svg(&panels, None)
 }
 
-/// Returns a line about the end of a pass.
+/// Describes a pass in a line of text.
 fn words(pass: &Pass) -> String {
     let learnt = format!("heat {:.3}, sides {:.3}", pass.cost.heat, pass.cost.sides);
     let Some(score) = pass.score else {

@@ -1,4 +1,4 @@
-//! Biases of pairs of types as a small heat table.
+//! Biases of pairs of types as a small heat map.
 
 use fmp::Edge;
 
@@ -6,7 +6,7 @@ use super::colours::type_colour;
 use exports::report::html::Html;
 use exports::report::{html, put};
 
-/// Rows are the parent's types, columns those of the part; the colours span the table's own largest bias.
+/// Draws the table. Rows are the parent's types, and columns the part's types. The colours span the largest bias in the table.
 pub(super) fn table(edge: &Edge) -> Html {
     let all = || edge.bias.iter().flatten().filter(|bias| bias.is_finite());
     let largest = all().fold(0.0_f64, |largest, it| largest.max(it.abs()));
@@ -30,7 +30,7 @@ pub(super) fn table(edge: &Edge) -> Html {
     }
     put!(
         out,
-        "</table><figcaption>biases: parent's type down, own across</figcaption></figure>\n"
+        "</table><figcaption>biases: parent's type in rows, own type in columns</figcaption></figure>\n"
     );
     out
 }

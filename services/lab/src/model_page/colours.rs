@@ -8,7 +8,7 @@ pub(super) fn type_colour(mixture: usize) -> &'static str {
     COLOURS[mixture % COLOURS.len()]
 }
 
-/// Colour of a part: the sides of the body differ.
+/// Colour of a part; the left and right side of the body have different colours.
 pub(super) fn part_colour(name: &str) -> &'static str {
     if name.starts_with("right") {
         "#d1495b"

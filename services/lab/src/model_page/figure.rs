@@ -1,4 +1,4 @@
-//! The whole body in its most ordinary types, as filters and as a tree.
+//! The whole body in its most ordinary types, drawn as filters and as a tree.
 
 use fmp::Model;
 
@@ -8,15 +8,15 @@ use super::springs::{Ellipse, ellipses, of_pair};
 use exports::report::html::Html;
 use exports::report::{html, put};
 
-/// Where every part is drawn.
+/// Positions of the drawn parts.
 #[derive(Debug)]
 pub(super) struct Figure {
     types: Vec<usize>,
-    /// Top left corner of the filter, cells.
+    /// Top left corner of each filter, cells.
     corner: Vec<[f64; 2]>,
-    /// The spring of the chosen types; `None` for the root.
+    /// Spring of each part for the chosen types; `None` for the root.
     spring: Vec<Option<Ellipse>>,
-    /// Left, top, width, height of everything, cells.
+    /// Bounding box of the figure: left, top, width, height, cells.
     frame: [f64; 4],
 }
 
@@ -52,7 +52,7 @@ impl Figure {
         }
     }
 
-    /// The filters, each where its spring would rest.
+    /// Draws the filters, each at the rest position of its spring.
     pub(super) fn filters(&self, model: &Model) -> Html {
         let mut out = self.open("dark", CELL);
         for (part, [x, y]) in self.corner.iter().enumerate() {
@@ -69,7 +69,7 @@ impl Figure {
         out
     }
 
-    /// The tree, with ellipses for the springs.
+    /// Draws the tree, with ellipses for the springs.
     pub(super) fn tree(&self, model: &Model) -> Html {
         let mut out = self.open("light", 1.0);
         let centre = |part: usize| {
@@ -128,7 +128,7 @@ impl Figure {
         out
     }
 
-    /// * `unit`: of the picture's coordinates, per cell.
+    /// * `unit`: units of the picture's coordinates per cell.
     fn open(&self, class: &str, unit: f64) -> Html {
         let [left, top, width, height] = self.frame;
         let scale = SCALE.min(500.0 / width.max(1.0));
@@ -145,10 +145,10 @@ impl Figure {
     }
 }
 
-/// The types of an ordinary posture: of every part the one that rests nearest to the mean of where all of its
-/// types would, of the root the one that goes best with them. The smallest type wins a tie.
+/// Returns the types of an ordinary posture. Each part has the type whose rest position is nearest to the mean rest position of all its
+/// types. The root has the type that fits these best. If types are equal, the first one is chosen.
 ///
-/// The types whose biases add up to most are those of a rare posture: its filters have most to gain from each
+/// The types with the largest sum of biases would show a rare posture: its filters gain most from each
 /// other.
 fn ordinary_types(model: &Model) -> Vec<usize> {
     let parts = &model.spec().parts;
@@ -182,7 +182,7 @@ fn ordinary_types(model: &Model) -> Vec<usize> {
     types
 }
 
-/// Index of the first of the largest values, 0 if there is none.
+/// Returns the index of the first of the largest values; 0 if there are no values.
 fn best(values: impl Iterator<Item = f64>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
     for (index, value) in values.enumerate() {
@@ -210,7 +210,7 @@ mod tests {
         edge.springs = fmp::Springs::PerChildType(vec![at(-9), at(1), at(5)]);
         spec.parts[1].filter_of_type.push(0);
         let model = Model::new(spec).unwrap();
-        // The second child's springs are alike, and never with its type 2 if the root's is 2.
+        // The springs of the second child are alike, and its type 2 is impossible with type 2 of the root.
         assert_eq!(ordinary_types(&model), [0, 1, 0]);
     }
 }

@@ -1,20 +1,20 @@
-//! Filters as glyphs: what edges they want, cell by cell.
+//! Filters as glyphs: the edges that each cell responds to.
 
 use fmp::{Filter, Model, N_CHANNELS};
 
 use exports::report::html::Html;
 use exports::report::{html, put};
 
-/// Undirected orientations of the features.
+/// Number of undirected orientations in the features.
 const N_ORIENTATIONS: usize = 9;
 
-/// Side of a cell in the glyphs' own unit.
+/// Side of a cell in units of the glyph.
 pub(super) const CELL: f64 = 10.0;
 
-/// Steps of brightness; the strokes of one step are one path.
+/// Number of brightness steps; the strokes of one step form one path.
 const N_STEPS: usize = 6;
 
-/// Definitions of all glyphs, `f0` and on, for `<use>`.
+/// Returns the definitions of all glyphs, with the names `f0`, `f1` and so on, for `<use>`.
 pub(super) fn symbols(model: &Model) -> Html {
     let mut out = html!("<svg class=\"hidden\"><defs>\n");
     for (index, filter) in model.spec().filters.iter().enumerate() {
@@ -26,7 +26,7 @@ pub(super) fn symbols(model: &Model) -> Html {
     out
 }
 
-/// The glyph of a type, with its number and the largest weight of an orientation.
+/// Draws the glyph of a type, with its number and the largest weight of an orientation.
 pub(super) fn of_type(model: &Model, part: usize, mixture: usize) -> Html {
     let index = model.spec().parts[part].filter_of_type[mixture];
     let filter = model.filter(part, mixture);
@@ -42,8 +42,8 @@ pub(super) fn of_type(model: &Model, part: usize, mixture: usize) -> Html {
     )
 }
 
-/// Positive weights of every orientation of every cell, `[row][column][orientation]`: those of both
-/// contrasts and of none.
+/// Returns the positive weights of every orientation in every cell, `[row][column][orientation]`. The sum is over the features with both
+/// contrasts and without contrast.
 fn orientations(filter: &Filter) -> Vec<f64> {
     filter
         .weights
@@ -68,14 +68,14 @@ fn strokes(filter: &Filter) -> Html {
     for (at, &weight) in weights.iter().enumerate() {
         let share = if largest > 0.0 { weight / largest } else { 0.0 };
         let step = (share * N_STEPS as f64).floor() as usize;
-        // The darkest step would be clutter.
+        // Strokes of the darkest step would only add clutter.
         if step == 0 {
             continue;
         }
         let (cell, orientation) = (at / N_ORIENTATIONS, at % N_ORIENTATIONS);
         let x = ((cell % filter.cols) as f64 + 0.5) * CELL;
         let y = ((cell / filter.cols) as f64 + 0.5) * CELL;
-        // The edge lies across the gradient.
+        // The edge is perpendicular to the gradient.
         let angle = (orientation as f64 * 180.0 / N_ORIENTATIONS as f64 + 90.0).to_radians();
         let length = CELL * (0.2 + 0.28 * share);
         let (dy, dx) = angle.sin_cos();

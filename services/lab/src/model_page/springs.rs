@@ -1,4 +1,4 @@
-//! Springs: where a child rests, and how far it may go.
+//! Springs: rest position of a child, and its range of movement.
 
 use fmp::{Edge, Spring, Springs};
 
@@ -7,7 +7,7 @@ use super::colours::type_colour;
 use exports::report::html::Html;
 use exports::report::{html, put};
 
-/// Where a spring rests, and where it costs [`SPRING_COST`].
+/// Rest position of a spring, and the ellipse on which it costs [`SPRING_COST`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ellipse {
     /// Offset of the child from its parent, cells.
@@ -17,7 +17,8 @@ pub(super) struct Ellipse {
 }
 
 impl Ellipse {
-    /// The spring costs `w0 d^2 + w1 d` an axis with `d = anchor - offset`: least at `d = -w1 / (2 w0)`.
+    /// Computes the ellipse. On each axis, the spring costs `w0 d^2 + w1 d` with `d = anchor - offset`, which is smallest at `d = -w1 / (2
+    /// w0)`.
     pub(super) fn of(spring: &Spring) -> Self {
         let axis = |value: usize| [spring.w[2 * value], spring.w[2 * value + 1]];
         let [x, y] = spring.anchor.map(f64::from);
@@ -29,7 +30,7 @@ impl Ellipse {
     }
 }
 
-/// The child's type and the ellipse, of all springs.
+/// Returns the child's type and the ellipse of each spring.
 pub(super) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
     match &edge.springs {
         Springs::PerChildType(all) => all.iter().map(Ellipse::of).enumerate().collect(),
@@ -41,7 +42,7 @@ pub(super) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
     }
 }
 
-/// The spring of a pair of types; `None` where the pair never occurs.
+/// Returns the spring of a pair of types; `None` if the pair never occurs.
 pub(super) fn of_pair(edge: &Edge, parent_type: usize, own_type: usize) -> Option<Ellipse> {
     match &edge.springs {
         Springs::PerChildType(all) => all.get(own_type).map(Ellipse::of),
@@ -51,7 +52,7 @@ pub(super) fn of_pair(edge: &Edge, parent_type: usize, own_type: usize) -> Optio
     }
 }
 
-/// All springs of a part around the parent, in cells.
+/// Draws all springs of a part around the parent, in cells.
 pub(super) fn panel(edge: &Edge) -> Html {
     const SIDE: f64 = 150.0;
     let all = ellipses(edge);

@@ -1,4 +1,4 @@
-//! The page is whole, escaped, and needs nothing else.
+//! Tests of the page: it is complete, escaped, and needs no other file.
 
 use fmp::{Edge, Filter, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ const SPRING: Spring = Spring {
     anchor: [2, 3],
 };
 
-/// A root and two children of two types each, filters of 2x3 cells.
+/// Returns a model with a root and two children of two types each, with filters of 2x3 cells.
 pub(crate) fn planted(name: &str) -> ModelSpec {
     let part = |part: usize| PartSpec {
         name: format!("{name} {part}"),
@@ -74,7 +74,7 @@ fn every_filter_part_and_pair_of_types_is_drawn() {
 fn no_name_of_a_model_or_a_part_becomes_markup() {
     let page = page(planted("<script>'\"&"));
     assert!(!page.contains("<script"));
-    // The title twice; every part in the figure and on its card; the parent on two cards.
+    // The text occurs twice in the title. Every part is in the figure and on its card, and the parent on two cards.
     let escaped = page.matches("&lt;script&gt;&#39;&quot;&amp;").count();
     assert_eq!(escaped, 2 + 3 + 3 + 2);
 }

@@ -1,4 +1,4 @@
-//! People on photographs, by their marked joints.
+//! People in photographs, from their marked joints.
 
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::Fill;
@@ -11,7 +11,7 @@ use super::{Job, Work};
 use crate::failures::dataset_failure;
 use crate::person::deal;
 
-/// Joints of `skeleton::PARSE14`.
+/// Indices of joints in `skeleton::PARSE14`.
 mod joint {
     pub(super) const R_ANKLE: usize = 0;
     pub(super) const R_KNEE: usize = 1;
@@ -31,20 +31,20 @@ mod joint {
 
 /// Shortest trunk that is used, pixels.
 const MIN_TRUNK_PX: f64 = 10.0;
-/// Lean of a trunk up to which the picture is not turned, radians.
+/// Largest lean of a trunk for which the picture is not rotated, radians.
 const MAX_LEAN: f64 = 0.35;
-/// Margin of the box around the parts, trunk lengths: what a search's box has.
+/// Margin of the box around the parts, in trunk lengths, as in a search.
 const MARGIN: f64 = 0.25;
-/// Widths of shoulders and hips of a person seen from the front, trunk lengths.
+/// Width of the shoulders, and below of the hips, of a person seen from the front, in trunk lengths.
 const SHOULDERS: f64 = 0.62;
 const HIPS: f64 = 0.38;
-/// Sum of the bends of knees and elbows and of the head's lean, trunk lengths, of a person seen from the side.
+/// Sum of the bends of knees and elbows and the head's lean for a person seen from the side, in trunk lengths.
 const BEND: f64 = 0.35;
 
-/// A data set and its samples.
+/// Name of a data set, and its samples.
 type Named = (String, Vec<Sample>);
 
-/// The samples to learn from, and those of every data set to judge on.
+/// Returns the samples for training, and the samples of every data set for the evaluation.
 pub(super) fn samples(job: &Job, work: &Work) -> Result<(Vec<Sample>, Vec<Named>), Failure> {
     let all = &job.datasets;
     let only = deal(all, "--only", &job.only, false)?;
@@ -90,7 +90,7 @@ fn selection(values: &[&str]) -> Result<Option<Selection>, Failure> {
     one.transpose().or_fail(ExitKind::Usage)
 }
 
-/// The sample of a person, turned upright; nothing if the trunk is too short.
+/// Returns the sample of a person, rotated upright; `None` if the trunk is too short.
 fn of_person(person: &Person) -> Result<Option<Sample>, Failure> {
     let [x, y] = trunk(&person.joints);
     let length = x.hypot(y);
@@ -123,7 +123,7 @@ fn of_person(person: &Person) -> Result<Option<Sample>, Failure> {
     }))
 }
 
-/// The box of points with a margin, `[x1, y1, x2, y2]`.
+/// Returns the box around points with a margin, as `[x1, y1, x2, y2]`.
 fn bounds(points: &[[f64; 2]], margin: f64) -> [f64; 4] {
     let empty = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
     let [x1, y1, x2, y2] = points.iter().fold(empty, |[x1, y1, x2, y2], [x, y]| {
@@ -132,7 +132,7 @@ fn bounds(points: &[[f64; 2]], margin: f64) -> [f64; 4] {
     [x1 - margin, y1 - margin, x2 + margin, y2 + margin]
 }
 
-/// From the middle of the hips to the neck, pixels.
+/// Returns the vector from the middle of the hips to the neck, pixels.
 fn trunk(joints: &[[f64; 2]]) -> [f64; 2] {
     let hips = middle(joints, joint::R_HIP, joint::L_HIP);
     [0, 1].map(|axis| joints[joint::NECK][axis] - hips[axis])
@@ -142,14 +142,15 @@ fn middle(joints: &[[f64; 2]], a: usize, b: usize) -> [f64; 2] {
     [0, 1].map(|axis| f64::midpoint(joints[a][axis], joints[b][axis]))
 }
 
-/// The direction in which a person faces, by the joints in the picture: towards its right, towards the camera.
+/// Estimates the direction in which a person faces from the joints in the picture: towards the right of the picture, and towards the
+/// camera.
 ///
-/// How wide shoulders and hips look tells how much the person faces the camera; where knees, elbows and the head bend to
-/// tells the side, which is less certain: its length is then below 1.
+/// The visible width of the shoulders and hips shows how much the person faces the camera. The bends of knees, elbows and head show
+/// the sideways component. It is less certain, so the length of the result can be below 1.
 pub(crate) fn front(joints: &[[f64; 2]]) -> [f32; 2] {
     let [x, y] = trunk(joints);
     let length = x.hypot(y);
-    // The right of the picture as the trunk has it.
+    // Direction to the right in the picture, perpendicular to the trunk.
     let right = [-y / length, x / length];
     let along = |from: [f64; 2], to: [f64; 2]| {
         ((to[0] - from[0]) * right[0] + (to[1] - from[1]) * right[1]) / length
@@ -173,7 +174,7 @@ pub(crate) fn front(joints: &[[f64; 2]]) -> [f32; 2] {
 mod tests {
     use super::*;
 
-    /// Somebody who faces the camera with stretched limbs.
+    /// A person who faces the camera with straight limbs.
     fn standing() -> Vec<[f64; 2]> {
         let mut joints = vec![[0.0; 2]; 14];
         joints[joint::NECK] = [0.0, -100.0];

@@ -1,4 +1,4 @@
-//! People who do not exist, as the search finds them.
+//! Synthetic people, as the search finds them.
 
 use std::sync::Arc;
 
@@ -13,10 +13,10 @@ use super::Work;
 use crate::scenes::{Scenes, Shown, of_pictures};
 use crate::searches::Searches;
 
-/// Largest mean error of the parts of a pose that counts as the person, as a share of the box's height.
+/// Largest mean error of the parts for which a pose counts as the person's, as a share of the box's height.
 const MAX_ERROR: f64 = 0.12;
 
-/// The samples of all scenes: the best pose of every picture, where it is the person.
+/// Returns the samples of all scenes: the best pose in every picture, if it is the person's.
 pub(super) fn samples(
     scenes: &Scenes,
     model: &Arc<Model>,
@@ -60,7 +60,7 @@ fn sample(
     })
 }
 
-/// The mean distance of parts that are known, under the better of both assignments of the sides.
+/// Returns the mean error of the known parts, for the better of the two assignments of left and right.
 fn mean_error(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
     let mean = |of: &dyn Fn(usize) -> usize| {
         let distances = centres.iter().enumerate().map(|(part, [x, y])| {
@@ -74,7 +74,7 @@ fn mean_error(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
     Some(sides[0].min(sides[1]))
 }
 
-/// Where the person faces, by the true joints in space.
+/// Returns the direction in which the person faces, from the true joints in space.
 pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
     let joints: Vec<Option<Point3<f64>>> = shown
         .in_world

@@ -1,4 +1,4 @@
-//! How often a model sees people where there are none.
+//! False alarms of a model on images without people.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,26 +11,26 @@ use training::datasets::Picture;
 
 use super::progress::Progress;
 
-/// Largest share of a better detection's boxes that a worse one may cover, as `detect` has it.
+/// Largest overlap with the boxes of a better detection at which a detection is kept, as in `detect`.
 const OVERLAP: f64 = 0.1;
 
-/// Most detections of an image.
+/// Largest number of detections in an image.
 const MOST: usize = 1000;
 
 /// False alarms on images without people.
 #[derive(Debug)]
 pub(super) struct Alarms {
-    /// The images' folder, if they are not those that were trained on.
+    /// Folder of the images; `None` for the images of the training.
     folder: Option<PathBuf>,
     n_images: usize,
     n_unreadable: usize,
-    /// Threshold and false alarms: as it was trained, and as `detect` uses it.
+    /// Threshold and number of false alarms, for the threshold of the training and for that of `detect`.
     counts: [(f64, usize); 2],
 }
 
 /// Counts the detections on images without people.
 ///
-/// * `folder`: where they are, if they were not trained on.
+/// * `folder`: folder of the images; `None` for the images of the training.
 pub(super) fn count(
     model: &Model,
     images: &[PathBuf],
@@ -79,7 +79,7 @@ pub(super) fn count(
     Ok(alarms)
 }
 
-/// Scores of what is found; nothing on images that are too small.
+/// Returns the scores of the detections; empty for images that are too small.
 fn scores(
     search: &Search,
     settings: &CandidateSettings,
@@ -101,18 +101,18 @@ impl Alarms {
         count as f64 / self.n_images.max(1) as f64
     }
 
-    /// For people.
+    /// Returns the counts as text.
     pub(super) fn text(&self) -> String {
         let [(trained, at_trained), (used, at_used)] = self.counts;
         let of = match &self.folder {
             Some(folder) => format!("images of {}", folder.display()),
-            None => "negatives, which were trained on".to_owned(),
+            None => "negatives of the training".to_owned(),
         };
         let n = self.n_images;
         let of_trained = self.per_image(at_trained);
         let where_detection_begins = if used < trained {
             let of_used = self.per_image(at_used);
-            format!(", {of_used:.3} at {used} where detection begins")
+            format!(", {of_used:.3} at the detection threshold {used}")
         } else {
             String::new()
         };
@@ -122,7 +122,7 @@ impl Alarms {
         )
     }
 
-    /// For programs.
+    /// Returns the counts as JSON.
     pub(super) fn json(&self) -> Value {
         let at = |(threshold, count): (f64, usize)| json!({ "threshold": threshold, "count": count, "per_image": self.per_image(count) });
         json!({

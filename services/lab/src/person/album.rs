@@ -1,4 +1,4 @@
-//! The images that are trained on: decoded, turned and mirrored when they are asked for.
+//! Images for training: decoded, rotated and mirrored on demand.
 
 use std::path::{Path, PathBuf};
 
@@ -10,23 +10,23 @@ use training::{Album, AlbumError};
 
 use super::data::Data;
 
-/// Fill where a turned image has no pixels: the border goes on, so that there is no edge that could be
-/// learnt.
+/// Fill of the pixels outside a rotated image: the border is repeated, so that there is no artificial edge that the model could
+/// learn.
 const FILL: Fill = Fill::Replicate;
 
-/// Everybody, turned and mirrored, and the images without people.
+/// All people, with rotated and mirrored copies, and the images without people.
 #[derive(Debug)]
 pub(super) struct Gallery {
     people: Vec<Person>,
     joint_mirror: Vec<usize>,
     copies: Vec<Copied>,
-    /// Centres of the parts of every copy, pixels of the copy.
+    /// Centres of the parts in every copy, pixels of the copy.
     parts: Vec<Vec<[f64; 2]>>,
     negatives: Vec<PathBuf>,
     stamp: u64,
 }
 
-/// A person, turned and mirrored.
+/// A rotated and mirrored copy of a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Copied {
     person: usize,
@@ -35,11 +35,11 @@ struct Copied {
 }
 
 impl Gallery {
-    /// Finds out where the parts of all copies are.
+    /// Computes the positions of the parts in all copies.
     ///
     /// # Errors
     ///
-    /// An image that could be decoded before cannot any more.
+    /// Fails if an image cannot be decoded that was decoded before.
     pub(super) fn new(data: &Data, table: &SkeletonTable) -> Result<Self, Failure> {
         let joint_mirror = table.joint_mirror().to_vec();
         let of_person = |(person, (it, angles)): (usize, &(Person, Vec<f64>))| {
@@ -77,17 +77,17 @@ impl Gallery {
         })
     }
 
-    /// Centres of the parts of every copy, pixels of the copy.
+    /// Returns the centres of the parts in every copy, pixels of the copy.
     pub(super) fn parts(&self) -> &[Vec<[f64; 2]>] {
         &self.parts
     }
 
-    /// Who a copy is of, counted from 0.
+    /// Returns the index of the person in a copy.
     pub(super) fn person_of(&self, copy: usize) -> usize {
         self.copies[copy].person
     }
 
-    /// A hash of the names and sizes of all image files.
+    /// Returns a hash of the names and sizes of all image files.
     pub(super) fn stamp(&self) -> u64 {
         self.stamp
     }
@@ -122,7 +122,7 @@ fn turned(plain: &Sample, degrees: f64) -> Result<Sample, AlbumError> {
     })
 }
 
-/// FNV-1a of the names and lengths of files.
+/// Returns the FNV-1a hash of the names and lengths of files.
 fn stamp(files: &[&Path]) -> u64 {
     let named = files.iter().flat_map(|file| {
         let length = std::fs::metadata(file).map_or(0, |metadata| metadata.len());

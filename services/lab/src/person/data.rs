@@ -1,4 +1,4 @@
-//! Training data of a model: data sets joined, and images without people.
+//! Training data of a model: people of several data sets, and images without people.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,37 +14,37 @@ use super::progress::Progress;
 use crate::failures::dataset_failure;
 use inputs::images;
 
-/// Which people, which images without people, and what is made of them.
+/// Selection of people and of images without people, and options for their use.
 ///
-/// Values of `only`, `without`, `sides` and `rotate` may name their data set as it is written in `datasets`:
+/// Values of `only`, `without`, `sides` and `rotate` may name their data set as written in `datasets`:
 /// `DATASET=VALUE`.
 #[derive(Debug, Clone, Default)]
 pub struct Chosen {
     /// Annotated people: folders or files.
     pub datasets: Vec<PathBuf>,
-    /// Folders of images without people, all of which are used.
+    /// Folders of images without people; all images are used.
     pub negatives: Vec<PathBuf>,
-    /// Selections of those who are trained on; everybody if there is none.
+    /// Selections of people for training; all people if empty.
     pub only: Vec<String>,
-    /// Selections of those who are left out.
+    /// Selections of people to leave out.
     pub without: Vec<String>,
-    /// Whose left and right the labels are: `marked` or `seen`.
+    /// Meaning of left and right in the labels: `marked` or `seen`.
     pub sides: Vec<String>,
-    /// Angles of turned copies, degrees, anticlockwise, separated by commas.
+    /// Angles of rotated copies, degrees, anticlockwise, separated by commas.
     pub rotate: Vec<String>,
-    /// True if mirror images are trained on.
+    /// True to train on mirror images too.
     pub with_mirror: bool,
-    /// Faults of labels that end the training instead of leaving the person out.
+    /// Kinds of bad labels that end the training, instead of leaving the person out.
     pub fatal: Vec<FaultKind>,
 }
 
-/// Reads the parts of a model and where they lie between the joints.
+/// Parses the parts of a model and their positions between the joints.
 ///
-/// * `file`: where `text` is from, for messages.
+/// * `file`: file of the text, for messages.
 ///
 /// # Errors
 ///
-/// The text is not a skeleton table.
+/// Fails if the text is not a skeleton table.
 pub fn parse_skeleton(file: &Path, text: &str) -> Result<SkeletonTable, Failure> {
     SkeletonTable::parse(text).map_err(|error| {
         let message = format!(
@@ -56,29 +56,28 @@ pub fn parse_skeleton(file: &Path, text: &str) -> Result<SkeletonTable, Failure>
     })
 }
 
-/// Everything that is trained on.
+/// All training data.
 #[derive(Debug)]
 pub(super) struct Data {
-    /// Everybody who can be used, in the order of the data sets, with the angles they are turned by,
-    /// 0 first.
+    /// All usable people, in the order of the data sets, with the angles of their copies; the first angle is 0.
     pub(super) people: Vec<(Person, Vec<f64>)>,
-    /// How many people were left out, for every kind of fault.
+    /// Number of people who were left out, for each kind of bad label.
     pub(super) left_out: BTreeMap<&'static str, usize>,
-    /// True if mirror images are trained on.
+    /// True to train on mirror images too.
     pub(super) with_mirror: bool,
-    /// Images without people, all of which can be decoded.
+    /// Images without people that can be decoded.
     pub(super) negatives: Vec<PathBuf>,
-    /// Images without people that cannot.
+    /// Number of images without people that cannot be decoded.
     pub(super) n_unreadable: usize,
 }
 
 impl Data {
-    /// Reads and judges all of it.
+    /// Reads and checks all data.
     ///
     /// # Errors
     ///
-    /// A data set or a selection cannot be read, a person has a fault that was called fatal, or nobody
-    /// or no image without people is left.
+    /// Fails if a data set or a selection cannot be read, if a person has a bad label of a fatal kind, or if no people
+    /// or no images without people are left.
     pub(super) fn read(
         arguments: &Chosen,
         table: &SkeletonTable,
@@ -110,7 +109,7 @@ impl Data {
         }
         if data.people.is_empty() {
             let n: usize = data.left_out.values().sum();
-            let message = format!("nobody is left to train on: all {n} people were left out");
+            let message = format!("no person is left to train on: all {n} people were left out");
             return Err(Failure::new(ExitKind::Input, message));
         }
         data.negatives(&arguments.negatives, progress)?;
@@ -139,7 +138,7 @@ impl Data {
     }
 }
 
-/// All images of folders, by name.
+/// Returns all images in folders, by name.
 pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     if let Some(folder) = folders.iter().find(|folder| !folder.is_dir()) {
         let message = format!(
@@ -151,7 +150,7 @@ pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     images::listed(folders)
 }
 
-/// Returns the options to read every data set with.
+/// Returns the options for reading each data set.
 pub(crate) fn read_options(
     arguments: &Chosen,
     table: &SkeletonTable,
@@ -177,7 +176,7 @@ pub(crate) fn read_options(
         .collect()
 }
 
-/// One selection at most.
+/// Returns the only selection; fails if there are several.
 fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure> {
     match values {
         [] => Ok(None),
@@ -191,7 +190,7 @@ fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure
     }
 }
 
-/// Angles of copies, 0 first, each once.
+/// Returns the angles of copies without duplicates, 0 first.
 fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
     let mut angles = vec![0.0];
     for text in values.iter().flat_map(|value| value.split(',')) {
@@ -207,7 +206,7 @@ fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
     Ok(angles)
 }
 
-/// Whose left and right the joints of a data set are called by: the last word counts.
+/// Returns the meaning of left and right in a data set; the last value counts.
 pub(crate) fn sides_of(values: &[&str]) -> Result<Sides, Failure> {
     let Some(name) = values.last() else {
         return Ok(Sides::default());

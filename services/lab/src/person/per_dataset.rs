@@ -1,21 +1,21 @@
-//! Options that mean one of several data sets: `--only PARSE=1-100`.
+//! Options whose values can be for one of several data sets: `--only PARSE=1-100`.
 
 use std::path::{Path, PathBuf};
 
 use failure::{ExitKind, Failure};
 
-/// Which data sets an option's value is for.
+/// Data sets that the value of an option is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Whose<'a> {
-    /// It names none.
+    /// All data sets; the value names none.
     All(&'a str),
-    /// The data set, counted from 0, and what is said of it.
+    /// Index of the data set, and the value for it.
     One(usize, &'a str),
 }
 
-/// Finds the data set that a value is for: `DATASET=VALUE` with the data set as it was written, else all of them.
+/// Finds the data set that a value is for. This is the data set in `DATASET=VALUE`, as it was written, or otherwise all of them.
 ///
-/// The longer one is meant where one data set begins with the other and `=`.
+/// If several data sets match, the longest name wins.
 pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {
     let value_of = |path: &Path| {
         let rest = argument.strip_prefix(path.to_str()?)?;
@@ -29,14 +29,14 @@ pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {
     }
 }
 
-/// Gives every data set the values that are for it.
+/// Returns the values for each data set.
 ///
-/// * `option`: its name, for messages.
-/// * `for_all`: whether a value may be for several data sets.
+/// * `option`: name of the option, for messages.
+/// * `for_all`: true if a value may be for several data sets.
 ///
 /// # Errors
 ///
-/// A value that must name its data set does not.
+/// Fails if a value does not name a data set although it must.
 pub(crate) fn deal<'a>(
     datasets: &[PathBuf],
     option: &str,
@@ -56,9 +56,9 @@ pub(crate) fn deal<'a>(
                 let first = datasets.first().map(|dataset| dataset.display().to_string());
                 let first = first.unwrap_or_default();
                 let message =
-                    format!("{option} {argument}: of several data sets, which one is meant?");
+                    format!("{option} {argument}: there are several data sets, and none is named");
                 return Err(Failure::new(ExitKind::Usage, message).with_hint(format!(
-                    "name it as you wrote it, for example {option} {first}={argument}"
+                    "name the data set as on the command line, for example {option} {first}={argument}"
                 )));
             }
         }

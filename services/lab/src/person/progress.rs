@@ -1,4 +1,4 @@
-//! Progress of a training, for users.
+//! Progress display of a training.
 
 use std::error::Error;
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use training::datasets::Problem;
 use training::{Event, Gap, Step, Watch};
 
-/// Shows on a console what is being done, and how long it will take.
+/// Shows the current step and the remaining time on a console.
 #[derive(Debug)]
 pub struct Progress {
     console: Box<dyn Console>,
@@ -18,27 +18,27 @@ pub struct Progress {
     state: Mutex<State>,
 }
 
-/// The step that is being done, and how long the others took.
+/// The current step, and the durations of finished steps.
 #[derive(Debug)]
 struct State {
     step: Step,
-    /// Counted from 0.
+    /// Index of the current step.
     at: usize,
     all: Vec<Step>,
     begin: Instant,
-    /// Those that were done by this process.
+    /// Steps that this process finished, with their durations.
     seconds: Vec<(Step, f64)>,
     gap: Option<Gap>,
-    /// Examples in memory, and their bytes.
+    /// Number of examples in memory, and their bytes.
     held: Option<(usize, usize)>,
-    /// Images of people that were placed and that were not, and the mean score.
+    /// Number of images of people in which the model was placed, number of other images, and the mean score.
     placed: Option<(usize, usize, f64)>,
 }
 
 impl Progress {
-    /// Nothing is done yet.
+    /// Creates the display before the first step.
     ///
-    /// * `stop`: ends the training.
+    /// * `stop`: stop request that ends the training.
     pub fn new(stop: Stop, console: Box<dyn Console>) -> Self {
         Self {
             console,
@@ -90,19 +90,19 @@ impl Progress {
         self.console.event(&event)
     }
 
-    /// Begins to read the features of a checkpoint's examples again.
+    /// Starts to read the features of a checkpoint's examples again.
     pub(super) fn resuming(&self, n_done: usize) {
-        self.console.begin(&format!("going on after step {n_done}"), "");
+        self.console.begin(&format!("continuing after step {n_done}"), "");
     }
 
     /// Reports that a training continues.
     pub(super) fn resumed(&self, n_done: usize, n_steps: usize) -> Result<(), Failure> {
-        self.console.message(&format!("going on after step {n_done} of {n_steps}"));
+        self.console.message(&format!("continuing after step {n_done} of {n_steps}"));
         self.console
             .event(&json!({ "event": "resumed", "done": n_done, "steps": n_steps }))
     }
 
-    /// Begins a step.
+    /// Starts a step.
     pub(super) fn begin(&self, step: Step, at: usize, all: &[Step]) {
         let mut state = self.lock();
         state.step = step;
@@ -128,18 +128,18 @@ impl Progress {
         self.console.event(&event)
     }
 
-    /// Begins to look for false alarms.
+    /// Starts to look for false alarms.
     pub(super) fn begin_alarms(&self, n_images: usize) {
         self.console.begin("false alarms", "");
         self.console.set(0, n_images);
     }
 
-    /// One of the images has been looked at.
+    /// Counts an image that was searched.
     pub(super) fn looked_at_one(&self) {
         self.console.advance(1);
     }
 
-    /// A failure if the user stopped it.
+    /// Fails if the user stopped the training.
     pub(super) fn go_on_or_stop(&self) -> Result<(), Failure> {
         if self.go_on() {
             Ok(())
@@ -148,12 +148,12 @@ impl Progress {
         }
     }
 
-    /// Images of people that could not be placed in the end.
+    /// Returns the number of images of people in which the final model could not be placed.
     pub(super) fn n_lost(&self) -> Option<usize> {
         self.lock().placed.map(|placed| placed.1)
     }
 
-    /// Ends the bar.
+    /// Removes the progress bar.
     pub fn finish(&self) {
         self.console.finish();
     }
@@ -214,7 +214,7 @@ impl State {
         [placed, gap, held].into_iter().flatten().collect()
     }
 
-    /// Seconds until all steps are done: each takes as long as those of its kind took, or all did.
+    /// Estimates the seconds until all steps are done: each step takes as long as earlier steps of its kind, or as the average step.
     fn seconds_left(&self) -> Option<f64> {
         let mean = |of: &dyn Fn(Step) -> bool| {
             let taken = self.seconds.iter().filter(|second| of(second.0)).map(|second| second.1);

@@ -12,15 +12,15 @@ use super::alarms::Alarms;
 use super::album::Gallery;
 use super::data::Data;
 
-/// Counts of everything.
+/// All counts of a training.
 #[derive(Debug)]
 pub struct Report {
     left_out: BTreeMap<&'static str, usize>,
-    /// People with sound labels.
+    /// Number of people with valid labels.
     n_sound: usize,
-    /// Those of them who are large enough to be trained on.
+    /// Number of these people who are large enough for training.
     n_people: usize,
-    /// Images of them, turned and mirrored ones with the others.
+    /// Number of their images, including rotated and mirrored copies.
     n_images: usize,
     n_negatives: usize,
     n_unreadable: usize,
@@ -29,20 +29,20 @@ pub struct Report {
     n_filters: usize,
     threshold: f64,
     training_seconds: f64,
-    /// Steps that were done before, by a process that was interrupted.
+    /// Number of steps done earlier, by a process that was interrupted.
     pub(super) n_resumed: usize,
-    /// All steps.
+    /// Total number of steps.
     pub(super) n_steps: usize,
-    /// Images of people whom the final model could not be laid over.
+    /// Number of images of people in which the final model could not be placed.
     pub(super) n_lost: Option<usize>,
     /// False alarms.
     pub(super) alarms: Option<Alarms>,
-    /// Everything together.
+    /// Total time, seconds.
     pub(super) seconds: f64,
 }
 
 impl Report {
-    /// Returns the report as known before the training.
+    /// Returns the report with the counts that are known before the training.
     pub(super) fn new(data: &Data, gallery: &Gallery, plan: &Plan) -> Self {
         let copies = (0..plan.n_people()).map(|i| gallery.person_of(plan.person(i)));
         let mut people: Vec<usize> = copies.collect();
@@ -69,7 +69,7 @@ impl Report {
         }
     }
 
-    /// Takes note of the model.
+    /// Adds the trained model to the report.
     pub(super) fn trained(&mut self, model: &Model, elapsed: Duration) {
         self.threshold = model.spec().threshold;
         self.training_seconds = elapsed.as_secs_f64();
@@ -83,7 +83,7 @@ impl Report {
         self.n_sound - self.n_people
     }
 
-    /// Describes the training data in a line.
+    /// Describes the training data in a line of text.
     pub(super) fn data_text(&self) -> String {
         format!(
             "{} people in {} images ({} left out, {} too small), {} negatives ({} unreadable); {} \
@@ -100,7 +100,7 @@ impl Report {
         )
     }
 
-    /// The same for programs.
+    /// Describes the training data as JSON.
     pub(super) fn data_json(&self) -> Value {
         json!({
             "people": self.n_people,
@@ -115,7 +115,7 @@ impl Report {
         })
     }
 
-    /// For people.
+    /// Returns the report as text.
     pub fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -126,7 +126,7 @@ impl Report {
     fn write(&self, text: &mut String) -> core::fmt::Result {
         writeln!(
             text,
-            "people        {} used, in {} images with turned and mirrored ones",
+            "people        {} used, in {} images including rotated and mirrored ones",
             self.n_people, self.n_images
         )?;
         let reasons: Vec<String> =
@@ -141,7 +141,7 @@ impl Report {
         if let Some(n_lost) = self.n_lost {
             writeln!(
                 text,
-                "  lost        {n_lost} images: the model fits on no level of them"
+                "  lost        {n_lost} images in which the model could not be placed"
             )?;
         }
         writeln!(
@@ -151,7 +151,7 @@ impl Report {
         )?;
         let before = match self.n_resumed {
             0 => String::new(),
-            n => format!(", {n} of them before it went on"),
+            n => format!(", {n} of them before the interruption"),
         };
         writeln!(
             text,
@@ -173,7 +173,7 @@ impl Report {
         writeln!(text, "time          {:.1} s", self.seconds)
     }
 
-    /// For programs.
+    /// Returns the report as JSON.
     pub fn json(&self) -> Value {
         json!({
             "event": "summary",

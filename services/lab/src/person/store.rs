@@ -1,4 +1,4 @@
-//! Files of a training: its checkpoint, and at the end the model.
+//! Files of a training: its checkpoint, and finally the model.
 
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
@@ -10,12 +10,12 @@ use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use training::{Checkpoint, CheckpointBytesError, CheckpointError};
 
-/// The files of one training. Nothing is being written while the state is not locked.
+/// Files of one training. While the state is not locked, no file is being written.
 #[derive(Debug)]
 pub struct Store {
     out: PathBuf,
     state: Mutex<State>,
-    /// Held as long as this training runs; the system lets go of it however the process ends.
+    /// Lock that is held during this training; the operating system releases it when the process ends.
     _mine: File,
 }
 
@@ -27,19 +27,19 @@ struct State {
     model_written: bool,
 }
 
-/// Why a checkpoint is of no use.
+/// Reason why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 enum Refused {
     #[error("cannot read the checkpoint {}", path.display())]
     Io { path: PathBuf, source: io::Error },
-    #[error("{} is no sound checkpoint", path.display())]
+    #[error("{} is not a valid checkpoint", path.display())]
     Bytes {
         path: PathBuf,
         source: CheckpointBytesError,
     },
-    #[error("the checkpoint {} is of a training on other image files", path.display())]
+    #[error("the checkpoint {} is from a training with other image files", path.display())]
     Images { path: PathBuf },
-    #[error("cannot go on from the checkpoint {}", path.display())]
+    #[error("cannot continue from the checkpoint {}", path.display())]
     Other {
         path: PathBuf,
         source: CheckpointError,
@@ -47,12 +47,12 @@ enum Refused {
 }
 
 impl Store {
-    /// Looks whether a model can be written, and whether a training was interrupted before.
+    /// Checks whether the model can be written, and whether an earlier training was interrupted.
     ///
     /// # Errors
     ///
-    /// There is no place for the model, another training is writing it, or there is a checkpoint that the training does
-    /// not continue from.
+    /// Fails if the path of the model is not a file in an existing folder, if another training is writing it, or if there is a checkpoint
+    /// that the training does not continue from.
     pub fn new(out: &Path, resume: bool) -> Result<Self, Failure> {
         let wrong = |what: &str| {
             let message = format!("--out {}: {what}", out.display());
@@ -72,17 +72,17 @@ impl Store {
         let checkpoint = store.checkpoint();
         if !resume && checkpoint.exists() {
             let message = format!(
-                "{} is there: an earlier training was interrupted",
+                "{} exists: an earlier training was interrupted",
                 checkpoint.display()
             );
             return Err(Failure::new(ExitKind::Usage, message).with_hint(
-                "continue from it with --resume; to start anew, delete it or choose another --out",
+                "continue from it with --resume; to start from the beginning, delete it or choose another --out",
             ));
         }
         Ok(store)
     }
 
-    /// Returns the name of the model: its file without the ending.
+    /// Returns the name of the model: its file name without the extension.
     pub(super) fn model_name(&self) -> String {
         let stem = self.out.file_stem().unwrap_or_default();
         stem.to_string_lossy().into_owned()
@@ -92,7 +92,7 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// It is damaged, or was made with other image files.
+    /// Fails if the checkpoint is damaged, or was made with other image files.
     pub(super) fn load(&self, stamp: u64) -> Result<Option<Checkpoint>, Failure> {
         let path = self.checkpoint();
         let bytes = match files::read(&path, files::RESULTS) {
@@ -115,7 +115,7 @@ impl Store {
         }
     }
 
-    /// A checkpoint that does not fit the training.
+    /// Returns the failure for a checkpoint that does not fit the training.
     pub(super) fn refused(&self, source: CheckpointError) -> Failure {
         let path = self.checkpoint();
         self.with_advice(Refused::Other { path, source })
@@ -130,17 +130,17 @@ impl Store {
         ))
     }
 
-    /// Takes note of where a training goes on.
+    /// Records the step at which a training continues.
     pub(super) fn resumed(&self, n_done: usize, n_steps: usize) {
         let mut state = self.lock();
         (state.n_done, state.n_steps) = (n_done, n_steps);
     }
 
-    /// Writes the checkpoint: it is complete, or the one before it stays.
+    /// Writes the checkpoint completely, or keeps the previous one.
     ///
     /// # Errors
     ///
-    /// Those of the operating system.
+    /// Fails with errors of the operating system.
     pub(super) fn save(
         &self,
         checkpoint: &Checkpoint,
@@ -158,11 +158,11 @@ impl Store {
         Ok(())
     }
 
-    /// Writes the model, and removes the checkpoint, which is of no use any more.
+    /// Writes the model, and removes the checkpoint, which is no longer needed.
     ///
     /// # Errors
     ///
-    /// Those of the operating system.
+    /// Fails with errors of the operating system.
     pub(super) fn finish(&self, model: &Model) -> Result<(), Failure> {
         let mut state = self.lock();
         fmp::files::write(&self.out, model).or_fail(ExitKind::Run)?;
@@ -174,8 +174,8 @@ impl Store {
         })
     }
 
-    /// How a training that was stopped ends: what is left of it, and how to go on. Waits for what is
-    /// being written.
+    /// Waits until the current file is written, and returns the failure for a stopped training. Its hint says how to
+    /// continue.
     pub fn interrupted(&self) -> Failure {
         let state = self.lock();
         self.let_go();
@@ -184,7 +184,7 @@ impl Store {
             n_steps,
             model_written,
         } = *state;
-        // Never unlocked again: nothing is to be written any more.
+        // The lock is never released, so that no more files are written.
         core::mem::forget(state);
         let stopped = |what: String| Failure::new(ExitKind::Interrupted, what);
         if model_written {
@@ -198,11 +198,11 @@ impl Store {
         };
         if !path.exists() {
             return so_far
-                .with_hint("nothing is kept: the first checkpoint is written after a step");
+                .with_hint("there is no checkpoint: the first one is written after a step");
         }
         let path = path.display();
         so_far.with_hint(format!(
-            "the same command with --resume goes on from {path}"
+            "the same command with --resume continues from {path}"
         ))
     }
 
@@ -212,7 +212,7 @@ impl Store {
         self.out.with_file_name(name)
     }
 
-    /// Tidies up the file that said whose the model is; without it nothing is lost.
+    /// Removes the lock file, if possible. It only served to reserve the model.
     fn let_go(&self) {
         drop(fs::remove_file(claim_of(&self.out)));
     }
@@ -245,7 +245,7 @@ fn claim(out: &Path) -> Result<File, Failure> {
             Failure::new(ExitKind::Usage, message)
         })?;
     match file.try_lock() {
-        // A file system that cannot lock is no reason not to train.
+        // If the file system does not support locks, the training goes on without one.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let message = format!("--out {}: another training is writing it", out.display());
@@ -255,7 +255,7 @@ fn claim(out: &Path) -> Result<File, Failure> {
     }
 }
 
-/// The folder that a file lies in, as the operating system wants it named.
+/// Returns the folder of a file, in a form that the operating system accepts.
 fn folder_of(file: &Path) -> &Path {
     match file.parent() {
         Some(folder) if folder != Path::new("") => folder,

@@ -14,19 +14,18 @@ use super::progress::Progress;
 use super::report::Report;
 use super::store::Store;
 
-/// Data and settings of the training of a model.
+/// Data and settings for training a model.
 #[derive(Debug)]
 pub struct Job {
     /// The people, and the images without people.
     pub data: Chosen,
-    /// The parts of the model, and where they lie between the joints.
+    /// Parts of the model, and their positions between the joints.
     pub skeleton: SkeletonTable,
-    /// How to train.
+    /// Settings of the training.
     pub settings: Settings,
-    /// Folder of images without people on which false alarms are counted at the end; the negatives themselves if
-    /// not given.
+    /// Folder of images without people, on which false alarms are counted at the end; if `None`, the images of the training are used.
     pub judge: Option<PathBuf>,
-    /// True to go on from the checkpoint of an interrupted training, if there is one.
+    /// True to continue from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
 }
 
@@ -34,7 +33,7 @@ pub struct Job {
 ///
 /// # Errors
 ///
-/// A data set, an image or a checkpoint that cannot be used; a file that cannot be written; a stop request
+/// Fails if a data set, an image or a checkpoint cannot be used, if a file cannot be written, or on a stop request
 /// ([`ExitKind::Interrupted`]).
 pub fn train(job: &Job, store: &Store, progress: &Progress) -> Result<Report, Failure> {
     let begin = Instant::now();
@@ -74,7 +73,7 @@ pub fn train(job: &Job, store: &Store, progress: &Progress) -> Result<Report, Fa
     Ok(report)
 }
 
-/// Begins, or goes on from the checkpoint.
+/// Starts from the beginning or from the checkpoint.
 fn start<'a>(
     job: &'a Job,
     plan: &'a Plan,

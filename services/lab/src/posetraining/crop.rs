@@ -1,23 +1,24 @@
-//! The square picture that is kept of a person.
+//! The square picture of a person that is stored for the training.
 
 use kernels::Rgb8View;
 use training::networks::pose::{FILL, MARGIN, SIDE, Shape, WINDOW};
 
-/// Where the square lies in a picture.
+/// Position of the square in a picture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crop {
-    /// Its middle, pixels of the picture.
+    /// Centre of the square, pixels of the picture.
     centre: [f64; 2],
-    /// Pixels of the picture for one of the square.
+    /// Pixels of the picture per pixel of the square.
     step: f64,
-    /// Cosine and sine of the angle by which the picture is turned.
+    /// Cosine and sine of the rotation of the picture.
     turn: [f64; 2],
 }
 
 impl Crop {
-    /// The square around joints that are finite: as large as the network's window, and a margin. `None` if they have no extent.
+    /// Returns the square around the joints with finite positions: the size of the network's window, with a margin. `None` if the joints
+    /// have no extent.
     ///
-    /// * `angle`: the picture is turned by it first, radians, clockwise.
+    /// * `angle`: clockwise rotation of the picture before cropping, radians.
     pub(super) fn around(joints: &[[f64; 2]], angle: f64) -> Option<Self> {
         let turn = [angle.cos(), angle.sin()];
         let known = joints.iter().filter(|joint| joint.iter().all(|value| value.is_finite()));
@@ -34,7 +35,7 @@ impl Crop {
         })
     }
 
-    /// The point of the square at a point of the picture.
+    /// Converts a point of the picture to a point of the square.
     pub(super) fn inside(&self, at: [f64; 2]) -> [f64; 2] {
         let [x, y] = [0, 1].map(|axis| (at[axis] - self.centre[axis]) / self.step);
         let [cosine, sine] = self.turn;
@@ -45,7 +46,7 @@ impl Crop {
         ]
     }
 
-    /// The point of the picture at a point of the square.
+    /// Converts a point of the square to a point of the picture.
     pub(super) fn outside(&self, at: [f64; 2]) -> [f64; 2] {
         let [x, y] = at.map(|at| (at - 0.5 * (SIDE - 1) as f64) * self.step);
         let [cosine, sine] = self.turn;
@@ -55,12 +56,12 @@ impl Crop {
         ]
     }
 
-    /// Pixels of the square for one of the picture.
+    /// Returns the pixels of the square per pixel of the picture.
     pub(super) fn enlarges(&self) -> f64 {
         1.0 / self.step
     }
 
-    /// The picture in it, red first: means of enough points that no pixel of the picture is skipped.
+    /// Returns the square as RGB. Each pixel is the mean of enough points that no pixel of the picture is skipped.
     pub(super) fn rgb(&self, picture: Rgb8View<'_>) -> Vec<u8> {
         let n = (self.step.ceil() as usize).clamp(1, 8);
         let mut rgb = Vec::with_capacity(3 * SIDE * SIDE);
@@ -85,7 +86,7 @@ impl Crop {
     }
 }
 
-/// The colour between four pixels; [`FILL`] beyond the picture.
+/// Interpolates the colour between four pixels; [`FILL`] outside the picture.
 fn colour(picture: Rgb8View<'_>, [x, y]: [f64; 2]) -> [f64; 3] {
     let (left, top) = (x.floor(), y.floor());
     let [right, below] = [x - left, y - top];

@@ -1,4 +1,4 @@
-//! People on photographs, by their marked joints and a teacher.
+//! People in photographs, from their marked joints and a teacher.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -16,16 +16,16 @@ use crate::failures::dataset_failure;
 use crate::orientation::facing;
 use crate::person::{deal, read_options, sides_of};
 
-/// Pairs that show who is seen from behind: hips and shoulders, the right one first.
+/// Pairs of joints that show whether a person is seen from behind: hips and shoulders, the right one first.
 const PAIRS: [[usize; 2]; 2] = [[2, 3], [8, 9]];
 const NECK: usize = 12;
-/// Shortest trunk, pixels of the square picture.
+/// Length of the shortest trunk that is used, pixels of the square picture.
 const MIN_TRUNK: f32 = 8.0;
-/// Most pixels of the network's window for one of the picture: smaller people show too little.
+/// Largest enlargement, in pixels of the network's window per pixel of the picture: smaller people show too little detail.
 const MOST_ENLARGED: f64 = 4.0;
-/// Share of the window up to which two findings of the teacher are one.
+/// Distance up to which two findings of the teacher count as the same keypoint, as a share of the window.
 const SAME: f32 = 0.05;
-/// Joints of clicked people that are marked as invisible lie anywhere.
+/// Invisible joints of manually marked people can be at any position, even outside the picture.
 const ANYWHERE_PX: f64 = 1e5;
 
 type Point = [f32; 2];
@@ -33,7 +33,7 @@ type Point = [f32; 2];
 /// A keypoint that the teacher does not find.
 const UNKNOWN: (Point, f32) = ([f32::NAN; 2], 0.0);
 
-/// Everybody, with the place in the data set.
+/// Returns all usable people, with their positions in the data set.
 pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Person)>, Failure> {
     let chosen = &people.photographs;
     let table = SkeletonTable::published();
@@ -67,10 +67,10 @@ pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Per
     Ok(all)
 }
 
-/// The people who can be used, with their places.
+/// Returns the usable people, with their positions in the data set.
 ///
-/// Threads of our own: one of rayon that waited for a network, whose threads are rayon's as well, would begin with
-/// another person meanwhile, and so on, until its stack is full.
+/// The function starts its own threads. Networks run on rayon's threads too. A rayon thread that waits for a network would start on
+/// another person meanwhile, and so on, until its stack overflows.
 fn of_all(
     people: &[Annotated],
     (sides, teachers): (Sides, &[Vec<PoseNetwork>]),
@@ -102,7 +102,7 @@ fn of_all(
         let died = || {
             Err(Failure::new(
                 ExitKind::Run,
-                "a thread that prepared people died",
+                "a thread that prepares people has panicked",
             ))
         };
         let join = |scoped_join_handle: std::thread::ScopedJoinHandle<'_, _>| {
@@ -115,7 +115,7 @@ fn of_all(
     Ok(found)
 }
 
-/// A person; nothing if the trunk is not known, or the person is too small.
+/// Returns a person; `None` if the trunk is unknown or the person is too small.
 fn of_person(
     person: &Annotated,
     sides: Sides,
@@ -178,7 +178,7 @@ fn of_person(
     }))
 }
 
-/// The joints that are marked as visible; the others are not finite.
+/// Returns the joints that are marked as visible; the others are not finite.
 fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
     core::array::from_fn(|joint| {
         let is_visible = person.visible.get(joint).is_some_and(|visible| *visible);
@@ -187,8 +187,8 @@ fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
     })
 }
 
-/// The direction in which a person faces, by marks in the upright picture; 0 where the hips and shoulders say something
-/// else than how wide they are.
+/// Returns the direction in which a person faces, from the marks in the upright picture; 0 if it contradicts the order of left and right
+/// at the hips and shoulders.
 fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
     let marked = |joint: usize| marks.marked[joint].map(f64::from);
     let joints: [[f64; 2]; N_JOINTS] = core::array::from_fn(marked);
@@ -200,14 +200,14 @@ fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
     }
 }
 
-/// Turns a direction relative to an upright trunk into one in the picture, in which the trunk leans.
+/// Rotates a direction relative to an upright trunk into the picture with the leaning trunk.
 fn in_picture([aside, towards]: [f32; 2], lean: f32) -> [f32; 3] {
     let aside = if aside.is_finite() { aside } else { 0.0 };
     let towards = if towards.is_finite() { towards } else { 0.0 };
     [aside * lean.cos(), aside * lean.sin(), towards]
 }
 
-/// The angle between the trunk and upright, clockwise, radians.
+/// Returns the angle of the trunk from upright, clockwise, radians.
 fn lean(joints: &[[f64; 2]; N_JOINTS]) -> f64 {
     let [right, left] = PAIRS[0].map(|pair| joints[pair]);
     let shoulders = PAIRS[1].map(|pair| joints[pair]);
@@ -235,8 +235,8 @@ fn length([x, y]: Point) -> f32 {
     x.hypot(y)
 }
 
-/// How far the left hip and shoulder lie to the right of the right ones, on average, in the upright picture: below 0 for who is
-/// seen from behind. The teacher's where there is no mark; nothing where neither is known.
+/// Returns the mean distance by which the left hip and shoulder are to the right of the right ones, in the upright picture. It is negative
+/// for a person seen from behind. Unmarked joints are the teacher's; `None` if neither source has them.
 fn across(marks: &Marks) -> Option<f32> {
     let widths = PAIRS.iter().filter_map(|[right, left]| {
         let is_marked = [right, left].iter().all(|joint| marks.marked[**joint][0].is_finite());
@@ -315,7 +315,7 @@ fn find(
     }))
 }
 
-/// Pairs are those of the mirror image.
+/// The pairs of joints must match those of the mirror image.
 const _: () = {
     assert!(MIRROR[PAIRS[0][0]] == PAIRS[0][1], "hips");
     assert!(MIRROR[PAIRS[1][0]] == PAIRS[1][1], "shoulders");

@@ -1,4 +1,4 @@
-//! People who do not exist.
+//! Synthetic people.
 
 use failure::Failure;
 use training::networks::pose::{
@@ -10,10 +10,10 @@ use super::crop::Crop;
 use crate::orientation::front_in_view;
 use crate::scenes::{Scenes, Shown, of_pictures};
 
-/// Fewest joints that are seen.
+/// Smallest number of visible joints for a person to be used.
 const FEWEST: usize = 10;
 
-/// The people of all scenes, with the numbers of the subjects.
+/// Returns the people of all scenes, with the numbers of the subjects.
 pub(super) fn people(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<(u64, Person)>, Failure> {
     let console = work.console;
     if scenes.n == 0 {
@@ -73,5 +73,5 @@ fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
     Some((subject, person))
 }
 
-/// The extra keypoints of scenes and of the network are the same.
+/// Scenes and the network have the same extra keypoints.
 const _: () = assert!(EXTRAS.len() == scene::N_EXTRAS);

@@ -1,4 +1,4 @@
-//! The training itself: from prepared people to an ONNX file with its card.
+//! The training: from prepared people to an ONNX file with its card.
 
 use exports::report::curves::{self, Line, Panel};
 use training::networks::Trainer;
@@ -9,27 +9,27 @@ use crate::trained::{self, Job, Shown};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use inputs::cards::METADATA_KEY;
 
-/// The results of a hundred steps.
+/// Results of a hundred steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
 
-/// Reads the network that the training goes on from; nothing for random parameters.
+/// Reads the network to start from; `None` for random parameters.
 fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
     let Some(from) = &job.from else {
         if settings.extras_alone {
-            let message = "extras_alone = true keeps all but the extra keypoints of a network, and none is named";
-            let hint = "name the network with --from, or take extras_alone out of the settings";
+            let message = "extras_alone = true keeps a network except for its extra keypoints, but no network is named";
+            let hint = "name the network with --from, or remove extras_alone from the settings";
             return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
         }
         return Ok(None);
     };
     let begun = pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
-        let hint = "--from takes a network of `train network` that has the `shape` of the settings";
+        let hint = "--from needs a network of `train network` with the `shape` of the settings";
         failure::in_file(&from.file, &error).with_hint(hint)
     })?;
     Ok(Some(begun))
 }
 
-/// Draws the costs of all passes, and the scores on people who are kept apart.
+/// Draws the costs of all passes, and the scores on held-out people.
 fn drawn(passes: &[Pass]) -> String {
     let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
         name,
@@ -54,7 +54,7 @@ fn drawn(passes: &[Pass]) -> String {
             ],
         ),
         panel(
-            "share, people kept apart",
+            "share, held-out people",
             vec![
                 score("limbs, both ends", &|score| score.both_ends),
                 score("direction", &|score| score.front),
@@ -66,12 +66,12 @@ fn drawn(passes: &[Pass]) -> String {
     curves::svg(&panels, None)
 }
 
-/// Trains a network on prepared people, and writes it; a checkpoint, and curves (`.svg`), follow every hundred steps.
+/// Trains a network on prepared people, and writes it. After every hundred steps, a checkpoint and the curves (`.svg`) are written.
 ///
 /// # Errors
 ///
-/// Nobody to learn from, or nobody kept apart; the checkpoint is of another training; a file cannot be written; it was stopped
-/// ([`ExitKind::Interrupted`]).
+/// Fails if there are no people for training or no held-out people, if the checkpoint is from another training, if a file cannot be
+/// written, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn train(
     (job, settings): (&Job, &Settings),
     people: &Prepared,
@@ -99,7 +99,7 @@ pub fn train(
     trained::run(job, task, &shown, &written, (stop, console))
 }
 
-/// Describes a pass in a line.
+/// Describes a pass in a line of text.
 fn line(pass: &Pass) -> String {
     let cost = pass.cost;
     let learnt = format!(
@@ -110,7 +110,7 @@ fn line(pass: &Pass) -> String {
         return learnt;
     };
     format!(
-        "{learnt}; {} people kept apart: limbs {:.1} / {:.1} %, direction {:.1} %, errors told by {:.3}, extra keypoints {:.1} %",
+        "{learnt}; {} held-out people: limbs {:.1} / {:.1} %, direction {:.1} %, area of errors {:.3}, extra keypoints {:.1} %",
         score.people,
         100.0 * score.mean_of_ends,
         100.0 * score.both_ends,

@@ -1,4 +1,4 @@
-//! The training of a network that predicts errors.
+//! Training of a network that predicts errors.
 
 use std::fs;
 use std::io;
@@ -18,28 +18,28 @@ use training::networks::{Backend, Parameter, TrainError};
 use super::replace::replace;
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop, in_file};
 
-/// The results of a pass over the samples.
+/// Results of a pass over the samples.
 type Pass = training::networks::Pass<f32, Validated>;
 type Trainer<'a> = training::networks::Trainer<QualityTask<'a>>;
 
-/// Data and settings of the training of a network.
+/// Data and settings for training a network.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Files of samples to learn from and to validate on.
+    /// Files of samples for training and validation.
     pub samples: Vec<PathBuf>,
-    /// Files of samples to judge the network on; every file by itself.
+    /// Files of samples for testing the network, each file separately.
     pub judge: Vec<PathBuf>,
-    /// The ONNX file to write; the checkpoint and the curves are beside it.
+    /// The ONNX file to write; the checkpoint and the curves are in files beside it.
     pub out: PathBuf,
-    /// Weights of torchvision's VGG-16 to begin with.
+    /// Weights of torchvision's VGG-16 to start from.
     pub weights: Option<PathBuf>,
-    /// Identity in the file; its name if not given.
+    /// Identity stored in the file; the file's name if `None`.
     pub identity: Option<String>,
-    /// True to go on from the checkpoint of an interrupted training, if there is one.
+    /// True to continue from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
 }
 
-/// How good the network was after a pass.
+/// Returns the quality of the network after a pass.
 fn validated(pass: &Pass) -> Validated {
     pass.score.unwrap_or(Validated {
         loss: f32::NAN,
@@ -47,7 +47,7 @@ fn validated(pass: &Pass) -> Validated {
     })
 }
 
-/// The losses above, and the area under the ROC below.
+/// Draws two panels: the losses, and below the area under the ROC curve.
 fn drawn(passes: &[Pass], best: Option<usize>) -> String {
     let line = |name, value: &dyn Fn(&Pass) -> f64| Line {
         name,
@@ -62,7 +62,7 @@ fn drawn(passes: &[Pass], best: Option<usize>) -> String {
     };
     let area = Panel {
         what: "area",
-        lines: vec![line("area under the ROC, validated", &|pass| {
+        lines: vec![line("area under the ROC curve, validated", &|pass| {
             validated(pass).area
         })],
     };
@@ -73,7 +73,7 @@ fn drawn(passes: &[Pass], best: Option<usize>) -> String {
 ///
 /// # Errors
 ///
-/// Samples, weights or a checkpoint that cannot be used; a file that cannot be written; a stop request
+/// Fails if samples, weights or a checkpoint cannot be used, if a file cannot be written, or on a stop request
 /// ([`ExitKind::Interrupted`]).
 pub fn train(
     job: &Job,
@@ -107,7 +107,7 @@ pub fn train(
     while !trainer.is_done() {
         if !trainer.pass(&mut |_| !stop.is_requested()) {
             let failure = Failure::new(ExitKind::Interrupted, "stopped");
-            return Err(failure.with_hint(format!("--resume goes on from {}", kept.display())));
+            return Err(failure.with_hint(format!("--resume continues from {}", kept.display())));
         }
         replace(&kept, &trainer.checkpoint().or_fail(ExitKind::Run)?)?;
         let drawn = drawn(trainer.passes(), trainer.best());
@@ -125,7 +125,7 @@ pub fn train(
         let all: Vec<&Sample> = samples.all.iter().collect();
         if samples.tile != settings.network.tile().unwrap_or(samples.tile) {
             let message = format!(
-                "{}: its tiles do not have the size that this network takes",
+                "{}: the tiles do not have the input size of this network",
                 file.display()
             );
             return Err(Failure::new(ExitKind::Input, message));
@@ -135,7 +135,7 @@ pub fn train(
     fs::remove_file(&kept).map_err(|error| in_file(&kept, &error))
 }
 
-/// Weights of torchvision's VGG-16.
+/// Reads the weights of torchvision's VGG-16.
 fn weights(file: &Path) -> Result<Vec<Parameter>, Failure> {
     let bytes = files::read(file, files::RESULTS).map_err(|error| in_file(file, &error))?;
     vgg::parse(&bytes).map_err(|error| in_file(file, &error))
@@ -146,13 +146,13 @@ fn read(file: &Path) -> Result<Samples, Failure> {
     Samples::from_bytes(&bytes).map_err(|error| in_file(file, &error))
 }
 
-/// Several files as one.
+/// Reads several files as one set of samples.
 fn read_all(files: &[PathBuf]) -> Result<Samples, Failure> {
     let mut all = Samples::default();
     for file in files {
         let samples = read(file)?;
         if !all.all.is_empty() && samples.tile != all.tile {
-            let message = format!("{}: its tiles are of another size", file.display());
+            let message = format!("{}: the tiles have another size", file.display());
             return Err(Failure::new(ExitKind::Input, message));
         }
         all.tile = samples.tile;
@@ -167,9 +167,10 @@ fn checkpoint(path: &Path, resume: bool) -> Result<Option<Vec<u8>>, Failure> {
         Err(error) => Err(in_file(path, &error)),
         Ok(bytes) if resume => Ok(Some(bytes)),
         Ok(_) => {
-            let message = format!("{} is there: a training was interrupted", path.display());
-            Err(Failure::new(ExitKind::Usage, message)
-                .with_hint("continue from it with --resume; to start anew, delete it"))
+            let message = format!("{} exists: a training was interrupted", path.display());
+            Err(Failure::new(ExitKind::Usage, message).with_hint(
+                "continue from it with --resume; to start from the beginning, delete it",
+            ))
         }
     }
 }
@@ -180,18 +181,18 @@ fn refused(error: TrainError, checkpoint: &Path) -> Failure {
     if is_old {
         let path = checkpoint.display();
         return failure.with_hint(format!(
-            "--resume needs the samples and settings that it was made with; to begin anew, delete {path}"
+            "--resume needs the same samples and settings; to start from the beginning, delete {path}"
         ));
     }
     failure
 }
 
-/// Reports how far the training is.
+/// Reports the progress of the training.
 struct Say<'a> {
     console: &'a dyn Console,
     epochs: usize,
     begin: Instant,
-    /// Passes that were done before.
+    /// Number of passes done earlier, by an interrupted process.
     before: usize,
 }
 
@@ -204,10 +205,10 @@ impl Say<'_> {
             "event": "data", "learnt": learnt, "validated": validated, "resumed": self.before,
         }))?;
         console.message(&format!(
-            "{learnt} samples to learn from, {validated} to validate on"
+            "{learnt} samples for training, {validated} for validation"
         ));
         if self.before > 0 {
-            console.message(&format!("going on after pass {}", self.before));
+            console.message(&format!("continuing after pass {}", self.before));
         }
         Ok(())
     }
@@ -248,7 +249,7 @@ impl Say<'_> {
             .map(|area| area.map_or("-".to_owned(), |value| format!("{:.0}", 100.0 * value)));
         let areas: Vec<String> = areas.collect();
         self.console.result(&format!(
-            "{name}: {} samples, area under the ROC {:.3}, rank correlation {:.3}\n  area by part, %: {}",
+            "{name}: {} samples, area under the ROC curve {:.3}, rank correlation {:.3}\n  area by part, %: {}",
             judgement.n,
             judgement.mean_area(),
             judgement.mean_rank_correlation(),

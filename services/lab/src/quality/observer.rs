@@ -1,4 +1,4 @@
-//! Pictures with known joints, searched as the pipeline does.
+//! Search of pictures with known joints, as in the pipeline.
 
 use std::sync::Arc;
 
@@ -11,27 +11,27 @@ use viewquality::{EvidenceError, Normalisation, Sampler, Tile, TileShape, eviden
 
 use crate::searches::Searches;
 
-/// Why a picture makes no sample.
+/// Reason why there is no sample for a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NoSample {
     /// The picture cannot be searched.
     #[error(transparent)]
     Search(#[from] fmp::ImageTooSmall),
-    /// The search found nobody.
-    #[error("nobody was found")]
+    /// The search found no person.
+    #[error("no person was found")]
     Nobody,
-    /// A true joint is not known.
-    #[error("a joint is not known")]
+    /// A true joint is unknown.
+    #[error("a joint is unknown")]
     Unknown,
     /// The model has another number of parts.
-    #[error("the model is not one of 26 parts")]
+    #[error("the model does not have 26 parts")]
     Model,
     /// The evidence cannot be written.
     #[error("the results of the search do not fit a network of expected errors")]
     Evidence(#[from] EvidenceError),
 }
 
-/// Searches pictures as the pipeline does, and compares what it finds with the truth.
+/// Searches pictures as in the pipeline, and compares the results with the truth.
 #[derive(Debug)]
 pub(super) struct Observer {
     model: Arc<Model>,
@@ -41,7 +41,7 @@ pub(super) struct Observer {
 }
 
 impl Observer {
-    /// Prepares for tiles of a shape.
+    /// Prepares the search for tiles of a shape.
     pub(super) fn new(model: Arc<Model>, shape: TileShape) -> Self {
         Self {
             searches: Searches::new(Arc::clone(&model)),
@@ -53,12 +53,12 @@ impl Observer {
 
     /// Makes a sample.
     ///
-    /// * `joints`: the true ones of `skeleton::PARSE14`, pixels of the picture.
+    /// * `joints`: the true joints of `skeleton::PARSE14`, pixels of the picture.
     /// * `named`: group and source of the sample.
     ///
     /// # Errors
     ///
-    /// [`NoSample`]
+    /// Fails with [`NoSample`].
     pub(super) fn observe(
         &self,
         picture: Rgb8View<'_>,
@@ -98,7 +98,7 @@ impl Observer {
     }
 }
 
-/// The tile and its margin as bytes.
+/// Returns the tile and its margin as bytes.
 fn picture_of(picture: Rgb8View<'_>, tile: &Tile) -> Vec<u8> {
     let [height, width] = picture_size(tile.shape);
     let wide = Tile {

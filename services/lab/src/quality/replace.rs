@@ -1,10 +1,10 @@
-//! Files that are whole at any time.
+//! Files that are always complete.
 
 use std::path::Path;
 
 use failure::{ExitKind, Failure};
 
-/// Writes a file that is complete, or the one before it stays.
+/// Writes a file completely, or keeps the previous one.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     files::replace(path, bytes).map_err(|error| {
         let message = format!("cannot write {}: {error}", path.display());

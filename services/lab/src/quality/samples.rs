@@ -1,4 +1,4 @@
-//! The samples of a quality network: what the single-view model makes of pictures with known joints.
+//! Samples for a quality network: results of the single-view model on pictures with known joints.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,35 +18,35 @@ use crate::failures::dataset_failure;
 use crate::person::deal;
 use crate::scenes::{Scenes, of_pictures};
 
-/// Which pictures.
+/// Selection of pictures.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Annotated people: folders or files.
     pub datasets: Vec<PathBuf>,
-    /// Selections of those who are used, everybody if there is none; each may name its data set: `DATASET=SELECTION`.
+    /// Selections of people to use; all people if empty. A selection may name its data set: `DATASET=SELECTION`.
     pub only: Vec<String>,
-    /// Selections of those who are left out.
+    /// Selections of people to leave out.
     pub without: Vec<String>,
-    /// Scenes that do not exist.
+    /// Synthetic scenes.
     pub scenes: Scenes,
-    /// The tiles of the network.
+    /// Shape of the network's tiles.
     pub tile: TileShape,
 }
 
-/// Number of samples written, and of pictures without one.
+/// Counts of samples and of pictures without one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Made {
-    /// Samples.
+    /// Number of samples.
     pub n: usize,
-    /// Pictures of which there is no sample.
+    /// Number of pictures without a sample.
     pub n_lost: usize,
 }
 
-/// Makes samples on rayon's current pool, and writes them; they do not depend on the number of threads.
+/// Makes samples on rayon's current pool, and writes them. The samples do not depend on the number of threads.
 ///
 /// # Errors
 ///
-/// A data set, a picture or a scene that cannot be used; not one sample; the file cannot be written; a stop request
+/// Fails if a data set, a picture or a scene cannot be used, if there is no sample, if the file cannot be written, or on a stop request
 /// ([`ExitKind::Interrupted`]).
 pub fn make(
     job: &Job,
@@ -61,7 +61,7 @@ pub fn make(
     if n == 0 {
         return Err(Failure::new(
             ExitKind::Input,
-            "not one picture makes a sample",
+            "there is no sample for any picture",
         ));
     }
     let samples = Samples {
@@ -74,7 +74,7 @@ pub fn make(
     Ok(Made { n, n_lost })
 }
 
-/// The samples of scenes.
+/// Returns the samples of scenes.
 fn scenes(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
     of_pictures(
         &job.scenes,
@@ -88,7 +88,7 @@ fn scenes(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
     )
 }
 
-/// The samples of data sets.
+/// Returns the samples of data sets.
 fn people(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
     let all = &job.datasets;
     let only = deal(all, "--only", &job.only, false)?;

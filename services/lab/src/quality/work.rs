@@ -26,12 +26,12 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Pictures of which there is no sample.
+    /// Returns the number of pictures without a sample.
     pub(super) fn n_lost(&self) -> usize {
         self.n_lost.load(Ordering::Relaxed)
     }
 
-    /// Stops where that was asked for.
+    /// Fails if a stop was requested.
     pub(super) fn go_on(&self) -> Result<(), Failure> {
         if self.stop.is_requested() {
             return Err(Failure::new(ExitKind::Interrupted, "stopped"));
@@ -39,7 +39,7 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Takes note of pictures that were looked at.
+    /// Counts pictures that were searched.
     pub(super) fn done(&self, n: usize, n_lost: usize) {
         const EVERY: usize = 100;
         self.n_lost.fetch_add(n_lost, Ordering::Relaxed);

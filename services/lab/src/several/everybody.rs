@@ -1,4 +1,4 @@
-//! A finished run of several people against the truth of its scene: who was found, where, and by which name.
+//! Comparison of a finished run of several people with the truth of its scene: detections, positions and identities.
 
 use std::collections::BTreeMap;
 
@@ -15,48 +15,48 @@ use super::judge::{FOUND_M, Put, Score};
 use super::report::{ActorReport, measured, of_actor};
 use super::shelf::{N_TRUE, TruePerson};
 
-/// A person in the output is right at these mean distances of the joints, millimetres; as `VoxelPose` judges Panoptic.
+/// Mean distances of the joints up to which a person in the output is correct, millimetres; as in `VoxelPose`'s evaluation on Panoptic.
 const RIGHT_MM: [u32; 6] = [25, 50, 75, 100, 125, 150];
 
-/// The score of a run.
+/// Scores of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Everybody {
-    /// Frames of the truth that the run has a line for.
+    /// Number of true frames for which the run has a line.
     pub frames: usize,
-    /// The people who were there.
+    /// Results for each true person.
     pub people: Vec<ActorReport>,
-    /// Mean distance of the fourteen joints of those who were found, millimetres.
+    /// Mean distance of the fourteen joints of the people who were found, millimetres.
     pub mpjpe_mm: Option<Measured>,
-    /// Average precision, percent, by the distance at which a person is right, millimetres. People are ordered by the deviations that the
-    /// run states.
+    /// Average precision in percent, for each distance in millimetres up to which a person is correct. People are ordered by the standard
+    /// deviations in the run's output.
     pub ap: BTreeMap<u32, f64>,
-    /// Share of the people for whom the output has a person within half a metre, percent.
+    /// Share of the true people with a person of the output within half a metre, percent.
     pub recall: f64,
-    /// How often an id changed, and that in a minute.
+    /// Number of id changes.
     pub switches: usize,
-    /// See [`switches`](Self::switches).
+    /// Number of id changes per minute.
     pub switches_a_minute: f64,
-    /// Number of ids that were given.
+    /// Number of different ids in the output.
     pub ids: usize,
-    /// Mean number of people in the output of a frame, and of people who were there.
+    /// Mean number of people in the output of a frame.
     pub put_out: f64,
-    /// See [`put_out`](Self::put_out).
+    /// Mean number of true people in a frame.
     pub there: f64,
 }
 
 /// A person in the output.
 struct Candidate {
     frame: usize,
-    /// Mean of the stated deviations, metres.
+    /// Mean of the standard deviations in the output, metres.
     sd_m: f64,
-    /// Mean distance to every person who was there, metres.
+    /// Mean distance to every true person, metres.
     distances_m: Vec<f64>,
 }
 
-/// Judges a run.
+/// Evaluates a run.
 ///
-/// * `rate_hz`: frames of the truth a second.
-/// * `lines`: of `pose3d.jsonl`; frames that the truth does not have are passed over, as are frames of the truth without a line.
+/// * `rate_hz`: true frames per second.
+/// * `lines`: lines of `pose3d.jsonl`. Frames without truth are skipped, and so are true frames without a line.
 pub fn everybody(truth: &[Frame], lines: &[FrameLine], rate_hz: f64) -> Everybody {
     let by_number: BTreeMap<u64, &Frame> = truth.iter().map(|frame| (frame.frame, frame)).collect();
     let mut tally = Tally::default();
@@ -68,13 +68,13 @@ pub fn everybody(truth: &[Frame], lines: &[FrameLine], rate_hz: f64) -> Everybod
     tally.sum_up(rate_hz)
 }
 
-/// The frames so far.
+/// Counts over the frames so far.
 #[derive(Default)]
 struct Tally {
     score: Score,
     candidates: Vec<Candidate>,
     n_true: usize,
-    /// Distances of those who were found, metres, frame by frame.
+    /// Distances of the people who were found, metres, for each frame.
     errors_m: Vec<Share>,
 }
 
@@ -138,7 +138,7 @@ impl Tally {
     }
 }
 
-/// A person who was there; `None` if a joint is not known.
+/// Returns a true person; `None` if a joint is unknown.
 fn true_person(id: usize, joints: &Joints) -> Option<TruePerson> {
     let put = Put::plain(0, joints);
     let mut all = [Point3::origin(); N_TRUE];
@@ -148,7 +148,7 @@ fn true_person(id: usize, joints: &Joints) -> Option<TruePerson> {
     Some(TruePerson { id, joints: all })
 }
 
-/// The joints of a person of a run.
+/// Returns the joints of a person in a run.
 fn joints(person: &PersonLine) -> Joints {
     core::array::from_fn(|joint| {
         let placed = person.joints.get(PARSE14.joints[joint].name)?.placed()?;
@@ -157,7 +157,7 @@ fn joints(person: &PersonLine) -> Joints {
     })
 }
 
-/// Mean of the deviations that a run states, metres; infinite if there is no person.
+/// Returns the mean of the standard deviations in the output, metres; infinite if there is no joint.
 fn deviation(person: &PersonLine) -> f64 {
     let placed = person.joints.values().filter_map(|joint| joint.placed());
     let (mut sum, mut n) = (0.0, 0.0);
@@ -172,7 +172,7 @@ fn deviation(person: &PersonLine) -> f64 {
     if n > 0.0 { sum / n } else { f64::INFINITY }
 }
 
-/// Mean distance of the joints, metres; infinite if half of them are unknown.
+/// Returns the mean distance of the joints, metres; infinite if half of them are unknown.
 fn distance(put: &Joints, there: &Joints) -> f64 {
     let both = put.iter().zip(there);
     let each: Vec<f64> = both.filter_map(|(a, b)| Some(((*a)? - (*b)?).norm())).collect();
@@ -182,8 +182,8 @@ fn distance(put: &Joints, there: &Joints) -> f64 {
     each.iter().sum::<f64>() / each.len() as f64
 }
 
-/// Area under the precision over the recall, percent: the surest people first, each right if the nearest person who was there is near and
-/// nobody surer is that person.
+/// Returns the area under the curve of precision over recall, percent. People of the output come in the order of their certainty. A person
+/// is correct if the nearest true person is close enough and was not matched before.
 fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f64 {
     let mut taken = std::collections::BTreeSet::new();
     let (mut n_right, mut points) = (0.0, Vec::new());
@@ -196,7 +196,7 @@ fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f
         n_right += f64::from(is_right);
         points.push((n_right / n_true.max(1) as f64, n_right / (nth + 1) as f64));
     }
-    // The precision at a recall is the best at that or a higher one.
+    // The precision at a recall is the highest precision at this recall or a higher one.
     let (mut area, mut best, mut last) = (0.0, 0.0_f64, points.last().map_or(0.0, |point| point.0));
     for (recall, precision) in points.iter().rev() {
         area += (last - recall) * best;
@@ -227,7 +227,7 @@ mod tests {
         (0..n).map(frame).collect()
     }
 
-    /// A line in which people stand at places, by their ids.
+    /// Returns a line of results with people of these ids at these positions.
     fn line(frame: u64, people: &[(u64, f64)]) -> FrameLine {
         let person = |(id, x): &(u64, f64)| {
             let joints = PARSE14.joints.iter().zip(standing(*x));
@@ -275,7 +275,8 @@ mod tests {
         assert_eq!(score.ids, 3);
         assert!((score.recall - 100.0 * 100.0 / 120.0).abs() < 1e-9);
         assert_eq!(score.ap[&50], 0.0);
-        // 100 of the 120 who were there are right, and 100 of the 120 who were put out, or a little more before the last.
+        // 100 of the 120 true people are correct, and 100 of 120 people in the output. Before the last frames, the share is slightly
+        // higher.
         assert!((69.4..70.0).contains(&score.ap[&75]), "{:?}", score.ap);
     }
 }

@@ -8,7 +8,7 @@ use statistics::score::Share;
 
 use super::shelf::{N_TRUE, TruePerson};
 
-/// The parts that are judged, by the joints at their ends.
+/// Parts to evaluate, with the joints at their ends.
 const PARTS: [(&str, [usize; 2]); 10] = [
     ("upper arms", [9, 10]),
     ("upper arms", [8, 7]),
@@ -21,11 +21,11 @@ const PARTS: [(&str, [usize; 2]); 10] = [
     ("head", [12, 13]),
     ("torso", [12, 14]),
 ];
-/// A truth is found by nothing that is farther away, mean over the joints, metres.
+/// Largest mean distance of the joints at which a person of the output can be a true person, metres.
 pub(super) const FOUND_M: f64 = 0.5;
-/// Where the ears are between the neck and the top of the head, as `keypoints::joint_ways` has it.
+/// Position of the ears between the neck and the top of the head, as in `keypoints::joint_ways`.
 const EARS: f64 = 1.0 / 1.8;
-/// The average is over the first three actors.
+/// Number of actors in the average: the first three.
 pub(super) const ACTORS: usize = 3;
 
 /// A person in the output.
@@ -33,12 +33,12 @@ pub(super) const ACTORS: usize = 3;
 pub struct Put {
     /// Identity.
     pub id: u64,
-    /// The joints of the truth, where they were found.
+    /// Joints in the order of the truth; `None` for a joint that was not found.
     pub joints: [Option<Point3<f64>>; N_TRUE],
 }
 
 impl Put {
-    /// The joints as they are: the head from the neck to its top.
+    /// Takes the joints unchanged; the head extends from the neck to its top.
     pub fn plain(id: u64, joints: &Joints) -> Self {
         let mut all = [None; N_TRUE];
         all[..14].copy_from_slice(joints);
@@ -46,8 +46,8 @@ impl Put {
         Self { id, joints: all }
     }
 
-    /// By the rule of 4D Association: the bottom of the head is the middle of the shoulders and of the ears, its top 0.125 m along the face
-    /// and 0.145 m up. The ears lie at 1 / 1.8 of the way from the neck to the top of the head.
+    /// Applies the rule of 4D Association. The bottom of the head is midway between the shoulders and the ears. Its top is 0.125 m from
+    /// there in the direction of the face, and 0.145 m up. The ears are at 1 / 1.8 of the distance from the neck to the top of the head.
     pub fn new(id: u64, joints: &Joints) -> Self {
         let middle = |a: usize, b: usize| Some(nalgebra::center(&joints[a]?, &joints[b]?));
         let [shoulders, hips] = [middle(8, 9), middle(2, 3)];
@@ -66,47 +66,47 @@ impl Put {
     }
 }
 
-/// The parts of a person that are right in a frame.
+/// Correct parts of a person in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartsOfFrame {
-    /// Who.
+    /// Id of the person.
     pub actor: usize,
-    /// How many, of how many.
+    /// Number of correct parts, and number of all parts.
     pub right: Share,
 }
 
 /// The score of a person.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Actor {
-    /// Parts that are right, in each frame in which the person is there.
+    /// Correct parts in each frame in which the person is present.
     pub parts: Vec<Share>,
-    /// In all frames, by the name of the part.
+    /// Correct parts over all frames, by the name of the part.
     pub by_part: BTreeMap<&'static str, Share>,
     /// Distances of the twelve joints of the limbs, metres.
     pub errors_m: Vec<Share>,
-    /// Frames in which the person was found.
+    /// Number of frames in which the person was found.
     pub n_found: usize,
-    /// How often the id changed.
+    /// Number of id changes.
     pub switches: usize,
     /// The id in the last frame in which the person was found.
     pub last_id: Option<u64>,
 }
 
-/// The score of a run.
+/// Score of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Score {
-    /// The people who were there, by their ids in the truth.
+    /// True people, by their ids in the truth.
     pub actors: BTreeMap<usize, Actor>,
-    /// Parts that are right, frame by frame.
+    /// Correct parts, for each frame.
     pub frames: Vec<Vec<PartsOfFrame>>,
     /// All ids in the output.
     pub ids: BTreeSet<u64>,
-    /// People in the output, in all frames together.
+    /// Number of people in the output, over all frames.
     pub n_put: usize,
 }
 
 impl Score {
-    /// Adds a frame: for every person who was there the nearest one in the output, the closest pairs first.
+    /// Adds a frame. Each true person is matched with the nearest person of the output, the closest pairs first.
     pub fn add(&mut self, truth: &[TruePerson], put: &[Put]) {
         self.ids.extend(put.iter().map(|person| person.id));
         self.n_put += put.len();
@@ -136,7 +136,7 @@ impl Score {
 }
 
 impl Put {
-    /// Mean distance of the joints, metres; `None` of fewer than four.
+    /// Returns the mean distance of the joints, metres; `None` for fewer than four joints.
     fn distance(&self, person: &TruePerson) -> Option<f64> {
         let each = person.joints.iter().zip(&self.joints);
         let each = each.filter_map(|(a, b)| Some((a - (*b)?).norm()));
@@ -146,7 +146,7 @@ impl Put {
 }
 
 impl Actor {
-    /// Adds a frame; returns the parts that are right.
+    /// Adds a frame, and returns the correct parts.
     fn add(&mut self, person: &TruePerson, put: Option<&Put>) -> Share {
         let error = |joint: usize| {
             let point = put.and_then(|put| put.joints[joint])?;
@@ -177,7 +177,7 @@ impl Actor {
 mod tests {
     use super::*;
 
-    /// A person of 1.7 m, somewhere.
+    /// Returns a person with a height of 1.7 m at a position.
     fn person(id: usize, x: f64) -> TruePerson {
         let joint = |nth: usize| Point3::new(x + 0.1 * (nth % 2) as f64, 0.0, 0.12 * nth as f64);
         TruePerson {

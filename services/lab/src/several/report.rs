@@ -1,4 +1,4 @@
-//! A run, summed up in numbers.
+//! Summary of a run in numbers.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use statistics::score::{Bootstrap, Share};
 use super::Run;
 use super::judge::{ACTORS, Actor, PartsOfFrame};
 
-/// Frames that are drawn together for an interval: a second.
+/// Number of consecutive frames in a block of the bootstrap: one second.
 const BLOCK: usize = 25;
 
 /// A number with its 95 % interval, by bootstrap over blocks of 25 frames.
@@ -17,54 +17,54 @@ const BLOCK: usize = 25;
 pub struct Measured {
     /// The number.
     pub value: f64,
-    /// The lower and the upper end.
+    /// Lower and upper end of the interval.
     pub interval: [f64; 2],
 }
 
 /// The score of a person.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActorReport {
-    /// The person, from 1 as in publications.
+    /// Id of the person, counted from 1 as in publications.
     pub actor: usize,
-    /// Frames in which the person is there, and was found.
+    /// Number of frames in which the person is present.
     pub frames: usize,
-    /// See [`frames`](Self::frames).
+    /// Number of frames in which the person was found.
     pub found: usize,
-    /// Parts that are right, percent.
+    /// Correct parts, percent.
     pub pcp3d: Option<Measured>,
-    /// The same for each part.
+    /// Correct parts by the name of the part, percent.
     pub parts: BTreeMap<&'static str, f64>,
     /// Mean distance of the twelve joints of the limbs, millimetres.
     pub mpjpe_mm: Option<Measured>,
-    /// How often the id changed.
+    /// Number of id changes.
     pub switches: usize,
 }
 
 /// The score of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// The views that were used, from 0.
+    /// Views that were used, counted from 0.
     pub views: Vec<usize>,
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
     /// Mean PCP3D of the first three actors, percent.
     pub mean_pcp3d: Option<Measured>,
-    /// The people who were there.
+    /// Results for each true person.
     pub actors: Vec<ActorReport>,
-    /// How often an id changed.
+    /// Number of id changes.
     pub switches: usize,
-    /// Number of ids that were given.
+    /// Number of different ids in the output.
     pub ids: usize,
     /// Mean number of people in the output of a frame.
     pub put_out: f64,
-    /// Time of the association alone, milliseconds a frame: median and 99th percentile.
+    /// Time of the association alone, milliseconds per frame: median and 99th percentile.
     pub association_ms: [f64; 2],
 }
 
 impl Report {
-    /// Sums up a run.
+    /// Summarises a run.
     ///
-    /// * `views`: those of the set that were used.
+    /// * `views`: the views of the set that were used.
     pub fn new(run: &Run, views: &[usize]) -> Self {
         let score = &run.score;
         let times: Vec<f64> = run.association.iter().map(|time| 1e3 * time.as_secs_f64()).collect();
@@ -112,7 +112,7 @@ pub(super) fn measured(frames: &[Share], scale: f64) -> Option<Measured> {
     })
 }
 
-/// Mean of the percentages of the first actors; `None` if one of them is never there.
+/// Returns the mean percentage of the first actors; `None` if one of them is never present.
 fn mean(frames: &[Vec<PartsOfFrame>]) -> Option<Measured> {
     let of_parts = |parts: &[PartsOfFrame]| {
         let of_actor = |id: usize| {

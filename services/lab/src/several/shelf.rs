@@ -1,4 +1,4 @@
-//! A set of several people in the layout of 4D Association's Shelf: what a detector found in every view, and where people were.
+//! A set of several people in the layout of 4D Association's Shelf: detections in every view, and the true positions of people.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,11 +11,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3};
 use people::{Detection, Keypoint, View};
 use serde::Deserialize;
 
-/// Keypoints of OpenPose's body-25.
+/// Number of keypoints in OpenPose's body-25.
 const N_KEYPOINTS: usize = 25;
-/// Joints of the truth: the first twelve of `skeleton::PARSE14`, then the bottom and the top of the head, and the middle of the hips.
+/// Number of joints in the truth: the first twelve of `skeleton::PARSE14`, the bottom and the top of the head, and the middle of the hips.
 pub(super) const N_TRUE: usize = 15;
-/// The ends of OpenPose's 26 part affinity fields.
+/// Keypoints at the two ends of OpenPose's 26 part affinity fields.
 const FIELDS: [[usize; 26]; 2] = [
     [
         1, 9, 10, 8, 8, 12, 13, 1, 2, 3, 2, 1, 5, 6, 5, 1, 0, 0, 15, 16, 14, 19, 14, 11, 22, 11,
@@ -25,16 +25,16 @@ const FIELDS: [[usize; 26]; 2] = [
         24,
     ],
 ];
-/// Most candidates of a keypoint, and people of a frame.
+/// Largest number of candidates for a keypoint, and of people in a frame.
 const MOST: usize = 1000;
-/// Least number of keypoints of a person.
+/// Smallest number of keypoints of a person.
 const LEAST_KEYPOINTS: usize = 5;
-/// Keypoints of less confidence do not count.
+/// Confidence of a keypoint below which it is ignored.
 const LEAST_CONFIDENCE: f64 = 0.05;
-/// Standard deviation of a keypoint of full confidence, as a share of the size of the picture of the person; of a lower confidence, more.
+/// Standard deviation of a keypoint with full confidence, as a share of the person's size in the picture; larger for lower confidence.
 const SD_SHARE: f64 = 0.02;
 
-/// Why a set could not be read.
+/// Reason why a set could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ShelfError {
     /// A file could not be read.
@@ -45,30 +45,30 @@ pub enum ShelfError {
         /// The cause.
         source: std::io::Error,
     },
-    /// The calibration is not what it should be.
+    /// The calibration does not have the expected form.
     #[error("{} is not a calibration of this layout: {reason}", path.display())]
     Calibration {
         /// The file.
         path: PathBuf,
-        /// The reason.
+        /// Reason for the error.
         reason: String,
     },
-    /// A text file of numbers is not what it should be.
+    /// A text file of numbers does not have the expected form.
     #[error("{}: number {number} should be {expected}", path.display())]
     Number {
         /// The file.
         path: PathBuf,
-        /// Position of the number in the file, from 1.
+        /// Position of the number in the file, counted from 1.
         number: usize,
-        /// A description of what it should be.
+        /// Description of the expected number.
         expected: &'static str,
     },
 }
 
-/// A person who was there.
+/// A true person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TruePerson {
-    /// Which person.
+    /// Id of the person.
     pub id: usize,
     /// The joints, metres.
     pub joints: [Point3<f64>; N_TRUE],
@@ -81,14 +81,14 @@ pub fn is_one(folder: &Path) -> bool {
         .all(|file| folder.join(file).is_file())
 }
 
-/// A set.
+/// A set of detections with truth.
 #[derive(Debug, Clone, Default)]
 pub struct Shelf {
     /// The cameras.
     pub cameras: Vec<Camera>,
-    /// Detections, frame by frame, view by view.
+    /// Detections by frame and view.
     pub frames: Vec<Vec<View>>,
-    /// Who was there, frame by frame.
+    /// True people by frame.
     pub truth: Vec<Vec<TruePerson>>,
 }
 
@@ -97,7 +97,7 @@ impl Shelf {
     ///
     /// # Errors
     ///
-    /// [`ShelfError`].
+    /// Fails with [`ShelfError`].
     pub fn read(folder: &Path) -> Result<Self, ShelfError> {
         let cameras = cameras(&folder.join("calibration.json"))?;
         let mut views = Vec::with_capacity(cameras.len());
@@ -116,7 +116,7 @@ impl Shelf {
         })
     }
 
-    /// The set with some of the views.
+    /// Returns the set with some of the views.
     #[must_use]
     pub fn with_views(&self, views: &[usize]) -> Self {
         Self {
@@ -181,7 +181,7 @@ fn read(path: &Path) -> Result<String, ShelfError> {
     })
 }
 
-/// The numbers of a text file, one after another.
+/// Reads the numbers of a text file one by one.
 struct Numbers<'a> {
     path: &'a Path,
     words: SplitAsciiWhitespace<'a>,
@@ -209,7 +209,7 @@ impl<'a> Numbers<'a> {
         })
     }
 
-    /// A number of things, of which there are not too many.
+    /// Reads a count, and checks its limit.
     fn count(&mut self, expected: &'static str) -> Result<usize, ShelfError> {
         let count: usize = self.next(expected)?;
         if count <= MOST {
@@ -260,7 +260,7 @@ fn detections(path: &Path, camera: &Camera) -> Result<Vec<View>, ShelfError> {
     Ok(frames)
 }
 
-/// Makes people of candidates: the strongest field first, one candidate of a keypoint for each person.
+/// Groups candidates into people: the strongest field first, with one candidate of a keypoint for each person.
 fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     struct Edge {
         strength: f64,
@@ -307,7 +307,7 @@ fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     seen(candidates, &groups)
 }
 
-/// The groups as people, and the candidates that are nobody's.
+/// Returns the groups as people, and the candidates that belong to no person.
 fn seen(candidates: &[Candidates], groups: &[Group]) -> View {
     let ways = joint_ways(&BODY_25.map(str::to_owned));
     let sizes: Vec<f64> = groups.iter().map(|group| size(candidates, group)).collect();
@@ -340,9 +340,9 @@ fn seen(candidates: &[Candidates], groups: &[Group]) -> View {
     }
 }
 
-/// A candidate with its deviation; `None` if the detector is too little sure of it.
+/// Returns a candidate with its standard deviation; `None` if the confidence is too low.
 ///
-/// * `size`: of the person in the picture, pixels.
+/// * `size`: size of the person in the picture, pixels.
 fn placed([x, y, confidence]: [f64; 3], size: f64) -> Option<Keypoint> {
     let sd_px = (SD_SHARE * size / confidence.max(LEAST_CONFIDENCE).sqrt()).max(1.0);
     (confidence > LEAST_CONFIDENCE).then_some(Keypoint {
@@ -352,7 +352,7 @@ fn placed([x, y, confidence]: [f64; 3], size: f64) -> Option<Keypoint> {
     })
 }
 
-/// A joint from the keypoints of a way.
+/// Returns a joint as the weighted sum of the keypoints in `way`.
 fn joint(candidates: &[Candidates], group: &Group, way: &Way, size: f64) -> Option<Keypoint> {
     let mut joint = Keypoint {
         at_px: [0.0; 2],
@@ -370,7 +370,7 @@ fn joint(candidates: &[Candidates], group: &Group, way: &Way, size: f64) -> Opti
     Some(joint)
 }
 
-/// The longer side of the box around a person, pixels.
+/// Returns the longer side of the box around a person, pixels.
 fn size(candidates: &[Candidates], group: &Group) -> f64 {
     let side = |axis: usize| {
         let each = group
@@ -419,7 +419,7 @@ fn truth(path: &Path) -> Result<Vec<Vec<TruePerson>>, ShelfError> {
 mod tests {
     use super::*;
 
-    /// Two candidates of every keypoint, 100 pixels apart, of two people.
+    /// Returns two candidates of every keypoint, 100 pixels apart, for two people.
     fn candidates() -> (Vec<Candidates>, Vec<Vec<f64>>) {
         let both = |nth: usize| [100.0, 200.0].map(|x| [x, 10.0 * nth as f64, 0.9]).to_vec();
         let field = vec![0.9, 0.1, 0.1, 0.8];
@@ -432,7 +432,7 @@ mod tests {
     #[test]
     fn the_strongest_fields_make_people_and_the_rest_is_loose() {
         let (mut candidates, mut fields) = candidates();
-        // A third right wrist that nothing leads to.
+        // A third right wrist, without a field that leads to it.
         candidates[4].push([300.0, 40.0, 0.5]);
         for field in [8, 9].into_iter().filter(|field| FIELDS[1][*field] == 4) {
             fields[field] = vec![0.9, 0.1, 0.0, 0.1, 0.8, 0.0];

@@ -1,4 +1,4 @@
-//! The files of a sequence.
+//! Files of a sequence.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,16 +16,16 @@ use super::{Job, absolute_path};
 
 const JPEG_QUALITY: u8 = 95;
 
-/// How pictures are stored.
+/// File format of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Lossless.
     Png,
-    /// Smaller, and as most cameras would have it (quality 95).
+    /// Smaller; most cameras use this format (quality 95).
     Jpg,
 }
 
-/// The name of a picture with its ending.
+/// Returns the name of a picture with its extension.
 pub(super) fn name(stem: &str, format: Format) -> String {
     match format {
         Format::Png => format!("{stem}.png"),
@@ -74,7 +74,7 @@ fn png(bytes: &mut Vec<u8>) -> PngEncoder<&mut Vec<u8>> {
     PngEncoder::new_with_quality(bytes, CompressionType::Fast, FilterType::Sub)
 }
 
-/// Writes the truth.
+/// Writes the ground truth.
 pub(super) fn truth(file: &Path, header: &Header, frames: &[Frame]) -> Result<(), Failure> {
     let mut lines = header.to_line().or_fail(ExitKind::Run)? + "\n";
     for frame in frames {
@@ -84,7 +84,7 @@ pub(super) fn truth(file: &Path, header: &Header, frames: &[Frame]) -> Result<()
     text(file, &lines)
 }
 
-/// Writes the rig that a user would have, and the exact one.
+/// Writes the rig that a user would have, and the exact rig.
 pub(super) fn rigs(folder: &Path, scene: &Scene) -> Result<(), Failure> {
     let written = scene.written_rig().or_fail(ExitKind::Usage)?;
     for (name, rig) in [("rig.toml", &written), ("rig-exact.toml", scene.rig())] {
@@ -96,7 +96,7 @@ pub(super) fn rigs(folder: &Path, scene: &Scene) -> Result<(), Failure> {
 
 /// Writes the deployment.
 ///
-/// * `name`: of the sequence.
+/// * `name`: name of the sequence.
 pub(super) fn deployment(
     folder: &Path,
     name: &str,
@@ -130,7 +130,7 @@ pub(super) fn deployment(
         };
         let (name, source) = (quoted(&camera.name), quoted(&source));
         write!(text, "\n[[camera]]\nname = {name}\nsource = {source}\n").or_fail(ExitKind::Run)?;
-        // The address of a scene has it.
+        // With `live`, the address of the scene contains the skew.
         let skew_ms = settings.skews_ms.get(nth).filter(|skews_ms| **skews_ms != 0.0 && !job.live);
         if let Some(skew_ms) = skew_ms {
             writeln!(text, "skew_ms = {skew_ms:?}").or_fail(ExitKind::Run)?;
@@ -145,7 +145,7 @@ pub(super) fn deployment(
     self::text(&folder.join("deployment.toml"), &text)
 }
 
-/// Writes a text.
+/// Writes a text file.
 pub(super) fn text(file: &Path, text: &str) -> Result<(), Failure> {
     put(file, text.as_bytes())
 }

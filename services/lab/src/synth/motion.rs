@@ -1,4 +1,4 @@
-//! Recorded motion in the place of an action.
+//! Recorded motion that replaces an action.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ use training::datasets::sequences::{
     MarkerTable, Motion, MotionError, MotionOptions, PRESETS, read_motion,
 };
 
-/// A table of how markers become joints: one that ships, by its name, or a file.
+/// Reads a table that maps markers to joints: a shipped table by its name, or a file.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is not such a table.
+/// Fails if the file cannot be read or is not such a table.
 pub fn marker_table(name: &Path) -> Result<MarkerTable, Failure> {
     let preset = name.to_str().filter(|text| PRESETS.contains(text));
     match preset.and_then(MarkerTable::preset) {
@@ -35,14 +35,14 @@ fn failed(error: MotionError) -> Failure {
     Failure::new(ExitKind::Input, error).with_hint(hint)
 }
 
-/// Reads what was recorded, to be performed.
+/// Reads a recorded motion.
 ///
-/// * `file`: C3D or TRC.
-/// * `table`: how its markers become joints; the first one that ships whose markers are there if not given.
+/// * `file`: C3D or TRC file.
+/// * `table`: map from markers to joints; if `None`, the first shipped table whose markers are all in the file.
 ///
 /// # Errors
 ///
-/// The file cannot be read; markers or frames are not there; nobody moves so.
+/// Fails if the file cannot be read, if markers or frames are missing, or if the motion is impossible for a person.
 pub fn recording(
     file: &Path,
     table: Option<&MarkerTable>,
@@ -66,7 +66,7 @@ fn performed(file: &Path, motion: &Motion) -> Recording {
     }
 }
 
-/// A name for folders and deployments: lower case, digits and hyphens, not long.
+/// Returns a short name for folders and deployments: lower case letters, digits and hyphens.
 fn name(file: &Path) -> String {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let plain = |letter: char| {
@@ -83,13 +83,13 @@ fn name(file: &Path) -> String {
     }
 }
 
-/// Frames of every camera: as many as are asked for, or as there are.
+/// Returns the number of frames per camera: the requested number, or the length of the recording.
 ///
-/// * `none`: what is asked for where nothing is said and nothing was recorded.
+/// * `none`: the default if no number is requested and there is no recording.
 ///
 /// # Errors
 ///
-/// Fewer were recorded.
+/// Fails if the recording is shorter than requested.
 pub fn n_frames(
     asked: Option<u64>,
     rate_hz: f64,
@@ -99,11 +99,11 @@ pub fn n_frames(
     let Some(recording) = recording else {
         return Ok(asked.unwrap_or(none));
     };
-    // The last frame may lie on the last posture.
+    // The last frame may be exactly at the last posture.
     let most = (recording.seconds() * rate_hz + 1e-6).floor() as u64 + 1;
     match asked {
         Some(asked) if asked > most => Err(format!(
-            "{asked} frames, but what was recorded ends after {most} at {rate_hz} frames a second"
+            "{asked} frames were requested, but the recording ends after {most} at {rate_hz} frames per second"
         ))
         .or_fail(ExitKind::Usage),
         asked => Ok(asked.unwrap_or(most)),

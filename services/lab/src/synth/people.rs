@@ -1,4 +1,4 @@
-//! The people on the pictures, as annotations.
+//! Annotations of the people in the pictures.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use training::datasets::Person;
 
 use super::files;
 
-/// Annotated people: the person, the name, and whether they are seen from behind.
+/// Annotated people: the person, the name, and whether the person is seen from behind.
 #[derive(Debug, Default)]
 pub(super) struct People(Vec<(Person, String, bool)>);
 
-/// The joint on the other side, in the order of `skeleton::PARSE14`.
+/// Index of the same joint on the other side of the body, in the order of `skeleton::PARSE14`.
 const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
 
 impl People {
@@ -24,7 +24,7 @@ impl People {
         self.0.len()
     }
 
-    /// Adds the people of a sequence that lies in a folder of that name.
+    /// Adds the people of a sequence, whose files are in the folder of this name.
     pub(super) fn append(&mut self, folder: &str, others: Self) {
         self.0.extend(others.0.into_iter().map(|(mut person, name, behind)| {
             person.image = Path::new(folder).join(&person.image);
@@ -32,7 +32,7 @@ impl People {
         }));
     }
 
-    /// Writes both files of annotations; none if there is nobody.
+    /// Writes both files of annotations; no files if there are no people.
     pub(super) fn write(&self, folder: &Path) -> Result<(), Failure> {
         if self.0.is_empty() {
             return Ok(());

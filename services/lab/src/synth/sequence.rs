@@ -1,4 +1,4 @@
-//! One sequence: its pictures made on all threads, its truth, its deployment.
+//! One sequence: renders its pictures on all threads, and writes its truth and its deployment.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,21 +13,21 @@ use super::people::People;
 use super::{Job, files, rig_failure};
 use inputs::make_folder;
 
-/// Frames that one thread makes one after the other, of one camera.
+/// Number of consecutive frames of one camera that one thread renders.
 const CHUNK: u64 = 8;
 
-/// A sequence to be written.
+/// A sequence to write.
 #[derive(Debug)]
 pub(super) struct Sequence<'a> {
     job: &'a Job,
-    /// The same scene on every thread.
+    /// The scene, shared by all threads.
     scene: Arc<Scene>,
     folder: PathBuf,
     name: String,
 }
 
 impl<'a> Sequence<'a> {
-    /// Puts the scene together and makes the folders.
+    /// Prepares the scene and creates the folders.
     pub(super) fn new(
         job: &'a Job,
         settings: &Settings,
@@ -71,7 +71,7 @@ impl<'a> Sequence<'a> {
         self.job.n_frames * self.n_cameras() as u64
     }
 
-    /// Writes everything but the annotated people, which are handed back.
+    /// Writes all files except the annotated people, which are returned.
     pub(super) fn write(&self, stop: &Stop, console: &dyn Console) -> Result<People, Failure> {
         let views: Result<Vec<View>, SceneError> = (0..self.n_cameras())
             .into_par_iter()
@@ -110,7 +110,7 @@ impl<'a> Sequence<'a> {
         Ok(self.people(&frames))
     }
 
-    /// Makes and writes one picture.
+    /// Renders and writes one picture.
     fn picture(&self, view: &mut View, frame: u64) -> Result<Seen, Failure> {
         if self.job.live {
             return Ok(view.truth(frame));
@@ -128,7 +128,7 @@ impl<'a> Sequence<'a> {
         Ok(seen)
     }
 
-    /// From chunks of one camera to frames of all.
+    /// Converts chunks of one camera to frames of all cameras.
     fn frames(&self, seen: &[Vec<Seen>], n_cameras: usize) -> Vec<Frame> {
         let frame = |frame: u64| {
             let (chunk, within) = ((frame / CHUNK) as usize, (frame % CHUNK) as usize);
@@ -145,7 +145,7 @@ impl<'a> Sequence<'a> {
         (0..self.job.n_frames).map(frame).collect()
     }
 
-    /// Everybody who is in a picture; a picture that repeats the one before is no other.
+    /// Returns all people in the pictures; a repetition of the previous picture does not count.
     fn people(&self, frames: &[Frame]) -> People {
         let mut people = People::default();
         if self.job.live {

@@ -1,4 +1,4 @@
-//! `parallax-lab train finder-pictures`, `parallax-lab train finder`, and `parallax-lab judge` of what comes out.
+//! `parallax-lab train finder-pictures`, `parallax-lab train finder`, and `parallax-lab judge` on the resulting detector.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! `parallax-lab train joints` and what uses its file: knees that are marked beyond those that the model was trained on.
+//! `parallax-lab train joints` and the commands that use its file. Knees are marked lower than in the training data of the model.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -10,11 +10,11 @@ use crate::common::Ended;
 
 /// The knees of a figure, and the hips above them.
 const KNEES: [[usize; 2]; 2] = [[1, 2], [4, 3]];
-/// How far beyond a knee it is marked, as a share of the thigh.
+/// Distance by which the mark is beyond the knee, as a share of the thigh.
 const BEYOND: f64 = 0.25;
 
 impl Drawn {
-    /// A trained model, people to learn joints from and others, whose knees are marked too low.
+    /// Trains a model, and draws people to learn joints from and other people, whose knees are marked too low.
     fn with_low_knees() -> Self {
         let drawn = Self::new(14);
         assert_ended(&drawn.train("m.fmp", &[]).wait(), 0, &[]);
@@ -44,7 +44,7 @@ impl Drawn {
         self.start(&[&words[..], more].concat()).wait()
     }
 
-    /// Returns the mean offset of a joint along its bone and the positions of joints, as printed by `judge`.
+    /// Returns the mean offset of a joint along its bone and the positions of the joints, as printed by `judge`.
     fn offset(&self, joint: &str, joint_map: &str) -> (f64, Value) {
         let words = ["judge", "m.fmp", "others-low.jsonl", "--json"];
         let more = ["--offsets", "--joint-map", joint_map];
@@ -59,7 +59,7 @@ impl Drawn {
         (along, report["joints"].clone())
     }
 
-    /// The right knee that `detect` finds.
+    /// Returns the right knee that `detect` finds.
     fn knee(&self, joint_map: &str) -> Value {
         let words = ["detect", "others/0.png", "--model", "m.fmp", "--json"];
         let more = ["--threshold", "-9", "--joint-map", joint_map];

@@ -1,4 +1,4 @@
-//! Measures the search of frames by the filters: on the GPU, and beside it on the processor.
+//! Measures the search of frames by the filters on the GPU, and on the processor for comparison.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -19,21 +19,21 @@ use super::provenance::Provenance;
 use super::report::Report;
 use crate::spread::Spread;
 
-/// Rounds before the first one that counts: kernels are compiled, memory is taken.
+/// Rounds before the measured ones, in which kernels are compiled and memory is allocated.
 const WARM_UP: usize = 3;
 
 /// Options of the benchmark of the GPU.
 #[derive(Debug, Clone)]
 pub struct Gpu {
-    /// Widths and heights of frames, pixels.
+    /// Widths and heights of the frames, pixels.
     pub sizes: Vec<[usize; 2]>,
-    /// Numbers of views that are searched at once.
+    /// Numbers of views that are searched at the same time.
     pub views: Vec<usize>,
-    /// Rates of frames, hertz; 0 for as fast as possible.
+    /// Frame rates, hertz; 0 for as fast as possible.
     pub rates_hz: Vec<f64>,
-    /// Frames of a row of the table.
+    /// Number of frames for each row of the table.
     pub frames: usize,
-    /// Says if software Vulkan will do.
+    /// True if software Vulkan is allowed.
     pub software: bool,
 }
 
@@ -43,7 +43,7 @@ struct Row {
     size: [usize; 2],
     n_views: usize,
     rate_hz: f64,
-    /// From the picture to poses and evidence of all views, milliseconds.
+    /// Time from the picture to poses and evidence of all views, milliseconds.
     spread: Option<Spread>,
 }
 
@@ -51,7 +51,7 @@ struct Row {
 ///
 /// # Errors
 ///
-/// There is no GPU, it cannot search, or it is lost.
+/// Fails if there is no GPU, if it cannot run the search, or if it is lost.
 pub fn gpu(options: &Gpu, verbosity: Verbosity) -> Result<Report, Failure> {
     let provenance = Provenance::now();
     let choice = if options.software {
@@ -88,7 +88,7 @@ pub fn gpu(options: &Gpu, verbosity: Verbosity) -> Result<Report, Failure> {
     Ok(options.report(provenance, &device, &rows))
 }
 
-/// A step for each view.
+/// Returns a search step for each view.
 fn steps(
     model: &Arc<Model>,
     [width, height]: [usize; 2],
@@ -149,7 +149,7 @@ fn measure(
     Ok(Spread::of(times))
 }
 
-/// A picture with edges in all directions: circles and noise.
+/// Returns a picture with edges in all directions: circles and noise.
 fn picture(width: usize, height: usize) -> Vec<u8> {
     let mut rng = fastrand::Rng::with_seed(1);
     let mut pixel = |at: usize| {

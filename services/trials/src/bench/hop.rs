@@ -16,11 +16,11 @@ use super::receiver::{N_PLACED, ReceiverReport, Spot, WARM_UP, write};
 
 /// Name of the receiving process.
 const RECEIVER: &str = "receiver";
-/// How long to wait for the receiver to start, and for its report.
+/// Longest time to wait for the receiver to start, and for its report.
 const PATIENCE: Duration = Duration::from_secs(30);
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The settings of a series.
+/// Settings of a series.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
     /// Name of the deployment.
@@ -31,20 +31,20 @@ pub(super) struct Series {
     pub n_messages: u64,
     /// Interval between messages.
     pub interval: Duration,
-    /// The scheduling of the receiver, and whether it polls.
+    /// Scheduling of the receiver, including whether it polls.
     pub receiver: Scheduling,
     /// The log level of the receiver.
     pub log: Level,
 }
 
-/// The measurements of a series.
+/// Measurements of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Measured {
     /// Number of measured messages that were sent.
     pub sent: u64,
     /// The report of the receiver.
     pub receiver: ReceiverReport,
-    /// Number of messages whose location both processes know.
+    /// Number of messages whose location is known in both processes.
     pub n_compared: usize,
     /// Number of these with the same location in both processes.
     pub n_same_place: usize,
@@ -52,7 +52,7 @@ pub(super) struct Measured {
     pub copied_bytes: u64,
 }
 
-/// Sends a series. `None` if it was interrupted.
+/// Sends a series. `None` if the benchmark was interrupted.
 pub(super) fn measure(series: &Series, stop: &Stop) -> Result<Option<Measured>, Failure> {
     let namespace = Namespace::new(&series.name)?;
     let limits = Limits::new(1, 1, 1);
@@ -64,7 +64,7 @@ pub(super) fn measure(series: &Series, stop: &Stop) -> Result<Option<Measured>, 
     );
     let [health, metrics] = process_topics(RECEIVER);
     let topics = [pixels, health, metrics];
-    // Dropped in reverse order: ports, topics, bus, and last the lock, which removes all files.
+    // These are dropped in reverse order: ports, topics, bus, and finally the lock, which removes all files.
     let lock = namespace.acquire()?;
     preflight(&topics)?;
     let bus = Bus::open(lock.namespace(), "sender", stop)?;
@@ -108,7 +108,7 @@ fn start(series: &Series, namespace: &Namespace) -> Result<Child, Failure> {
     Child::start(&executable, &args).or_fail(ExitKind::Run)
 }
 
-/// Sends all messages; returns the locations of the first ones, or `None` if it was interrupted.
+/// Sends all messages. Returns the locations of the first ones, or `None` if the benchmark was interrupted.
 fn send(
     series: &Series,
     publisher: &SlicePublisher<u8, FrameHeader>,
@@ -146,7 +146,7 @@ fn header(message: u64, status: Status) -> FrameHeader {
     }
 }
 
-/// Sends the end of the series to the receiver until it reports.
+/// Repeats the message that ends the series until the receiver sends its report.
 fn request_report(
     child: &mut Child,
     publisher: &SlicePublisher<u8, FrameHeader>,
@@ -179,10 +179,10 @@ fn no_report(child: &mut Child) -> Failure {
     for line in child.read_lines().unwrap_or_default() {
         output::message(line);
     }
-    Failure::new(ExitKind::Run, "the receiving process says nothing")
+    Failure::new(ExitKind::Run, "the receiving process does not respond")
 }
 
-/// The number of messages whose location both processes know, and of those with the same location.
+/// Returns the number of messages whose location is known in both processes, and how many of these have the same location.
 fn compare(sent: &[Spot], received: &[Spot]) -> (usize, usize) {
     let of = |message: u64| sent.iter().find(move |spot| spot.message == message);
     let pairs = received.iter().filter_map(|spot| Some((spot, of(spot.message)?)));

@@ -13,14 +13,14 @@ use super::workload::{Case, Measured, Workload};
 use crate::spread::Spread;
 use crate::trial::limit;
 
-/// The kind of load benchmark.
+/// Kind of load benchmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// All cameras in real time; then the same with one killed.
+    /// All cameras in real time; then the same with one camera killed.
     Latency,
-    /// All cameras, every frame, as fast as possible.
+    /// All cameras, with every frame processed as fast as possible.
     Throughput,
-    /// One camera, two, and so on, in real time; then all with one killed.
+    /// One camera, two cameras, and so on, in real time; then all cameras with one killed.
     Scale,
 }
 
@@ -35,13 +35,13 @@ impl Kind {
 
     fn title(self) -> &'static str {
         match self {
-            Self::Latency => "from capture to result at the pace of the clock, milliseconds",
-            Self::Throughput => "every frame as fast as it is taken, milliseconds",
-            Self::Scale => "one camera more from run to run, milliseconds",
+            Self::Latency => "from capture to result in real time, milliseconds",
+            Self::Throughput => "every frame, as fast as possible, milliseconds",
+            Self::Scale => "one more camera in each run, milliseconds",
         }
     }
 
-    /// The runs of a benchmark with at most `n_views` cameras.
+    /// Returns the runs of a benchmark with at most `n_views` cameras.
     fn cases(self, n_views: usize) -> Vec<Case> {
         let case = |n_views| Case {
             n_views,
@@ -62,11 +62,11 @@ impl Kind {
     }
 }
 
-/// Measures a deployment under load. `None` if it was interrupted.
+/// Measures a deployment under load. `None` if the benchmark was interrupted.
 ///
 /// # Errors
 ///
-/// The deployment cannot be read or used, has fewer cameras than requested, or a run fails.
+/// Fails if the deployment cannot be read or used, if it has fewer cameras than requested, or if a run fails.
 pub fn load(
     kind: Kind,
     options: &Options,
@@ -108,8 +108,8 @@ impl Options {
         let file = self.deployment.as_ref();
         let pictures = match file {
             Some(file) => file.display().to_string(),
-            None if self.live => format!("made while it runs, seed {}", self.seed),
-            None => format!("made beforehand, seed {}", self.seed),
+            None if self.live => format!("rendered during the run, seed {}", self.seed),
+            None => format!("rendered in advance, seed {}", self.seed),
         };
         json!({
             "views": n_views,
@@ -121,7 +121,7 @@ impl Options {
         })
     }
 
-    /// The requested limits, checked on the run with all cameras.
+    /// Returns the requested limits, checked on the run with all cameras.
     fn limits(&self, all: &[Measured]) -> Vec<Limit> {
         let whole = all.iter().rfind(|measured| !measured.case.has_dead);
         let end_to_end = whole.and_then(|whole| whole.end_to_end);
@@ -142,16 +142,24 @@ impl Options {
                 )
             }),
             self.min_rate_hz
-                .map(|min_rate_hz| limit::at_least("results a second", min_rate_hz, rate)),
+                .map(|min_rate_hz| limit::at_least("results per second", min_rate_hz, rate)),
         ];
         limits.into_iter().flatten().collect()
     }
 }
 
-/// The table: per run a row and one row per stage.
+/// Returns the table, with a row for each run and a row for each stage of a run.
 fn table(all: &[Measured]) -> Table {
     let mut table = Table::new([
-        "<run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
+        "<run",
+        "results",
+        "per second",
+        "p50",
+        "p99",
+        "p99.9",
+        "max",
+        "cpu",
+        "dropped",
     ]);
     for measured in all {
         let number =

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 pub struct Options {
     /// The deployment file; synthetic cameras if there is none.
     pub deployment: Option<PathBuf>,
-    /// Number of cameras: the first ones of the deployment file, all by default; 4 synthetic cameras by default.
+    /// Number of cameras. For a deployment file, the first ones are used, by default all; the default is 4 synthetic cameras.
     pub views: Option<usize>,
     /// Length of the footage of every run, seconds.
     pub seconds: u32,
@@ -25,10 +25,10 @@ pub struct Options {
     pub out: PathBuf,
     /// The name of the deployment, unique among those that run at the same time.
     pub name: String,
-    /// The largest median latency end to end of the run with all cameras, milliseconds.
+    /// Largest median of the end-to-end latency in the run with all cameras, milliseconds.
     pub max_p50_ms: Option<f64>,
-    /// The largest 99th percentile of the same, milliseconds.
+    /// Largest 99th percentile of the same latency, milliseconds.
     pub max_p99_ms: Option<f64>,
-    /// The least rate of results of the same run, per second.
+    /// Smallest rate of results in the same run, per second.
     pub min_rate_hz: Option<f64>,
 }

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use scene::{Scene, Settings, View};
 use terminal::output;
 
-/// Writes the first pictures of every camera into a subfolder with its name; false if it was interrupted.
+/// Writes the first pictures of every camera into a subfolder named after it; false if the benchmark was interrupted.
 ///
-/// * `quiet`: shows no progress.
+/// * `quiet`: true to show no progress.
 pub(super) fn draw(
     settings: &Settings,
     n_frames: u64,
@@ -47,7 +47,7 @@ pub(super) fn draw(
     Ok(!stop.is_requested())
 }
 
-/// Writes the pictures of a camera; removes pictures of an earlier benchmark.
+/// Writes the pictures of a camera, and removes pictures of an earlier benchmark.
 ///
 /// * `is_enough`: called after every picture; true ends the rendering.
 fn draw_view(

@@ -1,4 +1,4 @@
-//! The provenance of a measurement: time, machine, load, version and commit.
+//! Provenance of a measurement: time, machine, load, version and commit.
 
 use std::fs;
 use std::path::Path;
@@ -7,24 +7,24 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
-/// The provenance of a measurement.
+/// Provenance of a measurement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Provenance {
     /// Date and time, UTC.
     pub date: String,
-    /// Processor, number of usable cores, kernel.
+    /// Processor, number of usable cores, and kernel.
     pub machine: String,
     /// Load averages of the last 1, 5 and 15 minutes, before the measurement.
     pub load: String,
     /// Version of the program.
     pub version: &'static str,
-    /// Commit of the working tree that contains the executable, with `-dirty` if it has changes; `unknown` outside a
+    /// Commit of the working tree of the executable, with `-dirty` if the tree has changes; `unknown` outside a
     /// working tree.
     pub commit: String,
 }
 
 impl Provenance {
-    /// The provenance of a measurement that starts now.
+    /// Returns the provenance of a measurement that starts now.
     pub(super) fn now() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         let cores = runtime::own_cores().map_or(0, |own_core| own_core.len());
@@ -41,7 +41,7 @@ impl Provenance {
         }
     }
 
-    /// The provenance in two lines.
+    /// Returns the provenance in two lines.
     pub(super) fn text(&self) -> String {
         format!(
             "{}, version {}, commit {}\n{}, load average {}",
@@ -50,7 +50,7 @@ impl Provenance {
     }
 }
 
-/// The rest of the first line of a file that starts with a prefix; `unknown` if there is none.
+/// Returns the text after a prefix in the first line with this prefix; `unknown` if there is no such line.
 fn first(file: &str, prefix: &str) -> String {
     let text = fs::read_to_string(file).unwrap_or_default();
     let mut lines = text.lines();
@@ -76,7 +76,7 @@ fn git(folder: &Path, arguments: &[&str]) -> Option<String> {
 
 /// Formats seconds since 1970 as `2026-11-21 17:38:39 UTC`.
 ///
-/// The date by Howard Hinnant's `civil_from_days`: years start in March, so that a leap day is the last of its year.
+/// Uses Howard Hinnant's `civil_from_days`: years start in March, so that a leap day is the last day of its year.
 fn date(seconds: u64) -> String {
     let (days, second) = (seconds / 86_400 + 719_468, seconds % 86_400);
     let (era, day_of_era) = (days / 146_097, days % 146_097);

@@ -14,10 +14,10 @@ use crate::spread::Spread;
 
 /// Number of messages before the measured ones.
 pub(super) const WARM_UP: u64 = 64;
-/// Number of messages, from the first, whose location is recorded.
+/// Number of first messages whose location is recorded.
 pub(super) const N_PLACED: u64 = 32;
 
-/// The location of a message: file and offset. The same location in two processes means the same bytes.
+/// Location of a message: file and offset. The same location in two processes means the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Spot {
     /// The number of the message.
@@ -29,7 +29,7 @@ pub(super) struct Spot {
 }
 
 impl Spot {
-    /// The location of a message; none if it is not in shared memory.
+    /// Returns the location of a message; `None` if it is not in shared memory.
     pub(super) fn of(message: u64, payload: &[u8]) -> Option<Self> {
         let Mapped { inode, offset, .. } = mapped_at(payload).ok()??;
         Some(Self {
@@ -40,16 +40,16 @@ impl Spot {
     }
 }
 
-/// The report of the receiver at the end of a series.
+/// Report of the receiver at the end of a series.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct ReceiverReport {
     /// Number of measured messages that were received.
     pub received: u64,
-    /// Number of messages with a wrong content.
+    /// Number of messages with wrong content.
     pub broken: u64,
     /// Time from just before sending to just after receiving, microseconds.
     pub hop_us: Option<Spread>,
-    /// The locations of the first messages.
+    /// Locations of the first messages.
     pub spots: Vec<Spot>,
     /// Bytes copied by the receiver's ports.
     pub copied_bytes: u64,
@@ -61,7 +61,7 @@ pub(super) struct ReceiverReport {
 ///
 /// # Errors
 ///
-/// The arguments are invalid.
+/// Fails if the arguments are invalid.
 pub fn receive(arguments: &[OsString]) -> Result<ExitCode, Failure> {
     let (launch, _) = Launch::from_args(arguments.iter().cloned())?;
     Ok(run_service(launch, receive_all))
@@ -103,7 +103,7 @@ impl ReceiverReport {
     }
 }
 
-/// Writes the content of a message: its number at both ends, and the low byte of it in between.
+/// Writes the content of a message: its number at both ends, and the low byte of the number in between.
 pub(super) fn write(message: u64, payload: &mut [u8]) {
     payload.fill(message as u8);
     let number = message.to_le_bytes();
@@ -115,7 +115,7 @@ pub(super) fn write(message: u64, payload: &mut [u8]) {
     }
 }
 
-/// Returns true if a payload is that of a message; checks both ends and one byte in the middle.
+/// Returns true if a payload is the content of a message; checks both ends and one byte in the middle.
 fn is_of(message: u64, payload: &[u8]) -> bool {
     let number = message.to_le_bytes();
     let is_whole = payload.len() < 24 || payload[payload.len() / 2] == message as u8;

@@ -1,4 +1,4 @@
-//! The report of a benchmark, as text, as JSON, and as a record in a Markdown file.
+//! Report of a benchmark as text, as JSON, and as a record in a Markdown file.
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::provenance::Provenance;
 
-/// The report of a benchmark.
+/// Report of a benchmark.
 #[derive(Debug)]
 pub struct Report {
     /// The name of the benchmark.
@@ -20,13 +20,13 @@ pub struct Report {
     pub(super) title: String,
     /// The provenance of the measurements.
     pub(super) provenance: Provenance,
-    /// The settings, by name.
+    /// Settings by name.
     pub(super) settings: Value,
-    /// The numbers.
+    /// Table of the numbers.
     pub(super) table: Table,
     /// Lines below the table.
     pub(super) notes: Vec<String>,
-    /// The limits, with what was measured.
+    /// Limits, with the measured values.
     pub(super) limits: Vec<Limit>,
     /// The measurements as JSON.
     pub(super) numbers: Value,
@@ -42,7 +42,7 @@ impl Report {
     ///
     /// # Errors
     ///
-    /// The file cannot be written to.
+    /// Fails if the file cannot be written to.
     pub fn append(&self, file: &Path) -> Result<(), Failure> {
         let written = self.write_record(file);
         written.map_err(|error| failure::in_file(file, &error))
@@ -59,11 +59,11 @@ impl Report {
             self.text()
         );
         let mut record = OpenOptions::new().create(true).append(true).open(file)?;
-        // In one write, so that records of concurrent benchmarks do not mix.
+        // A single write, so that records of concurrent benchmarks do not mix.
         record.write_all(text.as_bytes())
     }
 
-    /// The report as JSON.
+    /// Returns the report as JSON.
     pub fn json(&self) -> Value {
         let limits = self.limits.iter().map(
             |limit| json!({ "what": limit.what, "asked": limit.asked, "got": limit.got, "held": limit.held }),
@@ -79,7 +79,7 @@ impl Report {
         })
     }
 
-    /// The report as text.
+    /// Returns the report as text.
     pub fn text(&self) -> String {
         let mut lines = vec![self.title.clone()];
         lines.extend(self.provenance.text().lines().map(str::to_owned));
@@ -98,7 +98,7 @@ impl Report {
     }
 }
 
-/// The settings as one line: `name value, name value`.
+/// Returns the settings in one line: `name value, name value`.
 fn settings(value: &Value) -> String {
     let entries = value.as_object().into_iter().flatten();
     let texts = entries.map(|(name, value)| match value {

@@ -1,4 +1,4 @@
-//! Measures one hop between two processes, with a receiver that is woken by an event or polls.
+//! Measures one hop between two processes, with a receiver that either is woken by an event or polls.
 
 use std::time::Duration;
 
@@ -22,13 +22,13 @@ pub struct Transport {
     pub messages: u64,
     /// Interval between messages, microseconds.
     pub interval_us: u64,
-    /// Sizes of messages, bytes, at least 16; one series each.
+    /// Sizes of messages, bytes, at least 16; one series for each size.
     pub bytes: Vec<usize>,
-    /// True if only the polling receiver is measured.
+    /// True to measure the polling receiver only.
     pub spin: bool,
-    /// Cores of the sender and the receiver; any if empty.
+    /// Cores of the sender and the receiver; any cores if empty.
     pub cores: Vec<usize>,
-    /// Real-time priority of both, 1 to 99.
+    /// Real-time priority of both processes, 1 to 99.
     pub priority: Option<u8>,
     /// The largest median of a hop with a receiver that is woken by an event, microseconds.
     pub max_event_us: Option<f64>,
@@ -45,17 +45,17 @@ struct Row {
     measured: Measured,
 }
 
-/// Measures all series. `None` if it was interrupted.
+/// Measures all series. `None` if the benchmark was interrupted.
 ///
 /// # Errors
 ///
-/// The number of cores is not 0 or 2; the receiving process cannot be started, or does not report.
+/// Fails if the number of cores is not 0 or 2, or if the receiving process cannot be started or does not report.
 pub fn transport(options: &Transport, verbosity: Verbosity) -> Result<Option<Report>, Failure> {
     let [sender, receiver] = options.scheduling()?;
     let provenance = Provenance::now();
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     for denied in sender.apply() {
-        tracing::warn!("{denied}; going on without. Try: {}", denied.hint());
+        tracing::warn!("{denied}; continuing without it. Try: {}", denied.hint());
     }
     let mut rows = Vec::new();
     for spins in [false, true] {
@@ -100,10 +100,11 @@ fn mode(spins: bool) -> &'static str {
 }
 
 impl Transport {
-    /// The scheduling of the sender and the receiver.
+    /// Returns the scheduling of the sender and the receiver.
     fn scheduling(&self) -> Result<[Scheduling; 2], Failure> {
         if ![0, 2].contains(&self.cores.len()) {
-            let message = "--cores takes two: the sender's and the receiver's";
+            let message =
+                "--cores needs two values: the core of the sender and that of the receiver";
             return Err(Failure::new(ExitKind::Usage, message));
         }
         let of = |index: usize| Scheduling {
@@ -145,7 +146,7 @@ impl Transport {
         }
     }
 
-    /// The requested limits, and those that always apply.
+    /// Returns the requested limits, and those that always apply.
     fn limits(&self, rows: &[Row]) -> Vec<Limit> {
         let mut limits = Vec::new();
         for (spins, most) in [(false, self.max_event_us), (true, self.max_polled_us)] {
@@ -159,9 +160,9 @@ impl Transport {
         let sum = |of: fn(&Measured) -> u64| rows.iter().map(|row| of(&row.measured)).sum::<u64>();
         let compared = sum(|measured| measured.n_compared as u64);
         limits.extend([
-            limit::at_least("messages asked where they lie", 1.0, Some(compared as f64)),
+            limit::at_least("messages with a known location", 1.0, Some(compared as f64)),
             limit::at_most(
-                "of these elsewhere than they were written",
+                "messages received at another location",
                 0.0,
                 Some((compared - sum(|measured| measured.n_same_place as u64)) as f64),
             ),
@@ -171,7 +172,7 @@ impl Transport {
                 Some(sum(|measured| measured.copied_bytes) as f64),
             ),
             limit::at_most(
-                "messages with another content",
+                "messages with wrong content",
                 0.0,
                 Some(sum(|measured| measured.receiver.broken) as f64),
             ),

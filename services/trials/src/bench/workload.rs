@@ -1,4 +1,4 @@
-//! The deployment of a load benchmark, and the measurements of its runs.
+//! Deployment of a load benchmark, and measurements of its runs.
 
 use core::fmt::{self, Display, Formatter};
 use std::fs;
@@ -20,11 +20,11 @@ use crate::trial::injection::{Injector, ProcessFault};
 use crate::trial::results::{self, FrameResult};
 use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
 
-/// How long a stage waits for a late view of synthetic cameras, milliseconds.
+/// Time that a stage waits for a late view of synthetic cameras, milliseconds.
 const DEADLINE_MS: u64 = 500;
-/// The stages that compute, in pipeline order.
+/// Stages with computation, in pipeline order.
 const STAGES: [&str; 5] = ["capture", "pose", "quality", "fuse", "triangulate"];
-/// Ticks per second in which the kernel counts processor time (`USER_HZ`).
+/// Ticks per second in the kernel's counts of processor time (`USER_HZ`).
 const TICKS_HZ: f64 = 100.0;
 
 /// A kind of run.
@@ -32,9 +32,9 @@ const TICKS_HZ: f64 = 100.0;
 pub(super) struct Case {
     /// Number of cameras.
     pub n_views: usize,
-    /// True if every frame is processed, as fast as possible.
+    /// True to process every frame as fast as possible.
     pub is_lossless: bool,
-    /// True if the process of the last camera is killed.
+    /// True to kill the process of the last camera.
     pub has_dead: bool,
 }
 
@@ -51,12 +51,12 @@ impl Display for Case {
 }
 
 impl Case {
-    /// The name of its output folder.
+    /// Returns the name of the output folder.
     fn folder(self) -> String {
         self.to_string().replace(", ", "-").replace(' ', "-")
     }
 
-    /// The `key=value` pairs that replace values of the deployment.
+    /// Returns the `key=value` pairs that replace values of the deployment.
     fn set(self) -> Vec<&'static str> {
         let mut set = if self.is_lossless {
             vec!["capture.mode=lossless"]
@@ -70,14 +70,14 @@ impl Case {
     }
 }
 
-/// The measurements of a run.
+/// Measurements of a run.
 #[derive(Debug)]
 pub(super) struct Measured {
     /// The kind of run.
     pub case: Case,
-    /// Number of results; after the kill, if a camera is killed.
+    /// Number of results; if a camera is killed, the number after the kill.
     pub n_results: usize,
-    /// Results per second, from the first to the last.
+    /// Results per second, from the first result to the last.
     pub rate_hz: Option<f64>,
     /// Time from the capture of the first picture to the result, milliseconds.
     pub end_to_end: Option<Spread>,
@@ -85,21 +85,21 @@ pub(super) struct Measured {
     pub stages: Vec<(&'static str, Spread)>,
     /// Processor time of all processes over the whole run, seconds.
     pub cpu_seconds: f64,
-    /// Frames and messages that were dropped.
+    /// Number of frames and messages that were dropped.
     pub n_dropped: u64,
     /// The report of `launch` as JSON.
     pub run: Value,
 }
 
 impl Measured {
-    /// Processor time per result, milliseconds. None for a run with a killed camera: its results before the kill are not
+    /// Returns the processor time per result, milliseconds. `None` for a run with a killed camera, because results before the kill are not
     /// counted.
     pub(super) fn cpu_ms_per_result(&self) -> Option<f64> {
         let is_whole = self.n_results > 0 && !self.case.has_dead;
         is_whole.then(|| 1e3 * self.cpu_seconds / self.n_results as f64)
     }
 
-    /// The measurements as JSON.
+    /// Returns the measurements as JSON.
     pub(super) fn json(&self) -> Value {
         let stages = self.stages.iter();
         let stages = stages.map(|(name, spread)| ((*name).to_owned(), json!(spread)));
@@ -118,23 +118,23 @@ impl Measured {
     }
 }
 
-/// The deployment of a load benchmark.
+/// Deployment of a load benchmark.
 #[derive(Debug)]
 pub(super) struct Workload {
     /// The deployment file.
     file: PathBuf,
-    /// The absolute folder for the results; every run has a subfolder.
+    /// Absolute folder for the results, with a subfolder for each run.
     folder: PathBuf,
-    /// The folder of pictures rendered in advance, with a subfolder per camera.
+    /// Folder of pictures rendered in advance, with a subfolder for each camera.
     pictures: Option<PathBuf>,
-    /// The `key=value` pairs that replace values of the file in all runs.
+    /// `key=value` pairs that replace values of the file in all runs.
     set: Vec<String>,
     n_views: usize,
     verbosity: Verbosity,
 }
 
 impl Workload {
-    /// Reads the deployment, or writes one with synthetic cameras. `None` if it was interrupted.
+    /// Reads the deployment, or writes one with synthetic cameras. `None` if the benchmark was interrupted.
     pub(super) fn new(
         options: &Options,
         verbosity: Verbosity,
@@ -167,12 +167,12 @@ impl Workload {
         Ok(is_ready.then_some(workload))
     }
 
-    /// The maximal number of cameras of a run.
+    /// Returns the largest number of cameras in a run.
     pub(super) fn n_views(&self) -> usize {
         self.n_views
     }
 
-    /// Writes a deployment with synthetic cameras, and their pictures; false if it was interrupted.
+    /// Writes a deployment with synthetic cameras, and their pictures; false if the benchmark was interrupted.
     fn write_synthetic(&mut self, options: &Options, stop: &Stop) -> Result<bool, Failure> {
         let n_frames = (options.rate_hz * f64::from(options.seconds)).round() as u64;
         let setup = SyntheticSetup {
@@ -204,7 +204,7 @@ impl Workload {
         Ok(is_done)
     }
 
-    /// Limits the footage to some seconds, and refuses more cameras than there are.
+    /// Limits the footage to some seconds; fails if more cameras are requested than exist.
     fn shorten(&mut self, options: &Options) -> Result<(), Failure> {
         let deployment = load::read(&self.file, &self.set)?.deployment;
         let n_cameras = deployment.cameras.len();
@@ -225,7 +225,7 @@ impl Workload {
         Ok(())
     }
 
-    /// The deployment of a run.
+    /// Returns the deployment of a run.
     fn deployment(&self, case: Case) -> Result<Deployment, Failure> {
         let more = case.set().into_iter().map(str::to_owned);
         let set: Vec<String> = self.set.iter().cloned().chain(more).collect();
@@ -240,7 +240,7 @@ impl Workload {
         Ok(deployment)
     }
 
-    /// Runs the deployment and measures it. `None` if it was interrupted.
+    /// Runs the deployment and measures it. `None` if the benchmark was interrupted.
     pub(super) fn measure(&self, case: Case, stop: &Stop) -> Result<Option<Measured>, Failure> {
         let deployment = self.deployment(case)?;
         let planned = Planned::new(&deployment, self.verbosity.level)?;
@@ -291,7 +291,7 @@ fn measured(case: Case, results: &[FrameResult], cpu_seconds: f64, report: &Repo
     }
 }
 
-/// Results per second, from the first to the last.
+/// Returns the results per second, from the first result to the last.
 fn rate_hz(results: &[FrameResult]) -> Option<f64> {
     let sent = || results.iter().map(|result| result.sent_ms);
     let (first, last) = (sent().reduce(f64::min)?, sent().reduce(f64::max)?);
@@ -309,7 +309,7 @@ fn spread(percentiles: &Percentiles) -> Spread {
     }
 }
 
-/// Keeps the first cameras, and removes settings that name others.
+/// Keeps the first cameras, and removes settings that name other cameras.
 fn keep_views(deployment: &mut Deployment, n_views: usize) {
     deployment.cameras.truncate(n_views);
     let names: Vec<String> = deployment.cameras.iter().map(|camera| camera.name.clone()).collect();
@@ -321,14 +321,14 @@ fn keep_views(deployment: &mut Deployment, n_views: usize) {
     }
 }
 
-/// Processor time of all child processes that have ended, seconds.
+/// Returns the processor time of all child processes that have ended, seconds.
 fn cpu_seconds_of_children() -> Result<f64, Failure> {
     let stat = fs::read_to_string("/proc/self/stat").or_fail(ExitKind::Run)?;
-    let seconds = parse_stat(&stat).ok_or("/proc/self/stat is not as it was expected");
+    let seconds = parse_stat(&stat).ok_or("/proc/self/stat has an unexpected format");
     seconds.or_fail(ExitKind::Run)
 }
 
-/// The sum of fields 16 and 17 of `/proc/PID/stat` (`proc_pid_stat(5)`), seconds. Fields are counted from the end of the
+/// Returns the sum of fields 16 and 17 of `/proc/PID/stat` (`proc_pid_stat(5)`), seconds. Fields are counted from the end of the
 /// name, which may contain any character.
 fn parse_stat(stat: &str) -> Option<f64> {
     let (_, fields) = stat.rsplit_once(") ")?;

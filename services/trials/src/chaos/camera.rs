@@ -15,25 +15,25 @@ use super::verdict::{Verdict, ms};
 use crate::trial::limit::{at_least, at_most};
 use crate::trial::results::FrameResult;
 
-/// The duration of the fault, as a share of the footage.
+/// Duration of the fault, as a share of the footage.
 const SHARE: f64 = 0.2;
-/// The number of repetitions after which a picture counts as frozen: small, so that a short run shows it.
+/// Number of repetitions after which a picture counts as frozen. It is small, so that a short run shows the fault.
 const FROZEN_AFTER: &str = "capture.frozen_after=2";
 
 /// Measurements of a run with a camera fault. Times are in milliseconds.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct CameraFailure {
-    /// The camera.
+    /// Name of the camera.
     pub camera: String,
-    /// The first frame of the fault, and the one after the last.
+    /// First frame of the fault, and first frame after it.
     pub span: [u64; 2],
-    /// The number of results of these frames that give each cause of the fault as the reason why the view is missing.
+    /// For each cause, the number of results of these frames that name it as the reason for the missing view.
     pub flagged: Vec<(String, usize)>,
-    /// The number of results of these frames that other views were used in.
+    /// Number of results of these frames that use other views.
     pub results_without_it: usize,
-    /// The longest time between two of these results.
+    /// Longest time between two of these results.
     pub longest_pause_ms: Option<f64>,
-    /// The time from the last result of these frames to the first result that the camera is used in again.
+    /// Time from the last result of these frames to the first result that uses the camera again.
     pub back_ms: Option<f64>,
 }
 
@@ -41,7 +41,7 @@ impl CameraFailure {
     /// Evaluates the results of a run.
     ///
     /// * `view`: the number of the camera's view.
-    /// * `span`: the first frame of the fault, and the one after the last.
+    /// * `span`: the first frame of the fault, and the first frame after it.
     pub(super) fn new(
         fault: CameraFault,
         camera: &str,
@@ -80,17 +80,22 @@ impl CameraFailure {
     /// Checks the limits of the scenario.
     pub(super) fn judge(&self, limits: &Limits, outcome: &RunOutcome) -> Vec<Limit> {
         let flagged = self.flagged.iter();
-        let flagged = flagged
-            .map(|(cause, n)| at_least(&format!("frames called {cause}"), 1.0, Some(*n as f64)));
+        let flagged = flagged.map(|(cause, n)| {
+            at_least(
+                &format!("frames reported as: {cause}"),
+                1.0,
+                Some(*n as f64),
+            )
+        });
         let mut checked: Vec<Limit> = flagged.collect();
         checked.extend([
             at_least(
-                "results of others meanwhile",
+                "results of the others during the fault",
                 1.0,
                 Some(self.results_without_it as f64),
             ),
             at_most(
-                "longest pause of results meanwhile, ms",
+                "longest pause between results, ms",
                 limits.max_pause_ms,
                 self.longest_pause_ms,
             ),
@@ -100,11 +105,11 @@ impl CameraFailure {
         checked
     }
 
-    /// The measurements as text.
+    /// Returns the measurements as text.
     fn measured(&self, n_results: usize) -> String {
         let flagged = self.flagged.iter().map(|(cause, n)| format!("{n} {cause}"));
         format!(
-            "{}, {} frames: {}; {} results without it, longest pause {}; back {}; {n_results} results",
+            "{}, {} frames: {}; {} results without the camera, longest pause: {}; back: {}; {n_results} results",
             self.camera,
             self.span[1] - self.span[0],
             flagged.collect::<Vec<_>>().join(", "),
@@ -153,7 +158,7 @@ mod tests {
     use super::*;
     use crate::trial::results::ViewResult;
 
-    /// A result of two views; the second is missing if there is a reason.
+    /// Returns a result of two views. If a reason is given, the second view is missing.
     fn moment(frame: u64, sent_ms: f64, missing: Option<&str>) -> FrameResult {
         let second = ViewResult {
             missing: missing.map(str::to_owned),
@@ -212,7 +217,10 @@ mod tests {
     fn an_undetected_fault_and_a_camera_that_never_returns_miss_limits() {
         let unnoticed: Vec<FrameResult> =
             (0..8).map(|i| moment(i, 100.0 * i as f64, None)).collect();
-        assert_eq!(missed(&failed(&unnoticed)), ["frames called camera gone"]);
+        assert_eq!(
+            missed(&failed(&unnoticed)),
+            ["frames reported as: camera gone"]
+        );
         let gone = Some("camera gone");
         let never_back: Vec<FrameResult> =
             (0..8).map(|i| moment(i, 100.0 * i as f64, gone.filter(|_| i > 1))).collect();

@@ -1,26 +1,26 @@
-//! Camera faults, and the status that their frames must have.
+//! Camera faults, and the expected status of the affected frames.
 
 use messages::Status;
 
 /// A fault of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraFault {
-    /// It is disconnected.
+    /// The camera is disconnected.
     Unplug,
-    /// It repeats the same picture.
+    /// The camera repeats the same picture.
     Freeze,
-    /// Its clock jumps, goes back and stops.
+    /// The camera's clock jumps, goes back and stops.
     Clock,
-    /// Its pictures have a wrong size.
+    /// The pictures have a wrong size.
     Size,
-    /// It skips every second frame.
+    /// The camera skips every second frame.
     Slow,
-    /// Its pictures cannot be decoded.
+    /// The pictures cannot be decoded.
     Damage,
 }
 
 impl CameraFault {
-    /// All of them.
+    /// All camera faults.
     pub(super) const ALL: [Self; 6] = [
         Self::Unplug,
         Self::Freeze,
@@ -30,23 +30,20 @@ impl CameraFault {
         Self::Damage,
     ];
 
-    /// The name of the scenario, and its description.
+    /// Returns the name of the scenario, and its description.
     pub(super) fn name_and_summary(self) -> [&'static str; 2] {
         match self {
             Self::Unplug => [
                 "camera-unplug",
-                "a camera is unplugged, and plugged in again",
+                "a camera is unplugged and plugged in again",
             ],
-            Self::Freeze => [
-                "camera-freeze",
-                "a camera gives the same picture again and again",
-            ],
+            Self::Freeze => ["camera-freeze", "a camera repeats the same picture"],
             Self::Clock => [
                 "camera-clock",
-                "the clock of a camera jumps, goes back and stands still",
+                "the clock of a camera jumps, goes back and stops",
             ],
-            Self::Size => ["camera-size", "a camera gives pictures of another size"],
-            Self::Slow => ["camera-slow", "a camera leaves out every second frame"],
+            Self::Size => ["camera-size", "a camera sends pictures of another size"],
+            Self::Slow => ["camera-slow", "a camera skips every second frame"],
             Self::Damage => [
                 "camera-damage",
                 "the pictures of a camera cannot be decoded",
@@ -54,7 +51,7 @@ impl CameraFault {
         }
     }
 
-    /// The faults of the source that it consists of, one after the other, and the status of the frames of each.
+    /// Returns the consecutive faults of the source that make up this fault, with the expected status of the frames of each.
     pub(super) fn parts(self) -> &'static [(&'static str, Status)] {
         match self {
             Self::Unplug => &[("unplug", Status::UNPLUGGED)],
@@ -70,9 +67,9 @@ impl CameraFault {
         }
     }
 
-    /// The setting `fault` of a camera.
+    /// Returns the setting `fault` of a camera.
     ///
-    /// * `span`: the first frame, and the one after the last.
+    /// * `span`: the first frame of the fault, and the first frame after it.
     pub(super) fn setting(self, [from, to]: [u64; 2]) -> String {
         let parts = self.parts();
         let each = ((to - from) / parts.len() as u64).max(1);

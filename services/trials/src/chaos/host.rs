@@ -1,4 +1,4 @@
-//! A deployment of two hosts on this machine, and a fault of the link or of the host with cameras.
+//! A deployment of two hosts on this machine, with a fault of the link or of the host with cameras.
 
 use core::time::Duration;
 use std::net::TcpListener;
@@ -16,14 +16,14 @@ use super::testbed::Testbed;
 use super::verdict::{self, Verdict};
 use crate::trial::limit::{at_most, none_of};
 
-/// How long the fault lasts.
+/// Duration of the fault.
 const FAULT: Duration = Duration::from_secs(3);
-/// Until the other host counts as gone, milliseconds: it is silent for 1.2 s, and a machine may be busy.
+/// Longest time until the other host counts as gone, milliseconds. A host is gone after a silence of 1.2 s, and the machine may be busy.
 const MAX_NOTICED_MS: f64 = 4000.0;
-/// How long to wait for the other host at first.
+/// Longest time to wait for the other host at the start.
 const PATIENCE: Duration = Duration::from_mins(2);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
-/// The host with cameras.
+/// Name of the host with cameras.
 const FAR: &str = "rack";
 
 /// Measurements of a run with a host fault.
@@ -31,7 +31,7 @@ const FAR: &str = "rack";
 struct Measured {
     gone_ms: Option<f64>,
     back_ms: Option<f64>,
-    /// Views whose frames are not all accounted for.
+    /// Views with frames that are not accounted for.
     unaccounted: Vec<String>,
     state: Value,
 }
@@ -94,7 +94,7 @@ fn verdict(name: &str, options: &Options, measured: Measured) -> Verdict {
     Verdict {
         scenario: name.to_owned(),
         measured: format!(
-            "noticed {}, back after {}",
+            "noticed: {}, back: {}",
             verdict::ms(gone_ms),
             verdict::ms(back_ms)
         ),
@@ -109,15 +109,15 @@ fn verdict(name: &str, options: &Options, measured: Measured) -> Verdict {
     }
 }
 
-/// The run of a host; it ends with this.
+/// The run of a host; it ends when this value is dropped.
 struct Running(Child);
 
 impl Running {
-    /// Kills it; its processes end with it.
+    /// Kills the run; its processes end with it.
     fn end(&mut self) {
         let ended = self.0.kill().and_then(|()| self.0.wait());
         if let Err(error) = ended {
-            tracing::debug!(%error, "a host that had ended");
+            tracing::debug!(%error, "the host had already ended");
         }
     }
 }
@@ -130,7 +130,7 @@ impl Drop for Running {
 
 struct Watch<'a> {
     testbed: &'a Testbed,
-    /// The state of the hosts.
+    /// File with the state of the hosts.
     state: PathBuf,
 }
 
@@ -139,7 +139,7 @@ impl Watch<'_> {
         serde_json::from_str(&std::fs::read_to_string(&self.state).ok()?).ok()
     }
 
-    /// Waits until the state of the hosts satisfies `is_so`; `None` if it does not within `limit`.
+    /// Waits until the state of the hosts satisfies `is_so`; `None` if this takes longer than `limit`.
     fn until(&self, limit: Duration, is_so: impl Fn(&Value) -> bool) -> Option<Value> {
         let begin = Instant::now();
         while begin.elapsed() < limit && !self.testbed.stop.is_requested() {
@@ -161,13 +161,13 @@ fn views(state: &Value) -> impl Iterator<Item = &Value> {
     hosts.flat_map(|host| host["views"].as_array().into_iter().flatten())
 }
 
-/// Frames of the other host that were used, of the view that has the fewest.
+/// Returns the number of used frames of the other host, for the view with the fewest.
 fn n_used(state: &Value) -> u64 {
     let used = views(state).filter_map(|view| view["used"].as_u64());
     used.min().unwrap_or(0)
 }
 
-/// Views whose frames are not all accounted for.
+/// Returns the views with frames that are not accounted for.
 fn unaccounted(state: &Value, n_frames: u64) -> Vec<String> {
     let sum = |view: &Value| {
         let counts = ["used", "late", "gone", "left_out"];
@@ -178,7 +178,7 @@ fn unaccounted(state: &Value, n_frames: u64) -> Vec<String> {
         .map(|view| format!("view {}: {} of {n_frames}", view["view"], sum(view)))
         .collect();
     if views(state).next().is_none() {
-        odd.push("all: there is no hosts.json".to_owned());
+        odd.push("all: hosts.json is missing".to_owned());
     }
     odd
 }
@@ -187,7 +187,7 @@ fn free_port() -> std::io::Result<u16> {
     Ok(TcpListener::bind(("127.0.0.1", 0))?.local_addr()?.port())
 }
 
-/// Writes the deployment with its hosts, for one of them; the first half of the cameras is connected to the one that fuses.
+/// Writes the deployment with its hosts, for one of them. The first half of the cameras is connected to the fusing host.
 fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
     let text = std::fs::read_to_string(&testbed.file)
         .map_err(|error| failure::in_file(&testbed.file, &error))?;

@@ -1,19 +1,19 @@
-//! Faults of a host, or of the link to it.
+//! Faults of a host or of the link to it.
 
 /// A fault of a host or its link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostFault {
     /// The link is cut for three seconds.
     Cut,
-    /// The host with cameras is killed, and started again.
+    /// The host with cameras is killed and restarted.
     Kill,
 }
 
 impl HostFault {
-    /// Both.
+    /// Both faults.
     pub(super) const ALL: [Self; 2] = [Self::Cut, Self::Kill];
 
-    /// The name of its scenario, and what happens.
+    /// Returns the name of the scenario, and its description.
     pub(super) fn name_and_summary(self) -> [&'static str; 2] {
         match self {
             Self::Cut => [

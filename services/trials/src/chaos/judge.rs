@@ -10,32 +10,32 @@ use crate::trial::cost::Cost;
 use crate::trial::injection::ProcessFault;
 use crate::trial::limit::{at_least, at_most, none_of};
 
-/// The longest time until a death is noticed, milliseconds.
+/// Longest time until a death is noticed, milliseconds.
 const NOTICE_MS: f64 = 1000.0;
-/// The longest time from the hang limit until a hang is noticed, milliseconds.
+/// Longest time from the hang limit until a hang is noticed, milliseconds.
 const LATE_MS: f64 = 1000.0;
-/// Frames that may be unaccounted for per kill: the one that the process held, and one that its last health message did
+/// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
 /// not count.
 const MAX_UNACCOUNTED: u64 = 2;
-/// Growth allowed for a resource: by this factor, plus the following amounts.
+/// Factor by which a resource may grow; the following amounts are added.
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
 
-/// The outcome of a run, as far as it is the same for all scenarios.
+/// Part of a run's outcome that is the same for all scenarios.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RunOutcome {
-    /// Why the run failed, if it did.
+    /// Reason why the run failed; `None` if it did not fail.
     pub failure: Option<String>,
     /// Number of results that were written.
     pub n_results: usize,
     /// Number of frames, over all views, that are unaccounted for.
     pub unanswered: u64,
-    /// Processes that were restarted more often than faults were injected into them, or were given up.
+    /// Processes that were given up, or were restarted more often than faults were injected into them.
     pub failed: Vec<String>,
     /// Names of the files left in shared memory.
     pub leftovers: Vec<String>,
-    /// Cameras whose calibration is suspected to be wrong although it is right.
+    /// Cameras whose calibration is wrongly suspected.
     pub suspected: Vec<String>,
 }
 
@@ -50,24 +50,21 @@ impl RunOutcome {
             none_of("failures of the run", &failure),
             at_least("results", 1.0, Some(self.n_results as f64)),
             at_most(
-                "frames whose end is not known",
+                "frames unaccounted for",
                 (MAX_UNACCOUNTED * n_kills) as f64,
                 unanswered,
             ),
-            none_of("processes that failed by themselves", &self.failed),
-            none_of("left in shared memory", &self.leftovers),
-            none_of(
-                "cameras reported as moved that stand where they should",
-                &self.suspected,
-            ),
+            none_of("other processes that failed", &self.failed),
+            none_of("files left in shared memory", &self.leftovers),
+            none_of("cameras wrongly reported as moved", &self.suspected),
         ]
     }
 }
 
 /// Checks a run with one fault of a process.
 ///
-/// * `hang_ms`: how long a stopped process may send no heartbeat, or a spinning one report no progress, before the
-///   supervisor kills it.
+/// * `hang_ms`: time without heartbeats (for a stopped process) or without progress (for an endless loop) after which the
+///   supervisor kills the process.
 pub(super) fn once(
     requested: &Limits,
     fault: ProcessFault,
@@ -82,14 +79,14 @@ pub(super) fn once(
     let back = requested.max_return_ms + patience;
     let pause = match service_of(process) {
         "capture" | "pose" | "quality" => requested.max_pause_ms,
-        // Without the others some or all results are missing.
+        // Without the other processes, some or all results are missing.
         _ => back,
     };
     let mut limits = vec![
         at_most("noticed after, ms", notice, cost.noticed_ms),
         at_most("back after, ms", back, cost.back_ms),
         at_most(
-            "longest pause of results meanwhile, ms",
+            "longest pause between results, ms",
             pause,
             cost.longest_pause_ms,
         ),
@@ -98,14 +95,14 @@ pub(super) fn once(
     limits
 }
 
-/// The measurements of a run with random kills.
+/// Measurements of a run with random kills.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RandomKillsOutcome {
     /// Number of kills.
     pub n_kills: usize,
-    /// Downtimes of the processes that came back, milliseconds; none if none came back.
+    /// Downtimes of the processes that came back, milliseconds; `None` if none came back.
     pub downtime_ms: Option<Spread>,
-    /// The resources in use at the start and at the end; none if the run was too short.
+    /// Resources in use at the start and at the end; `None` if the run was too short.
     pub resources: Option<[ResourceUse; 2]>,
 }
 
@@ -118,7 +115,7 @@ pub(super) fn random(
     let mut limits = vec![
         at_least("kills", 1.0, Some(kills.n_kills as f64)),
         at_least(
-            "came back",
+            "kills with a recovery",
             kills.n_kills as f64,
             Some(kills.downtime_ms.map_or(0, |downtime_ms| downtime_ms.n) as f64),
         ),
@@ -136,41 +133,41 @@ pub(super) fn random(
         };
         limits.extend([
             grown(
-                "memory at last, MB",
+                "final memory, MB",
                 |used| used.memory_bytes,
                 MORE_BYTES,
                 1e6,
             ),
             grown(
-                "memory of the supervisor at last, MB",
+                "final memory of the supervisor, MB",
                 |used| used.supervisor_memory_bytes,
                 MORE_BYTES,
                 1e6,
             ),
             grown(
-                "shared memory at last, MB",
+                "final shared memory, MB",
                 |used| used.shared_bytes,
                 MORE_BYTES,
                 1e6,
             ),
             grown(
-                "descriptors at last",
+                "final number of descriptors",
                 |used| used.descriptors,
                 MORE_FILES,
                 1.0,
             ),
-            grown("files at last", |used| used.files, MORE_FILES, 1.0),
+            grown("final number of files", |used| used.files, MORE_FILES, 1.0),
         ]);
     }
     limits
 }
 
-/// The measurements of a run whose supervisor was killed, and of the next run.
+/// Measurements of a run whose supervisor was killed, and of the next run.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SupervisorKillOutcome {
-    /// Time from the kill until the last of its processes had ended, milliseconds; none if some did not end.
+    /// Time from the kill until the last process of the run had ended, milliseconds; `None` if some did not end.
     pub ended_ms: Option<f64>,
-    /// Number of files that were left for the next run to remove.
+    /// Number of files left for the next run to remove.
     pub files: u64,
     /// Time from the planning of the next run to its first result, milliseconds.
     pub result_ms: Option<f64>,
@@ -185,7 +182,11 @@ pub(super) fn supervisor(
     outcome: &RunOutcome,
 ) -> Vec<Limit> {
     let mut limits = vec![
-        at_most("its processes ended after, ms", NOTICE_MS, killed.ended_ms),
+        at_most(
+            "processes of the killed run ended after, ms",
+            NOTICE_MS,
+            killed.ended_ms,
+        ),
         at_most(
             "first result of the next run after, ms",
             requested.max_return_ms,
@@ -225,7 +226,7 @@ mod tests {
         missed.map(|missed| missed.what).collect()
     }
 
-    /// The limits that a good run misses after a change.
+    /// Returns the limits that a good run misses after a change.
     fn missed_once(
         fault: ProcessFault,
         process: &str,
@@ -250,28 +251,28 @@ mod tests {
             (|cost, _| cost.back_ms = None, &["back after, ms"]),
             (
                 |cost, _| cost.longest_pause_ms = Some(2001.0),
-                &["longest pause of results meanwhile, ms"],
+                &["longest pause between results, ms"],
             ),
             (|_, outcome| outcome.n_results = 0, &["results"]),
             (
                 |_, outcome| outcome.unanswered = 3,
-                &["frames whose end is not known"],
+                &["frames unaccounted for"],
             ),
             (
                 |_, outcome| outcome.failed = vec!["pose-1".to_owned()],
-                &["processes that failed by themselves"],
+                &["other processes that failed"],
             ),
             (
                 |_, outcome| outcome.leftovers = vec!["px".to_owned()],
-                &["left in shared memory"],
+                &["files left in shared memory"],
             ),
             (
                 |_, outcome| outcome.suspected = vec!["c1".to_owned()],
-                &["cameras reported as moved that stand where they should"],
+                &["cameras wrongly reported as moved"],
             ),
             (
                 |_, outcome| outcome.failure = Some("it broke".to_owned()),
-                &["failures of the run", "frames whose end is not known"],
+                &["failures of the run", "frames unaccounted for"],
             ),
         ];
         for (change, expected) in changes {
@@ -307,7 +308,7 @@ mod tests {
         assert_eq!(missed_once(ProcessFault::Kill, "capture-1", pause).len(), 1);
     }
 
-    /// The limits that a good run with random kills misses after a change.
+    /// Returns the limits that a good run with random kills misses after a change.
     fn missed_random(
         change: impl FnOnce(&mut RandomKillsOutcome, &mut ResourceUse),
     ) -> Vec<String> {
@@ -335,35 +336,34 @@ mod tests {
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 8] = [
             (|_, _| (), nothing),
-            (|series, _| series.n_kills = 4, &["came back"]),
+            (|series, _| series.n_kills = 4, &["kills with a recovery"]),
             (
                 |series, _| series.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
                 &["back after (p99), ms"],
             ),
             (
                 |_, used| used.memory_bytes = 143_000_000,
-                &["memory at last, MB"],
+                &["final memory, MB"],
             ),
             (
                 |_, used| used.supervisor_memory_bytes = 44_000_000,
-                &["memory of the supervisor at last, MB"],
+                &["final memory of the supervisor, MB"],
             ),
             (
                 |_, used| used.shared_bytes = 39_000_000,
-                &["shared memory at last, MB"],
+                &["final shared memory, MB"],
             ),
-            (|_, used| used.descriptors = 119, &["descriptors at last"]),
-            (|_, used| used.files = 64, &["files at last"]),
+            (
+                |_, used| used.descriptors = 119,
+                &["final number of descriptors"],
+            ),
+            (|_, used| used.files = 64, &["final number of files"]),
         ];
         for (change, expected) in changes {
             assert_eq!(missed_random(change), expected);
         }
         let none = random(&ASKED, &RandomKillsOutcome::default(), &good().1);
-        let expected = [
-            "kills",
-            "back after (p99), ms",
-            "frames whose end is not known",
-        ];
+        let expected = ["kills", "back after (p99), ms", "frames unaccounted for"];
         assert_eq!(missed(none), expected, "nobody was killed");
     }
 
@@ -386,7 +386,10 @@ mod tests {
             ended_ms: None,
             ..good_one.clone()
         };
-        assert_eq!(judge(&orphans), ["its processes ended after, ms"]);
+        assert_eq!(
+            judge(&orphans),
+            ["processes of the killed run ended after, ms"]
+        );
         let broken = SupervisorKillOutcome {
             result_ms: None,
             ..good_one

@@ -15,7 +15,7 @@ use super::testbed::Testbed;
 use super::verdict::Verdict;
 use crate::trial::limit::at_least;
 
-/// The rotation of the camera, degrees.
+/// Rotation of the camera, degrees.
 const DEGREES: f64 = 2.0;
 
 /// Rotates a camera of a rig by `DEGREES` about a random axis perpendicular to its optical axis.
@@ -59,13 +59,21 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     let fit = fit.unwrap_or_default();
     let px = |px: Option<f64>| px.map_or_else(|| "unknown".to_owned(), |px| format!("{px:.0} px"));
     let measured = format!(
-        "{camera} turned by {DEGREES} degrees: {}; cameras are {} apart with it, {} without; {} results",
-        if is_named { "named" } else { "not named" },
+        "{camera} rotated by {DEGREES} degrees: {}; cameras disagree by {} with it, {} without it; {} results",
+        if is_named {
+            "identified"
+        } else {
+            "not identified"
+        },
         px(fit.residual_px),
         px(fit.without_px),
         outcome.n_results,
     );
-    let named = at_least("it is named", 1.0, Some(f64::from(u8::from(is_named))));
+    let named = at_least(
+        "moved camera identified",
+        1.0,
+        Some(f64::from(u8::from(is_named))),
+    );
     let limits = [named].into_iter().chain(outcome.judge(0)).collect();
     Ok(Verdict {
         scenario: MOVED.to_owned(),

@@ -16,19 +16,19 @@ use super::testbed::Testbed;
 
 /// Number of results before the supervisor is killed.
 const RESULTS: usize = 3;
-/// How long to wait for these results.
+/// Longest time to wait for these results.
 const PATIENCE: Duration = Duration::from_mins(1);
-/// How long to wait for the orphaned processes to end.
+/// Longest time to wait for the orphaned processes to end.
 const ORPHAN_PATIENCE: Duration = Duration::from_secs(10);
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// Runs `parallax run` in a process of its own until there are results, and kills it.
+/// Runs `parallax run` in a separate process until there are results, and kills it.
 ///
 /// * `planned`: the plan of the same deployment.
 ///
 /// # Errors
 ///
-/// The run cannot be started, ends early, or has no results in time.
+/// Fails if the run cannot be started, ends early, or has no results in time.
 pub(super) fn kill(
     testbed: &Testbed,
     scenario: &str,
@@ -48,7 +48,7 @@ pub(super) fn kill(
     let mut supervisor = command.spawn().or_fail(ExitKind::Run)?;
     let outcome = wait_for_results(testbed, &mut supervisor, &results);
     let orphans = children(supervisor.id());
-    // Also after a failure: the process must not be left running.
+    // This also happens after a failure, so that the process does not keep running.
     supervisor.kill().or_fail(ExitKind::Run)?;
     let killed = Instant::now();
     supervisor.wait().or_fail(ExitKind::Run)?;
@@ -72,30 +72,30 @@ fn wait_for_results(testbed: &Testbed, supervisor: &mut Child, file: &Path) -> R
             return Ok(());
         }
         if let Some(status) = supervisor.try_wait().or_fail(ExitKind::Run)? {
-            let message = format!("the run ended before it was killed: {status}");
+            let message = format!("the run ended before it could be killed: {status}");
             return Err(Failure::new(ExitKind::Run, message));
         }
         if begin.elapsed() > PATIENCE {
-            let message = "the run that was to be killed gave no results";
+            let message = "the run that should be killed gave no results";
             return Err(Failure::new(ExitKind::Run, message));
         }
         std::thread::sleep(POLL_INTERVAL);
     }
 }
 
-/// The child processes of a process.
+/// Returns the child processes of a process.
 fn children(parent: u32) -> BTreeSet<u32> {
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
     let pids = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
     pids.filter(|pid| state(*pid).is_some_and(|state| state.1 == parent)).collect()
 }
 
-/// Returns true if a process runs; a zombie does not.
+/// Returns true if a process runs; a zombie process does not count.
 fn is_alive(pid: u32) -> bool {
     state(pid).is_some_and(|state| !['Z', 'X'].contains(&state.0))
 }
 
-/// The state and the parent of a process.
+/// Returns the state and the parent of a process.
 fn state(pid: u32) -> Option<(char, u32)> {
     parse(&fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)
 }

@@ -1,4 +1,4 @@
-//! The scenario `kill-random`: randomly chosen processes are killed, one after the other.
+//! The scenario `kill-random`: randomly chosen processes are killed one after the other.
 
 use failure::{Failure, now_nanos};
 use serde_json::json;
@@ -14,7 +14,7 @@ use super::testbed::Testbed;
 use super::verdict::{self, Verdict};
 use crate::spread::Spread;
 
-/// No process is killed after this share of the frames.
+/// Share of the frames after which no process is killed.
 const UNTIL: f64 = 0.8;
 /// Time between two kills, nanoseconds.
 const PERIOD: u64 = 2_000_000_000;

@@ -1,4 +1,4 @@
-//! Kills randomly chosen processes of a run, one after the other, and records their restarts.
+//! Kills randomly chosen processes of a run one after the other, and records their restarts.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -16,9 +16,9 @@ pub(super) struct RandomKills {
     random: Rng,
     /// Time between two kills, nanoseconds.
     period: u64,
-    /// No process is killed once there is a result of this frame.
+    /// Frame whose result ends the kills.
     until_frame: u64,
-    /// When the next process is killed; none before the first result.
+    /// Time of the next kill; `None` before the first result.
     next_at: Option<u64>,
     is_over: bool,
     /// Process id and epoch of the running processes, by name.
@@ -29,17 +29,17 @@ pub(super) struct RandomKills {
 /// One kill.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Kill {
-    /// The name of the process.
+    /// Name of the process.
     pub process: String,
     /// Times of the kill and of the restart.
     pub times: FaultTimes,
-    /// The epoch of the process after the kill.
+    /// Epoch of the process after the kill.
     pub epoch: u32,
 }
 
 impl Kill {
-    /// The downtime, milliseconds: from the kill until the process sent its first message that contributed to a
-    /// result, or, for processes that results do not name, until it reported that it has worked.
+    /// Returns the downtime, milliseconds. It ends when the process sends its first message that contributes to a
+    /// result. For processes that results do not name, it ends when the process reports that it has worked.
     ///
     /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
     pub(super) fn downtime_ms(
@@ -58,7 +58,7 @@ impl Kill {
 
 impl RandomKills {
     /// * `period`: the time between two kills, nanoseconds.
-    /// * `until_frame`: no process is killed once there is a result of this frame, so that all can come back.
+    /// * `until_frame`: frame whose result ends the kills, so that all processes have time to come back.
     pub(super) fn new(seed: u64, period: u64, until_frame: u64) -> Self {
         Self {
             random: Rng::with_seed(seed),
@@ -71,14 +71,14 @@ impl RandomKills {
         }
     }
 
-    /// All kills so far.
+    /// Returns all kills so far.
     pub(super) fn kills(&self) -> &[Kill] {
         &self.kills
     }
 
     /// Handles an event of the supervisor, and kills a process if it is time. Returns a message about the kill.
     ///
-    /// * `now`: `failure::now_nanos`.
+    /// * `now`: current time (`failure::now_nanos`).
     /// * `kill`: kills the process with this id.
     pub(super) fn handle(
         &mut self,
@@ -120,7 +120,7 @@ impl RandomKills {
         self.kill_if_due(now, kill)
     }
 
-    /// The kill of a process that is not back yet.
+    /// Returns the kill of a process that is not back yet.
     fn pending(&mut self, process: &str) -> Option<&mut Kill> {
         let mut kills = self.kills.iter_mut();
         kills.find(|kill| kill.process == process && kill.times.recovered.is_none())
@@ -168,7 +168,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// Passes an event at a time; returns the id of the process that was killed.
+    /// Passes an event at a time, and returns the id of the process that was killed.
     fn handle_at(random_kills: &mut RandomKills, event: &Event<'_>, ms: u64) -> Option<u32> {
         let mut killed = None;
         random_kills.handle(event, ms * MS, |pid| {
@@ -206,7 +206,7 @@ mod tests {
         handle_at(random_kills, &event, ms)
     }
 
-    /// Two running processes, and a result at 100 ms.
+    /// Returns the state with two running processes and a result at 100 ms.
     fn after_first_result() -> RandomKills {
         let mut random_kills = RandomKills::new(1, 2000 * MS, 90);
         handle_at(&mut random_kills, &started("triangulate", 70, 0), 0);
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2099), None);
         let first = health_at(&mut random_kills, "pose-0", 0, 1, 2100).unwrap();
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2200), None);
-        // The other process, because the first is not back.
+        // The other process is killed, because the first one is not back.
         let second = handle_at(
             &mut random_kills,
             &Event::Line {

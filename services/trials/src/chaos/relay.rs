@@ -1,4 +1,4 @@
-//! A relay on the loopback that stands for a cable between two hosts: it can be cut, and joined again.
+//! A relay on the loopback that simulates a cable between two hosts: it can be cut and reconnected.
 
 use core::time::Duration;
 use std::io::{self, Read as _, Write as _};
@@ -6,12 +6,12 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How long a thread of the relay sleeps at most before it looks whether it is to end.
+/// Longest sleep of a relay thread before it checks whether to end.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Most connections at the same time, either way a thread.
+/// Size of the buffer for relayed data, bytes.
 const BYTES: usize = 1 << 16;
 
-/// The relay; it ends when it is dropped.
+/// The relay, which ends when it is dropped.
 #[derive(Debug)]
 pub(super) struct Relay {
     port: u16,
@@ -20,7 +20,7 @@ pub(super) struct Relay {
 }
 
 impl Relay {
-    /// A relay to a port of this machine.
+    /// Starts a relay to a port of this machine.
     pub(super) fn to(port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", 0))?;
         let it = Self {
@@ -35,12 +35,12 @@ impl Relay {
         Ok(it)
     }
 
-    /// The port that it listens at.
+    /// Returns the port on which the relay listens.
     pub(super) fn port(&self) -> u16 {
         self.port
     }
 
-    /// Pulls the cable, or plugs it in: nothing passes, and neither side is told, as it is with a cable.
+    /// Unplugs or plugs in the cable. While it is unplugged, no data passes, and neither side is notified, as with a real cable.
     pub(super) fn cut(&self, is_cut: bool) {
         self.is_cut.store(is_cut, Ordering::Relaxed);
     }
@@ -61,16 +61,16 @@ fn accept(listener: &TcpListener, port: u16, flags: &Flags) {
             continue;
         };
         let address = SocketAddr::from(([127, 0, 0, 1], port));
-        // Where nobody listens the connection is closed, as it would be without the relay.
+        // If nothing listens on the port, the connection is closed, as without the relay.
         if let Ok(far) = TcpStream::connect_timeout(&address, Duration::from_secs(1))
             && let Err(error) = join(&near, &far, flags)
         {
-            tracing::debug!(%error, "a connection that is not relayed");
+            tracing::debug!(%error, "a connection cannot be relayed");
         }
     }
 }
 
-/// Relays both ways, each in a thread of its own.
+/// Relays both directions, each in its own thread.
 fn join(near: &TcpStream, far: &TcpStream, flags: &Flags) -> io::Result<()> {
     for it in [near, far] {
         it.set_nonblocking(false)?;
@@ -106,7 +106,7 @@ fn pass(mut from: TcpStream, mut to: TcpStream, (is_cut, is_over): &Flags) {
     }
     for it in [from, to] {
         if let Err(error) = it.shutdown(std::net::Shutdown::Both) {
-            tracing::debug!(%error, "a connection that was closed");
+            tracing::debug!(%error, "a connection was closed");
         }
     }
 }
@@ -125,7 +125,7 @@ mod tests {
         client.write_all(b"one ").unwrap();
         got.read_exact(&mut bytes).unwrap();
         relay.cut(true);
-        // What was on its way when the cable was pulled still arrives.
+        // Data that was in transit when the cable was unplugged still arrives.
         std::thread::sleep(3 * PAUSE);
         client.write_all(b"two ").unwrap();
         got.set_read_timeout(Some(5 * PAUSE)).unwrap();

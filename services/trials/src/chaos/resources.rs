@@ -1,7 +1,7 @@
 //! Measures the resources of a run every second: memory, descriptors and files.
 //!
-//! Buffers of a process grow to what its largest frame needed, so that an old process holds more than one that was just started.
-//! The resources of a run at its start and at its end are therefore compared at equal ages of its processes.
+//! The buffers of a process grow to the size that its largest frame needed, so an old process uses more memory than a new one.
+//! Therefore the resources at the start and at the end of a run are compared at equal ages of its processes.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -17,10 +17,10 @@ use crate::trial::injection::has_worked;
 
 /// Time between two samples, nanoseconds.
 const PERIOD: u64 = 1_000_000_000;
-/// The least number of samples at which growth is judged.
+/// Smallest number of samples from which growth is computed.
 const MIN_SAMPLES: usize = 9;
 
-/// The resources in use at one time.
+/// Resources in use at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub(super) struct ResourceUse {
     /// Anonymous resident memory (`RssAnon`) of all processes except the supervisor, bytes.
@@ -31,25 +31,25 @@ pub(super) struct ResourceUse {
     pub descriptors: u64,
     /// Files of the deployment, including those in shared memory.
     pub files: u64,
-    /// Allocated size of its files in shared memory, bytes.
+    /// Allocated size of the deployment's files in shared memory, bytes.
     pub shared_bytes: u64,
 }
 
-/// The resources in use at one time, and the memory of every process.
+/// Resources in use at one time, and the memory of every process.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Measured {
-    /// The resources of all processes.
+    /// Resources of all processes.
     pub used: ResourceUse,
-    /// Anonymous resident memory of every process except the supervisor, in the order in which they were asked for, bytes.
+    /// Anonymous resident memory of every process except the supervisor, in the order of the requested ids, bytes.
     pub memory_bytes: Vec<u64>,
 }
 
-/// A process that is measured.
+/// A measured process.
 #[derive(Debug)]
 struct Watched {
     pid: u32,
     epoch: u32,
-    /// When it was started, `failure::now_nanos`.
+    /// Time at which the process was started (`failure::now_nanos`).
     started_at: u64,
     /// True if it has worked in this epoch.
     has_worked: bool,
@@ -58,17 +58,17 @@ struct Watched {
 /// Resources in use at one time.
 #[derive(Debug)]
 struct Sample {
-    /// When, `failure::now_nanos`.
+    /// Time of the sample (`failure::now_nanos`).
     at: u64,
     used: ResourceUse,
-    /// Class of age and memory of every process, bytes; in the order of their names.
+    /// Age class and memory in bytes of every process, in the order of their names.
     processes: Vec<(u32, u64)>,
 }
 
-/// Takes a sample every second in which all processes work.
+/// Takes a sample in every second in which all processes work.
 #[derive(Debug, Default)]
 pub(super) struct ResourceMonitor {
-    /// By name.
+    /// Processes by name.
     processes: BTreeMap<String, Watched>,
     taken_at: u64,
     samples: Vec<Sample>,
@@ -77,7 +77,7 @@ pub(super) struct ResourceMonitor {
 impl ResourceMonitor {
     /// Handles an event of the supervisor, and takes a sample if it is time.
     ///
-    /// * `now`: `failure::now_nanos`.
+    /// * `now`: current time (`failure::now_nanos`).
     /// * `measure`: measures the processes with these ids.
     pub(super) fn handle(
         &mut self,
@@ -129,8 +129,8 @@ impl ResourceMonitor {
         }
     }
 
-    /// The resources at the start and at the end: the medians of the first and of the last third of the samples; the memory of
-    /// every process at equal ages. None if there are too few samples.
+    /// Returns the resources at the start and at the end: the medians over the first and the last third of the samples. The memory of
+    /// processes is compared at equal ages. `None` if there are too few samples.
     pub(super) fn ends(&self) -> Option<[ResourceUse; 2]> {
         let third = self.samples.len() / 3;
         if self.samples.len() < MIN_SAMPLES {
@@ -149,22 +149,22 @@ impl ResourceMonitor {
         Some([of(0)?, of(1)?])
     }
 
-    /// The median of the samples in a span of time; none if there are none.
+    /// Returns the median of the samples in a span of time; `None` if there are none.
     ///
-    /// * `span`: `failure::now_nanos`.
+    /// * `span`: start and end of the span (`failure::now_nanos`).
     pub(super) fn within(&self, span: &Range<u64>) -> Option<ResourceUse> {
         let within = self.samples.iter().filter(|sample| span.contains(&sample.at));
         median(within.map(|within| within.used))
     }
 }
 
-/// Ages of one class differ by less than a factor of two: the logarithm of the age in seconds.
+/// Returns the class of an age: the logarithm of the age in seconds. Ages in one class differ by less than a factor of two.
 fn age_class(nanos: u64) -> u32 {
     (nanos / 1_000_000_000).checked_ilog2().map_or(0, |exponent| exponent + 1)
 }
 
-/// The memory of all processes in two parts of a run, bytes: of every process the mean over the classes of age that it had in
-/// both, and of each class the median. A process that had no age in both counts in neither.
+/// Returns the memory of all processes in two parts of a run, bytes. For each process, it is the mean over the age classes that the process
+/// had in both parts, with the median of each class. A process without a common age class is left out.
 fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
     let n_processes = parts.iter().flat_map(|part| part.iter());
     let n_processes = n_processes.map(|process| process.processes.len()).max().unwrap_or(0);
@@ -195,7 +195,7 @@ fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
     sums
 }
 
-/// The median of every field; none if there are no samples.
+/// Returns the median of every field; `None` if there are no samples.
 fn median(samples: impl Iterator<Item = ResourceUse>) -> Option<ResourceUse> {
     let samples: Vec<ResourceUse> = samples.collect();
     let of = |number: fn(&ResourceUse) -> u64| {
@@ -214,7 +214,7 @@ fn median(samples: impl Iterator<Item = ResourceUse>) -> Option<ResourceUse> {
 
 /// Measures the resources of a deployment whose supervisor is this process.
 ///
-/// * `pids`: the ids of its other processes.
+/// * `pids`: ids of the other processes of the deployment.
 pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> Measured {
     let own = std::process::id();
     let descriptors = pids.iter().copied().chain([own]).map(descriptors);
@@ -234,25 +234,25 @@ pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> Measured {
     }
 }
 
-/// Allocated size of a file in shared memory, bytes: less than its length if pages were never written.
+/// Returns the allocated size of a file in shared memory, bytes. It is smaller than the file's length if some pages were never written.
 fn shared(name: &str) -> u64 {
     let found = fs::metadata(Path::new("/dev/shm").join(name));
     found.map_or(0, |file| file.blocks() * 512)
 }
 
-/// Number of files of a deployment, including those in shared memory.
+/// Returns the number of a deployment's files, including those in shared memory.
 pub(super) fn n_files(namespace: &Namespace) -> u64 {
     shared_files(namespace).len() as u64 + files(namespace.root())
 }
 
-/// The names of a deployment's files in shared memory.
+/// Returns the names of a deployment's files in shared memory.
 pub(super) fn shared_files(namespace: &Namespace) -> Vec<String> {
     let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
     names.filter(|name| name.starts_with(namespace.prefix())).collect()
 }
 
-/// Anonymous resident memory of a process, bytes; 0 if it has ended.
+/// Returns the anonymous resident memory of a process, bytes; 0 if it has ended.
 fn memory(pid: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"));
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(within(3..5), None);
     }
 
-    /// A sample of one process.
+    /// Returns a sample of one process.
     fn sample(age_s: u64, memory: u64) -> Sample {
         Sample {
             at: 0,
@@ -349,11 +349,11 @@ mod tests {
 
     #[test]
     fn memory_is_compared_at_equal_ages() {
-        // At first it is killed often, and at last grows old: what it holds depends on its age alone.
+        // The process is killed often at first and grows old at the end; its memory depends on its age alone.
         let young = [(1, 50), (5, 60), (1, 50), (2, 55)].map(|(age, memory)| sample(age, memory));
         let old = [(5, 60), (20, 120), (100, 180)].map(|(age, memory)| sample(age, memory));
         assert_eq!(at_equal_ages([&young, &old]), [60, 60]);
-        // What every new process holds more of was left by those before it.
+        // Each new process uses more memory because of data that earlier processes left behind.
         let leaking = [(1, 90), (2, 95), (5, 100)].map(|(age, memory)| sample(age, memory));
         assert_eq!(at_equal_ages([&young, &leaking]), [55, 95]);
         let older = [(50, 90)].map(|(age, memory)| sample(age, memory));

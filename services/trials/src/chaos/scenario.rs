@@ -1,4 +1,4 @@
-//! The scenarios, by name.
+//! Scenarios by name.
 
 use launch::SERVICES;
 
@@ -6,9 +6,9 @@ use super::fault::CameraFault;
 use super::host_fault::HostFault;
 use crate::trial::injection::ProcessFault;
 
-/// The name of the scenario with a camera that was moved after the calibration.
+/// Name of the scenario with a camera that was moved after the calibration.
 pub(super) const MOVED: &str = "camera-moved";
-/// The name of the scenario in which the process `results` is stopped for a while.
+/// Name of the scenario in which the process `results` is stopped for a while.
 pub(super) const STALL: &str = "stall-results";
 
 /// A fault to inject.
@@ -26,18 +26,18 @@ pub enum Scenario {
     Moved,
     /// The process `results` is stopped for a while.
     Stall,
-    /// A fault of a link between two hosts, or of one of them.
+    /// A fault of the link between two hosts, or of one of the hosts.
     Host(HostFault),
 }
 
 impl Scenario {
-    /// All scenarios.
+    /// Returns all scenarios.
     pub fn all() -> Vec<Self> {
         let once = |fault| SERVICES.map(|service| Self::Once(fault, service));
         let mut all = Vec::from(once(ProcessFault::Kill));
         all.push(Self::Random);
         all.extend(once(ProcessFault::Stop));
-        // Not `results`: no stage waits for it, and its work depends on the disk.
+        // The process `results` is excluded: no stage waits for it, and its work depends on the disk.
         let spinning = SERVICES.into_iter().filter(|service| *service != "results");
         all.extend(spinning.map(|spinning| Self::Once(ProcessFault::Spin, spinning)));
         all.push(Self::Supervisor);
@@ -47,17 +47,17 @@ impl Scenario {
         all
     }
 
-    /// The scenario with the given name, for the command line.
+    /// Returns the scenario with the given name, for the command line.
     ///
     /// # Errors
     ///
-    /// There is no scenario of that name; the message is for the user.
+    /// Fails if there is no scenario with that name; the message is for the user.
     pub fn by_name(name: &str) -> Result<Self, String> {
         let found = Self::all().into_iter().find(|scenario| scenario.name() == name);
-        found.ok_or_else(|| "there is no scenario of this name; --list names them all".to_owned())
+        found.ok_or_else(|| "there is no scenario of this name; --list shows all names".to_owned())
     }
 
-    /// Its name.
+    /// Returns the name of the scenario.
     pub fn name(self) -> String {
         match self {
             Self::Once(ProcessFault::Kill, service) => format!("kill-{service}"),
@@ -82,18 +82,17 @@ impl Scenario {
                 format!("a {service} process is stopped (SIGSTOP), as if it hung")
             }
             Self::Once(ProcessFault::Spin, service) => {
-                format!(
-                    "a {service} process computes for ever, with signs of life but without work"
-                )
+                format!("a {service} process loops endlessly: it sends heartbeats but does no work")
             }
-            Self::Random => "a process chosen at random is killed every two seconds".to_owned(),
+            Self::Random => "a randomly chosen process is killed every two seconds".to_owned(),
             Self::Supervisor => {
-                "`parallax run` itself is killed, and the same deployment started again".to_owned()
+                "`parallax run` itself is killed, and the same deployment is started again"
+                    .to_owned()
             }
             Self::Camera(it) => it.name_and_summary()[1].to_owned(),
-            Self::Moved => "a camera was turned by two degrees after the calibration".to_owned(),
+            Self::Moved => "a camera was rotated by two degrees after the calibration".to_owned(),
             Self::Stall => {
-                "the results process stands still for three seconds, and goes on".to_owned()
+                "the results process is stopped for three seconds, and then continues".to_owned()
             }
             Self::Host(it) => it.name_and_summary()[1].to_owned(),
         }
@@ -101,14 +100,14 @@ impl Scenario {
 
     /// Returns true if the scenario is possible with the processes of a deployment.
     ///
-    /// * `processes`: their names.
+    /// * `processes`: names of the processes.
     pub fn is_possible(self, processes: &[String]) -> bool {
         match self {
             Self::Once(_, service) => {
                 processes.iter().any(|process| service_of(process) == service)
             }
             Self::Random | Self::Supervisor | Self::Camera(_) | Self::Stall => true,
-            // Two of its cameras at either host; what carries messages is in some builds only.
+            // Each host needs two cameras, and not every build supports links between hosts.
             Self::Host(_) => {
                 bridge::HAS_LINK
                     && processes.iter().filter(|process| service_of(process) == "capture").count()
@@ -122,7 +121,7 @@ impl Scenario {
     }
 }
 
-/// The service of a process.
+/// Returns the service of a process.
 pub(super) fn service_of(process: &str) -> &str {
     process.split_once('-').map_or(process, |parts| parts.0)
 }

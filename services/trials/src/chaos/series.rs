@@ -1,4 +1,4 @@
-//! Reports a long run in parts: latency, kills and resources of each.
+//! Report of a long run in parts: latency, kills and resources in each part.
 
 use core::ops::Range;
 
@@ -10,10 +10,10 @@ use super::resources::{ResourceMonitor, ResourceUse};
 use crate::spread::Spread;
 use crate::trial::results::FrameResult;
 
-/// The numbers of a part of a run.
+/// Numbers of a part of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Part {
-    /// Its start, seconds since the planning of the run.
+    /// Start of the part, seconds since the planning of the run.
     pub from_s: f64,
     /// Number of kills.
     pub kills: usize,
@@ -21,14 +21,14 @@ pub(super) struct Part {
     pub results: usize,
     /// Time from the capture of the first picture to the result, milliseconds.
     pub end_to_end_ms: Option<Spread>,
-    /// The median resources; none if there was no second in which all processes worked.
+    /// Median resources; `None` if there was no second in which all processes worked.
     #[serde(rename = "held")]
     pub resources: Option<ResourceUse>,
 }
 
 /// Divides a run into parts.
 ///
-/// * `length`: the length of a part, nanoseconds; the last one may be shorter.
+/// * `length`: the length of a part, nanoseconds; the last part may be shorter.
 /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
 pub(super) fn parts(
     length: u64,
@@ -56,7 +56,7 @@ pub(super) fn parts(
     begins.map(part).collect()
 }
 
-/// The parts as a table: a header and one line per part; empty for a single part.
+/// Returns the parts as a table with a header and one line per part; empty for a single part.
 pub(super) fn table(parts: &[Part]) -> Vec<String> {
     if parts.len() < 2 {
         return Vec::new();
@@ -143,7 +143,7 @@ mod tests {
         }
     }
 
-    /// A monitor of one process with samples at the given seconds.
+    /// Returns a monitor of one process with samples at the given seconds.
     fn monitor(at_s: &[u64]) -> ResourceMonitor {
         let mut monitor = ResourceMonitor::default();
         let event = Event::Started {

@@ -16,33 +16,33 @@ use super::testbed::Testbed;
 use super::verdict::{Verdict, ms};
 use crate::trial::limit::{at_least, at_most};
 
-/// How long the process is stopped, nanoseconds.
+/// Duration of the stop, nanoseconds.
 const STALL_NANOS: u64 = 3_000_000_000;
-/// Settings with which the supervisor does not take it for hung.
+/// Settings with which the supervisor does not treat the process as hung.
 const NO_HANG_DETECTION: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];
-/// With realtime delivery: the least rate of results during the stall, as a share of the rate before.
+/// With realtime delivery, the smallest rate of results during the stop, as a share of the rate before it.
 const SHARE: f64 = 0.5;
 
 /// Stops and resumes the process `results`, and measures the rate of results.
 #[derive(Debug, Default)]
 pub(super) struct StallInjector {
-    /// The process is stopped once there is a result of this frame.
+    /// Frame after whose result the process is stopped.
     at_frame: u64,
     pid: Option<u32>,
     /// Time, nanoseconds, and number of results at the first health message with a result.
     first: Option<[u64; 2]>,
-    /// The same when the process was stopped.
+    /// Time, nanoseconds, and number of results when the process was stopped.
     stopped: Option<[u64; 2]>,
-    /// The same when the process was resumed.
+    /// Time, nanoseconds, and number of results when the process was resumed.
     resumed: Option<[u64; 2]>,
 }
 
-/// The measurements.
+/// Measurements of the stop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct StallMeasurement {
-    /// Duration of the stall, milliseconds.
+    /// Duration of the stop, milliseconds.
     pub stall_ms: f64,
-    /// Results per second before and during the stall.
+    /// Results per second before and during the stop.
     pub rates_hz: [f64; 2],
 }
 
@@ -54,9 +54,9 @@ impl StallInjector {
         }
     }
 
-    /// Handles an event of the supervisor, and stops or resumes the process if it is time. Returns a message about it.
+    /// Handles an event of the supervisor, and stops or resumes the process if it is time. Returns a message about the stop.
     ///
-    /// * `now`: `failure::now_nanos`.
+    /// * `now`: current time (`failure::now_nanos`).
     /// * `signal`: stops (true) or resumes (false) the process with this id.
     pub(super) fn handle(
         &mut self,
@@ -94,9 +94,11 @@ impl StallInjector {
         self.first.get_or_insert(state);
         let pid = self.pid?;
         let (stops, message) = match (self.stopped, self.resumed) {
-            (None, _) if frame >= self.at_frame => (true, "stopping results on purpose"),
+            (None, _) if frame >= self.at_frame => {
+                (true, "stopping the process results on purpose")
+            }
             (Some([at, _]), None) if state[0] - at >= STALL_NANOS => {
-                (false, "letting results go on")
+                (false, "resuming the process results")
             }
             _ => return None,
         };
@@ -112,7 +114,7 @@ impl StallInjector {
         })
     }
 
-    /// The measurements; none if the process was not stopped and resumed.
+    /// Returns the measurements; `None` if the process was not stopped and resumed.
     pub(super) fn measurement(&self) -> Option<StallMeasurement> {
         let [first, stopped, resumed] = [self.first?, self.stopped?, self.resumed?];
         let rate = |from: [u64; 2], to: [u64; 2]| {
@@ -125,7 +127,7 @@ impl StallInjector {
     }
 }
 
-/// Checks the limits: with realtime delivery the other processes go on; with lossless delivery nothing is lost.
+/// Checks the limits. With realtime delivery, the other processes must continue; with lossless delivery, no result may be lost.
 ///
 /// * `every_frame`: the number of frames, with lossless delivery.
 fn judge(
@@ -136,7 +138,7 @@ fn judge(
 ) -> Vec<Limit> {
     let most_ms = STALL_NANOS as f64 / 1e6 + requested.max_pause_ms;
     let mut limits = vec![at_most(
-        "it stood still, ms",
+        "duration of the stop, ms",
         most_ms,
         measurement.map(|measurement| measurement.stall_ms),
     )];
@@ -146,7 +148,11 @@ fn judge(
         let [before, meanwhile] =
             measurement.map_or([f64::NAN; 2], |measurement| measurement.rates_hz);
         let meanwhile = Some(meanwhile).filter(|value| value.is_finite());
-        at_least("results a second meanwhile", SHARE * before, meanwhile)
+        at_least(
+            "results per second during the stop",
+            SHARE * before,
+            meanwhile,
+        )
     });
     limits.extend(outcome.judge(0));
     limits
@@ -173,7 +179,7 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
     Ok(Verdict {
         scenario: STALL.to_owned(),
         measured: format!(
-            "results stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
+            "results stopped for {}; results per second: {before:.1} before, {meanwhile:.1} during the stop; {} results written",
             ms(measurement.map(|measurement| measurement.stall_ms)),
             outcome.n_results
         ),
@@ -192,7 +198,7 @@ mod tests {
 
     const SECOND: u64 = 1_000_000_000;
 
-    /// Passes a health message with a number of results at a time; returns whether the process was stopped or resumed.
+    /// Passes a health message with a number of results at a time. Returns true if the process was stopped, false if it was resumed.
     fn health_at(stall: &mut StallInjector, n_sent: u64, at: u64) -> Option<bool> {
         let health = Health {
             n_sent,
@@ -252,7 +258,10 @@ mod tests {
             })
         };
         assert_eq!(missed(with(2.0), None), [""; 0]);
-        assert_eq!(missed(with(1.9), None), ["results a second meanwhile"]);
+        assert_eq!(
+            missed(with(1.9), None),
+            ["results per second during the stop"]
+        );
         assert_eq!(missed(with(0.0), Some(20)), [""; 0]);
         assert_eq!(missed(with(0.0), Some(21)), ["results written"]);
         assert_eq!(missed(None, None).len(), 2);

@@ -1,4 +1,4 @@
-//! The deployment under test, and its runs.
+//! The deployment under test and its runs.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, Synt
 
 /// Frames per second of the synthetic cameras.
 const RATE_HZ: f64 = 5.0;
-/// How long a stage waits for a late view of the synthetic cameras, milliseconds.
+/// Time that a stage waits for a late view of the synthetic cameras, milliseconds.
 const DEADLINE_MS: u64 = 500;
 
 /// The deployment under test.
@@ -26,24 +26,24 @@ const DEADLINE_MS: u64 = 500;
 pub(super) struct Testbed {
     /// The deployment file.
     pub file: PathBuf,
-    /// The absolute folder for the results; every scenario has a subfolder.
+    /// Absolute folder for the results, with a subfolder for each scenario.
     pub folder: PathBuf,
     /// `key=value` pairs that replace values of the file.
     pub set: Vec<String>,
-    /// Verbosity: decides what is printed and logged.
+    /// Verbosity of printed output and the log.
     pub verbosity: Verbosity,
-    /// Ends the trial.
+    /// Stop request that ends the trial.
     pub stop: Stop,
 }
 
 /// A completed run.
 #[derive(Debug)]
 pub(super) struct CompletedRun {
-    /// Its report, or why it failed.
+    /// Report of the run, or the reason why it failed.
     pub report: Result<Report, Failure>,
-    /// Its results.
+    /// Results of the run.
     pub results: Vec<FrameResult>,
-    /// The files that it left behind.
+    /// Files that the run left behind.
     pub leftovers: Vec<String>,
 }
 
@@ -75,7 +75,7 @@ impl Testbed {
         Ok(testbed)
     }
 
-    /// Writes a deployment with synthetic cameras; returns its file.
+    /// Writes a deployment with synthetic cameras, and returns its file.
     fn write_synthetic(&self, options: &Options) -> Result<PathBuf, Failure> {
         let setup = SyntheticSetup {
             subject: 1,
@@ -92,7 +92,7 @@ impl Testbed {
         SyntheticDeployment::new(&setup, self.folder.clone())?.write(&setup)
     }
 
-    /// Limits the footage to some seconds; returns the name of the deployment.
+    /// Limits the footage to some seconds, and returns the name of the deployment.
     fn shorten(&mut self, seconds: u32) -> Result<String, Failure> {
         let planned = self.plan("", &[])?;
         let resolved = planned.resolved();
@@ -106,7 +106,7 @@ impl Testbed {
         Ok(resolved.deployment.name.clone())
     }
 
-    /// The `key=value` pairs of a scenario.
+    /// Returns the `key=value` pairs of a scenario.
     ///
     /// * `more`: pairs in addition to those of all scenarios.
     pub(super) fn set(&self, more: &[&str]) -> Vec<String> {
@@ -114,7 +114,7 @@ impl Testbed {
         self.set.iter().cloned().chain(more).collect()
     }
 
-    /// The output folder of a scenario.
+    /// Returns the output folder of a scenario.
     pub(super) fn output(&self, scenario: &str) -> PathBuf {
         self.folder.join(scenario)
     }
@@ -126,7 +126,7 @@ impl Testbed {
         self.plan_with(scenario, more, &|_| ())
     }
 
-    /// As [`Self::plan`].
+    /// Plans a run like [`Self::plan`], with further changes.
     ///
     /// * `change`: changes that `key=value` pairs cannot express.
     pub(super) fn plan_with(
@@ -141,9 +141,9 @@ impl Testbed {
         Planned::new(&loaded.deployment, self.verbosity.level)
     }
 
-    /// Runs the deployment to its end or to a failure.
+    /// Runs the deployment until it ends or fails.
     ///
-    /// * `on_event`: as for [`Planned::run`].
+    /// * `on_event`: see [`Planned::run`].
     pub(super) fn run(
         &self,
         planned: &Planned,
@@ -173,9 +173,9 @@ impl Testbed {
 }
 
 impl CompletedRun {
-    /// The outcome to check.
+    /// Returns the outcome to check.
     ///
-    /// * `n_faults`: the number of faults injected into a process.
+    /// * `n_faults`: returns the number of faults injected into a process.
     pub(super) fn outcome(&self, n_faults: impl Fn(&str) -> u32) -> RunOutcome {
         let report = self.report.as_ref().ok();
         RunOutcome {
@@ -190,7 +190,7 @@ impl CompletedRun {
         }
     }
 
-    /// The report as JSON; null if the run failed.
+    /// Returns the report as JSON; null if the run failed.
     pub(super) fn json(&self) -> Value {
         self.report.as_ref().map_or(Value::Null, Report::json)
     }

@@ -1,4 +1,4 @@
-//! The verdict on a scenario, as text and as JSON.
+//! Verdict on a scenario, as text and as JSON.
 
 use core::fmt::Write as _;
 
@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 use super::judge::{RandomKillsOutcome, SupervisorKillOutcome};
 use crate::trial::cost::Cost;
 
-/// The verdict on a scenario.
+/// Verdict on a scenario.
 #[derive(Debug)]
 pub(super) struct Verdict {
-    /// The name of the scenario.
+    /// Name of the scenario.
     pub scenario: String,
     /// The measurements as text.
     pub measured: String,
@@ -19,7 +19,7 @@ pub(super) struct Verdict {
     pub details: Vec<String>,
     /// The measurements as JSON.
     pub numbers: Value,
-    /// The limits, with what was measured.
+    /// Limits, with the measured values.
     pub limits: Vec<Limit>,
     /// The report on the run as JSON.
     pub run: Value,
@@ -31,7 +31,7 @@ impl Verdict {
         self.limits.iter().all(|limit| limit.held)
     }
 
-    /// The verdict as JSON.
+    /// Returns the verdict as JSON.
     pub(super) fn json(&self) -> Value {
         let limit = |limit: &Limit| json!({ "what": limit.what, "asked": limit.asked, "measured": limit.got, "held": limit.held });
         json!({
@@ -44,7 +44,7 @@ impl Verdict {
     }
 }
 
-/// The verdicts as a table, with the missed limits of each.
+/// Returns the verdicts as a table, with the missed limits of each.
 pub(super) fn table(verdicts: &[Verdict]) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -75,10 +75,10 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
     writeln!(text, "{n_held} of {} scenarios held", verdicts.len())
 }
 
-/// Text on a fault of a process.
+/// Describes the measurements of a process fault.
 pub(super) fn of_cost(process: &str, cost: &Cost, n_results: usize) -> String {
     format!(
-        "{process}: noticed {}, restarted {}, back {}; longest pause {} (before {}); {n_results} results",
+        "{process}: noticed: {}, restarted: {}, back: {}; longest pause: {} (before the fault: {}); {n_results} results",
         ms(cost.noticed_ms),
         ms(cost.restarted_ms),
         ms(cost.back_ms),
@@ -87,10 +87,10 @@ pub(super) fn of_cost(process: &str, cost: &Cost, n_results: usize) -> String {
     )
 }
 
-/// Text on random kills.
+/// Describes the measurements of random kills.
 pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -> String {
     let mut text = format!(
-        "{} kills; back p50 {}, p99 {}; {n_results} results",
+        "{} kills; back: p50 {}, p99 {}; {n_results} results",
         measured.n_kills,
         ms(measured.downtime_ms.map(|downtime_ms| downtime_ms.p50)),
         ms(measured.downtime_ms.map(|downtime_ms| downtime_ms.p99)),
@@ -100,7 +100,7 @@ pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -
         // Writing to a string cannot fail.
         let _infallible = write!(
             text,
-            "; at first and at last {:.0} and {:.0} MB, {} and {} descriptors, {} and {} files",
+            "; at the start and at the end {:.0} and {:.0} MB, {} and {} descriptors, {} and {} files",
             mb(first.memory_bytes + first.supervisor_memory_bytes),
             mb(last.memory_bytes + last.supervisor_memory_bytes),
             first.descriptors,
@@ -112,17 +112,17 @@ pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -
     text
 }
 
-/// Text on a killed supervisor.
+/// Describes the measurements of a killed supervisor.
 pub(super) fn of_orphans(killed: &SupervisorKillOutcome, n_results: usize) -> String {
     format!(
-        "its processes ended {}; {} files left for the next start, whose first result came {}; {n_results} results",
+        "processes ended: {}; {} files left for the next run; first result of the next run: {}; {n_results} results",
         ms(killed.ended_ms),
         killed.files,
         ms(killed.result_ms),
     )
 }
 
-/// A time in milliseconds, or `never`.
+/// Formats a time in milliseconds; `never` for `None`.
 pub(super) fn ms(time: Option<f64>) -> String {
     time.map_or_else(|| "never".to_owned(), |ms| format!("{ms:.0} ms"))
 }
@@ -168,6 +168,6 @@ mod tests {
             ..Cost::default()
         };
         let text = of_cost("pose-1", &cost, 7);
-        assert!(text.contains("noticed 3 ms, restarted never"), "{text}");
+        assert!(text.contains("noticed: 3 ms, restarted: never"), "{text}");
     }
 }

@@ -8,32 +8,32 @@ use super::score::Score;
 use crate::trial::cost::Cost;
 use crate::trial::limit::{at_least, at_most, none_of};
 
-/// Frames that may be unaccounted for per kill: the one that the process held, and one that its last health message did
+/// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
 /// not count.
 const MAX_UNACCOUNTED: u64 = 2;
 
 /// The measurements of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured<'a> {
-    /// Frames that the cameras should capture.
+    /// Number of frames that the cameras should capture.
     pub n_frames: u64,
-    /// Number of results, and of those with a skeleton.
+    /// Number of results, and number of results with a skeleton.
     pub n_results: [usize; 2],
-    /// The accuracy of the results.
+    /// Accuracy of the results.
     pub score: &'a Score,
-    /// The cost of the kill, if a kill was planned.
+    /// Cost of the kill; `None` if no kill was planned.
     pub cost: Option<&'a Cost>,
-    /// How long a stage waits for a late view, milliseconds.
+    /// Time that a stage waits for a late view, milliseconds.
     pub deadline_ms: f64,
     /// Computing time relative to a machine that keeps up with 5 frames per second, at least 1.
     pub slowness: f64,
-    /// Interval of frames relative to 5 frames per second, at least 1.
+    /// Interval between frames relative to 5 frames per second, at least 1.
     pub spread: f64,
-    /// The frame counts of every view.
+    /// Frame counts of every view.
     pub views: &'a [ViewReport],
-    /// Processes that ended unexpectedly, other than the one that was killed.
+    /// Processes that ended unexpectedly, except the killed one.
     pub failed: &'a [String],
-    /// Number of results that were not written, if it is known.
+    /// Number of results that were not written; `None` if unknown.
     pub n_unwritten: Option<u64>,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
             share(results, measured.n_frames as usize),
         ),
         at_least(
-            "of these with a skeleton, %",
+            "results with a skeleton, %",
             requested.min_skeletons,
             share(skeletons, results),
         ),
@@ -69,9 +69,9 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
                 (measured.spread * requested.max_return_ms).round(),
                 cost.back_ms,
             ),
-            at_least("results of the others meanwhile", least, results),
+            at_least("results of the others during the fault", least, results),
             at_most(
-                "longest pause of results meanwhile, ms",
+                "longest pause between results, ms",
                 (measured.slowness * requested.max_pause_ms).round(),
                 cost.longest_pause_ms,
             ),
@@ -85,11 +85,11 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     };
     limits.extend([
         at_most(
-            "frames whose end is not known",
+            "frames unaccounted for",
             may_be_lost as f64,
             Some(unanswered as f64),
         ),
-        none_of("processes that failed by themselves", measured.failed),
+        none_of("other processes that failed", measured.failed),
         at_most(
             "results not written",
             0.0,
@@ -99,8 +99,8 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     limits
 }
 
-/// Returns true if the camera was away for so long that there must be results of the other views meanwhile: longer than the
-/// usual pauses between results and the deadline of a late view.
+/// Returns true if the camera was away so long that there must be results of the other views in the meantime. This is the case if it was
+/// away longer than the usual pauses between results and the deadline for a late view.
 fn needs_results_meanwhile(cost: &Cost, deadline_ms: f64) -> bool {
     let away = cost.back_ms.unwrap_or(f64::INFINITY);
     away > 2.0 * cost.usual_pause_ms.unwrap_or(0.0) + deadline_ms
@@ -158,7 +158,7 @@ mod tests {
         }
     }
 
-    /// The measurements of a good run.
+    /// Measurements of a good run.
     struct Run {
         n_results: [usize; 2],
         score: Score,
@@ -207,7 +207,7 @@ mod tests {
         }
     }
 
-    /// The limits that a good run misses after a change.
+    /// Returns the limits that a good run misses after a change.
     fn missed(change: impl FnOnce(&mut Run)) -> Vec<String> {
         let limits = Run::changed(change).limits().into_iter();
         limits.filter(|limit| !limit.held).map(|limit| limit.what).collect()
@@ -224,10 +224,7 @@ mod tests {
         type Change = fn(&mut Run);
         let changes: [(Change, &str); 10] = [
             (|run| run.n_results = [9, 9], "frames with a result, %"),
-            (
-                |run| run.n_results = [90, 80],
-                "of these with a skeleton, %",
-            ),
+            (|run| run.n_results = [90, 80], "results with a skeleton, %"),
             (|run| run.score = score(Some(49.9)), "PCP3D at 0.5, %"),
             (|run| run.score = score(None), "PCP3D at 0.5, %"),
             (
@@ -240,19 +237,16 @@ mod tests {
             ),
             (
                 |run| run.changed_cost(|cost| cost.results_without_it = 0),
-                "results of the others meanwhile",
+                "results of the others during the fault",
             ),
             (
                 |run| run.changed_cost(|cost| cost.longest_pause_ms = Some(2001.0)),
-                "longest pause of results meanwhile, ms",
+                "longest pause between results, ms",
             ),
-            (
-                |run| run.views[0] = view(2),
-                "frames whose end is not known",
-            ),
+            (|run| run.views[0] = view(2), "frames unaccounted for"),
             (
                 |run| run.failed.push("pose-1".to_owned()),
-                "processes that failed by themselves",
+                "other processes that failed",
             ),
         ];
         for (change, expected) in changes {
@@ -274,11 +268,7 @@ mod tests {
         for (back_ms, pause_ms, expected) in [
             (16_000.0, 6000.0, &[][..]),
             (16_001.0, 6000.0, &["killed camera back after, ms"]),
-            (
-                16_000.0,
-                6001.0,
-                &["longest pause of results meanwhile, ms"],
-            ),
+            (16_000.0, 6001.0, &["longest pause between results, ms"]),
         ] {
             let got = missed(|run| {
                 slow(run);
@@ -311,12 +301,15 @@ mod tests {
             }
         };
         assert_eq!(missed(back(1099.0)), Vec::<String>::new());
-        assert_eq!(missed(back(1101.0)), ["results of the others meanwhile"]);
+        assert_eq!(
+            missed(back(1101.0)),
+            ["results of the others during the fault"]
+        );
     }
 
     #[test]
     fn without_a_kill_no_frame_may_be_unaccounted_for() {
         let got = missed(|run| run.cost = None);
-        assert_eq!(got, ["frames whose end is not known"]);
+        assert_eq!(got, ["frames unaccounted for"]);
     }
 }

@@ -1,4 +1,4 @@
-//! Measures the speed of this machine before and after the run: renders and processes frames in this process.
+//! Measures the speed of this machine before and after the run, by rendering and processing frames in this process.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,23 +16,23 @@ use crate::trial::synthetic::SyntheticDeployment;
 /// Frames per second on a machine that is fast enough.
 pub(super) const FULL_RATE_HZ: f64 = 5.0;
 
-/// The least frame rate, frames per second.
+/// Lowest frame rate, frames per second.
 const MIN_RATE_HZ: f64 = 0.25;
 
-/// The share of the interval between two frames that computing may take. The rest is for the overhead of processes and
+/// Share of the interval between two frames that computing may use. The rest is for the overhead of processes and
 /// for changes of the load.
 const SHARE: f64 = 0.5;
 
-/// Looks at a person whose last frame is long ago, in the place of one: into three boxes, and closer.
+/// Number of evaluations of the network for a person whose last frame is long ago, instead of one: three boxes, and a closer one.
 const LOOKS: f64 = 4.0;
 
-/// The duration of a measurement.
+/// Duration of a measurement.
 const SPAN: Duration = Duration::from_secs(2);
 
-/// The least number of its frames, in which every camera searches for the person once.
+/// Smallest number of measured frames; in these, every camera searches for the person once.
 const LEAST_FRAMES: u64 = 10;
 
-/// Renders frames of all cameras and finds the person in them, as the processes of the run do.
+/// Renders frames of all cameras and finds the person in them, like the processes of the run.
 pub(super) struct Gauge {
     views: Vec<GaugedView>,
 }
@@ -57,7 +57,7 @@ impl Gauge {
         let view = |camera: usize| {
             let view = View::new(&scene, camera).or_fail(ExitKind::Run)?;
             let step = process::network_step(resolved, camera)?
-                .ok_or("the demo is measured with a network")
+                .ok_or("the speed for the demo can only be measured with a network")
                 .or_fail(ExitKind::Run)?;
             Ok(GaugedView {
                 picture: vec![0; view.size().rgb_bytes()],
@@ -75,7 +75,7 @@ impl Gauge {
     /// Measures for about two seconds.
     pub(super) fn measure(&mut self) -> Result<Machine, Failure> {
         let load = load();
-        // A warm-up; then the person is looked for again.
+        // After a warm-up, the person is searched for again.
         self.frame(0)?;
         for view in &mut self.views {
             view.memory = NetworkMemory::default();
@@ -116,22 +116,22 @@ impl GaugedView {
     }
 }
 
-/// The measured speed of this machine.
+/// Measured speed of this machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Machine {
-    /// The load average of the last minute, before the measurement.
+    /// Load average of the last minute, before the measurement.
     load: Option<f64>,
     n_cores: usize,
     n_cameras: usize,
-    /// Time for one frame of all cameras on all cores in which the person is looked for everywhere, seconds.
+    /// Time for one frame of all cameras on all cores in which the person is searched for in the whole picture, seconds.
     search_s: f64,
-    /// Mean time where the person is followed from frame to frame, seconds.
+    /// Mean time for one frame in which the person is followed from the previous frame, seconds.
     followed_s: f64,
 }
 
 impl Machine {
-    /// Mean time for one frame of all cameras on all cores, seconds. On a machine that is too slow to follow the person from box to box, the
-    /// network looks around the last box as well, and into what it sees there.
+    /// Returns the mean time for one frame of all cameras on all cores, seconds. If the machine is too slow to follow the person from box
+    /// to box, the network is applied to more boxes: those around the last box, and a closer one.
     fn frame_s(&self) -> f64 {
         if self.followed_s <= SHARE * FOLLOWED_S {
             self.followed_s
@@ -140,7 +140,7 @@ impl Machine {
         }
     }
 
-    /// The frame rate of the cameras: at most `FULL_RATE_HZ`, and such that computing takes at most `SHARE` of the time.
+    /// Returns the frame rate of the cameras: at most `FULL_RATE_HZ`, and so low that computing takes at most `SHARE` of the time.
     pub(super) fn rate_hz(&self) -> f64 {
         let most = SHARE / self.frame_s();
         // Rounded to two decimals, for display.
@@ -148,17 +148,17 @@ impl Machine {
         rounded.clamp(MIN_RATE_HZ, FULL_RATE_HZ)
     }
 
-    /// Computing time relative to a machine that is fast enough; at least 1.
+    /// Returns the computing time relative to a machine that is fast enough; at least 1.
     pub(super) fn slowness(&self) -> f64 {
         (FULL_RATE_HZ * self.frame_s() / SHARE).max(1.0)
     }
 
-    /// Interval of frames relative to a machine that is fast enough; 1 to 20.
+    /// Returns the interval between frames relative to a machine that is fast enough; 1 to 20.
     pub(super) fn spread(&self) -> f64 {
         FULL_RATE_HZ / self.rate_hz()
     }
 
-    /// The slower of two measurements.
+    /// Returns the slower of two measurements.
     pub(super) fn slower(self, other: Self) -> Self {
         if other.frame_s() > self.frame_s() {
             other
@@ -167,7 +167,7 @@ impl Machine {
         }
     }
 
-    /// The measurement and its consequences as text.
+    /// Describes the measurement and its consequences as text.
     pub(super) fn text(&self) -> String {
         let Self {
             n_cores, n_cameras, ..
@@ -180,13 +180,13 @@ impl Machine {
         };
         let frame_ms = 1000.0 * self.frame_s();
         let text = format!(
-            "{busy}a frame of {n_cameras} cameras takes {frame_ms:.0} ms of the {n_cores} cores together"
+            "{busy}a frame of {n_cameras} cameras takes {frame_ms:.0} ms on all {n_cores} cores"
         );
         if self.slowness() <= 1.0 {
             return text;
         }
         format!(
-            "{text}, so the cameras take {} frames a second instead of {FULL_RATE_HZ}, the killed camera has {:.1} \
+            "{text}, so the cameras take {} frames per second instead of {FULL_RATE_HZ}, the killed camera has {:.1} \
              times as long to come back, and a pause may be {:.1} times as long",
             self.rate_hz(),
             self.spread(),
@@ -194,7 +194,7 @@ impl Machine {
         )
     }
 
-    /// The measurement as JSON.
+    /// Returns the measurement as JSON.
     pub(super) fn json(&self) -> Value {
         json!({
             "load": self.load,
@@ -207,7 +207,7 @@ impl Machine {
     }
 }
 
-/// The load average of the last minute.
+/// Returns the load average of the last minute.
 fn load() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/loadavg").ok()?;
     text.split_whitespace().next()?.parse().ok()
@@ -233,7 +233,7 @@ mod tests {
             (0.02, 5.0, 1.0),
             (0.1, 5.0, 1.0),
             (0.2, 2.5, 2.0),
-            // The person cannot be followed any more.
+            // At this rate, the person can no longer be followed.
             (0.3, 0.55, 9.0),
             (0.5, 0.33, 15.0),
             (4.0, 0.25, 120.0),

@@ -1,4 +1,4 @@
-//! The content of the demo's HTML page: tables, space view and pictures.
+//! Content of the demo's HTML page: tables, skeletons in space, and pictures.
 
 use std::path::Path;
 
@@ -35,8 +35,8 @@ pub(super) fn page(
     Page {
         title: "Parallax: the demo".to_owned(),
         lead: format!(
-            "{} cameras saw a person who does not exist, {} frames at {} a second. {} processes and their supervisor \
-             gave {}: {} with a skeleton in space, {} of these from all {} cameras.",
+            "{} cameras saw a synthetic person: {} frames at {} per second. {} processes and their supervisor \
+             produced {}: {} with a skeleton in space, {} of these from all {} cameras.",
             run.cameras.len(),
             run.n_frames,
             run.rate_hz,
@@ -53,8 +53,8 @@ pub(super) fn page(
         space: space(run, synthetic),
         marks: marks(report.cost.as_ref(), &clock),
         tables,
-        legend: "Thick: the pose that all views agreed on, right orange, left blue; thin and grey: what the view found \
-                 alone; pink: where the other views say that the right wrist must lie."
+        legend: "Thick lines: the pose that all views agreed on, right orange, left blue. Thin grey lines: the pose that the view \
+                 found alone. Pink lines: possible positions of the right wrist according to the other views."
             .to_owned(),
         strips: strips(run, report.cost.as_ref(), folder),
     }
@@ -140,34 +140,31 @@ fn number(value: Option<f64>, digits: usize) -> String {
 
 fn of_cost(cost: &Cost, camera: &str) -> Table {
     let note = format!(
-        "The process of {camera} was killed (SIGKILL) while it worked. Times are counted from the kill; only frames \
-         that a result uses count as back."
+        "The process of {camera} was killed (SIGKILL) while it worked. Times are measured from the kill. The camera counts as \
+         back when a result uses one of its frames."
     );
-    let mut table = table("What the killed camera cost", &note, ["", ""]);
+    let mut table = table("Cost of the killed camera", &note, ["", ""]);
     let ms = |value: Option<f64>| {
         value.map_or_else(|| "never".to_owned(), |value| format!("{value:.0} ms"))
     };
     let count =
         |value: Option<u64>| value.map_or_else(|| "–".to_owned(), |number| number.to_string());
     table.rows = [
-        ("its death was noticed after", ms(cost.noticed_ms)),
-        ("it was started again after", ms(cost.restarted_ms)),
+        ("death noticed after", ms(cost.noticed_ms)),
+        ("restarted after", ms(cost.restarted_ms)),
+        ("first frame used in a result again after", ms(cost.back_ms)),
+        ("last frame before the kill", count(cost.last_frame)),
+        ("first frame after the kill", count(cost.first_frame)),
         (
-            "its first frame that a result uses again came after",
-            ms(cost.back_ms),
-        ),
-        ("its last frame before", count(cost.last_frame)),
-        ("its first frame after", count(cost.first_frame)),
-        (
-            "its frames in between, without a part in any result",
+            "frames in between, not used in any result",
             count(cost.frames_lost),
         ),
         (
-            "results of the other views of these frames",
+            "results of these frames from the other views",
             cost.results_without_it.to_string(),
         ),
         (
-            "longest time between two results then",
+            "longest time between two results during the outage",
             ms(cost.longest_pause_ms),
         ),
         (
@@ -181,8 +178,8 @@ fn of_cost(cost: &Cost, camera: &str) -> Table {
 }
 
 fn accuracy(report: &Report) -> Table {
-    let note = "PCP3D at gamma 0.5: segments whose ends are off by at most half their length in the mean; MPJPE: mean \
-                distance of the joints.";
+    let note = "PCP3D at gamma 0.5: share of the segments whose mean end error is at most half their length. MPJPE: mean \
+                distance of the joints from the truth.";
     let mut columns = vec![String::new()];
     columns.extend(report.scores.iter().map(|score| score.0.to_owned()));
     let scores = || report.scores.iter().map(|score| &score.1);
@@ -217,8 +214,8 @@ fn accuracy(report: &Report) -> Table {
 }
 
 fn latency(run: &Run<'_>) -> Table {
-    let note = "Milliseconds of computing, by stage; end to end is from the capture of a frame to its skeleton in \
-                space, waiting for busy processes included. The cameras draw their pictures, which real ones do not.";
+    let note = "Computing time of each stage in milliseconds. End to end is the time from the capture of a frame to its skeleton \
+                in space, including waiting times. Unlike real cameras, these cameras also render their pictures.";
     let mut table = table("Latency", note, ["stage", "frames", "p50", "p99", "max"]);
     let latency = run.report.recorded().latency();
     let rows = latency.into_iter().flat_map(budget::rows);
@@ -237,17 +234,10 @@ fn latency(run: &Run<'_>) -> Table {
 }
 
 fn accounts(run: &Run<'_>) -> Table {
-    let note = "Every frame of every view once: used in a result; nobody found; answered too late; passed over for want \
-                of time, or while its process was away; not known, since a killed process held it.";
+    let note = "Every frame of every view is counted once: used in a result, without a person (empty), too late, skipped for \
+                lack of time, lost while its process was away, or unknown because a killed process had it.";
     let columns = [
-        "view",
-        "frames",
-        "used",
-        "empty",
-        "late",
-        "passed over",
-        "lost",
-        "not known",
+        "view", "frames", "used", "empty", "late", "skipped", "lost", "unknown",
     ];
     let mut table = table("Frames accounted for", note, columns);
     table.rows = run
@@ -274,7 +264,7 @@ fn accounts(run: &Run<'_>) -> Table {
     table
 }
 
-/// Strips of overlays of some frames in all views; see [`chosen`].
+/// Returns strips of overlays of some frames in all views; see [`chosen`].
 fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     let file = |camera: &String, frame: u64| {
         folder.join("overlays").join(camera).join(format!("{frame:06}.png"))
@@ -302,7 +292,7 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     shown.iter().map(strip).collect()
 }
 
-/// The frames to show: the first complete one, the last complete one before the kill, the first without the camera, and the
+/// Returns the frames to show: the first complete frame, the last complete one before the kill, the first without the camera, and the
 /// last complete one.
 ///
 /// * `drawn`: the frames with overlays.
@@ -326,7 +316,7 @@ fn chosen<'a>(drawn: &[&'a FrameResult], killed_at: Option<u64>) -> Vec<&'a Fram
     shown
 }
 
-/// An overlay as JPEG.
+/// Reads an overlay as JPEG.
 fn jpeg(file: &Path) -> Result<Vec<u8>, image::ImageError> {
     let picture = image::open(file)?.into_rgb8();
     let mut bytes = Vec::new();
@@ -339,7 +329,7 @@ mod tests {
     use super::*;
     use crate::trial::results::ViewResult;
 
-    /// A frame with overlays, with all four cameras or without the killed one.
+    /// Returns a frame with overlays, with all four cameras or without the killed one.
     fn drawn(frame: u64, is_complete: bool) -> FrameResult {
         let mut views = vec![ViewResult::default(); 4];
         views[VICTIM].missing = (!is_complete).then(|| "process lost".to_owned());

@@ -1,4 +1,4 @@
-//! The report on the demo: accuracy, cost of the kill, and limits, as text and as JSON.
+//! Report on the demo: accuracy, cost of the kill, and limits, as text and as JSON.
 
 use core::fmt::Write as _;
 use std::path::Path;
@@ -13,14 +13,14 @@ use super::score::{GAMMA, Score, score};
 use crate::trial::cost::{Cost, EpochSource};
 use crate::trial::results::FrameResult;
 
-/// The report on the demo.
+/// Report on the demo.
 #[derive(Debug)]
 pub(super) struct Report {
-    /// Accuracy of all results, of those with every view, and of those without the killed camera's view.
+    /// Accuracy of all results, of the results with every view, and of the results without the killed camera's view.
     pub scores: [(&'static str, Score); 3],
-    /// The cost of the kill, if a kill was planned.
+    /// Cost of the kill; `None` if no kill was planned.
     pub cost: Option<Cost>,
-    /// The limits, with what was measured.
+    /// Limits, with the measured values.
     pub limits: Vec<Limit>,
 }
 
@@ -35,11 +35,11 @@ impl Report {
         let scores = [
             ("all results", of(&|_| true)),
             (
-                "with every camera",
+                "results with every camera",
                 of(&|result| result.views.iter().all(|view| view.missing.is_none())),
             ),
             (
-                "without the killed one",
+                "without the killed camera",
                 of(&|result| result.views[VICTIM].missing.is_some()),
             ),
         ];
@@ -82,7 +82,7 @@ impl Report {
         self.limits.iter().all(|limit| limit.held)
     }
 
-    /// The report as JSON; the content of `report.json`.
+    /// Returns the report as JSON, which is the content of `report.json`.
     pub(super) fn json(&self, run: &Run<'_>) -> Value {
         let limit = |limit: &Limit| json!({ "what": limit.what, "asked": limit.asked, "measured": limit.got, "held": limit.held });
         let [all, complete, without] = &self.scores;
@@ -104,7 +104,7 @@ impl Report {
         })
     }
 
-    /// The report as text.
+    /// Returns the report as text.
     pub(super) fn text(&self, folder: &Path) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.

@@ -7,7 +7,7 @@ use crate::trial::Point;
 use crate::trial::injection::FaultTimes;
 use crate::trial::results::FrameResult;
 
-/// The number of the view whose camera is killed.
+/// Number of the view whose camera is killed.
 pub(super) const VICTIM: usize = 2;
 
 /// A completed run of the demo.
@@ -19,19 +19,19 @@ pub(super) struct Run<'a> {
     pub n_frames: u64,
     /// Frames per second.
     pub rate_hz: f64,
-    /// How long a stage waits for a late view, milliseconds.
+    /// Time that a stage waits for a late view, milliseconds.
     pub deadline_ms: f64,
-    /// The measured speed of this machine: before or after the run, whichever is slower.
+    /// Speed of this machine, measured before or after the run, whichever is slower.
     pub machine: Option<Machine>,
     /// The names of all processes except the supervisor.
     pub processes: &'a [String],
-    /// The report of `launch` on it.
+    /// The report of `launch` on the run.
     pub report: &'a Report,
-    /// The results.
+    /// Results of the run.
     pub results: &'a [FrameResult],
     /// The true joints of each result, metres in the world.
     pub truth: &'a [Vec<Point>],
-    /// The times of the kill, if a kill was planned.
+    /// Times of the kill; `None` if no kill was planned.
     pub killed: Option<FaultTimes>,
     /// The session, which is the time of planning (`failure::now_nanos`).
     pub session: u64,

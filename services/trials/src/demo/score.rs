@@ -1,4 +1,4 @@
-//! The accuracy of results: PCP3D and MPJPE.
+//! Accuracy of results: PCP3D and MPJPE.
 
 use serde::Serialize;
 use skeleton::PARSE14;
@@ -9,13 +9,13 @@ use crate::trial::Point;
 /// The conventional threshold of PCP3D.
 pub(super) const GAMMA: f64 = 0.5;
 
-/// The accuracy of some results.
+/// Accuracy of some results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Score {
     /// Number of results.
     pub frames: usize,
     /// PCP3D: percentage of segments whose mean end error is at most half their length. A segment that was not found
-    /// counts as wrong. None without results.
+    /// counts as wrong. `None` if there are no results.
     pub pcp3d_percent: Option<f64>,
     /// MPJPE: mean distance of the found joints from the truth, millimetres.
     pub mpjpe_mm: Option<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Score {
 /// * `pairs`: the found and the true joints of `skeleton::PARSE14` of each result, metres.
 pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [Point])>) -> Score {
     let segments = segments(&PARSE14).map_or_else(Vec::new, Vec::from);
-    // By segment: the number of right ones, and of all.
+    // For each segment, the number of correct ones and the number of all.
     let mut right = vec![[0_usize; 2]; segments.len()];
     let (mut distances, mut n_joints, mut frames) = (Vec::new(), 0_usize, 0);
     for (found, truth) in pairs {
@@ -67,7 +67,7 @@ pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [P
 mod tests {
     use super::*;
 
-    /// Fourteen joints in a row, 0.1 m apart.
+    /// Returns fourteen joints in a row, 0.1 m apart.
     fn truth() -> Vec<Point> {
         (0..14).map(|i| [0.1 * f64::from(i), 0.0, 0.0]).collect()
     }

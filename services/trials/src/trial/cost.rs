@@ -1,36 +1,36 @@
-//! The cost of a process fault: the downtime, and the results of the other processes meanwhile.
+//! Cost of a process fault: the downtime, and the results of the other processes in the meantime.
 
 use serde::Serialize;
 
 use super::injection::FaultTimes;
 use super::results::FrameResult;
 
-/// The cost of a process fault. Times are in milliseconds after the fault.
+/// Cost of a process fault. Times are in milliseconds after the fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct Cost {
-    /// When the fault was injected, milliseconds since the planning of the run; none if it was not.
+    /// Time of the injection, milliseconds since the planning of the run; `None` if the fault was not injected.
     pub killed_at_ms: Option<f64>,
-    /// When the supervisor noticed it.
+    /// Time until the supervisor noticed the fault.
     pub noticed_ms: Option<f64>,
-    /// When the process was restarted.
+    /// Time until the process was restarted.
     pub restarted_ms: Option<f64>,
-    /// When the process sent its first message after the fault that contributed to a result.
+    /// Time until the process sent its first message after the fault that contributed to a result.
     pub back_ms: Option<f64>,
-    /// Its last frame with a result before the fault.
+    /// Last frame of the process with a result before the fault.
     pub last_frame: Option<u64>,
-    /// Its first frame with a result after the fault.
+    /// First frame of the process with a result after the fault.
     pub first_frame: Option<u64>,
-    /// Number of frames in between.
+    /// Number of frames between these two.
     pub frames_lost: Option<u64>,
-    /// Number of results of these frames, from the other views.
+    /// Number of results of the frames in between, from the other views.
     pub results_without_it: usize,
-    /// The longest time between two results while the process was away.
+    /// Longest time between two results while the process was away.
     pub longest_pause_ms: Option<f64>,
-    /// The longest time between two results before the fault.
+    /// Longest time between two results before the fault.
     pub usual_pause_ms: Option<f64>,
 }
 
-/// Where results record the epoch of a process.
+/// Part of a result that has the epoch of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum EpochSource {
     /// The process is the camera of this view.
@@ -39,12 +39,12 @@ pub(crate) enum EpochSource {
     Pose(usize),
     /// The process makes the results.
     Result,
-    /// Nowhere; only its health messages show it.
+    /// No part: only the process's health messages have its epoch.
     Unrecorded,
 }
 
 impl EpochSource {
-    /// The epoch of the process in a result, and when the process sent its message, milliseconds since the planning of
+    /// Returns the epoch of the process in a result, and the time at which the process sent its message, milliseconds since the planning of
     /// the run.
     fn epoch(self, result: &FrameResult) -> Option<(u32, f64)> {
         match self {
@@ -57,8 +57,8 @@ impl EpochSource {
         }
     }
 
-    /// When the process sent its first message of an epoch that contributed to a result, milliseconds since the
-    /// planning of the run; none if there is no such result.
+    /// Returns the time at which the process sent its first message of an epoch that contributed to a result, milliseconds since the
+    /// planning of the run; `None` if there is no such result.
     pub(crate) fn began_ms(self, epoch: u32, results: &[FrameResult]) -> Option<f64> {
         let mut sent = results.iter().filter_map(|result| self.epoch(result));
         sent.find(|pair| pair.0 == epoch).map(|sent| sent.1)
@@ -68,7 +68,7 @@ impl EpochSource {
 impl Cost {
     /// Computes the cost from the times of the fault and the results of the run.
     ///
-    /// * `source`: where results record the epoch of the process.
+    /// * `source`: the part of a result that has the epoch of the process.
     /// * `times`: the times of the fault.
     /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
     pub(crate) fn new(
@@ -87,7 +87,7 @@ impl Cost {
         let (old, new): (Vec<_>, Vec<_>) = epochs.partition(|epoch| epoch.1.0 == 0);
         let (last, first) = (old.last(), new.first());
         let recovered = times.recovered.filter(|_| source == EpochSource::Unrecorded).map(after);
-        // The pause ends with the first result of the new epoch, or else with the first result after the recovery.
+        // The pause ends with the first result of the new epoch, or otherwise with the first result after the recovery.
         let is_after_recovery =
             |result: &&FrameResult| recovered.is_some_and(|ms| result.sent_ms >= injected_at + ms);
         let end = first
@@ -97,7 +97,7 @@ impl Cost {
         let end = end.unwrap_or(f64::INFINITY);
         let is_between = |result: &&FrameResult| match source {
             EpochSource::Unrecorded => result.sent_ms > injected_at && result.sent_ms < end,
-            // By frame number: the result of a frame captured in the meantime may be sent later.
+            // Results are selected by frame number: the result of a frame captured in the meantime may be sent later.
             _ => {
                 last.is_none_or(|last| result.frame > last.0.frame)
                     && first.is_none_or(|first| result.frame < first.0.frame)
@@ -121,7 +121,7 @@ impl Cost {
     }
 }
 
-/// The longest time between two consecutive results of which the later was sent in the given span, milliseconds, both
+/// Returns the longest time between two consecutive results, milliseconds. The later of the two must have been sent in the given span, both
 /// ends included.
 fn longest_pause(results: &[FrameResult], from: f64, to: f64) -> Option<f64> {
     let pairs = results.windows(2).map(|pair| [pair[0].sent_ms, pair[1].sent_ms]);
@@ -136,7 +136,7 @@ mod tests {
     use super::super::results::ViewResult;
     use super::*;
 
-    /// A result sent at a time, with the epoch of all its processes; without an epoch, the view is missing.
+    /// Returns a result sent at a time, with the epoch of all its processes; without an epoch, the view is missing.
     fn moment(frame: u64, sent_ms: f64, epoch: Option<u32>) -> FrameResult {
         let camera = epoch.map(|epoch| CameraTimes {
             epoch,

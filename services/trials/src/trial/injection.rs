@@ -8,11 +8,11 @@ use supervise::Event;
 /// A fault of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProcessFault {
-    /// It is killed (SIGKILL), as by a crash.
+    /// The process is killed (SIGKILL), as by a crash.
     Kill,
-    /// It is stopped (SIGSTOP), as if it hung.
+    /// The process is stopped (SIGSTOP), as if it hung.
     Stop,
-    /// It enters an endless loop. The process does so itself: see `--spin-after`.
+    /// The process enters an endless loop. It does so itself: see `--spin-after`.
     Spin,
 }
 
@@ -26,12 +26,12 @@ impl ProcessFault {
         }
     }
 
-    /// The fault as a present and as a past participle, for messages.
+    /// Returns the fault as a present and as a past participle, for messages.
     fn participles(self) -> [&'static str; 2] {
         match self {
             Self::Kill => ["killing", "killed"],
             Self::Stop => ["stopping", "stopped"],
-            Self::Spin => ["letting spin", "sent spinning"],
+            Self::Spin => ["starting an endless loop in", "put into an endless loop"],
         }
     }
 }
@@ -43,9 +43,9 @@ pub(crate) struct Injector {
     fault: ProcessFault,
     /// The name of the process.
     process: String,
-    /// The name in messages.
+    /// Name of the process in messages.
     label: String,
-    /// The fault is injected once there is a result of this frame; `Spin`: once the process has sent this frame.
+    /// Frame after whose result the fault is injected; for `Spin`, the frame after which the process starts its loop.
     at_frame: u64,
     /// The id of the process, while it runs.
     pid: Option<u32>,
@@ -53,22 +53,22 @@ pub(crate) struct Injector {
     times: FaultTimes,
 }
 
-/// The times of a fault, nanoseconds (`failure::now_nanos`).
+/// Times of a fault, nanoseconds (`failure::now_nanos`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct FaultTimes {
-    /// The fault was injected.
+    /// Time of the injection.
     pub injected: Option<u64>,
-    /// The supervisor noticed it.
+    /// Time at which the supervisor noticed the fault.
     pub noticed: Option<u64>,
-    /// The process was restarted.
+    /// Time at which the process was restarted.
     pub restarted: Option<u64>,
-    /// The restarted process reported that it has worked.
+    /// Time at which the restarted process reported that it has worked.
     pub recovered: Option<u64>,
 }
 
 impl Injector {
     /// * `process`: the name of the process in the deployment.
-    /// * `at_frame`: the fault is injected once there is a result of this frame.
+    /// * `at_frame`: frame after whose result the fault is injected.
     pub(crate) fn new(fault: ProcessFault, process: &str, at_frame: f64) -> Self {
         Self {
             fault,
@@ -88,7 +88,7 @@ impl Injector {
         }
     }
 
-    /// The times of the fault so far.
+    /// Returns the times of the fault so far.
     pub(crate) fn times(&self) -> FaultTimes {
         self.times
     }
@@ -96,7 +96,7 @@ impl Injector {
     /// Handles an event of the supervisor, and injects the fault if it is time. Returns a message about the injection or
     /// the recovery.
     ///
-    /// * `now`: `failure::now_nanos`.
+    /// * `now`: current time (`failure::now_nanos`).
     /// * `inject`: injects the fault into the process with this id.
     pub(crate) fn handle(
         &mut self,
@@ -136,8 +136,8 @@ impl Injector {
         }
     }
 
-    /// The process whose health messages show when it is time: the one that makes the results; for `Spin` the process
-    /// itself, which does not get beyond its frame.
+    /// Returns the process whose health messages show that it is time. This is the process that makes the results. For `Spin`, it is the
+    /// process itself, which does not continue after its frame.
     fn trigger(&self) -> &str {
         match self.fault {
             ProcessFault::Kill | ProcessFault::Stop => "triangulate",
@@ -179,7 +179,8 @@ impl Injector {
     }
 }
 
-/// Returns true if a process has worked in this epoch or a later one: has sent messages, or, for `results`, received some.
+/// Returns true if a process has worked in this epoch or a later one. It has worked if it has sent messages or, for `results`, received
+/// some.
 pub(crate) fn has_worked(process: &str, health: &Health, epoch: u32) -> bool {
     let has_messages = health.n_sent > 0 || (process == "results" && health.n_received > 0);
     health.epoch >= epoch && has_messages
@@ -193,7 +194,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// Passes an event at a time; returns the id of the process with the fault, and the message.
+    /// Passes an event at a time, and returns the id of the process with the fault, and the message.
     fn handle_at(
         injector: &mut Injector,
         event: &Event<'_>,

@@ -2,7 +2,7 @@
 
 use exports::report::run::Limit;
 
-/// A limit that holds if the number is at least the given one.
+/// Returns a limit that holds if the number is at least the given one.
 pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
     limit(
         what,
@@ -12,7 +12,7 @@ pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
     )
 }
 
-/// A limit that holds if the number is at most the given one.
+/// Returns a limit that holds if the number is at most the given one.
 pub(crate) fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
     limit(
         what,
@@ -22,7 +22,7 @@ pub(crate) fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
     )
 }
 
-/// A limit that holds if the list is empty.
+/// Returns a limit that holds if the list is empty.
 pub(crate) fn none_of(what: &str, got: &[String]) -> Limit {
     Limit {
         what: what.to_owned(),
@@ -36,7 +36,7 @@ pub(crate) fn none_of(what: &str, got: &[String]) -> Limit {
     }
 }
 
-/// * `got`: the measured number; a limit on an unmeasured number is missed.
+/// * `got`: the measured number; a limit without a measured number is missed.
 fn limit(what: &str, asked: String, got: Option<f64>, held: bool) -> Limit {
     let digits = |value: f64| usize::from(value.fract() != 0.0);
     Limit {

@@ -13,24 +13,24 @@ use super::Point;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FrameResult {
     pub frame: u64,
-    /// The epoch of the process that made it.
+    /// Epoch of the process that made the result.
     pub epoch: u32,
-    /// When it was sent, milliseconds since the planning of the run.
+    /// Time at which the result was sent, milliseconds since the planning of the run.
     pub sent_ms: f64,
-    /// The joints of the person who is followed, of `skeleton::PARSE14`, metres in the world; none for those not found.
+    /// Joints of `skeleton::PARSE14` of the followed person, metres in the world; `None` for a joint that was not found.
     pub joints: Vec<Option<Point>>,
-    /// The views, in the order of the rig.
+    /// Views in the order of the rig.
     pub views: Vec<ViewResult>,
 }
 
 /// One view of a result.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct ViewResult {
-    /// Why it was not used in the result, if it was not.
+    /// Reason why the view was not used in the result; `None` if it was used.
     pub missing: Option<String>,
-    /// The times of its camera.
+    /// Times of the view's camera.
     pub camera: Option<CameraTimes>,
-    /// The times of its pose process.
+    /// Times of the view's pose process.
     pub pose: Option<PoseTimes>,
 }
 
@@ -40,7 +40,7 @@ impl FrameResult {
         self.joints.iter().any(Option::is_some)
     }
 
-    /// When the first of its pictures was captured, milliseconds since the planning of the run.
+    /// Returns the time at which the first picture of the result was captured, milliseconds since the planning of the run.
     pub(crate) fn captured_ms(&self) -> Option<f64> {
         let shots = self.views.iter().filter_map(|view| view.camera);
         shots.map(|shot| shot.captured_ms).reduce(f64::min)
@@ -50,11 +50,11 @@ impl FrameResult {
 /// Reads the results of a run, in the order of the file.
 ///
 /// * `folder`: the output folder of the run.
-/// * `cameras`: their names, in the order of the rig.
+/// * `cameras`: names of the cameras, in the order of the rig.
 ///
 /// # Errors
 ///
-/// A file cannot be read, or a line of it is invalid.
+/// Fails if a file cannot be read, or has an invalid line.
 pub(crate) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<FrameResult>, Failure> {
     let frames: Vec<FrameLine> = lines(folder)?;
     let times: Vec<TimesLine> = lines(folder)?;
@@ -69,7 +69,7 @@ fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
     lines.map_err(|error| failure::in_file(&file, &error))
 }
 
-/// Joins the lines of both files by frame; a frame that is in one of them only has no result.
+/// Joins the lines of both files by frame. A frame that is in only one of them has no result.
 fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<FrameResult> {
     let times = times.into_iter().map(|time| (time.frame, time));
     let times: BTreeMap<u64, TimesLine> = times.collect();

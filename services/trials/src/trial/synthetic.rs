@@ -15,22 +15,22 @@ pub(crate) const N_CAMERAS: usize = 4;
 const RADIUS: f64 = 4.2;
 /// Height of the cameras, metres.
 const HEIGHT: f64 = 1.5;
-/// Scale of the images relative to the ring's default: 320x240 pixels, so that two cores can make and process four views.
+/// Scale of the images relative to the ring's default: 320x240 pixels, so that two cores can render and process four views.
 const SCALE: f64 = 0.5;
 /// Every n-th frame has overlays.
 const OVERLAY_EVERY: u64 = 4;
 
-/// Who finds the person.
+/// Method that finds the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Finder {
-    /// Who does by default: the network that ships.
+    /// The default method: the shipped network.
     Default,
     /// The filters, near the last pose.
     TrackingFilters,
 }
 
 impl Finder {
-    /// Its line at the top of the deployment file.
+    /// Returns the line for this method at the top of the deployment file.
     fn method(self) -> &'static str {
         match self {
             Self::Default => "",
@@ -38,7 +38,7 @@ impl Finder {
         }
     }
 
-    /// Its part of the deployment file.
+    /// Returns the section for this method in the deployment file.
     fn section(self) -> &'static str {
         match self {
             Self::Default => "",
@@ -49,10 +49,10 @@ impl Finder {
     }
 }
 
-/// The settings of a synthetic deployment.
+/// Settings of a synthetic deployment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SyntheticSetup<'a> {
-    /// The number of the person, which determines shape and clothes.
+    /// Number of the person, which determines body shape and clothes.
     pub subject: u64,
     /// The action of the person.
     pub action: Action,
@@ -64,20 +64,20 @@ pub(crate) struct SyntheticSetup<'a> {
     pub n_frames: u64,
     /// Number of cameras, evenly spaced on a ring.
     pub n_cameras: usize,
-    /// How long a stage waits for a late view, milliseconds.
+    /// Time that a stage waits for a late view, milliseconds.
     pub deadline_ms: u64,
-    /// Who finds the person.
+    /// Method that finds the person.
     pub finder: Finder,
     /// The name of the deployment.
     pub name: &'a str,
-    /// The command that writes it, for a comment in its file.
+    /// The command that writes the deployment, for a comment in its file.
     pub command: &'a str,
 }
 
 /// A deployment with synthetic cameras.
 #[derive(Debug)]
 pub(crate) struct SyntheticDeployment {
-    /// The absolute folder for all its files.
+    /// Absolute folder for all files of the deployment.
     pub folder: PathBuf,
     /// The cameras.
     pub rig: Rig,
@@ -112,7 +112,7 @@ impl SyntheticDeployment {
         })
     }
 
-    /// Writes the rig and the deployment; returns the deployment file.
+    /// Writes the rig and the deployment, and returns the deployment file.
     pub(crate) fn write(&self, setup: &SyntheticSetup<'_>) -> Result<PathBuf, Failure> {
         let rig = self.folder.join("rig.toml");
         geometry::files::write(&rig, RigFormat::Own, &self.rig).or_fail(ExitKind::Input)?;
@@ -159,7 +159,7 @@ impl SyntheticDeployment {
         )
     }
 
-    /// The true positions of the joints of `skeleton::PARSE14` in the given frames, metres in the world.
+    /// Returns the true positions of the joints of `skeleton::PARSE14` in the given frames, metres in the world.
     pub(crate) fn truth(
         &self,
         frames: impl Iterator<Item = u64>,
@@ -170,7 +170,7 @@ impl SyntheticDeployment {
     }
 }
 
-/// The camera with images scaled by `SCALE`.
+/// Returns the camera with images scaled by `SCALE`.
 fn scaled(camera: &Camera) -> Camera {
     let intrinsics = camera.intrinsics;
     // The centre of the top-left pixel is at 0.
@@ -188,7 +188,7 @@ fn scaled(camera: &Camera) -> Camera {
     }
 }
 
-/// The absolute path of a file or folder.
+/// Returns the absolute path of a file or folder.
 pub(crate) fn absolute(folder: &Path) -> Result<PathBuf, Failure> {
     std::path::absolute(folder).or_fail(ExitKind::Usage)
 }

@@ -1,4 +1,4 @@
-//! The folder of a run: results line by line, and pictures with the poses drawn in them.
+//! Folder of a run: lines of results, and pictures with the poses drawn in them.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -17,12 +17,12 @@ use crate::moment::{Moment, Other, Seen, in_view, in_world, spread};
 use crate::picture;
 use crate::scene::Scene;
 
-/// Longest line that is read, bytes: hundreds of views.
+/// Longest line that is read, bytes; enough for hundreds of views.
 const LONGEST_LINE: u64 = 4 << 20;
-/// Most pixels of a picture that is read.
+/// Largest number of pixels in a picture that is read.
 const MOST_PIXELS: u64 = 64 << 20;
 
-/// The folder of a run.
+/// Folder of a run.
 #[derive(Debug)]
 pub(crate) struct Folder {
     name: String,
@@ -30,14 +30,14 @@ pub(crate) struct Folder {
     frames: Vec<Frame>,
     notes: Vec<String>,
     poses: Mutex<File>,
-    /// Where the lines of a frame about its views begin, and how many there are.
+    /// For each frame, the position of its first line about the views, and the number of these lines.
     views: BTreeMap<u64, (u64, usize)>,
     view_lines: Option<Mutex<File>>,
-    /// Folder of the pictures of every view, and the numbers of their frames, ascending.
+    /// For each view, the folder of its pictures and the ascending frame numbers.
     pictures: Vec<(PathBuf, Vec<u64>)>,
 }
 
-/// The part of a line about a frame that is needed to find it again.
+/// The part of a line about a frame that is needed to find the frame again.
 #[derive(Deserialize)]
 struct Head {
     frame: u64,
@@ -46,13 +46,13 @@ struct Head {
 }
 
 impl Folder {
-    /// Opens it.
+    /// Opens the folder.
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
         let mut notes = Vec::new();
         let poses = open_lines(path, FrameLine::FILE, &mut notes)?.ok_or_else(|| {
             let text = format!("{} has no {}", path.display(), FrameLine::FILE);
             let failure = Failure::new(ExitKind::Input, text);
-            failure.with_hint("name the folder that a run has left, its `output`")
+            failure.with_hint("name the output folder of a run (`output` in its deployment)")
         })?;
         let mut frames = Vec::new();
         let add = |head: Head, place| {
@@ -95,17 +95,17 @@ impl Folder {
         })
     }
 
-    /// Its cameras and joints.
+    /// Returns the cameras and joints of the run.
     pub(crate) fn scene(&self) -> Arc<Scene> {
         Arc::clone(&self.scene)
     }
 
-    /// Where it is.
+    /// Returns the path of the folder.
     pub(crate) fn name(&self) -> String {
         self.name.clone()
     }
 
-    /// Its frames, ascending.
+    /// Returns the frames in ascending order.
     pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
     }
@@ -115,7 +115,7 @@ impl Folder {
         &self.notes
     }
 
-    /// A frame.
+    /// Returns a frame.
     pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
         let at = at.min(self.frames.len() - 1);
         let text = &line_at(&self.poses, self.frames[at].place, 1)?;
@@ -134,7 +134,7 @@ impl Folder {
         Ok(moment)
     }
 
-    /// A picture, of the frame or of the last one before it.
+    /// Returns the picture of the frame, or the last one before it.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         let (folder, frames) = self.pictures.get(view)?;
         let before = frames.partition_point(|number| *number <= frame);
@@ -154,7 +154,7 @@ fn unreadable(why: impl Into<Box<dyn core::error::Error + Send + Sync>>) -> Fail
     Failure::new(ExitKind::Input, why)
 }
 
-/// A file of lines; one of a run that was cut short still has another name.
+/// Opens a file of lines. If a run was cut short, the file has another name.
 fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Option<File>, Failure> {
     let part = format!("{name}.part");
     for name in [name, &part] {
@@ -163,7 +163,7 @@ fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Opti
             Ok(file) => {
                 if name == part {
                     notes.push(format!(
-                        "the run was cut short, or has not ended: {name} is not finished"
+                        "{name} is not complete: the run was cut short or has not ended"
                     ));
                 }
                 return Ok(Some(file));
@@ -175,7 +175,7 @@ fn open_lines(folder: &Path, name: &str, notes: &mut Vec<String>) -> Result<Opti
     Ok(None)
 }
 
-/// Calls for every line that can be read, with its place, and counts the others; one that has no end does not count.
+/// Calls `each` for every valid line with its position, and returns the number of invalid lines. A last line without an end is ignored.
 fn each_line(file: &File, mut each: impl FnMut(Head, u64)) -> Result<u64, Failure> {
     let mut reader = BufReader::new(file);
     let (mut place, mut n_bad, mut line) = (0, 0, Vec::new());
@@ -194,7 +194,7 @@ fn each_line(file: &File, mut each: impl FnMut(Head, u64)) -> Result<u64, Failur
     }
 }
 
-/// So many lines from a place on.
+/// Reads `n` lines from a position.
 fn line_at(file: &Mutex<File>, place: u64, n: usize) -> Result<String, Failure> {
     let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
     file.seek(SeekFrom::Start(place)).map_err(unreadable)?;
@@ -206,7 +206,7 @@ fn line_at(file: &Mutex<File>, place: u64, n: usize) -> Result<String, Failure> 
     Ok(text)
 }
 
-/// The cameras and joints of a run by its settings, as far as they can be read.
+/// Returns the cameras and joints from the settings of a run, if they can be read.
 fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
     let file = folder.join("deployment.json");
     let text = failure::read_text(&file);
@@ -217,7 +217,7 @@ fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
     match read {
         Ok(resolved) => {
             let mut scene = Scene::of_finished(&resolved);
-            // Coordinates in the files of a run are those of its footage.
+            // Coordinates in the files of a run are pixels of the footage.
             for (view, footage) in scene.views.iter_mut().zip(&resolved.footage) {
                 view.size = footage.size;
                 if let Some(camera) = &view.camera
@@ -244,13 +244,13 @@ fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
     }
 }
 
-/// The calibrated camera of the footage itself.
+/// Returns the calibrated camera of the footage.
 fn of_footage(resolved: &Resolved, name: &str) -> Option<geometry::Camera> {
     let rig = inputs::rig_of(&resolved.deployment).ok()?;
     rig.camera(name).cloned()
 }
 
-/// The folder of a camera's pictures, and their frames.
+/// Returns the folder of a camera's pictures, and the numbers of their frames.
 fn pictures(folder: &Path, camera: &str) -> (PathBuf, Vec<u64>) {
     let folder = folder.join("overlays").join(camera);
     let is_plain = !camera.starts_with('.') && !camera.contains('/');
@@ -265,7 +265,7 @@ fn pictures(folder: &Path, camera: &str) -> (PathBuf, Vec<u64>) {
     (folder, frames)
 }
 
-/// A frame by its line, with the person who is followed, without the poses of its views.
+/// Returns the frame of a line with the followed person, without the poses in its views.
 fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
     let person = line.followed();
     let placed = |person: Option<&PersonLine>| -> Vec<Option<PlacedJoint>> {
@@ -311,7 +311,7 @@ fn of_line(scene: &Scene, line: &FrameLine) -> Moment {
     }
 }
 
-/// Adds the pose of a view.
+/// Adds the pose in a view.
 fn see(scene: &Scene, moment: &mut Moment, line: &ViewLine) {
     let Some(view) = scene.views.iter().position(|view| view.name == line.view) else {
         return;

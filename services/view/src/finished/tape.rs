@@ -1,4 +1,4 @@
-//! A recording: its results and its pictures, by their places in the file.
+//! A recording, with the positions of its results and pictures in the file.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,12 +25,12 @@ pub(crate) struct Tape {
     frames: Vec<Frame>,
     notes: Vec<String>,
     poses: Vec<Entry>,
-    /// Pictures of every view by their frames.
+    /// Pictures of every view by frame number.
     pictures: Vec<BTreeMap<u64, Entry>>,
 }
 
 impl Tape {
-    /// Opens it.
+    /// Opens a recording.
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
         let recording = recorded::open(path)?;
         let refused = |why: String| {
@@ -40,7 +40,8 @@ impl Tape {
         let about = recording.about.as_ref();
         let about = about.map_err(|why| refused(why.to_string()))?;
         let settings = serde_json::from_str::<Settings>(&about.settings);
-        let settings = settings.map_err(|why| refused(format!("its settings: {why}")))?;
+        let settings =
+            settings.map_err(|why| refused(format!("the settings cannot be read: {why}")))?;
         let scene = Scene::of_finished(&settings.resolved);
         let mut notes: Vec<String> = scene.problem.clone().into_iter().collect();
         note(&recording, &mut notes);
@@ -51,7 +52,7 @@ impl Tape {
             read_pose(&mut input, pose).is_ok_and(|message| message.status != Status::END)
         });
         if poses.is_empty() {
-            return Err(refused("it has no result".to_owned()));
+            return Err(refused("the recording has no result".to_owned()));
         }
         poses.sort_by_key(|pose| pose.frame);
         let frame = |(place, entry): (usize, &Entry)| Frame {
@@ -78,17 +79,17 @@ impl Tape {
         })
     }
 
-    /// Its cameras and joints.
+    /// Returns the cameras and joints of the run.
     pub(crate) fn scene(&self) -> Arc<Scene> {
         Arc::clone(&self.scene)
     }
 
-    /// Where it is.
+    /// Returns the path of the recording.
     pub(crate) fn name(&self) -> String {
         self.name.clone()
     }
 
-    /// Its frames, ascending.
+    /// Returns the frames in ascending order.
     pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
     }
@@ -98,7 +99,7 @@ impl Tape {
         &self.notes
     }
 
-    /// A frame.
+    /// Returns a frame.
     pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
         let at = at.min(self.poses.len() - 1);
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -111,7 +112,7 @@ impl Tape {
         Ok(moment)
     }
 
-    /// A picture, of the frame or of the last one before it.
+    /// Returns the picture of the frame, or the last one before it.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         let (frame, entry) = self.pictures.get(view)?.range(..=frame).next_back()?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -127,7 +128,12 @@ fn read_pose(file: &mut File, entry: &Entry) -> Result<Box<Skeletons>, Failure> 
     let mut buffer = Buffer::default();
     let message = recording::read(file, Kind::Skeletons, entry, &mut buffer);
     let message = message.map_err(|why| Failure::new(ExitKind::Input, why))?;
-    let refused = || Failure::new(ExitKind::Input, "a message of results is of another kind");
+    let refused = || {
+        Failure::new(
+            ExitKind::Input,
+            "a message of the results topic is of another kind",
+        )
+    };
     message.skeletons().ok_or_else(refused)
 }
 
@@ -137,7 +143,7 @@ fn note(recording: &Recording, notes: &mut Vec<String>) {
         notes.push("the recording was cut off, or is still being written".to_owned());
     }
     if !recording.extent.damage.is_empty() || recording.extent.n_malformed > 0 {
-        notes.push("the recording is damaged; what cannot be read is left out".to_owned());
+        notes.push("the recording is damaged; unreadable messages are left out".to_owned());
     }
     if recording.n_lost() > 0 {
         notes.push(format!(

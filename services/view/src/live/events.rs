@@ -1,4 +1,4 @@
-//! Events in a deployment, as lines for its user: found from the differences between two looks.
+//! Events in a deployment, as text lines for the user. They are derived from changes between two looks at the deployment.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -11,9 +11,9 @@ use crate::board::{Board, Weight};
 use crate::moment::Moment;
 use crate::scene::Scene;
 
-/// Results without a skeleton in a row before it is said.
+/// Number of consecutive results without a skeleton after which this is reported.
 const IN_A_ROW: u32 = 3;
-/// Shortest time between two lines about what one process has lost.
+/// Shortest time between two reports of the losses of one process.
 const LOSSES: Duration = Duration::from_secs(10);
 
 /// State at the last look.
@@ -22,7 +22,7 @@ pub(crate) struct Events {
     /// Status of the last frame of every view.
     frames: Vec<Status>,
     processes: BTreeMap<String, Seen>,
-    /// Results without a skeleton in a row.
+    /// Number of consecutive results without a skeleton.
     n_without: u32,
     /// True if a message was refused.
     has_refused: bool,
@@ -33,13 +33,13 @@ pub(crate) struct Events {
 struct Seen {
     state: State,
     restarts: u32,
-    /// When losses were said last, and those of then.
+    /// Time at which losses were last reported; the next field has the counts at that time.
     told: Option<Instant>,
     dropped: [u64; Cause::ALL.len()],
 }
 
 impl Events {
-    /// Nothing was seen yet.
+    /// Creates the state before the first look.
     pub(crate) fn new(scene: &Scene) -> Self {
         Self {
             frames: vec![Status::OK; scene.views.len()],
@@ -49,21 +49,21 @@ impl Events {
         }
     }
 
-    /// A message about a frame cannot be used; said once.
+    /// Reports once that a message about a frame cannot be used.
     pub(crate) fn refused(&mut self, board: &Board, why: &str) {
         if !self.has_refused {
-            board.event(Weight::Error, &format!("a result cannot be shown: {why}"));
+            board.event(Weight::Error, &format!("cannot show a result: {why}"));
         }
         self.has_refused = true;
     }
 
-    /// A result: says when skeletons stay away, and when they are back.
+    /// Takes a result: reports when skeletons are missing, and when they are back.
     pub(crate) fn result(&mut self, board: &Board, moment: &Moment) {
         let Some(why) = &moment.why else {
             if self.n_without >= IN_A_ROW {
                 board.event(
                     Weight::Note,
-                    &format!("frame {}: a skeleton again", moment.frame),
+                    &format!("frame {}: skeleton is back", moment.frame),
                 );
             }
             self.n_without = 0;
@@ -78,7 +78,7 @@ impl Events {
         }
     }
 
-    /// A frame of a view: says when its camera fails, and when it is back.
+    /// Takes a frame of a view: reports when its camera fails, and when it is back.
     pub(crate) fn frame(&mut self, board: &Board, scene: &Scene, view: usize, status: Status) {
         let Some(last) = self.frames.get_mut(view).filter(|frame| **frame != status) else {
             return;
@@ -86,13 +86,13 @@ impl Events {
         *last = status;
         let name = scene.views.get(view).map_or("", |view| &view.name);
         match status {
-            Status::OK => board.event(Weight::Note, &format!("{name}: pictures again")),
+            Status::OK => board.event(Weight::Note, &format!("{name}: pictures are back")),
             Status::END => board.event(Weight::Note, &format!("{name}: end of footage")),
             other => board.event(Weight::Error, &format!("{name}: {}", other.reason())),
         }
     }
 
-    /// The processes: says who has died, is back, is silent, and what was lost.
+    /// Takes the state of the processes: reports processes that have died, are back or are silent, and losses.
     pub(crate) fn processes(&mut self, board: &Board, snapshot: &Snapshot) {
         for process in &snapshot.processes {
             let name = &process.name;
@@ -133,7 +133,7 @@ fn tell(board: &Board, name: &str, known: Seen, seen: Seen) {
     if seen.restarts > known.restarts {
         board.event(
             Weight::Warning,
-            &format!("{name} was started again, {} times so far", seen.restarts),
+            &format!("{name} was restarted, {} times so far", seen.restarts),
         );
         return;
     }
@@ -147,7 +147,7 @@ fn tell(board: &Board, name: &str, known: Seen, seen: Seen) {
 
 /// Reports losses, at most once every few seconds.
 fn lost(board: &Board, name: &str, seen: &mut Seen, now: &[u64; Cause::ALL.len()]) {
-    // Counts of a process that was started again begin at 0.
+    // The counts of a restarted process begin at 0.
     let is_less = now.iter().zip(&seen.dropped).any(|counts| counts.0 < counts.1);
     if is_less {
         seen.dropped = [0; Cause::ALL.len()];
@@ -161,7 +161,7 @@ fn lost(board: &Board, name: &str, seen: &mut Seen, now: &[u64; Cause::ALL.len()
         .map(|((now, then), cause)| format!("{} {}", now - then, cause.name()))
         .collect();
     if !new.is_empty() {
-        let what = format!("{name} has lost messages or frames: {}", new.join(", "));
+        let what = format!("{name} lost messages or frames: {}", new.join(", "));
         board.event(Weight::Warning, &what);
         (seen.told, seen.dropped) = (Some(Instant::now()), *now);
     }

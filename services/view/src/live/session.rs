@@ -18,17 +18,17 @@ use crate::moment::Moment;
 use crate::picture;
 use crate::scene::Scene;
 
-/// How often the state of the processes is read.
+/// Time between two readings of the state of the processes.
 const STATE_PERIOD: Duration = Duration::from_millis(500);
-/// The longest pause between two looks at the cameras while no result comes.
+/// Longest pause between two looks at the cameras while there is no result.
 const PATIENCE: Duration = Duration::from_millis(90);
 
-/// Decision to look again, or not.
+/// Decision whether to continue following the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Look {
-    /// Yes.
+    /// The deployment still runs.
     On,
-    /// The deployment ends; the session has to be dropped.
+    /// The deployment ends; the session must be dropped.
     Over,
 }
 
@@ -42,14 +42,14 @@ pub(crate) struct Session {
     cameras: Vec<Camera>,
     events: Events,
     tape: Option<Tape>,
-    /// When the state was read last.
+    /// Time at which the state of the processes was last read.
     told: Option<Instant>,
-    /// When the cameras were looked at last.
+    /// Time at which the cameras were last read.
     looked: Option<Instant>,
-    /// The session in the messages, once it is known.
+    /// Session number of the run; `None` until a process has reported it.
     run: Option<u64>,
     namespace: Namespace,
-    // Dropped last: the subscribers use its ports.
+    // Dropped last, because the subscribers use its ports.
     _bus: Bus,
 }
 
@@ -57,25 +57,25 @@ pub(crate) struct Session {
 #[derive(Debug)]
 struct Camera {
     frames: SliceSubscriber<u8, FrameHeader>,
-    /// The shortest time between two pictures.
+    /// Shortest time between two pictures.
     pause: Duration,
-    /// When the last picture was due.
+    /// Time at which the last picture was due.
     due: Instant,
 }
 
 impl Session {
-    /// Begins to look on.
+    /// Starts to follow a run.
     ///
     /// # Errors
     ///
-    /// It does not run, has too many onlookers, or its model or calibration cannot be read.
+    /// Fails if the deployment does not run or has too many onlookers, or if its model or calibration cannot be read.
     pub(crate) fn open(
         named: Option<&str>,
         pictures_per_second: u32,
         stop: &Stop,
     ) -> Result<Self, Failure> {
         let namespace = live::namespace(named)?;
-        // Fails if it does not run, before anything is made in its folder.
+        // Fails if the deployment does not run, before any file is created in its folder.
         let live = Live::open(&namespace)?;
         let resolved = live::description(&namespace)?;
         let scene = Scene::of_frames(&resolved)?;
@@ -107,7 +107,7 @@ impl Session {
         })
     }
 
-    /// The cameras and joints.
+    /// Returns the cameras and joints.
     pub(crate) fn scene(&self) -> Arc<Scene> {
         Arc::clone(&self.scene)
     }
@@ -120,12 +120,12 @@ impl Session {
         })
     }
 
-    /// Puts what is new on the board. The cameras are looked at when a result has come: to make pictures small takes time, and then
+    /// Puts new messages on the board. The cameras are read right after a result: reducing pictures takes time, and at this moment
     /// the deployment is most likely to have some.
     ///
     /// # Errors
     ///
-    /// Messages cannot be received.
+    /// Fails if messages cannot be received.
     pub(crate) fn look(&mut self, board: &Board) -> Result<Look, Failure> {
         let has_come = self.look_at_poses(board)?;
         if has_come || self.looked.is_none_or(|looked| looked.elapsed() >= PATIENCE) {
@@ -144,14 +144,14 @@ impl Session {
         Ok(Look::On)
     }
 
-    /// Ends what it does besides looking on.
+    /// Ends a recording, if there is one.
     pub(crate) fn leave(&mut self, board: &Board) {
         if let Some(tape) = self.tape.take() {
             tape.finish(board);
         }
     }
 
-    /// Returns true if a result has come.
+    /// Returns true if a result has arrived.
     fn look_at_poses(&mut self, board: &Board) -> Result<bool, Failure> {
         let Some(message) = self.poses.latest_boxed()? else {
             return Ok(false);
@@ -187,7 +187,7 @@ impl Session {
             return Ok(());
         }
         let earlier = now.checked_sub(camera.pause / 2).unwrap_or(now);
-        // In step with its rate, so that a picture that comes a little early is not left out.
+        // The due time advances by the period, so that a picture that arrives slightly early is not left out.
         camera.due = (camera.due + camera.pause).max(earlier);
         let size = [head.width as usize, head.height as usize];
         let frame = head.stamp.frame;
@@ -215,7 +215,7 @@ impl Session {
         Ok(())
     }
 
-    /// Begins or ends a recording, if that was asked for.
+    /// Starts or ends a recording, if requested.
     fn record(&mut self, board: &Board) {
         if self.tape.as_ref().is_some_and(Tape::is_finished)
             && let Some(tape) = self.tape.take()
@@ -225,7 +225,7 @@ impl Session {
         match board.take_record() {
             Some(true) if self.tape.is_none() => {
                 let Some(run) = self.run else {
-                    // No process has reported yet, which they do every second.
+                    // No process has reported yet; each reports every second.
                     board.ask_again();
                     return;
                 };

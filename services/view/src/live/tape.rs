@@ -1,4 +1,4 @@
-//! A recording that a page has asked for.
+//! A recording requested by a page.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::path::{Path, PathBuf};
@@ -16,10 +16,10 @@ use serde_json::{Value, json};
 use crate::board::{Board, Weight};
 use crate::date;
 
-/// Bytes that may wait to be written, in millions.
+/// Largest amount of data that may wait to be written, in millions of bytes.
 const QUEUE_MB: u64 = 128;
 
-/// A recording under way, in a thread of its own.
+/// A recording in progress, in its own thread.
 #[derive(Debug)]
 pub(crate) struct Tape {
     file: PathBuf,
@@ -29,11 +29,11 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// Begins to record everything but evidence, and pictures as they came from cameras, into the folder of the results.
+    /// Starts to record into the folder of the results: all messages except evidence and the cameras' original pictures.
     ///
     /// # Errors
     ///
-    /// The settings and files of the run cannot be read, or the thread cannot be started.
+    /// Fails if the settings and files of the run cannot be read, or the thread cannot be started.
     pub(crate) fn start(
         namespace: &Namespace,
         resolved: &Resolved,
@@ -80,17 +80,17 @@ impl Tape {
         })
     }
 
-    /// The file.
+    /// Returns the path of the file.
     pub(crate) fn file(&self) -> &Path {
         &self.file
     }
 
-    /// Returns true if it has ended by itself.
+    /// Returns true if the recording has ended on its own.
     pub(crate) fn is_finished(&self) -> bool {
         self.thread.is_finished()
     }
 
-    /// Ends it, and says what it holds.
+    /// Ends the recording, and reports its result as an event.
     pub(crate) fn finish(self, board: &Board) {
         self.stop.store(true, Ordering::Relaxed);
         let file = self.file.display();
@@ -103,11 +103,11 @@ impl Tape {
                 board.event(Weight::Warning, &what);
             }
             Ok(Err(why)) => board.event(Weight::Error, &format!("cannot record: {why}")),
-            Err(_panic) => board.event(Weight::Error, "the recording has failed"),
+            Err(_panic) => board.event(Weight::Error, "the recording failed"),
         }
     }
 
-    /// For the page.
+    /// Returns the state of the recording for the page.
     pub(crate) fn json(&self) -> Value {
         let bytes = std::fs::metadata(&self.file).map_or(0, |metadata| metadata.len());
         json!({

@@ -1,4 +1,4 @@
-//! Evaluation of sequences on the keypoints of a network.
+//! Evaluation of the keypoints of a network on sequences.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,27 +15,27 @@ use terminal::{Globals, Terminal, output};
 
 use super::Arguments;
 
-/// Options of the evaluation on a network.
+/// Options of the evaluation of a network.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// Judge the keypoints of this network (ONNX) in place of the filters; "shipped": the one that ships.
+    /// Evaluate the keypoints of this network (ONNX) instead of the filters; "shipped" for the shipped network.
     #[arg(
         long,
         value_name = "FILE",
         conflicts_with_all = ["model", "versions", "paper", "consistency", "sigma", "network", "oracle", "resume", "only", "without"]
     )]
     pub(super) network_evidence: Option<PathBuf>,
-    /// The card of the network; if not given, the one beside it, or in its metadata.
+    /// Card of the network; if not given, the file beside it, or the card in its metadata.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     card: Option<PathBuf>,
-    /// Detector (ONNX) that finds the boxes of people; if not given, the one that ships.
+    /// Detector (ONNX) that finds the boxes of people; the shipped detector if not given.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     pub(super) detector: Option<PathBuf>,
-    /// The card of the detector; if not given, the one beside it, or in its metadata.
+    /// Card of the detector; if not given, the file beside it, or the card in its metadata.
     #[arg(long, value_name = "FILE", requires = "detector")]
     detector_card: Option<PathBuf>,
-    /// Problems to add, separated by commas: clean, covered:N (half of the person in N views), views:N (only so many),
-    /// turned:DEGREES (of one camera), bystander, exchanged (sides in a view); all: the whole set. Only with
+    /// Disturbances to add, separated by commas: clean (none), covered:N (half of the person in N views), views:N (only N views),
+    /// turned:DEGREES (one camera is rotated), bystander, exchanged (left and right in one view); "all" for the whole set. Only with
     /// --network-evidence.
     #[arg(
         long,
@@ -58,7 +58,7 @@ impl Options {
     }
 }
 
-/// The networks that are named.
+/// Files of the networks on the command line.
 struct Files<'a> {
     file: &'a Path,
     options: &'a Options,
@@ -120,7 +120,7 @@ pub(super) fn run(
     }
     failure::require_results(
         rows.iter().any(|row| row.n_frames > 0),
-        "no frame was judged: there is none, or --every leaves none",
+        "no frame was evaluated: there is none, or --every leaves none",
     )
 }
 

@@ -1,13 +1,13 @@
-//! Warnings about people whose height in the frames does not suit the filters.
+//! Warnings about people whose height in the frames is unsuitable for the filters.
 
 use std::collections::BTreeSet;
 
 use geometry::search_size::{GOOD_PX, USABLE_PX, better_scale, search_sizes};
 use training::datasets::sequences::Sequence;
 
-/// Returns warnings about people who are too high or too low in the frames, once for sequences of the same rig.
+/// Returns warnings about people who are too tall or too short in the frames, once for all sequences of a rig.
 ///
-/// * `size`: width and height of the frames, else they are `scale` times the footage.
+/// * `size`: width and height of the frames; if `None`, `scale` times the footage's size.
 pub(super) fn warnings(
     sequences: &[Sequence],
     size: Option<[u32; 2]>,
@@ -33,7 +33,7 @@ fn warning(sequence: &Sequence, size: Option<[u32; 2]>, scale: f64) -> Option<St
     let [least, most] = USABLE_PX;
     let outside = seen.iter().find(|seen| !(least..=most).contains(&seen[1]))?;
     Some(format!(
-        "a person is about {:.0} px high in the frames of {}, where the filters want {} to {}: see --scale {}",
+        "a person is about {:.0} px tall in the frames of {}, but the filters need {} to {}: use --scale {}",
         outside[1],
         sequence.dataset,
         GOOD_PX[0],

@@ -81,7 +81,7 @@ fn refuse_sequence_options(arguments: &Arguments) -> Result<(), Failure> {
     match given.iter().find(|option| option.1) {
         None => Ok(()),
         Some((option, _)) => {
-            let message = format!("{option} has no meaning for single pictures");
+            let message = format!("{option} has no effect on single pictures");
             Err(Failure::new(ExitKind::Usage, message))
         }
     }
@@ -93,7 +93,7 @@ fn write(arguments: &Arguments, sets: &[Pictures], joints: &inputs::Joints) -> R
         ..Bootstrap::default()
     };
     let model = arguments.model.as_ref();
-    let model = model.map_or("the one that ships".to_owned(), |model| {
+    let model = model.map_or("the shipped model".to_owned(), |model| {
         model.display().to_string()
     });
     let numbers = pictures::write_report(&arguments.out, &model, sets, &bootstrap)?;

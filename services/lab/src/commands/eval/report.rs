@@ -42,7 +42,9 @@ fn about(
     let file = arguments.sigma.as_ref().or(arguments.network.as_ref());
     let expected = match (file, arguments.oracle) {
         (Some(file), _) => file.display().to_string(),
-        (None, true) => "the true errors, a tenth of the person's size allowed".to_owned(),
+        (None, true) => {
+            "the true errors, with a tenth of the person's size as the threshold".to_owned()
+        }
         (None, false) => "none".to_owned(),
     };
     let size = arguments.size.map_or_else(
@@ -52,7 +54,7 @@ fn about(
     let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
     let settings = fuse::settings(config, 1.0, job.learned);
     let model = arguments.model.as_ref();
-    let model = model.map_or("the one that ships".to_owned(), |model| {
+    let model = model.map_or("the shipped model".to_owned(), |model| {
         model.display().to_string()
     });
     let upright = if job.film.upright { ", upright" } else { "" };
@@ -66,14 +68,14 @@ fn about(
                 "{}, alpha {}, beta {}, distances {}",
                 match config.energy {
                     deployment::paper::Energy::Paper => "the paper's",
-                    deployment::paper::Energy::Released => "that of the released program",
+                    deployment::paper::Energy::Released => "the released program's",
                 },
                 settings.alpha,
                 settings.beta,
                 if settings.max_distance_cells.is_finite() {
                     format!("up to {} cells", settings.max_distance_cells)
                 } else {
-                    "of any number of cells".to_owned()
+                    "of any size".to_owned()
                 }
             ),
         ),
@@ -82,11 +84,11 @@ fn about(
             if config.facing {
                 "decided for every view"
             } else {
-                "as the model names its parts"
+                "as named by the model"
             }
             .to_owned(),
         ),
-        ("candidates of a view", job.n_candidates.to_string()),
+        ("candidates per view", job.n_candidates.to_string()),
     ]
     .map(|(key, value)| (key.to_owned(), value))
     .to_vec()

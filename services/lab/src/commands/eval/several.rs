@@ -1,4 +1,4 @@
-//! Evaluation of who is who, on a set of several people.
+//! Evaluation of identities, on a set of several people.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -32,12 +32,12 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Fail
     )
 }
 
-/// Judges a finished run against the truth of its scene.
+/// Evaluates a finished run against the truth of its scene.
 ///
-/// * `run`: the folder of its results.
+/// * `run`: folder with the results of the run.
 pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode, Failure> {
     let [folder] = &arguments.sequences[..] else {
-        let what = "--run judges one run against the truth of one sequence";
+        let what = "--run evaluates one run against the truth of one sequence";
         return Err(Failure::new(ExitKind::Usage, what));
     };
     let file = folder.join("truth.jsonl");
@@ -45,7 +45,7 @@ pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode
     let refuse = |line: usize, error: &TruthError| {
         let what = format!("{}, line {line}: {error}", file.display());
         Failure::new(ExitKind::Input, what)
-            .with_hint("--run judges a run of a folder that `parallax-lab synth` wrote")
+            .with_hint("--run evaluates a run of a folder that `parallax-lab synth` wrote")
     };
     let mut lines = text.lines();
     let header = Header::parse(lines.next().unwrap_or_default());
@@ -62,11 +62,11 @@ pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode
     leave(arguments, &report, &everybody_in_lines(&report))?;
     failure::require_results(
         report.frames > 0,
-        "the run has no frame of the truth: are they of the same scene?",
+        "the run has no frame of the truth: check that both are of the same scene",
     )
 }
 
-/// Writes a report to the folder for it, and prints it.
+/// Writes a report into the output folder, and prints it.
 fn leave(arguments: &Arguments, report: &impl Serialize, lines: &str) -> Result<(), Failure> {
     inputs::make_folder(&arguments.out)?;
     let text = serde_json::to_string_pretty(report).or_fail(ExitKind::Run)?;
@@ -82,7 +82,7 @@ fn leave(arguments: &Arguments, report: &impl Serialize, lines: &str) -> Result<
 fn everybody_in_lines(report: &Everybody) -> String {
     let people = report.people.iter().map(|person| {
         format!(
-            "person {}: found in {} of {} frames, PCP3D {} %, limbs off by {} mm, {} changes of the id\n",
+            "person {}: found in {} of {} frames, PCP3D {} %, limbs off by {} mm, {} id changes\n",
             person.actor,
             person.found,
             person.frames,
@@ -94,8 +94,8 @@ fn everybody_in_lines(report: &Everybody) -> String {
     let people: String = people.collect();
     let ap = report.ap.iter().map(|(mm, ap)| format!("{ap:.1} at {mm} mm"));
     format!(
-        "{people}everybody: mean of 14 joints {} mm, recall at 500 mm {:.1} %, average precision {} %\n\
-         {} changes of an id ({:.2} a minute), {} ids given, {:.2} people put out a frame, {:.2} there, {} frames; intervals: 95 %, over \
+        "{people}all people: mean error of 14 joints {} mm, recall at 500 mm {:.1} %, average precision {} %\n\
+         {} id changes ({:.2} per minute), {} different ids, {:.2} people found per frame, {:.2} present, {} frames; intervals: 95 %, over \
          blocks of 25 frames",
         number(report.mpjpe_mm),
         report.recall,
@@ -109,7 +109,7 @@ fn everybody_in_lines(report: &Everybody) -> String {
     )
 }
 
-/// A number with its interval.
+/// Formats a number with its interval.
 fn number(measured: Option<Measured>) -> String {
     let Some(Measured { value, interval }) = measured else {
         return "-".to_owned();
@@ -118,13 +118,13 @@ fn number(measured: Option<Measured>) -> String {
     format!("{value:.2} ({low:.2} to {high:.2})")
 }
 
-/// The views that were asked for; all if none was.
+/// Returns the selected views; all views if the selection is empty.
 fn chosen(asked: &[usize], n_views: usize) -> Result<Vec<usize>, Failure> {
     let is_twice = |nth: usize| asked[..nth].contains(&asked[nth]);
     let wrong = (0..asked.len()).find(|nth| asked[*nth] >= n_views || is_twice(*nth));
     if let Some(wrong) = wrong {
         let message = format!(
-            "--views: {} is not one of 0 to {}, or is there twice",
+            "--views: {} is not from 0 to {}, or is given twice",
             asked[wrong],
             n_views.saturating_sub(1)
         );
@@ -154,9 +154,9 @@ fn in_lines(report: &Report) -> String {
     let actors: String = report.actors.iter().map(actor).collect();
     let [median, slow] = report.association_ms;
     format!(
-        "{actors}mean of actors 1 to 3: PCP3D {} %\n{} changes of an id, {} ids given, {:.2} people put out a frame of {}\n\
-         association: median {median:.2} ms, 99th percentile {slow:.2} ms a frame\n\
-         by the protocol and the head rule of 4D Association; intervals: 95 %, over blocks of a second",
+        "{actors}mean of actors 1 to 3: PCP3D {} %\n{} id changes, {} different ids, {:.2} people found per frame in {} frames\n\
+         association: median {median:.2} ms, 99th percentile {slow:.2} ms per frame\n\
+         evaluated with the protocol and the head rule of 4D Association; intervals: 95 %, over blocks of a second",
         number(report.mean_pcp3d),
         report.switches,
         report.ids,

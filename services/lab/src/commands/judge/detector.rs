@@ -1,4 +1,4 @@
-//! `parallax-lab judge` of a detector of people.
+//! `parallax-lab judge` for a detector of people.
 
 use std::process::ExitCode;
 

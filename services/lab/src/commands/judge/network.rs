@@ -1,4 +1,4 @@
-//! `parallax-lab judge` of a network that finds keypoints.
+//! `parallax-lab judge` for a network that finds keypoints.
 
 use core::fmt;
 use std::path::Path;
@@ -66,17 +66,17 @@ pub(super) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
-/// How well the heat of the maps predicts the error of a joint.
+/// Measures of how well the height of the maps predicts the error of a joint.
 struct Expected {
     n_joints: usize,
     n_far: usize,
-    /// With its interval.
+    /// Area under the ROC curve, with its interval.
     auc: Option<(f64, [f64; 2])>,
     rank_correlation: Option<f64>,
 }
 
 impl Expected {
-    /// * `people`: the joints of each.
+    /// * `people`: errors of the joints of each person.
     fn new(people: &[Vec<JointError>]) -> Self {
         let auc = |errors: &[JointError]| {
             let each = errors.iter().map(|error| (error.expected, error.is_far()));
@@ -115,7 +115,7 @@ impl fmt::Display for Expected {
         };
         write!(
             to,
-            "expected errors of the maxima: area under the ROC {} ({} of {} joints are off by more than half a head), rank correlation {}",
+            "expected errors of the maxima: area under the ROC curve {} ({} of {} joints are off by more than half a head), rank correlation {}",
             auc,
             self.n_far,
             self.n_joints,
@@ -124,7 +124,7 @@ impl fmt::Display for Expected {
     }
 }
 
-/// Refuses what only models of parts have.
+/// Refuses options that apply only to models of parts.
 fn refuse(arguments: &Arguments) -> Result<(), Failure> {
     let unused = if arguments.offsets {
         "--offsets"

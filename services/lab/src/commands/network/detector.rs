@@ -1,4 +1,4 @@
-//! `parallax-lab model show` of a detector of people.
+//! `parallax-lab model show` for a detector of people.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -23,7 +23,7 @@ pub(super) fn show(
 ) -> Result<ExitCode, Failure> {
     if arguments.outline.is_some() {
         let message = format!(
-            "{}: --box is for networks that find keypoints; a detector looks at the whole picture",
+            "{}: --box is for networks that find keypoints; a detector uses the whole picture",
             file.display()
         );
         return Err(Failure::new(ExitKind::Usage, message));
@@ -65,7 +65,7 @@ pub(super) fn show(
     fitted.map(|_| ExitCode::SUCCESS)
 }
 
-/// The boxes that a detector finds in a picture, which is drawn.
+/// Returns the boxes that a detector finds in a picture, and draws them.
 fn look(detector: &Detector, image: &Path, out: Option<&Path>) -> Result<Vec<PersonBox>, Failure> {
     let picture = first_picture(image)?;
     let found = detector::people(detector, &picture, &mut Vec::new())?;
@@ -108,7 +108,7 @@ fn in_words(
     ))?;
     output::line(format_args!("  gives  {}", given(card)))?;
     output::line(format_args!(
-        "  keeps  boxes with a score of at least {}, and of two that share more than {} of their union the better",
+        "  keeps  boxes with a score of at least {}; if two boxes share more than {} of their union, the better one",
         card.least_score, card.most_overlap
     ))?;
     for (what, text) in [("licence", &card.licence), ("weights", &card.weights)] {

@@ -1,4 +1,4 @@
-//! The costs of a run, from the report that it printed.
+//! Costs of a run, from the report that it printed.
 
 use std::path::Path;
 
@@ -8,11 +8,12 @@ use serde_json::Value;
 
 use super::DEFAULT;
 
-/// Reads the costs of a run: processor time of its stages, and of the link what `hosts.json` in its folder says, if there is one.
+/// Reads the costs of a run: the processor time of its stages, and the costs of the link from `hosts.json` in its folder, if this file
+/// exists.
 ///
 /// # Errors
 ///
-/// The file is not the report of a run, or the run passed no frame.
+/// Fails if the file is not the report of a run, or the run processed no frame.
 pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
     let refused = |what: &str| {
         let failure = Failure::new(ExitKind::Input, format!("{}: {what}", file.display()));
@@ -30,15 +31,15 @@ pub(super) fn costs(file: &Path) -> Result<Costs, Failure> {
 
 fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     let spent = report["processor_s"].as_object();
-    let spent = spent.ok_or("it has no `processor_s`: it is not the report of a run")?;
+    let spent = spent.ok_or("`processor_s` is missing: this is not the report of a run")?;
     let n_views = report["views"].as_array().map_or(0, Vec::len);
     let n_frames = report["frames_in_footage"].as_f64().unwrap_or(0.0);
     if n_views == 0 || n_frames < 1.0 {
         return Err(format!(
-            "{n_frames} frames of {n_views} views: no costs can be computed from that"
+            "{n_frames} frames of {n_views} views: no costs can be computed"
         ));
     }
-    // A process of a service, milliseconds for each frame.
+    // Mean time of a process of this service, milliseconds per frame.
     let mean = |service: &str| {
         let is_meant = |name: &str| {
             let rest = name.strip_prefix(service);
@@ -49,7 +50,8 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         let sum: f64 = all.iter().sum();
         (!all.is_empty()).then(|| 1e3 * sum / (all.len() as f64 * n_frames))
     };
-    let needed = |service: &str| mean(service).ok_or_else(|| format!("no process {service} in it"));
+    let needed =
+        |service: &str| mean(service).ok_or_else(|| format!("no process {service} in the report"));
     let workers = spent.keys().filter(|key| key.starts_with("fuse-")).count() as f64;
     let fused = mean("fuse").map_or(0.0, |value| value * workers)
         + needed("triangulate")?
@@ -62,14 +64,15 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         ..DEFAULT
     };
     let n_pose = spent.keys().filter(|key| key.starts_with("pose-")).count();
-    // Where poses cross, some are found elsewhere.
+    // If hosts send poses, some poses are found on other hosts.
     let carries_poses = n_pose > 0 && n_pose < n_views;
     Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
 }
 
-/// Adds the measured costs of the link to the costs.
+/// Adds the measured costs of the link.
 ///
-/// * `hosts`: what `hosts.json` says; `carries_poses`: whether poses cross, and no frames.
+/// * `hosts`: content of `hosts.json`.
+/// * `carries_poses`: true if hosts send poses instead of frames.
 fn with_link(mut costs: Costs, hosts: &Value, carries_poses: bool) -> Costs {
     let far = hosts["hosts"].as_array().into_iter().flatten();
     let far = far.filter_map(|value| value["views"].as_array()).flatten();

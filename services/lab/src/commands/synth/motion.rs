@@ -12,17 +12,17 @@ use training::datasets::sequences::MotionOptions;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Recorded motion")]
 pub(super) struct MotionArguments {
-    /// Let the subjects move as recorded in a C3D or TRC file, instead of an action.
+    /// Move the subjects as recorded in a C3D or TRC file, instead of an action.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["actions", "live"])]
     motion: Option<PathBuf>,
-    /// Table that maps its markers to joints: cmu, pose2sim, parallax, optitrack36, or a file like those in
-    /// configs/markers; if not given, the first of these four whose markers are in the file.
+    /// Table that maps the markers of the file to joints: cmu, pose2sim, parallax, optitrack36, or a file like those in
+    /// configs/markers. If not given, the first of these four tables whose markers are all in the file.
     #[arg(long, value_name = "TABLE", requires = "motion")]
     markers: Option<PathBuf>,
-    /// First and last frame, by the numbers in the file; all if not given.
+    /// First and last frame, as numbered in the file; all frames if not given.
     #[arg(long, value_name = "FIRST-LAST", requires = "motion", value_parser = frames)]
     motion_frames: Option<[u32; 2]>,
-    /// Longest gap of a marker that is interpolated linearly, seconds.
+    /// Longest gap in a marker's track that is interpolated linearly, seconds.
     #[arg(long, value_name = "S", default_value_t = MotionOptions::default().max_gap_s, requires = "motion")]
     motion_gap: f64,
 }

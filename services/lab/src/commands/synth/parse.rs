@@ -8,23 +8,24 @@ pub(super) fn rig(text: &str) -> Result<RigChoice, String> {
     RigChoice::parse(text).map_err(|error| error.to_string())
 }
 
-/// Parses skews, milliseconds: `0,5,11,16`.
+/// Parses skews in milliseconds, for example `0,5,11,16`.
 pub(super) fn skews(text: &str) -> Result<Vec<f64>, String> {
     let skews = scene::Settings::parse_skews_ms(text);
     skews.ok_or_else(|| {
         format!(
-            "{text:?}: expected milliseconds, -1000 to 1000, with commas, for example 0,5,11,16"
+            "{text:?}: expected milliseconds from -1000 to 1000, separated by commas, for example 0,5,11,16"
         )
     })
 }
 
-/// Maximal number of subjects of one command.
+/// Largest number of subjects in one command.
 const MAX_SUBJECTS: usize = 10_000;
 
-/// Parses a list of subjects: `3`, or `1-20,25`. Keeps the order and removes duplicates.
+/// Parses a list of subjects, for example `3` or `1-20,25`. Keeps the order and removes duplicates.
 pub(super) fn subjects(text: &str) -> Result<Vec<u64>, String> {
-    let wrong =
-        || format!("{text:?}: expected numbers and ranges with commas, for example 1-20,25");
+    let wrong = || {
+        format!("{text:?}: expected numbers and ranges separated by commas, for example 1-20,25")
+    };
     let range = |part: &str| -> Option<RangeInclusive<u64>> {
         let (from, to) = part.split_once('-').unwrap_or((part, part));
         let range = from.trim().parse().ok()?..=to.trim().parse().ok()?;
@@ -53,7 +54,7 @@ pub(super) fn actions(text: &str) -> Result<Vec<Action>, String> {
     for name in text.split(',') {
         let action = Action::by_name(name.trim()).ok_or_else(|| {
             let known = Action::ALL.map(Action::name).join(", ");
-            format!("there is no action {name:?}, expected all, or some of {known}")
+            format!("there is no action {name:?}; expected all, or some of {known}")
         })?;
         if !actions.contains(&action) {
             actions.push(action);

@@ -1,4 +1,4 @@
-//! `parallax-lab train consistency`: learns the consistency of several views of a person from sequences with truth.
+//! `parallax-lab train consistency`: learns the consistency between several views of a person, from sequences with ground truth.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,21 +13,21 @@ use crate::commands::eval::size;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-SEQUENCE is a sequence for `parallax-lab eval`: a folder of HumanEva-I, of UMPM, of `parallax-lab synth`, or a description. \
-Every view is solved alone. From the parts near the truth it learns which types occur together in \
-two views, by the angle between the cameras as seen from the person, and with --rig NAME also for each pair of cameras \
-of that rig, by their names. The median error of every part is its threshold (tau); joints are a linear \
-map of the parts by least squares. Then it chooses alpha, the cap on distances and beta on \
-held-out subjects, by the largest area under the curve of PCP3D.
+SEQUENCE is a sequence for `parallax-lab eval`: a folder of HumanEva-I, of UMPM or of `parallax-lab synth`, or a description file. \
+Each view is solved alone. From the parts near the truth, the command learns which types occur together in \
+two views. The tables depend on the angle between the cameras as seen from the person. With --rig NAME, there are also tables for each pair of \
+cameras of that rig, by camera name. The threshold of each part (tau) is its median error. The joints are a linear \
+map of the parts, fitted by least squares. Finally, alpha, the cap on distances and beta are chosen on \
+held-out subjects, for the largest area under the PCP3D curve.
 
-The file belongs beside the model it was learned with: `consistency = \"person.consistency\"` in the [paper] section \
-of a deployment, or --consistency of `eval`. Its format: cargo doc -p consistency, `Learned`.
+Use the file with the model that it was learned with: `consistency = \"person.consistency\"` in the [paper] section \
+of a deployment, or --consistency of `eval`. For its format, see `Learned` in `cargo doc -p consistency`.
 
-With --json one object: the weights, every choice that was tried and its score, tau, the score of the tables on held-out \
-people by the number of bins, the error of joints with and without the map.
+--json prints one object: the weights, all weights that were tried with their scores, tau, the score of the tables on held-out \
+people for each number of bins, and the error of the joints with and without the map.
 
 Exit codes: 0 done; 2 the command line is wrong; 4 a sequence or a model cannot be used, or nothing could be learned; \
-5 a calibration cannot be used; 130 interrupted; OUT then holds the tables with the default weights, if weights were being tried.
+5 a calibration cannot be used; 130 interrupted. If weights were being tried, OUT then contains the tables with the default weights.
 
 Examples:
     parallax-lab synth out/ring --rig ring:6 --subjects 1-8 --actions walking,boxing,gestures --frames 6 --rate 1
@@ -38,22 +38,22 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The sequences.
+    /// Sequences to learn from, see below.
     #[arg(required = true, value_name = "SEQUENCE")]
     sequences: Vec<PathBuf>,
-    /// The model file; the person model that ships with Parallax if not given.
+    /// Model file; the shipped person model if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The file to write.
+    /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Subjects to choose the weights on, separated by commas; if not given, the last quarter of them.
+    /// Held-out subjects, on which the weights are chosen, separated by commas; the last quarter of the subjects if not given.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     hold_out: Vec<String>,
-    /// Maximal number of instants of the held-out subjects that weights are tried on, evenly spaced.
+    /// Largest number of instants of the held-out subjects for trying weights, evenly spaced.
     #[arg(long, value_name = "N", default_value_t = 48)]
     tries: usize,
-    /// Also learn tables by camera names, for a rig of this name; all sequences must be of one rig.
+    /// Also learn tables by camera name, for the rig with this name. All sequences must be of one rig.
     #[arg(long, value_name = "NAME")]
     rig: Option<String>,
     /// Do not learn the map from parts to joints.
@@ -62,19 +62,19 @@ pub(crate) struct Arguments {
     /// Size of the frames.
     #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "scale")]
     size: Option<[u32; 2]>,
-    /// Size of the frames as a share of that of the footage.
+    /// Size of the frames as a share of the footage's size.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Do not turn the frames upright.
+    /// Do not rotate the frames upright.
     #[arg(long)]
     no_upright: bool,
-    /// Use the first and every n-th frame after it.
+    /// Use the first frame and every n-th frame after it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     every: usize,
-    /// Maximal number of frames per sequence.
+    /// Largest number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Threads; one per core if not given. The file does not depend on it.
+    /// Number of threads; one per core if not given. It does not affect the file.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print the summary as JSON.

@@ -1,4 +1,4 @@
-//! `parallax-lab train joints`: learns where joints lie among the parts of a model.
+//! `parallax-lab train joints`: learns the positions of joints relative to the parts of a model.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,15 +13,15 @@ use super::marked::Marked;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-By default a joint is the centre of one part. This command searches the pictures of marked people with the \
-model, takes the best detection that covers 30 % of the box around a person's joints, and learns every joint as a \
-weighted sum of that part and the parts around it. Left and right are mirror images. Joints farther than a tenth of the \
-person's size from their mark are ignored: there the limb was not found. Every data set has the same weight, however many \
-people it has. The number of parts and the ridge are chosen by the error on people who are left out in turn.
+By default, a joint is the centre of one part. This command learns every joint as a weighted sum of that part and the parts \
+around it. It searches pictures of annotated people with the model, and uses the best detection that covers 30 % of the box \
+around a person's joints. The map is the same for left and right, mirrored. Joints farther than a tenth of the \
+person's size from their mark are ignored, because the limb was not found. Every data set has the same weight, whatever its \
+number of people. Cross-validation over people chooses the number of parts and the ridge.
 
-DATASETs are those of `train fmp`, of people with 14 joints: usually the same as for the model, with the same --only, --sides \
-and --without. The file fits this model only. Name it by `paper.joint_map` of a deployment, or by --joint-map of \
-`detect`, `eval` and `judge`. The file for the model that ships is part of Parallax.
+A DATASET has the form that `train fmp` describes, and people with 14 joints. Use the data sets of the model, with the same --only, --sides \
+and --without. The file fits this model only. Pass it as `paper.joint_map` in a deployment, or as --joint-map to \
+`detect`, `eval` and `judge`. The file for the shipped model is part of Parallax.
 
 The file is the same on any number of threads.
 
@@ -36,15 +36,15 @@ Example:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The model file, of 26 parts; "shipped": the one that ships.
+    /// Model file with 26 parts; "shipped" for the shipped model.
     #[arg(value_name = "MODEL")]
     model: PathBuf,
     #[command(flatten)]
     people: Marked,
-    /// The file to write.
+    /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Threads; one per core if not given.
+    /// Number of threads; one per core if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print the result as JSON.
@@ -90,11 +90,11 @@ fn summary(learned: &Learned) -> serde_json::Value {
 
 fn text(learned: &Learned) -> String {
     let it = &learned.file.learned;
-    let mut lines = vec!["reach  ridge   error of people left out, % of their size".to_owned()];
+    let mut lines = vec!["reach  ridge   error on people left out, % of their size".to_owned()];
     for (tried, errors) in &learned.tried {
         let errors: Vec<String> = errors.iter().map(|error| format!("{error:.3}")).collect();
         let is_taken = tried.reach == it.reach && tried.ridge == it.ridge;
-        let mark = if is_taken { "  <- taken" } else { "" };
+        let mark = if is_taken { "  <- chosen" } else { "" };
         let (reach, ridge) = (tried.reach, tried.ridge);
         lines.push(format!(
             "{reach:>5} {ridge:>6}   {}{mark}",
@@ -103,7 +103,7 @@ fn text(learned: &Learned) -> String {
     }
     for set in &it.sets {
         lines.push(format!(
-            "{}: {} of {} people found; error {:.3} before, {:.3} after, of people left out",
+            "{}: {} of {} people found; error on people left out: {:.3} before, {:.3} after",
             set.name, set.found, set.people, set.error_before, set.error_after
         ));
     }

@@ -1,4 +1,4 @@
-//! Options of the trainings of networks that find something.
+//! Options for training networks that find people or joints.
 
 use std::path::{Path, PathBuf};
 
@@ -8,28 +8,28 @@ use serde::{Serialize, de::DeserializeOwned};
 use terminal::output;
 use training::networks::Backend;
 
-/// Options that say which file is written, and how.
+/// Options for the output file and the training.
 #[derive(Debug, Args)]
 pub(super) struct Learning {
-    /// The ONNX file to write.
+    /// ONNX file to write.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     pub(super) out: Option<PathBuf>,
-    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
+    /// Settings of the training, as TOML; --print-settings shows the keys and their defaults.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Print the settings that would be used, as TOML, and exit.
+    /// Print the settings of the training as TOML, and exit.
     #[arg(long)]
     pub(super) print_settings: bool,
-    /// Number of steps, instead of that of the settings.
+    /// Number of steps; overrides the settings.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(super) steps: Option<u32>,
-    /// Random seed, instead of that of the settings.
+    /// Random seed; overrides the settings.
     #[arg(long, value_name = "N")]
     pub(super) seed: Option<u32>,
-    /// The library that computes: `built-in`, or `libtorch`, if this executable was built with it.
+    /// Library for the computation: `built-in`, or `libtorch` if this executable was built with it.
     #[arg(long, value_name = "NAME", default_value = "built-in", value_parser = ["built-in", "libtorch"])]
     backend: String,
-    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
+    /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.
     #[arg(long)]
     pub(super) resume: bool,
     /// Print the steps as JSON, one object per line.
@@ -38,7 +38,7 @@ pub(super) struct Learning {
 }
 
 impl Learning {
-    /// The settings of the file, or the defaults.
+    /// Reads the settings file; the defaults if none is given.
     pub(super) fn read<T: DeserializeOwned + Default>(&self) -> Result<T, Failure> {
         let Some(file) = &self.settings else {
             return Ok(T::default());
@@ -53,7 +53,7 @@ impl Learning {
         output::line(text.trim_end())
     }
 
-    /// The job without a network to go on from.
+    /// Returns the job, without a network to start from.
     pub(super) fn job(&self) -> Result<lab::posetraining::Job, Failure> {
         Ok(lab::posetraining::Job {
             out: self.out.clone().unwrap_or_default(),
@@ -63,7 +63,7 @@ impl Learning {
         })
     }
 
-    /// Prints passes, where JSON is wanted.
+    /// Prints passes if JSON was requested.
     pub(super) fn report(&self, passes: &[impl Serialize]) -> Result<(), Failure> {
         if self.json {
             for pass in passes {
@@ -74,7 +74,7 @@ impl Learning {
     }
 }
 
-/// The named file; clap has made sure that there is one.
+/// Returns the file name; clap guarantees that it is given.
 pub(super) fn named(file: Option<&Path>) -> &Path {
     file.unwrap_or(Path::new(""))
 }
@@ -85,8 +85,8 @@ fn backend(name: &str) -> Result<Backend, Failure> {
         "libtorch" => Ok(Backend::LibTorch),
         #[cfg(not(feature = "libtorch"))]
         "libtorch" => {
-            let message = "this Parallax was built without LibTorch";
-            let hint = "build it with --features libtorch: docs/guide/train.md says how";
+            let message = "this executable was built without LibTorch";
+            let hint = "build with --features libtorch; see docs/guide/train.md";
             Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
         }
         _ => Ok(Backend::BuiltIn),

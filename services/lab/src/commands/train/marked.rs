@@ -1,30 +1,30 @@
-//! Options for marked people to learn from, of several trainings.
+//! Options for annotated people, shared by several trainings.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use lab::person::Chosen;
 
-/// Data sets, and the people of them.
+/// Data sets, and the selection of people from them.
 #[derive(Debug, Args)]
 pub(super) struct Marked {
     /// Annotated people: folders or files, as for `train fmp`.
     #[arg(value_name = "DATASET", required = true)]
     datasets: Vec<PathBuf>,
-    /// People of a data set to learn from, all if not given.
+    /// People of a data set to train on; all if not given.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
-    /// People of a data set to leave out, for example a test set.
+    /// People of a data set to leave out, for example its test set.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     without: Vec<String>,
     /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
-    /// `marked` if not given.
+    /// The default is `marked`.
     #[arg(long, value_name = "[DATASET=]SIDES")]
     sides: Vec<String>,
 }
 
 impl Marked {
-    /// The choice; all other values are the defaults.
+    /// Returns the choice; all other values are the defaults.
     pub(super) fn chosen(&self) -> Chosen {
         Chosen {
             datasets: self.datasets.clone(),

@@ -1,4 +1,4 @@
-//! `parallax-lab train network-people` and `parallax-lab train network`: the network that finds joints.
+//! `parallax-lab train network-people` and `parallax-lab train network`: train the network that finds joints.
 
 pub(super) mod learn;
 pub(super) mod people;

@@ -14,14 +14,14 @@ use super::subjects;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-Exchanging left and right in all views changes no energy, so left and right must be decided by whether the \
-person is seen from the front or from behind. The network learns that from two sources, together or alone: DATASETs of annotated \
-people as for `parallax-lab train fmp`, with the person's own left and right (LSP; not PARSE), \
-and synthetic scenes (--scenes N), searched as in the pipeline.
+Exchanging left and right in all views does not change the energy. To tell left from right, Parallax must know whether a view shows the \
+person from the front or from behind. The network learns this from one or both of two sources. DATASETs are annotated \
+people as for `parallax-lab train fmp`, with left and right as sides of the body (LSP; not PARSE). \
+Synthetic scenes (--scenes N) are searched as in the pipeline.
 
---judge and --judge-scenes name people and scenes to judge on, which are left out of the training.
+--judge and --judge-scenes select people and scenes for the evaluation of the network. They are left out of the training.
 
-The network is the same, bit for bit, on any number of threads of one kind of machine.
+The network is the same, bit for bit, on any number of threads, on machines of the same kind.
 
 Exit codes: 0 the network is written; 2 the command line is wrong; 4 a data set cannot be used; 130 stopped by Ctrl-C.
 
@@ -35,28 +35,28 @@ pub(crate) struct Arguments {
     /// Annotated people: folders or files, as for `train fmp`.
     #[arg(value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// People of a data set to use, all if not given.
+    /// People of a data set to use; all if not given.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
-    /// People of a data set to judge on, and not to learn from.
+    /// People of a data set for the evaluation; they are left out of the training.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     judge: Vec<String>,
-    /// Number of synthetic scenes; each gives some pictures of every camera.
+    /// Number of synthetic scenes; each gives several pictures from every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
     /// First and last number of the synthetic people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
     subjects: [u64; 2],
-    /// Number of synthetic scenes to judge on.
+    /// Number of synthetic scenes for the evaluation.
     #[arg(long, value_name = "N", default_value_t = 0)]
     judge_scenes: u32,
-    /// First and last number of the synthetic people in the scenes to judge on.
+    /// First and last number of the synthetic people in the scenes for the evaluation.
     #[arg(long, value_name = "FROM-TO", default_value = "901-920", value_parser = subjects)]
     judge_subjects: [u64; 2],
-    /// Frames per camera of a scene, some seconds apart.
+    /// Frames per camera in a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people, as the background of every third scene instead of a room.
+    /// Folder of photographs without people, the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Number of training passes over all people.
@@ -65,13 +65,13 @@ pub(crate) struct Arguments {
     /// Random seed.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The single-view model; the person model that ships with Parallax if not given.
+    /// Single-view model; the shipped person model if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The file to write.
+    /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Threads; one per core if not given.
+    /// Number of threads; one per core if not given.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print the result as JSON.
@@ -146,13 +146,13 @@ fn json(report: &Report) -> serde_json::Value {
 
 fn text(report: &Report) -> String {
     let mut lines = vec![format!(
-        "learned from {} photographs ({} from behind) and {} pictures of scenes",
+        "trained on {} photographs ({} from behind) and {} pictures of scenes",
         report.n_photographs, report.n_behind, report.n_rendered
     )];
     lines.extend(report.judged.iter().map(|judged| {
         let [low, high] = judged.interval.map(|interval| 100.0 * interval);
         format!(
-            "{}: right for {:.1} % of {} people ({low:.1} to {high:.1}), surprise {:.3} nats (0.693: knows nothing)",
+            "{}: correct for {:.1} % of {} people ({low:.1} to {high:.1}), surprise {:.3} nats (0.693: no information)",
             judged.on,
             100.0 * judged.right,
             judged.n,

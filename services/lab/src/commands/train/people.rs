@@ -7,41 +7,40 @@ use failure::Failure;
 use lab::person::{Chosen, parse_skeleton};
 use training::datasets::{FaultKind, SkeletonTable};
 
-/// The data options.
+/// Options for the training data.
 #[derive(Debug, Args)]
 pub(super) struct People {
-    /// Annotated people: folders or files, see below.
+    /// Annotated people: folders or files, described below.
     #[arg(value_name = "DATASET", required_unless_present = "print_settings")]
     datasets: Vec<PathBuf>,
-    /// Folder of images without people; may be given several times.
+    /// Folder of images without people; the option can be repeated.
     #[arg(long, value_name = "DIR", required_unless_present = "print_settings")]
     negatives: Vec<PathBuf>,
-    /// People of a data set to train on, all if not given.
+    /// People of a data set to train on; all if not given.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
-    /// People of a data set to leave out, for example a test set.
+    /// People of a data set to leave out, for example its test set.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     without: Vec<String>,
     /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
-    /// `marked` if not given.
+    /// The default is `marked`.
     #[arg(long, value_name = "[DATASET=]SIDES")]
     sides: Vec<String>,
-    /// Train on rotated copies too, degrees, anticlockwise: -15,-7.5,7.5,15.
+    /// Also train on copies rotated anticlockwise by these angles in degrees, for example -15,-7.5,7.5,15.
     #[arg(long, value_name = "[DATASET=]DEGREES,...", allow_hyphen_values = true)]
     rotate: Vec<String>,
     /// Do not train on mirrored images.
     #[arg(long)]
     no_mirror: bool,
-    /// The parts of the model and their positions between the joints, as TOML; the published 26 parts for 14 joints if
-    /// not given.
+    /// Parts of the model and their positions between the joints, as TOML; if not given, the 26 published parts for 14 joints.
     #[arg(long, value_name = "FILE")]
     skeleton: Option<PathBuf>,
-    /// Kinds of label faults that end the training instead of leaving the person out: a list, or `all`.
+    /// Kinds of bad labels that end the training, separated by commas, or `all`. People with other bad labels are left out.
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = fatal)]
     fatal: Vec<Fatal>,
 }
 
-/// Label faults that end the training.
+/// Kinds of bad labels that end the training.
 #[derive(Debug, Clone, Copy)]
 enum Fatal {
     All,
@@ -58,7 +57,7 @@ fn fatal(name: &str) -> Result<Fatal, String> {
 }
 
 impl People {
-    /// Returns true if mirrored images are trained on.
+    /// Returns true if the training uses mirrored images.
     pub(super) fn with_mirror(&self) -> bool {
         !self.no_mirror
     }
@@ -71,7 +70,7 @@ impl People {
         }
     }
 
-    /// The data options for the training.
+    /// Returns the data options of the training.
     pub(super) fn chosen(&self) -> Chosen {
         let mut fatal: Vec<FaultKind> = Vec::new();
         for fault in &self.fatal {

@@ -1,4 +1,4 @@
-//! `parallax-lab train quality` and `quality-samples`: training of the network that predicts the errors of single views.
+//! `parallax-lab train quality` and `quality-samples`: train the network that predicts the errors of single views.
 
 pub(crate) mod network;
 pub(crate) mod samples;

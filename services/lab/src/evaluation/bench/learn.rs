@@ -1,4 +1,4 @@
-//! Compares single views with the truth: the training data of the consistency terms.
+//! Comparison of single views with the truth: the training data of the consistency terms.
 
 use kernels::Rgb8View;
 use multiview::learned::{Learner, Pair, ViewObservation};
@@ -11,14 +11,14 @@ use super::Bench;
 use crate::evaluation::{parse14, part_errors_and_facing, projected, size};
 
 impl Bench {
-    /// Solves every view of an instant alone, and adds them to the learners.
+    /// Solves every view of an instant alone, and adds the results to the learners.
     ///
     /// * `joints`: the true joints of the sequence's joint set, metres.
-    /// * `by_name`: learn the pairs of cameras by their names, too.
+    /// * `by_name`: true to learn pairs of cameras by name as well.
     ///
     /// # Panics
     ///
-    /// If the number of images, or the size of one, is not that of the rig.
+    /// Panics if the number of images or the size of an image does not match the rig.
     pub fn learn(
         &mut self,
         learners: &mut [Learner],

@@ -1,4 +1,4 @@
-//! The paper's figures as SVG: bars of every part, curves over the threshold, histograms of changes.
+//! The paper's figures as SVG: bars for every part, curves over the threshold, histograms of changes.
 
 use crate::evaluation::{ChangesOf, Group};
 use statistics::score::SEGMENT_NAMES;
@@ -6,7 +6,7 @@ use statistics::score::SEGMENT_NAMES;
 use exports::report::html::Html;
 use exports::report::put;
 
-/// One colour for each version, distinguishable with colour blindness and on light and dark backgrounds.
+/// Colours of the versions. They can be told apart with colour blindness, and on light and dark backgrounds.
 const COLOURS: [&str; 8] = [
     "#d9503f", "#3a86c8", "#2f9e5b", "#9a6bd0", "#d98a00", "#1f9c95", "#d0568f", "#808894",
 ];
@@ -15,7 +15,7 @@ pub(super) fn colour(version: usize) -> &'static str {
     COLOURS[version % COLOURS.len()]
 }
 
-/// A plot of percentages: 0 to 100 upwards.
+/// A plot of percentages; 0 is at the bottom.
 struct Plot {
     width: f64,
     out: Html,
@@ -86,7 +86,7 @@ impl Plot {
     }
 }
 
-/// A label of an axis: with as many decimals as it needs, two at most.
+/// Formats the label of an axis with as few decimals as possible, at most two.
 pub(super) fn tick(value: f64) -> String {
     let text = format!("{value:.2}");
     let short = text.trim_end_matches('0').trim_end_matches('.');
@@ -97,7 +97,7 @@ pub(super) fn tick(value: f64) -> String {
     }
 }
 
-/// The smallest top of an axis with four steps that have such labels.
+/// Returns the smallest value at the top of an axis with four steps for which such labels are exact.
 pub(super) fn top(most: f64) -> f64 {
     let tenth = 10_f64.powf(most.max(0.01).log10().floor());
     let steps = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
@@ -105,7 +105,7 @@ pub(super) fn top(most: f64) -> f64 {
     fits.unwrap_or(10.0 * tenth)
 }
 
-/// PCP3D of every part, a bar for each version.
+/// Draws PCP3D of every part, with a bar for each version.
 pub(super) fn bars(group: &Group, titles: &[String]) -> Html {
     let n = SEGMENT_NAMES.len() as f64;
     let mut plot = Plot::new(72.0 * n, 100.0, "%");
@@ -126,7 +126,7 @@ pub(super) fn bars(group: &Group, titles: &[String]) -> Html {
     plot.end()
 }
 
-/// PCP3D over the threshold, a curve for each version.
+/// Draws PCP3D over the threshold, with a curve for each version.
 pub(super) fn curves(group: &Group, titles: &[String]) -> Html {
     let mut plot = Plot::new(420.0, 100.0, "%");
     let ends = group.versions.iter().filter_map(|version| version.curve.last());
@@ -154,9 +154,9 @@ pub(super) fn curves(group: &Group, titles: &[String]) -> Html {
     plot.end()
 }
 
-/// Improvements (to the right) and deteriorations of one version.
+/// Draws the histogram of changes for one version; improvements are on the right.
 pub(super) fn histogram(changes: &ChangesOf) -> Html {
-    // The two bins around 0 would dwarf all others: they are cut off.
+    // The two bins around 0 are much higher than all others, so they are cut off.
     let far = changes
         .bins
         .iter()

@@ -1,4 +1,4 @@
-//! The page of single pictures.
+//! HTML page for single pictures.
 
 use crate::evaluation::{Pictures, number};
 use statistics::score::Bootstrap;
@@ -6,9 +6,9 @@ use statistics::score::Bootstrap;
 use exports::report::parts::{about_table, begin};
 use exports::report::put;
 
-/// One page that needs no other file.
+/// Returns one self-contained page.
 ///
-/// * `about`: what was run: key and value.
+/// * `about`: description of the run, as keys and values.
 pub fn pictures_html(
     sets: &[Pictures],
     about: &[(String, String)],

@@ -1,4 +1,4 @@
-//! The report of made-up numbers.
+//! Tests of the report page with invented numbers.
 
 #![expect(clippy::print_stderr, reason = "a test reports that it is skipped")]
 
@@ -27,12 +27,12 @@ fn the_page_is_self_contained_with_every_table_and_figure() {
         "paper 69.45",
         "a &lt;b&gt; &amp; c",
         "Geom., all views",
-        "iterations until settled",
+        "iterations until convergence",
         "<polyline",
     ] {
         assert!(page.contains(text), "{text}");
     }
-    // Bars, curves, and a histogram for each version but the first.
+    // The page has bars, curves, and a histogram for each version except the first.
     assert_eq!(page.matches("<svg").count(), page.matches("</svg>").count());
     assert_eq!(page.matches("<svg").count(), 2 + 2);
     for outside in ["http:", "https:", "src=", "@import", "NaN", "inf"] {
@@ -63,7 +63,7 @@ fn no_name_of_a_sequence_or_a_part_becomes_markup() {
         about: &[(evil(), evil())],
     });
     assert!(!page.contains("<script"));
-    // What was run, the part, every group in the table, and the one group with a heading of its own.
+    // The text occurs in the description of the run, in the part, in every group of the table, and in the heading of one group.
     let escaped = page.matches("&lt;script&gt;&#39;&quot;&amp;").count();
     assert_eq!(escaped, 2 + 1 + 3 * summary.groups.len() + 3);
 }
@@ -119,7 +119,7 @@ fn the_page_of_pictures_says_every_number_and_escapes_names() {
     let person =
         |x: f64| core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64]);
     let (here, there) = (Some(person(0.0)), Some(person(500.0)));
-    // Two of three pictures have their person, of whom one is found elsewhere by the best detection.
+    // In two of three pictures the person is found; in one of these, the best detection is elsewhere.
     let set = Pictures {
         name: "parse & co".to_owned(),
         n_left_out: 1,

@@ -1,4 +1,4 @@
-//! Checkpoints that are damaged, foreign or fine.
+//! Tests with damaged, foreign and valid checkpoints.
 
 use footage::Size;
 use formats::checksum::Envelope;
@@ -8,10 +8,10 @@ use training::{Album, AlbumError, Event, Plan, Settings, Trainer, Tree, Watch};
 
 use super::*;
 
-/// Bytes before the payload of a checkpoint.
+/// Number of bytes before the payload of a checkpoint.
 const HEADER: usize = 28;
 
-/// Stamp and fingerprint, at most: two numbers of a byte and eight.
+/// Largest size of stamp and fingerprint: two numbers of one plus eight bytes.
 const WHOSE: usize = 18;
 
 struct Noise;
@@ -67,7 +67,7 @@ fn plan() -> (Plan, Settings) {
     (Plan::new("m", &tree, &people, &settings).unwrap(), settings)
 }
 
-/// The bytes of a checkpoint with examples of all kinds.
+/// Returns the bytes of a checkpoint with examples of all kinds.
 fn bytes_of(plan: &Plan, settings: &Settings) -> Vec<u8> {
     let mut trainer = Trainer::new(plan, settings, &Noise, &Noise).unwrap();
     for _ in 0..4 {
@@ -76,7 +76,7 @@ fn bytes_of(plan: &Plan, settings: &Settings) -> Vec<u8> {
     trainer.checkpoint().to_bytes(7).unwrap()
 }
 
-/// The same file with another payload, and its right checksum.
+/// Returns the same file with another payload and its correct checksum.
 fn with_payload(bytes: &[u8], payload: &[u8]) -> Vec<u8> {
     let magic = *bytes.first_chunk().unwrap();
     Envelope { magic, version: 1 }.seal(payload)
@@ -144,7 +144,7 @@ proptest! {
         drop(Checkpoint::from_bytes(&with_payload(&fine, &bytes)));
     }
 
-    /// Damage under a right checksum: poses, shares, counts.
+    /// Tests damage to poses, shares and counts with a correct checksum.
     #[test]
     fn damage_is_an_error_or_another_training_but_no_panic(
         all in prop::collection::vec(
@@ -156,7 +156,7 @@ proptest! {
         let fine = bytes_of(&plan, &settings);
         for changes in all {
             let mut payload = fine[HEADER..].to_vec();
-            // The vector of the model lies between; the poses are at the end.
+            // The vector of the model is in the middle; the poses are at the end.
             let n_poses = payload.len().min(1500);
             let start = (payload.len() - n_poses).max(WHOSE);
             for (at, value) in changes {

@@ -12,11 +12,11 @@ use training::networks::finder::Settings;
 use crate::commands::train::learning::{Learning, named};
 
 const HELP: &str = "\
-PICTURES is a file of `parallax-lab train finder-pictures`. The network finds a box around everybody in a whole picture; the ONNX file \
-carries its card, and serves as `network.detector` of a deployment.
+PICTURES is a file of `parallax-lab train finder-pictures`. The network finds a box around every person in a whole picture. The ONNX file \
+contains its card. It can be used as `network.detector` in a deployment.
 
-After every hundred steps the state of the training is in OUT.checkpoint. After Ctrl-C or a kill, --resume continues from there and ends with \
-the same network, bit for bit, on the same kind of machine.
+After every hundred steps, the state of the training is saved in OUT.checkpoint. After Ctrl-C or a kill, --resume continues from there. \
+The resulting network is the same, bit for bit, on machines of the same kind.
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
 4 the pictures or the checkpoint cannot be used; 130 stopped by Ctrl-C.
@@ -28,12 +28,12 @@ Example:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Pictures, prepared by `train finder-pictures`.
+    /// Files of pictures, prepared by `train finder-pictures`.
     #[arg(value_name = "PICTURES", required_unless_present = "print_settings")]
     pictures: Option<PathBuf>,
     #[command(flatten)]
     learning: Learning,
-    /// Network made by this command to start from, in place of random weights: for more steps, or your own pictures.
+    /// Network of this command to start from, instead of random weights; for more steps, or to add your own pictures.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! `parallax-lab train finder-pictures`: prepares the pictures that the network which finds people learns from.
+//! `parallax-lab train finder-pictures`: prepares the training pictures of the network that finds people.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -17,14 +17,14 @@ use crate::commands::train::subjects;
 const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} {msg}";
 
 const HELP: &str = "\
-Three sources: DATASETs of annotated people as for `parallax-lab train fmp`, whose boxes lie around the joints; photographs \
-without people (--empty DIR); and synthetic scenes of several people (--scenes N). Every picture is reduced until its \
+The pictures come from three sources: DATASETs of annotated people as for `parallax-lab train fmp`, with boxes around their joints; photographs \
+without people (--empty DIR); and synthetic scenes of several people (--scenes N). Pictures are reduced so that the \
 longer side has at most 320 pixels.
 
-A teacher, a detector with a card, finds everybody else in the photographs of annotated people: a box that it is sure \
-of counts as a person, and a box that it is not sure of does not count in the training. Without a teacher everybody who is not marked counts as background.
+A teacher is a detector with a card. It finds the other people in the photographs of annotated people. Boxes with a high score \
+count as people; the training ignores boxes with a lower score. Without a teacher, people who are not annotated count as background.
 
-One picture in twelve is kept apart, to watch the training.
+One picture in twelve is held out, to monitor the training.
 
 Exit codes: 0 the file is written; 2 the command line is wrong; 4 a data set or the teacher cannot be used; 130 stopped by Ctrl-C.
 
@@ -38,28 +38,28 @@ Example:
 pub(crate) struct Arguments {
     #[command(flatten)]
     people: Marked,
-    /// A detector that finds everybody in the photographs.
+    /// Teacher: a detector that finds all people in the photographs.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Option<PathBuf>,
-    /// The card of the detector; if not given, the file beside it.
+    /// Card of the teacher; if not given, the file beside it.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Option<PathBuf>,
-    /// Photographs without people; also the background of every third scene.
+    /// Folder of photographs without people; they are also the background of every third scene.
     #[arg(long, value_name = "DIR")]
     empty: Option<PathBuf>,
-    /// Number of synthetic scenes; each gives some pictures of every camera.
+    /// Number of synthetic scenes; each gives several pictures from every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
-    /// Numbers of the people in the scenes.
+    /// First and last number of the synthetic people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-400", value_parser = subjects)]
     subjects: [u64; 2],
-    /// Frames per camera of a scene, some seconds apart.
+    /// Frames per camera in a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
     /// Random seed of the scenes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The file to write.
+    /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Print the result as JSON.

@@ -13,17 +13,17 @@ use training::networks::pose::Settings;
 use crate::commands::train::learning::{Learning, named};
 
 const HELP: &str = "\
-PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints, nose, heels and big toes as seen, the direction of the \
-trunk, and the expected error of each. The ONNX file contains its card.
+PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints, the nose, the heels and the big toes. It also finds the direction \
+of the trunk and an expected error of each joint. Left and right are sides of the picture. The ONNX file contains the network's card.
 
-After every hundred steps the state of the training is in OUT.checkpoint. After Ctrl-C or a kill, \
---resume continues, and ends with the same network, bit for bit, on the same kind of machine.
+After every hundred steps, the state of the training is saved in OUT.checkpoint. After Ctrl-C or a kill, \
+--resume continues from there. The resulting network is the same, bit for bit, on machines of the same kind.
 
---from continues the training of a network; use a lower `rate` in --settings for this. --from shipped means the network that ships. With `extras_alone = true` \
-in --settings only nose, heels and big toes are learned, and everything else in the file of --from stays as it is.
+--from FILE continues the training of a network; use a lower `rate` in --settings for this. --from shipped continues from the shipped network. \
+With `extras_alone = true` in --settings, only the nose, heels and big toes are learned. The rest of the network does not change.
 
-The built-in training needs no other software. A build with LibTorch (--features libtorch; docs/guide/train.md has the steps) \
-can be faster.
+The built-in training needs no other software. A build with LibTorch can be faster \
+(--features libtorch; see docs/guide/train.md).
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a setting is wrong; \
 4 the people or the checkpoint cannot be used; 130 stopped by Ctrl-C.
@@ -35,12 +35,12 @@ Example:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// People, prepared by `train network-people`.
+    /// Files of people, prepared by `train network-people`.
     #[arg(value_name = "PEOPLE", required_unless_present = "print_settings")]
     people: Option<PathBuf>,
     #[command(flatten)]
     learning: Learning,
-    /// Network made by this command to start from, in place of random weights: for more steps, or your own people.
+    /// Network of this command to start from, instead of random weights; for more steps, or to add your own people.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
 }
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// The network to go on from.
+/// Reads the network to start from.
 fn from(file: &Path) -> Result<posetraining::Earlier, Failure> {
     Ok(posetraining::Earlier {
         bytes: Shipped::PoseNetwork.read(file)?.into_owned(),

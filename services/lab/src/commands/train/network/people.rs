@@ -1,4 +1,4 @@
-//! `parallax-lab train network-people`: prepares the people that the network learns from.
+//! `parallax-lab train network-people`: prepares the training people of the network that finds joints.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,16 +18,17 @@ use crate::commands::train::subjects;
 const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} {msg}";
 
 const HELP: &str = "\
-Two sources: DATASETs of annotated people as for `parallax-lab train fmp`, and synthetic scenes (--scenes N), whose joints and \
-directions are exact. For each person it keeps a picture of 256 x 256 pixels and the joints as seen, so that left and \
-right follow the picture. The direction of a person follows from the marks, if left and right are the person's \
-own (LSP; for PARSE pass --sides PARSE=seen).
+The people come from two sources: DATASETs of annotated people as for `parallax-lab train fmp`, and synthetic scenes (--scenes N) with exact joints \
+and directions. For each person, the file contains a picture of 256 x 256 pixels and the joints; left and right are sides of the picture. \
+The direction in which a person faces is computed from the marks, if left and right are sides of the body \
+(LSP; for PARSE pass --sides PARSE=seen).
 
-A teacher, another network with a card, helps: its joints replace missing marks, sides that it surely contradicts are \
-exchanged, and where it agrees with a mark the mean of both is learned. Nose, heels and big toes come from the first teacher whose card names them (`--teacher` again, with its card).
+A teacher is another network with a card. Its joints replace missing marks. If it clearly contradicts the sides of a person, they are \
+exchanged. Where it agrees with a mark, the mean of both is learned. The nose, heels and big toes come from the first teacher whose card \
+has them; for several teachers, repeat --teacher and --teacher-card.
 
-One person in twelve is held out, to watch the training and to learn the expected error. Leave out the people to judge on \
-with --without.
+One person in twelve is held out, to monitor the training and to learn the expected error. Use --without to leave out the people \
+of a later evaluation.
 
 Exit codes: 0 the file is written; 2 the command line is wrong; 4 a data set or the teacher cannot be used; 130 stopped by Ctrl-C.
 
@@ -41,29 +42,29 @@ Example:
 pub(crate) struct Arguments {
     #[command(flatten)]
     people: Marked,
-    /// A network that finds keypoints, to help with joints and sides. Give it again for another network, which adds the keypoints that
-    /// the earlier ones do not know.
+    /// Teacher: a network that finds keypoints, to improve joints and sides. Repeat the option for a further network; it adds the keypoints
+    /// that earlier ones do not have.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Vec<PathBuf>,
-    /// The cards of the teachers, in the same order; if not given, the files beside them.
+    /// Cards of the teachers, in the same order; if not given, the files beside them.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Vec<PathBuf>,
-    /// Number of synthetic scenes; each gives some pictures of every camera.
+    /// Number of synthetic scenes; each gives several pictures from every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
-    /// Numbers of the people in the scenes.
+    /// First and last number of the synthetic people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-400", value_parser = subjects)]
     subjects: [u64; 2],
-    /// Frames per camera of a scene, some seconds apart.
+    /// Frames per camera in a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people, as the background of every third scene instead of a room.
+    /// Folder of photographs without people, the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Random seed of the scenes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The file to write.
+    /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Print the result as JSON.

@@ -11,13 +11,13 @@ use training::networks::quality::settings::Settings;
 use terminal::{Globals, output};
 
 const HELP: &str = "\
-The samples come from `parallax-lab train quality-samples`. Whole groups of them (subjects, images) are held out for \
-validation. After every pass the state is in OUT.checkpoint: --resume continues, and on the CPU the \
-network is the same, bit for bit, whatever the interruptions. OUT.svg shows the progress of the training. The best pass is \
-written as ONNX, with all that `errors` in [paper] needs: preprocessing, unit, thresholds.
+The samples come from `parallax-lab train quality-samples`. Whole groups of samples (subjects, images) are held out for \
+validation. After every pass, the state of the training is saved in OUT.checkpoint, and --resume continues from there. On the CPU, the resulting \
+network is the same, bit for bit, with or without interruptions. OUT.svg shows the progress of the training. The network of the best pass is \
+written as ONNX, with all data that `errors` in [paper] needs: preprocessing, unit, thresholds.
 
-VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.safetensors (convert a .pth \
-by safetensors.torch.save_file), and samples made with --tile vgg16.
+VGG-16 (--network vgg16) needs samples made with --tile vgg16. It starts from torchvision's weights: --weights vgg16.safetensors (to convert \
+a .pth file, use safetensors.torch.save_file).
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a \
 setting is wrong; 4 samples, weights or a checkpoint cannot be used; 130 stopped by Ctrl-C.
@@ -28,9 +28,9 @@ Example:
 /// The architecture of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Network {
-    /// Features of the search only, without the picture: a baseline.
+    /// A baseline: features of the search only, without the picture.
     Evidence,
-    /// A few separable convolutions, sampled around every part, and the features of the search.
+    /// A few separable convolutions, sampled around every part, together with the features of the search.
     Small,
     /// The network of the paper.
     Vgg16,
@@ -50,34 +50,34 @@ impl From<Network> for Kind {
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Samples to learn from and to validate on.
+    /// Files of samples for training and validation.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     samples: Vec<PathBuf>,
-    /// Samples to test the network on, each file separately; they are not used for training.
+    /// Files of samples to test the network on, each file separately. They are not used for training.
     #[arg(long, value_name = "FILE")]
     judge: Vec<PathBuf>,
-    /// The ONNX file to write.
+    /// ONNX file to write.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     out: Option<PathBuf>,
-    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
+    /// Settings of the training, as TOML; --print-settings shows the keys and their defaults.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Print the settings that would be used, as TOML, and exit.
+    /// Print the settings of the training as TOML, and exit.
     #[arg(long)]
     print_settings: bool,
-    /// The network, instead of that of the settings.
+    /// Architecture of the network; overrides the settings.
     #[arg(long, value_enum)]
     network: Option<Network>,
-    /// Random seed, instead of that of the settings.
+    /// Random seed; overrides the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Initial weights: torchvision's VGG-16, as .safetensors.
+    /// Initial weights: torchvision's VGG-16, as a .safetensors file.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// The identity stored in the file; the file's name if not given.
+    /// Identity stored in the file; the file's name if not given.
     #[arg(long, value_name = "TEXT")]
     identity: Option<String>,
-    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
+    /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.
     #[arg(long)]
     resume: bool,
     /// Print events and the summary as JSON, one object per line.

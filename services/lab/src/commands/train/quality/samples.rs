@@ -12,18 +12,18 @@ use crate::commands::train::subjects;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
-Two sources, together or alone: synthetic scenes (--scenes N, of the subjects of --subjects, each with another action, \
-rig, room, noise, blur and exposure, chosen by the seed), and DATASETs of annotated people as for \
-`parallax-lab train fmp`. Every picture is searched as in the pipeline. A sample consists of the tile (the \
-best pose and a margin around it), the results of the search, and the error of every part.
+The samples come from one or both of two sources: synthetic scenes (--scenes N) with the people of --subjects, and DATASETs of annotated people as \
+for `parallax-lab train fmp`. The seed chooses action, rig, room, noise, blur and exposure of each scene. Every picture is \
+searched as in the pipeline. A sample consists of the tile (the best pose and a margin around it), the results of the search, and \
+the error of every part.
 
-Put subjects and images for judging the network into a separate file.
+Put the subjects and images for the evaluation of the network into a separate file.
 
 Example:
     parallax-lab train quality-samples --scenes 200 --subjects 1-100 --out train.samples
     parallax-lab train quality-samples --scenes 40 --subjects 901-920 --seed 2 --out test.samples";
 
-/// The network that the tiles are for.
+/// Network for which the tiles are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TileOf {
     /// 160 x 64 pixels.
@@ -48,37 +48,37 @@ pub(crate) struct Arguments {
     /// Annotated people: folders or files, as for `train fmp`.
     #[arg(value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// People of a data set to use, all if not given.
+    /// People of a data set to use; all if not given.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
-    /// People of a data set to leave out, for example a test set.
+    /// People of a data set to leave out, for example its test set.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     without: Vec<String>,
-    /// Number of synthetic scenes; each gives some pictures of every camera.
+    /// Number of synthetic scenes; each gives several pictures from every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
-    /// Numbers of the people in the scenes.
+    /// First and last number of the synthetic people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
     subjects: [u64; 2],
-    /// Frames per camera of a scene, some seconds apart.
+    /// Frames per camera in a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people, as the background of every third scene instead of a room.
+    /// Folder of photographs without people, the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Random seed.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The single-view model; the person model that ships with Parallax if not given.
+    /// Single-view model; the shipped person model if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The network that the tiles are for.
+    /// Network for which the tiles are made.
     #[arg(long, value_enum, default_value_t = TileOf::Small)]
     tile: TileOf,
-    /// The file of samples to write.
+    /// File of samples to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Threads; one per core if not given. The samples do not depend on their number.
+    /// Number of threads; one per core if not given. It does not affect the samples.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if arguments.scenes == 0 && arguments.datasets.is_empty() {
         let failure = Failure::new(
             ExitKind::Usage,
-            "no pictures: name a DATASET, or --scenes N",
+            "no pictures: name a DATASET, or use --scenes N",
         );
         return Err(failure);
     }
@@ -117,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let made = pool.install(|| samples::make(&job, &arguments.out, model, (stop, &terminal)))?;
     if !globals.quiet {
         output::message(format_args!(
-            "{}: {} samples, {} pictures on which nobody was found",
+            "{}: {} samples, {} pictures without a detected person",
             arguments.out.display(),
             made.n,
             made.n_lost
