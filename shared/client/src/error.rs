@@ -49,7 +49,8 @@ impl ClientError {
         match self {
             Self::Guest(error) => failure::Fault::hint(error),
             Self::Description(_) => Some(
-                "build this program and the deployment from the same version of Parallax".to_owned(),
+                "build this program and the deployment from the same version of Parallax"
+                    .to_owned(),
             ),
             _ => None,
         }

@@ -227,7 +227,10 @@ mod tests {
                 "by 2.6 cm together",
             ),
             (|trust| trust.jumps = 0.087, "jumps in 8.7 %"),
-            (|trust| trust.implausible = 0.4, "40 % of the bodies that were found"),
+            (
+                |trust| trust.implausible = 0.4,
+                "40 % of the bodies that were found",
+            ),
             (|trust| trust.joints_implausible = 0.3, "30 % of the joints"),
             (|trust| trust.body_deviation = Some(3.0), "bones are 3.0"),
             (|trust| trust.sides_unsure = 0.5, "unsure in 50 %"),

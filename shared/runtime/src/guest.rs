@@ -124,7 +124,8 @@ impl Fault for GuestError {
     fn hint(&self) -> Option<String> {
         match self {
             Self::Version { .. } | Self::WrongType { .. } => Some(
-                "build this program and the deployment from the same version of Parallax".to_owned(),
+                "build this program and the deployment from the same version of Parallax"
+                    .to_owned(),
             ),
             Self::Full { .. } => {
                 Some("end one of them; a program that was killed no longer counts".to_owned())

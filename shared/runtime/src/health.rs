@@ -99,7 +99,9 @@ impl Health {
                     }
                     Err(error) => {
                         if result_sender.send(Err(error)).is_err() {
-                            tracing::debug!("the caller no longer waits for the start of the heartbeats");
+                            tracing::debug!(
+                                "the caller no longer waits for the start of the heartbeats"
+                            );
                         }
                     }
                 }

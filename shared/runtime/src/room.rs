@@ -12,8 +12,7 @@ use crate::reserve::{Refused, n_refused, refused};
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
 /// Remedy if there is no room.
-pub(crate) const ROOM: &str =
-    "make room in /dev/shm: end other programs that use it, or make it larger (in Docker --shm-size)";
+pub(crate) const ROOM: &str = "make room in /dev/shm: end other programs that use it, or make it larger (in Docker --shm-size)";
 
 /// If there was no room for a segment, returns a text with the requested size, the free size, and a remedy.
 pub(crate) fn no_room() -> Option<String> {

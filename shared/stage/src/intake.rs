@@ -105,7 +105,11 @@ impl Intake {
         self.cadence
             .processed(self.nth(frame), header.stamp.captured_at_nanos, busy_nanos);
         if self.delivery == Delivery::Realtime && self.cadence.stride() != stride {
-            tracing::info!(frame, every = self.cadence.stride(), "the cadence has changed");
+            tracing::info!(
+                frame,
+                every = self.cadence.stride(),
+                "the cadence has changed"
+            );
         }
     }
 
