@@ -229,6 +229,7 @@ mod tests {
             score: 0.5,
             front: [0.0; 2],
             extras: Vec::new(),
+            colour: None,
         };
         record.views[0].pose = wire::sightings_to_message(&[seen], 0, [80, 60]).ok();
         assert_eq!(parts(&maps, &record, 0).unwrap().len(), skeleton::N_PARTS);

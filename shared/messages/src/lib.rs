@@ -28,7 +28,9 @@ pub use metrics::{
 };
 pub use people::{NO_CANDIDATE, People, PersonMessage};
 pub use picture::{NO_SEQUENCE, PictureHeader};
-pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
+pub use pose::{
+    LocalMessage, NO_COLOUR, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose,
+};
 pub use quality::ViewQuality;
 pub use refusal::Refusal;
 pub use skeletons::{FusedView, Joint3d, Kept, Sides, SkeletonMessage, Skeletons};
@@ -60,7 +62,8 @@ const _: () = {
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
     assert!(
-        size_of::<ViewPose>() == 1880 + MAX_CANDIDATES * MAX_JOINTS * 12 + MAX_VIEW_KEYPOINTS * 12
+        size_of::<ViewPose>()
+            == 1880 + MAX_CANDIDATES * (MAX_JOINTS + 1) * 12 + MAX_VIEW_KEYPOINTS * 12
     );
     assert!(size_of::<PersonMessage>() == 24);
     assert!(size_of::<People>() == 64 + MAX_PEOPLE * 24);

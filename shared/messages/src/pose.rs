@@ -63,9 +63,12 @@ impl Searched {
     }
 }
 
+/// In place of a colour: the trunk is not seen, or there is no picture.
+pub const NO_COLOUR: [f32; 3] = [-1.0; 3];
+
 /// The single-view result: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v8")]
+#[type_name("ViewPose.v9")]
 #[repr(C)]
 pub struct ViewPose {
     /// Identity of the frame and the view.
@@ -101,6 +104,9 @@ pub struct ViewPose {
     /// Confidence of the network in every joint of every candidate, from 0 to 1. It is 0 for a joint that is not seen, and always with
     /// the paper's method.
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
+    /// Median colour of the trunk of every candidate: red, green and blue from 0 to 1, or [`NO_COLOUR`]. Used by the method of networks
+    /// only.
+    pub colours: [[f32; 3]; MAX_CANDIDATES],
     /// The extra keypoints of one candidate after the other, for as many candidates as fit: `[column, row, standard
     /// deviation along one axis]`, pixels of the frame. The deviation is 0 for a keypoint that was not found.
     pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],

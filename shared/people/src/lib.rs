@@ -18,6 +18,7 @@ mod frame;
 
 mod cluster;
 mod coarse;
+mod colour;
 
 mod bones;
 mod track;
@@ -65,7 +66,7 @@ pub struct Keypoint {
 pub struct Detection {
     /// The joints of `skeleton::PARSE14`, in its order; `None` where the joint was not found.
     pub joints: [Option<Keypoint>; N],
-    /// Colour of the trunk, each channel from 0 to 1; helps to recognise people who leave and come back.
+    /// Colour of the trunk, each channel from 0 to 1; tells people apart who are close to each other, and recognises people who come back.
     pub colour: Option<[f64; 3]>,
 }
 

@@ -135,7 +135,7 @@ pub(crate) fn remembered(track: &Track) -> Option<Remembered> {
         velocity: track.velocity,
         seen_s: track.seen_s,
         bones: track.bones,
-        colour: track.colour,
+        colour: track.colours.mean,
     })
 }
 
@@ -146,7 +146,7 @@ pub(crate) fn revived(person: &Remembered) -> Track {
     track.coarse.covariances = person.covariances;
     track.velocity = person.velocity;
     track.bones = person.bones;
-    track.colour = person.colour;
+    track.colours.mean = person.colour;
     track.state = State::Lost;
     track
 }

@@ -6,6 +6,7 @@ use skeleton::body::Joints;
 use crate::bones::Bones;
 use crate::cluster::Member;
 use crate::coarse::Coarse;
+use crate::colour::Colours;
 use crate::distance::named;
 use crate::{Frame, N, State};
 
@@ -49,7 +50,7 @@ pub(crate) struct Track {
     /// Bit `n` is set if the person was seen `n` frames ago.
     history: u32,
     pub(crate) bones: Bones,
-    pub(crate) colour: Option<[f64; 3]>,
+    pub(crate) colours: Colours,
     pub(crate) members: Vec<Member>,
     pub(crate) state: State,
 }
@@ -65,7 +66,7 @@ impl Track {
             seen_s: time_s,
             history: 0,
             bones: Bones::default(),
-            colour: None,
+            colours: Colours::default(),
             members: Vec::new(),
             state: State::New,
         }
@@ -162,7 +163,7 @@ impl Track {
             }
         }
         self.bones.add(&seen.joints);
-        self.take_colour(frame, &members);
+        self.colours.add(frame, &members);
         self.members = members;
         (self.placed_s, self.seen_s) = (time_s, time_s);
         self.history |= 1;
@@ -192,13 +193,6 @@ impl Track {
         self.history |= u32::from(members.len() >= 2);
         self.members = members;
         self.state = State::Unsure;
-    }
-
-    fn take_colour(&mut self, frame: &Frame, members: &[Member]) {
-        for colour in members.iter().filter_map(|member| frame.colour(member.at)) {
-            let kept = self.colour.unwrap_or(colour);
-            self.colour = Some([0, 1, 2].map(|nth| kept[nth] + 0.1 * (colour[nth] - kept[nth])));
-        }
     }
 
     /// Returns the centre of the trunk; `None` if no joint of the trunk is known.

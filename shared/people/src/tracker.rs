@@ -1,12 +1,12 @@
 //! Tracks people from frame to frame under lasting ids.
 
 use geometry::Camera;
-use nalgebra::Vector3;
 use skeleton::body::Joints;
 
 use crate::assignment::{NEVER, assign};
 use crate::cluster::{Member, clusters};
 use crate::coarse::{Coarse, agree};
+use crate::colour::difference;
 use crate::distance::{of_people, to_person};
 use crate::frame::Place;
 use crate::memory::{Memory, Remembered, remembered, revived};
@@ -34,6 +34,11 @@ const REMEMBERED_S: f64 = 60.0;
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
+/// A detection belongs to another person within this distance, in metres, if its colour is nearer to that person's by this much. A smaller
+/// difference counts as a distance of this many metres for each unit.
+const RIVAL_M: f64 = 1.0;
+const OTHER_COLOUR: f64 = 0.2;
+const COLOUR_M: f64 = 1.0;
 /// Number of views that must see a new person, or all views if there are fewer.
 const VIEWS_AT_ONCE: usize = 3;
 
@@ -161,17 +166,20 @@ impl Tracker {
                     &now.expected[track],
                     frame.as_seen,
                 );
-                fit.filter(|fit| fit.distance < self.tracks[track].reach(now.time_s, now.gap_s))
+                let fit = fit
+                    .filter(|fit| fit.distance < self.tracks[track].reach(now.time_s, now.gap_s))?;
+                let by_colour = self.by_colour(now, track, free[column])?;
+                Some((fit, fit.distance + by_colour))
             };
             let fits: Vec<_> = (0..rows.len())
                 .map(|row| (0..free.len()).map(|column| fit(row, column)).collect::<Vec<_>>())
                 .collect();
             let cost =
-                |row: usize, column: usize| fits[row][column].map_or(NEVER, |fit| fit.distance);
+                |row: usize, column: usize| fits[row][column].map_or(NEVER, |(_, cost)| cost);
             let assigned = assign(rows.len(), free.len(), cost);
             let mut taken = Vec::new();
             for (row, column) in assigned.into_iter().enumerate() {
-                let Some((column, fit)) =
+                let Some((column, (fit, _))) =
                     column.and_then(|column| Some((column, fits[row][column]?)))
                 else {
                     continue;
@@ -184,6 +192,24 @@ impl Tracker {
             }
             free.retain(|at| !taken.contains(at));
         }
+    }
+
+    /// Returns the cost of a detection whose colour is that of another person nearby rather than that of the track, in metres; `None` if it
+    /// cannot be the track's.
+    fn by_colour(&self, now: &Now<'_>, track: usize, at: Place) -> Option<f64> {
+        let frame = now.frame;
+        let Some(own) = self.tracks[track].colours.difference(frame, at) else {
+            return Some(0.0);
+        };
+        let others = self.tracks.iter().zip(now.expected).enumerate();
+        let others = others.filter_map(|(nth, (other, expected))| {
+            let by = other.colours.difference(frame, at).filter(|_| nth != track)?;
+            let fit = to_person(frame.sights(at), expected, frame.as_seen)?;
+            (fit.distance < RIVAL_M).then_some(by)
+        });
+        let other = others.fold(f64::INFINITY, f64::min);
+        let excess = (own - other).max(0.0);
+        (excess < OTHER_COLOUR).then_some(COLOUR_M * excess)
     }
 
     /// Updates the people for whom detections were assigned.
@@ -265,7 +291,8 @@ impl Tracker {
         let near = missed.filter_map(|(nth, (track, expected))| {
             let distance = of_people(expected, &person.joints)?;
             let is_near = distance < track.reach(time_s, gap_s) + TAKEN_UP_M;
-            is_near.then_some((track.id.is_none(), distance, nth))
+            let colour = track.colours.mean_difference(frame, &members).unwrap_or(0.0);
+            is_near.then_some((track.id.is_none(), distance + COLOUR_M * colour, nth))
         });
         let nearest = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         if let Some((_, _, nth)) = nearest {
@@ -362,10 +389,8 @@ impl Tracker {
         let each = self.gone.iter().enumerate().filter_map(|(nth, person)| {
             let n = person.bones.n.iter().copied().fold(f64::INFINITY, f64::min);
             let bones = track.bones.difference(&person.bones)?;
-            let colour = match (track.colour, person.colour) {
-                (Some(a), Some(b)) => Vector3::from(a).metric_distance(&Vector3::from(b)),
-                _ => 0.0,
-            };
+            let colour = track.colours.mean.zip(person.colour);
+            let colour = colour.map_or(0.0, |(new, old)| difference(new, old));
             let is_same = n >= FRAMES_TO_KNOW && bones < SAME_BONES && colour < SAME_COLOUR;
             let is_past = time_s > person.seen_s;
             (is_same && is_past).then_some((nth, bones / SAME_BONES + colour / SAME_COLOUR))

@@ -6,6 +6,7 @@
 
 mod bodies;
 mod by_network;
+mod colour;
 mod disagreement;
 mod extras;
 mod following;

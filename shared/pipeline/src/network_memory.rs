@@ -90,6 +90,8 @@ pub(crate) struct Seen {
     pub(crate) heat: f64,
     /// Evidence of the direction in which the trunk faces, if the network provides it.
     pub(crate) front: Option<FrontEvidence>,
+    /// Colour of the trunk, as in [`Sighting`](crate::Sighting).
+    pub(crate) colour: Option<[f32; 3]>,
 }
 
 impl NetworkMemory {

@@ -11,6 +11,7 @@ use posenetwork::{
     Detector, JointMaps, LookError, Looker, MOST_CELLS, MapSettings, PersonMaps, PoseNetwork, Turn,
 };
 
+use crate::colour::trunk_colour;
 use crate::looks::{Looks, of_others};
 use crate::network_memory::{NetworkMemory, Seen};
 use crate::placed::N;
@@ -153,6 +154,9 @@ impl NetworkStep {
         }
         memory.before = before;
         memory.keep_largest(self.settings.n_people);
+        for seen in &mut memory.seen[..memory.n_seen] {
+            seen.colour = trunk_colour(image, &Sighting::new(seen.maps.peaks(), 0.0).joints);
+        }
         if memory.n_seen == 0 {
             memory.empty.clear();
         }
@@ -205,7 +209,7 @@ impl NetworkStep {
                 keypoint_sigma,
                 ..
             } = &self.settings;
-            seen.turn = Turn::Up;
+            (seen.turn, seen.colour) = (Turn::Up, None);
             let is_there = seen.maps.of_keypoints(keypoints.as_ref(), rows, maps, *keypoint_sigma);
             if is_there && seen.judge(self.size, self.settings.least_heat) {
                 memory.n_seen += 1;
@@ -237,6 +241,7 @@ impl NetworkStep {
             people.push(Sighting {
                 front: front_of(&sighting, seen),
                 extras: self.extras_of(&seen.maps).collect(),
+                colour: seen.colour,
                 ..sighting
             });
         }

@@ -24,6 +24,8 @@ pub struct Sighting {
     pub front: FrontEvidence,
     /// Extra keypoints of the person.
     pub extras: Vec<ExtraKeypoint>,
+    /// Median red, green and blue of the trunk, 0 to 1; `None` if the trunk is not seen, or if there is no picture.
+    pub colour: Option<[f32; 3]>,
 }
 
 /// The people that one view sees in a frame.
@@ -50,6 +52,7 @@ impl Sighting {
             score,
             front: FrontEvidence::default(),
             extras: Vec::new(),
+            colour: None,
         }
     }
 

@@ -192,7 +192,7 @@ fn view(seen: Option<&Sightings>) -> View {
         };
         Detection {
             joints: core::array::from_fn(joint),
-            colour: None,
+            colour: sighting.colour.map(|colour| colour.map(f64::from)),
         }
     };
     let people = seen.iter().flat_map(|seen| &seen.people);

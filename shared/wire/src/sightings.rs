@@ -1,6 +1,6 @@
 //! The people that a view sees with the method of networks, and their maps.
 
-use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES, Status, ViewPose};
+use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES, NO_COLOUR, Status, ViewPose};
 use pipeline::{ExtraKeypoint, Sighting, Sightings};
 use posenetwork::{MapGrid, MapSettings, PersonMaps};
 
@@ -43,6 +43,7 @@ pub fn sightings_to_message(
     };
     for (nth, person) in people.iter().enumerate() {
         message.candidates[nth].score = person.score;
+        message.colours[nth] = person.colour.unwrap_or(NO_COLOUR);
         message.heats[nth][..person.heats.len()].copy_from_slice(&person.heats);
         for (slot, at) in message.joints[nth].iter_mut().zip(&person.joints) {
             *slot = at.unwrap_or_default();
@@ -84,6 +85,7 @@ pub fn sightings_from_message(
             score: message.candidates[nth].score,
             front,
             extras: extras.next().unwrap_or_default().to_vec(),
+            colour: colour_from_message(message, nth)?,
         };
         for joint in 0..person.joints.len() {
             let heat = message.heats[nth][joint];
@@ -102,6 +104,18 @@ pub fn sightings_from_message(
     }
     let skew_s = skew_from_message(message)?;
     Ok((n > 0).then_some(Sightings { people, skew_s }))
+}
+
+/// Reads the colour of a person's trunk.
+fn colour_from_message(message: &ViewPose, nth: usize) -> Result<Option<[f32; 3]>, WireError> {
+    let colour = message.colours[nth];
+    if colour == NO_COLOUR {
+        return Ok(None);
+    }
+    match colour.into_iter().find(|value| !(0.0..=1.0).contains(value)) {
+        Some(value) => Err(refused("colours", nth, f64::from(value), "0 to 1")),
+        None => Ok(Some(colour)),
+    }
 }
 
 /// Writes the grids of the maps of the people of a view. The caller fills in stamp and timing, and sends the values of one person

@@ -86,6 +86,7 @@ impl Scene {
             score: 1.0,
             front: [0.0; 2],
             extras: EXTRAS.map(extra).to_vec(),
+            colour: None,
         }
     }
 

@@ -37,6 +37,7 @@ fn sighting(camera: &Camera, [x, y]: [f64; 2], heat: f32) -> Sighting {
         score: -5.0,
         front: [0.0; 2],
         extras: Vec::new(),
+        colour: None,
     }
 }
 
