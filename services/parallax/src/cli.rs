@@ -59,7 +59,7 @@ Examples:
     max_term_width = 100
 )]
 pub(crate) struct Cli {
-    /// Options of all commands.
+    /// Global options, accepted by all commands.
     #[command(flatten)]
     pub globals: Globals,
     /// The command.
@@ -70,36 +70,36 @@ pub(crate) struct Cli {
 /// The command.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run a whole deployment of four synthetic cameras, kill one of its processes, and report.
+    /// Run a demo with four synthetic cameras, kill one of its processes, and write a report.
     Demo(demo::Arguments),
-    /// Run a deployment: all its processes, from footage to 3D.
+    /// Run a deployment: start all its processes, from footage to 3D.
     Run(run::Arguments),
     /// Run a deployment, and record every message in one file.
     Record(record::Arguments),
     /// Run the later stages of a recorded run again.
     Replay(replay::Arguments),
-    /// Write a finished run, or a recording, in the formats of other tools.
+    /// Export a finished run or a recording to the formats of other tools.
     Export(export::Arguments),
-    /// Inject faults into a deployment (kill and stop processes, disturb cameras), and check limits.
+    /// Inject faults into a deployment (kill and stop processes, disturb cameras), and check that it stays within limits.
     Chaos(chaos::Arguments),
-    /// Measure how fast messages travel, and how fast whole deployments are.
+    /// Measure the speed of messages between processes, and of whole deployments.
     #[command(subcommand)]
     Bench(bench::Command),
     /// Find people in single images.
     Detect(detect::Arguments),
-    /// Make a deployment from footage, step by step.
+    /// Create a deployment from footage, step by step.
     New(Box<new::Arguments>),
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
-    /// Find the places of cameras from their footage.
+    /// Find the positions and orientations of cameras from their footage.
     #[command(subcommand)]
     Calibrate(calibrate::Command),
-    /// List the video devices of this machine, and take pictures of live cameras.
+    /// List the video devices of this machine, or take a picture with a live camera.
     Cameras(cameras::Arguments),
     /// Smooth the trajectories of a finished run, and compute joint angles.
     Smooth(Box<smooth::Arguments>),
-    /// Find the clock offsets of the cameras of recorded footage.
+    /// Find the clock offsets between the cameras of recorded footage.
     #[command(subcommand)]
     Sync(sync::Command),
     /// Show and check deployment files.
@@ -109,24 +109,24 @@ pub(crate) enum Command {
     Publish(publish::Arguments),
     /// Print the layout of messages, for programs in other languages.
     Messages(messages::Arguments),
-    /// Show the state of a deployment on several machines, or make its keys.
+    /// Show the state of a deployment that runs on several machines, or create its keys.
     #[command(subcommand)]
     Hosts(hosts::Command),
-    /// List running deployments and the leftovers of dead ones in shared memory, or show the processes of one.
+    /// List running deployments and the shared memory left by dead ones, or show the processes of one deployment.
     Status(deployments::StatusArguments),
-    /// Watch the processes of a running deployment: rates, times, losses, memory.
+    /// Watch the processes of a running deployment: rates, times, lost messages, memory.
     Top(top::Arguments),
     /// Watch a running deployment, a finished run or a recording in the browser: skeleton, pictures, processes.
     View(view::Arguments),
-    /// Remove the leftovers of dead deployments from shared memory.
+    /// Remove the shared memory that dead deployments left behind.
     Clean(deployments::CleanArguments),
-    /// Check this machine for everything that Parallax needs, and say what to do about each problem.
+    /// Check that this machine has everything that Parallax needs, and explain how to fix each problem.
     Doctor(doctor::Arguments),
-    /// Print the completion script of a shell.
+    /// Print the completion script for a shell.
     Completions(completions::Arguments),
-    /// Write manual pages, one for each command.
+    /// Write the manual pages, one per command.
     Man(completions::ManArguments),
-    /// Run one process of a deployment; started by `run`.
+    /// Run one process of a deployment. `run` starts these processes.
     #[command(hide = true)]
     Service(service::Arguments),
 }

@@ -1,4 +1,4 @@
-//! `parallax cameras`: the video devices of this machine, and pictures of live cameras.
+//! `parallax cameras`: lists the video devices of this machine, and takes pictures with live cameras.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,22 +27,22 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Take a picture of a live camera.
+    /// Take a picture with a live camera.
     View(ViewArguments),
 }
 
 /// Options of `parallax cameras view`.
 #[derive(Debug, Args)]
 struct ViewArguments {
-    /// The camera: a source such as `/dev/video0` or `rtsp://...`, or with --deployment its name there.
+    /// The camera: a source such as `/dev/video0` or `rtsp://...`, or its name in the deployment of --deployment.
     camera: String,
-    /// The deployment file of the camera, with its format, size, rate and controls.
+    /// Deployment file that describes the camera: format, size, rate and controls.
     #[arg(long, value_name = "FILE")]
     deployment: Option<PathBuf>,
     /// The PNG file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Number of pictures to skip first, so that exposure settles.
+    /// Number of pictures to skip first, so that the exposure can settle.
     #[arg(long, value_name = "N", default_value_t = 5)]
     skip: usize,
 }
@@ -68,7 +68,7 @@ fn view(arguments: &ViewArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The camera that is asked for.
+/// Returns the camera that the arguments name.
 fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
     let name = &arguments.camera;
     let Some(file) = &arguments.deployment else {
@@ -100,7 +100,7 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
     })
 }
 
-/// A video device with what it offers.
+/// A video device with its formats and controls.
 struct Found {
     path: PathBuf,
     stable: Vec<PathBuf>,
@@ -153,7 +153,7 @@ fn look(path: &Path) -> Result<Found, VideoError> {
     })
 }
 
-/// The names of a device that stay when it is plugged in again.
+/// Returns the names of a device that do not change when it is plugged in again.
 fn stable_names(path: &Path) -> Vec<PathBuf> {
     let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"];
     let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();

@@ -66,27 +66,27 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The deployment file; four synthetic cameras if not given.
+    /// The deployment file. If not given, four synthetic cameras are used.
     deployment: Option<PathBuf>,
-    /// The scenarios, separated by commas; if not given, all that the deployment's processes allow.
+    /// The scenarios, separated by commas. If not given, all that the processes of the deployment allow.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Scenario::by_name)]
     scenario: Vec<Scenario>,
     /// List the scenarios and exit.
     #[arg(long)]
     list: bool,
-    /// Seed of the choice of processes and cameras, and of the synthetic scene.
+    /// Seed for the synthetic scene, and for the random choice of processes and cameras.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Length of the footage of every run, seconds; on a busy machine the start uses up some of it.
+    /// Length of the footage of every run, in seconds. On a busy machine, starting the processes uses up some of it.
     #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u32).range(4..=36_000))]
     seconds: u32,
-    /// Length of the parts in which a run of kill-random is reported, seconds.
+    /// Length of the parts into which the report of kill-random divides a long run, in seconds.
     #[arg(long, value_name = "S", default_value_t = 600, value_parser = clap::value_parser!(u32).range(1..))]
     part_seconds: u32,
-    /// The folder for the report and the results.
+    /// Folder for the report and the results.
     #[arg(long, value_name = "DIR", default_value = "out/chaos")]
     out: PathBuf,
-    /// Name of the deployment during the trial, unique among those that run at the same time.
+    /// Name of the deployment during the trial. It must be unique among running deployments.
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Configurable limits.
@@ -101,11 +101,11 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, milliseconds; for a process that results do
-    /// not name, until it reports work.
+    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For processes that results do
+    /// not name, the time until the process reports work.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while a process that the others do not need is missing, milliseconds.
+    /// Longest pause between results while a process is missing that the other processes do not need, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }

@@ -13,14 +13,14 @@ use terminal::output;
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Print every value with its meaning and its origin.
+    /// Print every setting with its value, meaning and origin.
     Show(Arguments),
-    /// Check the file, and that its inputs can be read.
+    /// Check the file, and check that its inputs can be read.
     Check(Arguments),
     /// Print the JSON schema of deployment files, for editors.
     #[command(after_help = SCHEMA_HELP)]
     Schema,
-    /// Print every key with its type and its meaning.
+    /// Print every key with its type and meaning.
     Keys(Keys),
 }
 
@@ -36,7 +36,7 @@ and as the first line of the deployment file:
 /// Options of `config keys`.
 #[derive(Debug, Args)]
 pub(crate) struct Keys {
-    /// Print the settings reference: Markdown, one table per section.
+    /// Print the settings reference in Markdown, with one table per section.
     #[arg(long)]
     markdown: bool,
 }
@@ -103,7 +103,7 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The entries as the lines of a complete deployment file, with the origin of every value.
+/// Returns the lines of a complete deployment file, with the origin of every value.
 fn document(entries: &[Entry]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut section = "";

@@ -1,4 +1,4 @@
-//! `parallax demo`: a whole deployment of four synthetic cameras, one of whose processes is killed, and a report.
+//! `parallax demo`: runs a deployment of four synthetic cameras, kills one of its processes, and writes a report.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -49,40 +49,40 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The folder for the report and the run.
+    /// Folder for the report and the run.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     out: PathBuf,
-    /// Frames per camera; if not given, those of twenty seconds, at least 30.
+    /// Frames per camera. If not given, the frames of twenty seconds, at least 30.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     frames: Option<u64>,
-    /// Duration of the run, seconds; instead of --frames.
+    /// Duration of the run in seconds, instead of --frames.
     #[arg(long, value_name = "S", conflicts_with = "frames", value_parser = clap::value_parser!(u32).range(2..=36_000))]
     seconds: Option<u32>,
-    /// Frames per second; if not given, as many as this machine can process, at most 5.
+    /// Frames per second. If not given, as many as this machine can process, at most 5.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// The action of the person; `parallax-lab synth --help` lists them.
+    /// Action of the person. `parallax-lab synth --help` lists the actions.
     #[arg(long, value_name = "NAME", default_value = "walking", value_parser = action)]
     action: Action,
-    /// Number of the person: shape, clothes, way of moving.
+    /// Number of the person, which determines shape, clothes and style of movement.
     #[arg(long, value_name = "N", default_value_t = 1)]
     subject: u64,
     /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// How long a stage waits for a late view, milliseconds; if not given, 500, or more on a slow machine.
+    /// Time that a stage waits for a late view, in milliseconds. If not given, 500, or more on a slow machine.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     deadline_ms: Option<u64>,
-    /// Kill no process.
+    /// Do not kill a process.
     #[arg(long)]
     no_kill: bool,
     /// Configurable limits.
     #[command(flatten)]
     limits: Limits,
-    /// Name of the deployment, unique among those that run at the same time.
+    /// Name of the deployment. It must be unique among running deployments.
     #[arg(long, value_name = "NAME", default_value = "demo")]
     name: String,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
+    /// Serve a page about the run while it runs, on this machine only. `parallax view --help` describes the page.
     #[arg(long)]
     view: bool,
     /// Print the report as JSON.
@@ -94,20 +94,20 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Least share of frames with a result, percent; slow machines drop frames, which are counted.
+    /// Minimum share of frames with a result, in percent. Slow machines drop frames, and dropped frames count as frames without a result.
     #[arg(long, value_name = "PERCENT", default_value_t = 10.0)]
     min_results: f64,
-    /// Least share of results with a skeleton, percent.
+    /// Minimum share of results with a skeleton, in percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 90.0)]
     min_skeletons: f64,
-    /// Least PCP3D at gamma 0.5 over all results, percent.
+    /// Minimum PCP3D at gamma 0.5 over all results, in percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
     min_pcp3d: f64,
-    /// Longest time until a frame of the killed camera is used in a result again, milliseconds, on a machine that keeps
+    /// Longest time until a frame of the killed camera is used in a result again, in milliseconds. The limit is for a machine that keeps
     /// up with 5 frames per second.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while the killed camera is away, milliseconds, on a machine that keeps up with
+    /// Longest pause between results while the killed camera is away, in milliseconds. The limit is for a machine that keeps up with
     /// 5 frames per second.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,

@@ -1,4 +1,4 @@
-//! `parallax status` and `parallax clean`: running deployments, and the remains of dead ones in shared memory.
+//! `parallax status` and `parallax clean`: list running deployments, and the shared memory that dead ones left behind.
 
 use std::process::ExitCode;
 
@@ -9,7 +9,7 @@ use runtime::{Namespace, Remains, deployments};
 use serde_json::{Value, json};
 use terminal::output;
 
-/// The status of a directory that does not belong to a deployment.
+/// Shown for a directory that does not belong to a deployment.
 const UNMARKED: &str = "not a deployment: left alone";
 
 /// Options of `parallax status`.
@@ -18,7 +18,7 @@ const UNMARKED: &str = "not a deployment: left alone";
 With a DEPLOYMENT it prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages
 (`parallax top --help` explains them). Times are in milliseconds, memory in bytes with --json.")]
 pub(crate) struct StatusArguments {
-    /// Name of a running deployment, or its file: show its processes and their times.
+    /// Name or file of a running deployment whose processes and times are shown.
     deployment: Option<String>,
     /// Print JSON.
     #[arg(long)]
@@ -28,14 +28,14 @@ pub(crate) struct StatusArguments {
 /// Options of `parallax clean`.
 #[derive(Debug, Args)]
 pub(crate) struct CleanArguments {
-    /// Names of dead deployments; all if none is given.
+    /// Names of dead deployments. If none is given, all dead deployments.
     names: Vec<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Lists the deployments of this user, or shows the processes of one.
+/// Lists the deployments of this user, or shows the processes of one deployment.
 pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     if let Some(named) = &arguments.deployment {
         return status_of(named, arguments.json);
@@ -79,7 +79,7 @@ fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Removes the remains of dead deployments of this user; running ones are not touched.
+/// Removes the shared memory of this user's dead deployments. Running deployments are not touched.
 pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
     let found = deployments(&Namespace::usual_base())?;
     for name in &arguments.names {

@@ -1,4 +1,4 @@
-//! `parallax doctor`: whether this machine has what Parallax needs, and what to do where it has not.
+//! `parallax doctor`: checks that this machine has what Parallax needs, and advises on what is missing.
 
 use std::process::{Command, ExitCode};
 
@@ -10,11 +10,11 @@ use rustix::process::{Resource, getrlimit};
 use serde_json::json;
 use terminal::output;
 
-/// Shared memory of four cameras of 640x480 pixels with the network that ships, and as much again, bytes.
+/// Recommended shared memory, in bytes: twice that of four cameras of 640x480 pixels with the shipped network.
 const SHARED_MEMORY: u64 = 512 << 20;
-/// Open files of a deployment of eight cameras in the process that has most.
+/// Open files of the process that has most, in a deployment of eight cameras.
 const OPEN_FILES: u64 = 1024;
-/// Stack of the main thread, bytes.
+/// Stack size of the main thread, in bytes.
 const STACK: u64 = 1 << 20;
 
 /// Options of `parallax doctor`.
@@ -31,7 +31,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// How much a finding matters.
+/// Importance of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Good,
@@ -49,7 +49,7 @@ impl State {
     }
 }
 
-/// One thing that was looked at.
+/// Result of one check.
 #[derive(Debug)]
 struct Finding {
     what: &'static str,
@@ -79,7 +79,7 @@ impl Finding {
     }
 }
 
-/// Looks at the machine.
+/// Checks the machine, and prints the findings.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut findings = vec![
         Finding::good("version", env!("PARALLAX_VERSION")),
@@ -132,7 +132,9 @@ fn processor() -> Finding {
     found
 }
 
-/// * `without`: how much it matters that it is not there.
+/// Checks that a program can be run.
+///
+/// * `without`: state of the finding if the program is missing.
 fn program(name: &'static str, without: State) -> Finding {
     let run = Command::new(name).arg("-version").output();
     match run {
@@ -198,7 +200,7 @@ fn cameras() -> Vec<Finding> {
     looked.collect()
 }
 
-/// Graphics cards, best first.
+/// Returns a finding per graphics card, best card first.
 fn adapters() -> Vec<Finding> {
     let what = "GPU";
     if !gpu::IS_BUILT {

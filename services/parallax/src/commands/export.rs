@@ -1,4 +1,4 @@
-//! `parallax export`: a finished run in the files of other tools.
+//! `parallax export`: exports a finished run to the formats of other tools.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,7 +9,7 @@ use launch::export::{Format, Given, Job, Lines, Naming, Origin, Trial, Written, 
 use nalgebra::{UnitVector3, Vector3};
 use terminal::{Globals, Terminal, output};
 
-/// Remark where the format is not in the build.
+/// Note for a build without the format.
 const NO_PARQUET: &str = "this build writes none: cargo build --release --features parquet";
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
@@ -51,41 +51,41 @@ Examples:
     parallax export run.mcap --to glb,mp4
     parallax export out/photos --to bvh --rate 25 --up 0,0,1")]
 pub(crate) struct Arguments {
-    /// The folder that a run has written, or a recording (MCAP).
+    /// Folder of a finished run, or a recording (MCAP).
     source: PathBuf,
     /// The formats, separated by commas, or `all`.
     #[arg(long, value_name = "LIST", value_parser = formats)]
     to: Formats,
-    /// Trajectories of the run: as found, or as smoothed by `parallax smooth`.
+    /// Trajectories to export: as found, or as smoothed by `parallax smooth`.
     #[arg(long, value_enum, default_value_t = Trajectories::Raw)]
     from: Trajectories,
-    /// The folder for the files; if not given, `export` in the folder of the run, or the name of the recording with `-export` appended.
+    /// Folder for the files. If not given, `export` in the folder of the run. For a recording, its name with `-export` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Name of the files.
+    /// Base name of the files.
     #[arg(long, default_value = "pose3d", value_parser = name)]
     name: String,
-    /// Names of the joints in the files: `right_ankle` as in the run, or `RAnkle` as in Pose2Sim's OpenSim models.
+    /// Names of the joints in the files: `own` as in the run (`right_ankle`), or `opensim` as in Pose2Sim's OpenSim models (`RAnkle`).
     #[arg(long, value_enum, default_value_t = Names::Own)]
     names: Names,
-    /// Frames of the footage per second, for a run without a frame rate.
+    /// Frames of the footage per second, if the run has no frame rate.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// Upward direction in the world of the rig, in place of the calibration's: 0,0,1.
+    /// Upward direction in the world of the rig, for example 0,0,1, in place of the one in the calibration.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = up)]
     up: Option<UnitVector3<f64>>,
-    /// Replace files that exist.
+    /// Replace existing files.
     #[arg(long)]
     force: bool,
-    /// Print the written files as JSON.
+    /// Print the list of written files as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Which trajectories.
+/// Choice of trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Trajectories {
-    /// As found.
+    /// As found by the run.
     Raw,
     /// Smoothed: pose3d-smooth.jsonl.
     Smooth,
@@ -100,7 +100,7 @@ enum Names {
     Opensim,
 }
 
-/// A list, as clap takes it from one argument.
+/// A list of formats. The alias lets clap parse it from one argument.
 type Formats = Vec<Format>;
 
 fn formats(text: &str) -> Result<Formats, String> {
@@ -192,7 +192,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// Folder of the files if `--out` is not given.
+/// Returns the folder of the files if `--out` is not given.
 fn beside(source: &Path) -> PathBuf {
     if source.is_dir() {
         return source.join("export");
@@ -201,7 +201,7 @@ fn beside(source: &Path) -> PathBuf {
     source.with_file_name(format!("{name}-export"))
 }
 
-/// Who has joints in how many frames.
+/// Describes the people that have joints, each with its number of frames.
 fn found(trials: &[Trial]) -> String {
     if let [only] = trials {
         let found = format!("{} of them have joints", only.n_with_points());

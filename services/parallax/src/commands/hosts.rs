@@ -1,4 +1,4 @@
-//! `parallax hosts`: the machines of a deployment of several: their state, and their keys.
+//! `parallax hosts`: shows the state of a deployment on several machines, and creates its keys.
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -13,15 +13,15 @@ use launch::{Resolved, hosts, load, plan};
 use serde_json::Value;
 use terminal::output;
 
-/// How long `status` waits for the host that fuses.
+/// Time that `status` waits for the host that fuses.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// The commands.
+/// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show the hosts of a running deployment: which of them answer, how well their clocks are known, and what became of every view.
+    /// Show the hosts of a running deployment: which of them answer, the accuracy of their clocks, and the fate of every view's frames.
     Status(StatusArguments),
-    /// Make the keys of all hosts: an authority, and a certificate with its key for each.
+    /// Create the keys of all hosts: a certificate authority, and a certificate with its key for each host.
     Keys(KeysArguments),
 }
 
@@ -38,7 +38,7 @@ Examples:
 pub(crate) struct StatusArguments {
     /// The deployment file.
     config: PathBuf,
-    /// The host of this machine; if not given, the one with the machine's name.
+    /// Name of this machine in the deployment. If not given, the host with this machine's own name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the state as JSON.
@@ -67,10 +67,10 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Resolves what this machine runs: a whole deployment, or the part of one of its hosts; and when the run began, where another host
-/// says so. A host with cameras waits for the one that fuses; none on a stop request.
+/// Resolves what this machine runs: a whole deployment, or the part of one host. A host with cameras waits for the host that fuses,
+/// which also gives the time at which the run began. Returns `None` on a stop request.
 ///
-/// * `chosen`: the host that was asked for, and whether nothing is to be started.
+/// * `chosen`: the host that the user named, and true if nothing is to be started.
 pub(crate) fn resolve(
     deployment: &Deployment,
     (named, is_dry): (Option<&str>, bool),
@@ -99,8 +99,8 @@ pub(crate) fn resolve(
     Ok(Some((resolved, session)))
 }
 
-/// Starts this program anew, in the same process, with what makes its link run in one thread ([`bridge::ONE_THREAD`]); processes that it starts
-/// inherit that.
+/// Restarts this program in the same process, with the environment variable that makes its link run in one thread
+/// ([`bridge::ONE_THREAD`]). Child processes inherit the variable.
 fn in_one_thread() -> Result<(), Failure> {
     if bridge::has_one_thread() {
         return Ok(());
@@ -108,7 +108,7 @@ fn in_one_thread() -> Result<(), Failure> {
     let (name, value) = bridge::ONE_THREAD;
     let program = std::env::current_exe().or_fail(ExitKind::Run)?;
     let arguments = std::env::args_os().skip(1);
-    // Returns only if it fails.
+    // `exec` returns only if it fails.
     let error = Program::new(program).args(arguments).env(name, value).exec();
     Err(Failure::new(
         ExitKind::Run,
@@ -116,7 +116,7 @@ fn in_one_thread() -> Result<(), Failure> {
     ))
 }
 
-/// The name of this machine.
+/// Returns the name of this machine.
 fn machine() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname");
     name.unwrap_or_default().trim().to_owned()
@@ -130,7 +130,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     let host = host.ok_or("the deployment has no [[host]]").or_fail(ExitKind::Usage)?;
     in_one_thread()?;
     let mut address = hosts::address(deployment, host)?;
-    // The host that fuses asks itself: its bridge listens already.
+    // On the host that fuses, the bridge listens already, so this command connects to it.
     address.listens = false;
     let text = bridge::status(&address, PATIENCE).or_fail(ExitKind::Run)?;
     let Some(text) = text else {
@@ -159,7 +159,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(status))
 }
 
-/// A host in words, with a line for every view.
+/// Describes a host, with a line for every view.
 fn line(host: &Value, deployment: &Deployment) -> String {
     let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     let name = host["name"].as_str().unwrap_or_default();

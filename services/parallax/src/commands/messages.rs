@@ -1,4 +1,4 @@
-//! `parallax messages`: the layout of messages, for programs in other languages.
+//! `parallax messages`: prints the layout of messages, for programs in other languages.
 
 mod json;
 mod table;

@@ -1,4 +1,4 @@
-//! `parallax publish`: the skeletons of a running deployment as datagrams.
+//! `parallax publish`: sends the skeletons of a running deployment as datagrams.
 
 use std::process::ExitCode;
 
@@ -21,12 +21,12 @@ Examples:
     parallax publish demo udp://192.168.1.20:9000 --beyond-this-machine
     nc -klu 127.0.0.1 9000                              print the datagrams")]
 pub(crate) struct Arguments {
-    /// Name of the deployment, or its file. It need not run yet.
+    /// Name or file of the deployment. It need not run yet.
     deployment: String,
-    /// The target: udp://HOST:PORT (JSON lines), udp://HOST:PORT?format=osc, osc://HOST:PORT.
+    /// The target: udp://HOST:PORT for JSON lines, or osc://HOST:PORT (or udp://HOST:PORT?format=osc) for OSC.
     #[arg(required = true, value_name = "TARGET")]
     targets: Vec<String>,
-    /// Allow targets that are not this machine: skeletons leave it unencrypted.
+    /// Allow targets on other machines. Skeletons are sent unencrypted.
     #[arg(long)]
     beyond_this_machine: bool,
     /// End when the deployment ends, instead of waiting for its next run.
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Publishes until Ctrl-C, or the end of the deployment.
+/// Publishes until Ctrl-C or the end of the deployment.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let targets = targets(&arguments.targets, arguments.beyond_this_machine)?;
     let namespace = live::namespace(Some(&arguments.deployment))?;
@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Reads targets, and says which of them are other machines, or refuses those.
+/// Parses the targets. Targets on other machines are refused, or reported if `beyond` is true.
 fn targets(texts: &[String], beyond: bool) -> Result<Vec<Target>, Failure> {
     let mut targets = Vec::new();
     for text in texts {
@@ -86,7 +86,7 @@ fn usage(error: &client::publish::TargetError) -> Failure {
     Failure::new(ExitKind::Usage, error.to_string())
 }
 
-/// Waits for the end of what was started by [`beside`], and shows what it said.
+/// Waits for the process that [`beside`] started, and prints its messages.
 pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
     let said = companion.map(Companion::finish).unwrap_or_default();
     let first = "publishing the skeletons";
@@ -95,10 +95,10 @@ pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
     }
 }
 
-/// Starts publishing beside a run of a deployment, as `--publish` asks; nothing without targets.
+/// Starts publishing beside a run of a deployment, for the option `--publish`. Returns `None` if there are no targets.
 ///
-/// * `name`: of the deployment.
-/// * `beyond`: whether targets may be other machines.
+/// * `name`: name of the deployment.
+/// * `beyond`: true to allow targets on other machines.
 pub(crate) fn beside(
     name: &str,
     texts: &[String],

@@ -15,7 +15,7 @@ use terminal::{Globals, output};
 use super::hosts;
 use disk_space::{Forecast, Growth, PerFrame};
 
-/// The maximal number of epochs of the recording process whose files are looked for.
+/// Number of epochs of the recording process for which files of an earlier recording are looked up.
 const MAX_EPOCHS: u32 = 64;
 
 /// Options of `parallax record`.
@@ -52,22 +52,22 @@ pub(crate) struct Arguments {
     /// The file to record to.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Replace FILE if it exists, and the results of an earlier run.
+    /// Replace FILE if it exists, and also the results of an earlier run.
     #[arg(long)]
     force: bool,
-    /// Leave out the largest messages; may be given twice.
+    /// Leave out a kind of large messages. May be given several times.
     #[arg(long, value_name = "WHAT")]
     without: Vec<Bulk>,
-    /// Memory for messages that wait to be written, millions of bytes.
+    /// Memory for messages that wait to be written, in megabytes.
     #[arg(long, value_name = "MB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..=65_536))]
     queue_mb: u64,
-    /// Folder for the results, instead of the file's `output`.
+    /// Folder for the results, in place of `output` in the deployment file.
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
+    /// Replace a value, for example `--set capture.scale=0.5`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
+    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host with this machine's own name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the summary as JSON.
@@ -78,11 +78,11 @@ pub(crate) struct Arguments {
 /// The kinds of large messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Bulk {
-    /// The pixels of frames; without them a replay from pose is impossible.
+    /// The pixels of frames. Without them, a replay from pose is impossible.
     Pixels,
-    /// The response maps; without them a replay from fuse is impossible.
+    /// The response maps. Without them, a replay from fuse is impossible.
     Evidence,
-    /// The pictures of live cameras as they came; without them a replay from capture is impossible.
+    /// The original pictures of live cameras. Without them, a replay from capture is impossible.
     Camera,
     /// The topics for Foxglove: skeletons, cameras, and their pictures as JPEG.
     Foxglove,
@@ -152,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// The disk space that the recording will take.
+/// Estimates the disk space of the recording.
 fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<Forecast, Failure> {
     let resolved = planned.resolved();
     let replaced = if arguments.force {
@@ -176,7 +176,7 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
 ///
 /// # Errors
 ///
-/// A file exists and `force` is not set, is a folder, or is being recorded to.
+/// Fails if a file exists and `force` is not set. Also fails if it is a folder, or another run is recording to it.
 fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
     let files = (0..MAX_EPOCHS).map(|i| record::file_of_life(file, i));
     for file in files.filter(|file| file.exists()) {

@@ -41,33 +41,33 @@ was measured (unless it was stopped by Ctrl-C before any was).")]
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
-    /// Folder for the results, instead of the file's `output`.
+    /// Folder for the results, in place of `output` in the deployment file.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace the results of an earlier run in the output folder.
     #[arg(long, conflicts_with = "dry_run")]
     force: bool,
-    /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
+    /// Replace a value, for example `--set capture.scale=0.5`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
+    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host with this machine's own name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
-    /// Fail with exit code 6 if 1 frame in 100 takes longer than this from capture to result, milliseconds; the same
+    /// Fail with exit code 6 if more than 1 frame in 100 takes longer than this from capture to result, in milliseconds. The same
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     latency_budget_ms: Option<f64>,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
+    /// Serve a page about the run while it runs, on this machine only. `parallax view --help` describes the page.
     #[arg(long, conflicts_with = "dry_run")]
     view: bool,
-    /// Send the skeletons as datagrams to udp://HOST:PORT (JSON lines) or osc://HOST:PORT while it runs; may be given several
-    /// times; `parallax publish --help` describes the datagrams.
+    /// Send the skeletons as datagrams during the run, to udp://HOST:PORT (JSON lines) or osc://HOST:PORT. May be given several
+    /// times. `parallax publish --help` describes the datagrams.
     #[arg(long, value_name = "TARGET", conflicts_with = "dry_run")]
     publish: Vec<String>,
-    /// Allow --publish to other machines than this: skeletons leave it unencrypted.
+    /// Allow --publish to send to other machines. Skeletons are sent unencrypted.
     #[arg(long, requires = "publish")]
     beyond_this_machine: bool,
-    /// Show the processes and the shared memory that they need, and start nothing; fails if the run could not start.
+    /// Show the processes and the shared memory that they need, but start nothing. Fails if the run could not start.
     #[arg(long)]
     dry_run: bool,
     /// Print the summary as JSON.
@@ -160,7 +160,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
             mb(topic.pool_bytes())
         ))?;
     }
-    // The same check as before a run.
+    // The check is the same as before a run.
     preflight(&plan.topics)?;
     Ok(ExitCode::SUCCESS)
 }

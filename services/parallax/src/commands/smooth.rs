@@ -38,25 +38,25 @@ Examples:
     parallax smooth out/run --constant-bones --fill-s 0.5
     parallax smooth out/run --method butterworth --cutoff-hz 6")]
 pub(crate) struct Arguments {
-    /// The results of a run.
+    /// Folder with the results of a run.
     folder: PathBuf,
-    /// The method: `rts` looks ahead, and uses the measured covariances; `butterworth` is a zero-phase low-pass filter;
-    /// `kalman` is the live method; `none` only computes angles.
+    /// The method. `rts` looks ahead, and uses the measured covariances. `butterworth` is a zero-phase low-pass filter.
+    /// `kalman` is the method of live runs. `none` only computes angles.
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
-    /// Cutoff of `butterworth`, Hz; 6 if not given.
+    /// Cutoff frequency of `butterworth`, in Hz. If not given, 6.
     #[arg(long, value_name = "HZ", value_parser = cutoff)]
     cutoff_hz: Option<f64>,
-    /// Longest gap to fill, seconds; 0.25 if not given.
+    /// Longest gap to fill, in seconds. If not given, 0.25.
     #[arg(long, value_name = "SECONDS", value_parser = fill)]
     fill_s: Option<f64>,
-    /// Keep the lengths of the limbs' bones constant (`rts`).
+    /// Keep the bones of the limbs at constant lengths (with `rts`).
     #[arg(long)]
     constant_bones: bool,
     /// Frames per second, in place of the times in the file.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
-    /// Direction against gravity in the world of the run, in place of that of its calibration.
+    /// Upward direction in the world of the run, in place of the one in its calibration.
     #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
     /// Print JSON.
@@ -124,7 +124,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
 }
 
-/// The defaults, replaced by what the command line says.
+/// Returns the default settings, with the values of the command line in their place.
 fn settings(arguments: &Arguments) -> Settings {
     let defaults = Settings::default();
     Settings {

@@ -1,4 +1,4 @@
-//! `parallax sync`: the clocks of the cameras of recorded footage.
+//! `parallax sync`: finds the clock offsets between the cameras of recorded footage.
 
 mod heard;
 
@@ -21,7 +21,7 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{le
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Estimate offset and drift of every camera from the movement of people, or from sounds.
+    /// Estimate the clock offset and drift of every camera, from the movement of people or from sounds.
     Estimate(Box<Arguments>),
 }
 
@@ -55,31 +55,31 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
-    /// The signal to compare.
+    /// Signal by which the clocks are compared.
     #[arg(long, value_enum, default_value_t = By::Movement)]
     by: By,
-    /// Largest clock offset of two cameras, seconds; use 10 for footage that was started by hand.
+    /// Largest clock offset between two cameras, in seconds. Use 10 if the recordings were started by hand.
     #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = window)]
     window: f64,
-    /// The camera with the reference clock; the first of the deployment if not given.
+    /// Camera with the reference clock. If not given, the first camera of the deployment.
     #[arg(long, value_name = "CAMERA")]
     reference: Option<String>,
-    /// Look at every n-th picture.
+    /// Use every n-th picture.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     every: u64,
-    /// Start in the footage of each camera, seconds.
+    /// Start at this time in the footage of each camera, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     from: f64,
-    /// Length of the footage to look at, seconds; all of it if not given.
+    /// Length of the footage to use, in seconds. If not given, all of it.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
-    /// Write a page with the costs of all pairs over their offset.
+    /// Write a page that plots the cost of each pair of cameras against its offset.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write `offset_ms` and `drift_ppm` into the deployment file, and change nothing else there.
+    /// Write `offset_ms` and `drift_ppm` into the deployment file. The rest of the file is not changed.
     #[arg(long)]
     write: bool,
-    /// Replace a value of the deployment, for example `--set network.file=other.onnx`; may be given several times.
+    /// Replace a value of the deployment, for example `--set network.file=other.onnx`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Print JSON.
@@ -92,7 +92,7 @@ pub(crate) struct Arguments {
 enum By {
     /// The movement of people.
     Movement,
-    /// The beginnings of sounds.
+    /// The times at which sounds begin.
     Sound,
 }
 
@@ -161,7 +161,7 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
     Ok(ExitCode::SUCCESS)
 }
 
-/// The number of the reference camera.
+/// Returns the index of the reference camera.
 fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Failure> {
     if let [_] | [] = &deployment.cameras[..] {
         let message = "the deployment has one camera: there is no other clock to compare with";
@@ -182,7 +182,7 @@ fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Fa
     })
 }
 
-/// Compares the clocks, which Ctrl-C ends.
+/// Compares the clocks. Ctrl-C ends the comparison.
 fn compared(
     found: Films,
     reference: usize,
@@ -270,7 +270,7 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     Ok(())
 }
 
-/// A residual, where there is one.
+/// Formats a residual, if there is one.
 fn pixels(it: f64) -> String {
     if it.is_finite() {
         format!("{it:.2}")
@@ -352,7 +352,7 @@ fn write_page(
     files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
 }
 
-/// A failure where the answer is not to be used.
+/// Fails if the clocks are not determined.
 fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     if outcome.doubts.is_empty() {
         return Ok(());

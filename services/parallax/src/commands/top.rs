@@ -27,12 +27,12 @@ computing; publishing, until the result is sent (with lossless delivery includin
 capture of the frame to this process's message; end to end, from the capture to the result. Percentiles are over the
 lifetime of the process; rates are over the last five seconds.")]
 pub(crate) struct Arguments {
-    /// Name of the deployment, or its file; may be left out if only one is running.
+    /// Name or file of the deployment. May be left out if only one deployment is running.
     deployment: Option<String>,
-    /// Print one table and exit; the default if standard output is not a terminal.
+    /// Print one table and exit. This is the default if standard output is not a terminal.
     #[arg(long)]
     once: bool,
-    /// Interval of updates, seconds.
+    /// Interval between updates, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = pause)]
     every: f64,
 }

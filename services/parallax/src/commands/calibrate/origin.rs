@@ -1,4 +1,4 @@
-//! `parallax calibrate origin`: a rig put on the floor.
+//! `parallax calibrate origin`: moves the origin of a rig to the floor.
 
 mod stood;
 
@@ -31,30 +31,30 @@ Examples:
         --x cam0=700,610 --x cam1=1010,566 --floor cam0=500,480 --floor cam1=700,500
     parallax calibrate origin rig.toml --people out/walk --out room.toml")]
 pub(crate) struct Arguments {
-    /// The rig, a calibration of any format.
+    /// The rig: a calibration in any format.
     rig: PathBuf,
-    /// Footage of cameras of the rig, NAME=PATH or named as the camera, with the board on the floor.
+    /// Footage of the board on the floor, one per camera of the rig: NAME=PATH, or a file with the name of the camera.
     #[arg(value_name = "FOOTAGE", requires = "board")]
     footage: Vec<String>,
     /// The board.
     #[arg(long, value_name = "BOARD", requires = "footage")]
     board: Option<Board>,
-    /// Number of frames, from the first, in which the board lies still.
+    /// Number of frames, from the first, in which the board does not move.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     frames: u64,
-    /// The origin, as a camera sees it; once for each camera.
+    /// Pixel at which a camera sees the origin. Give the option once per camera.
     #[arg(long, value_name = "CAMERA=X,Y", conflicts_with = "board", requires_all = ["x", "floor"])]
     at: Vec<String>,
-    /// A point along x.
+    /// Pixel at which a camera sees a point on the x axis.
     #[arg(long, value_name = "CAMERA=X,Y")]
     x: Vec<String>,
-    /// Any other point of the floor.
+    /// Pixel at which a camera sees any other point of the floor.
     #[arg(long, value_name = "CAMERA=X,Y")]
     floor: Vec<String>,
-    /// The folder of a finished run of this rig in which a person walks about.
+    /// Folder of a finished run of this rig in which a person walks about.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["board", "at"])]
     people: Option<PathBuf>,
-    /// Frames per second, for a run without a frame rate.
+    /// Frames per second, if the run has no frame rate.
     #[arg(long, value_name = "HZ", requires = "people", value_parser = rate)]
     rate: Option<f64>,
     /// The rig file to write.
@@ -175,7 +175,7 @@ fn camera_named(rig: &Rig, name: &str) -> Result<usize, Failure> {
     })
 }
 
-/// `CAMERA=X,Y`, several times.
+/// Parses several `CAMERA=X,Y`.
 fn clicks_of(rig: &Rig, texts: &[String]) -> Result<Vec<Click>, Failure> {
     let each = texts.iter().map(|text| {
         let parts = text.split_once('=').and_then(|(name, at)| {

@@ -1,4 +1,4 @@
-//! `parallax calibrate people`: where cameras stand, from people walking about.
+//! `parallax calibrate people`: finds the poses of cameras from people walking about.
 
 use std::process::ExitCode;
 
@@ -14,12 +14,12 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// Hint where the answer is refused.
+/// Hint for a refused result.
 const HINT: &str = "let one person walk through the whole volume, in view of at least two cameras at every moment, for half a minute, \
 with arms and turns; check that the intrinsics are those of the pictures (`parallax calib show`); if the cameras were not started \
 together, search their clocks with --window 2; if there is no telling, calibrate with a board";
 
-/// Hint where the answer is not known well.
+/// Hint for a result that is too uncertain.
 const CAUTION_HINT: &str = "longer footage, with more of the volume walked through in all directions, makes it better; how much joints in \
 space are off on account of it, a run with this rig tells by its residuals";
 
@@ -55,27 +55,27 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     walk: WalkArguments,
-    /// Standing height of the person, metres.
+    /// Standing height of the person, in metres.
     #[arg(long, value_name = "METRES", value_parser = height, conflicts_with_all = ["distance", "scale"])]
     height_m: Option<f64>,
-    /// The distance of two cameras, metres: `cam01:cam03=4.27`.
+    /// Distance between two cameras in metres, for example `cam01:cam03=4.27`.
     #[arg(long, value_name = "A:B=METRES", value_parser = distance, conflicts_with = "scale")]
     distance: Option<(String, String, f64)>,
-    /// Take scale and world from the rig of the deployment.
+    /// Keep the scale and the world of the deployment's rig.
     #[arg(long, value_name = "rig", value_parser = ["rig"])]
     scale: Option<String>,
-    /// Also estimate focal lengths; the result is less certain.
+    /// Also estimate focal lengths, which makes the result less certain.
     #[arg(long)]
     focal: bool,
-    /// Largest clock offset of two cameras, seconds. Offsets of a few pictures are found without it.
+    /// Largest clock offset between two cameras, in seconds. Offsets of a few pictures are found without this option.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = window)]
     window: f64,
-    /// Seed of the random samples; another seed shows their influence.
+    /// Seed of the random samples. Try another seed to see their influence.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
-/// The standing height of a person, metres.
+/// Parses the standing height of a person, in metres.
 pub(crate) fn height(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|value| (0.8..=2.4).contains(value));
     number.ok_or_else(|| format!("expected 0.8 to 2.4 metres, got {text:?}"))
@@ -94,7 +94,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
     Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
 }
 
-/// Refuses to keep the scale of a rig that has lenses alone.
+/// Fails if the scale of a rig is to be kept that has only lenses.
 fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let rig = inputs::rig_of(&deployment)?;
@@ -158,7 +158,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// A failure where the answer is known less well than is good: it is written all the same.
+/// Fails if the result is too uncertain. The rig file has been written nevertheless.
 fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
     if cautions.is_empty() {
         return Ok(());
@@ -171,7 +171,7 @@ fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
     Err(Failure::new(ExitKind::Limit, message).with_hint(CAUTION_HINT))
 }
 
-/// How well the worst camera is known.
+/// Describes the uncertainty of the least certain camera.
 fn how_sure(outcome: &Outcome) -> String {
     let worst =
         |axis: usize| outcome.reports.iter().map(|report| report.sd[axis]).fold(0.0, f64::max);
@@ -226,7 +226,7 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
     })
 }
 
-/// Where the vertical comes from.
+/// Describes the origin of the vertical.
 fn vertical(outcome: &Outcome) -> &'static str {
     match outcome.vertical {
         Vertical::Feet => "the feet that stand",

@@ -1,4 +1,4 @@
-//! `parallax calibrate refine`: an existing rig made better by a recording.
+//! `parallax calibrate refine`: improves an existing rig with recorded footage.
 
 use std::process::ExitCode;
 
@@ -14,7 +14,7 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// Hint where the answer is refused.
+/// Hint for a refused result.
 const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \
 or the rig is not that of these cameras, begin anew: parallax calibrate people";
 
@@ -41,16 +41,16 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     walk: WalkArguments,
-    /// Standard deviation of the rotations of the given rig, degrees.
+    /// Standard deviation of the camera rotations in the given rig, in degrees.
     #[arg(long, value_name = "DEGREES", default_value_t = 1.0, value_parser = deviation)]
     sd_degrees: f64,
-    /// Standard deviation of the places of its cameras, millimetres.
+    /// Standard deviation of the camera positions in the given rig, in millimetres.
     #[arg(long, value_name = "MM", default_value_t = 30.0, value_parser = deviation)]
     sd_mm: f64,
-    /// Standard deviation of the clocks, milliseconds; 0 keeps them fixed.
+    /// Standard deviation of the clocks, in milliseconds. 0 keeps the clocks fixed.
     #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = clock)]
     sd_ms: f64,
-    /// Also estimate focal lengths; the result is less certain.
+    /// Also estimate focal lengths, which makes the result less certain.
     #[arg(long)]
     focal: bool,
 }

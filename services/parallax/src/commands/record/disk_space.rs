@@ -1,4 +1,4 @@
-//! The disk space that a recording takes, and that is free.
+//! The disk space that a recording needs, and the free disk space.
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -11,28 +11,28 @@ use runtime::{TopicPlan, free_space};
 
 /// A recording starts only if there is space for this many frames.
 const MIN_FRAMES: u64 = 10;
-/// A skeleton for Foxglove.
+/// Size of a skeleton for Foxglove, in bytes.
 const SCENE_BYTES: u64 = 24_000;
-/// Interval of messages about the size of the file.
+/// Interval between messages about the size of the file.
 const PERIOD: Duration = Duration::from_secs(10);
 
-/// The largest size of one instant of all views in the file, bytes.
+/// Maximum size of the messages of one instant, over all views, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PerFrame {
     pub pixels: u64,
     pub evidence: u64,
-    /// The same pixels as JPEG for Foxglove, in text.
+    /// The frames' pixels as JPEG for Foxglove, encoded as text.
     pub foxglove: u64,
-    /// Pictures of live cameras as they came, if they came raw.
+    /// Original pictures of live cameras, if the cameras send raw pixels.
     pub camera: u64,
     /// All other messages.
     pub rest: u64,
 }
 
 impl PerFrame {
-    /// The sizes for the topics of a deployment.
+    /// Computes the sizes for the topics of a deployment.
     ///
-    /// * `has_foxglove`: whether the recording holds what Foxglove shows.
+    /// * `has_foxglove`: true if the recording contains the topics for Foxglove.
     pub(super) fn new(topics: &[TopicPlan], has_foxglove: bool) -> Self {
         let mut sum = Self::default();
         for topic in topics {
@@ -43,7 +43,7 @@ impl PerFrame {
                     sum.foxglove += if has_foxglove { bytes / 2 } else { 0 };
                 }
                 Some(Kind::Skeletons) => {
-                    // Of the room for eight people a recording holds what is used: a run follows one.
+                    // The topic has space for eight people, but the recording contains only those in use. A run follows one person.
                     let person = Kind::Skeletons.element_bytes().unwrap_or(0);
                     sum.rest += (Kind::Skeletons.head_bytes() + person) as u64;
                     sum.rest += if has_foxglove { SCENE_BYTES } else { 0 };
@@ -58,7 +58,7 @@ impl PerFrame {
         sum
     }
 
-    /// The sum without pixels or evidence, if they are left out.
+    /// Returns the total size, without pixels or evidence if these are left out.
     fn bytes(self, without: [bool; 2]) -> u64 {
         let [pixels, evidence] = without;
         let pixels = if pixels {
@@ -75,27 +75,27 @@ impl PerFrame {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Forecast {
     pub per_frame: PerFrame,
-    /// True if pixels are left out, and true if evidence is.
+    /// True if pixels are left out, and true if evidence is left out.
     pub without: [bool; 2],
-    /// None for a run until it is stopped.
+    /// Number of frames; `None` for a run without an end.
     pub n_frames: Option<u64>,
-    /// Used frames of the footage per second, if it is known.
+    /// Rate of the frames that are used, per second, if known.
     pub rate_hz: Option<f64>,
     pub free_bytes: u64,
 }
 
 impl Forecast {
-    /// The size of an instant, bytes.
+    /// Returns the size of one instant, in bytes.
     fn frame_bytes(&self) -> u64 {
         self.per_frame.bytes(self.without)
     }
 
-    /// The number of frames that fit on the disk.
+    /// Returns the number of frames that fit on the disk.
     fn n_that_fit(&self) -> u64 {
         self.free_bytes / self.frame_bytes().max(1)
     }
 
-    /// The forecast as text.
+    /// Returns the forecast as text.
     pub(super) fn text(&self, file: &Path) -> String {
         let mut text = format!(
             "recording {}: up to {} a frame",
@@ -127,7 +127,7 @@ impl Forecast {
         self.write_smaller(text)
     }
 
-    /// Writes how much smaller the recording would be without evidence and pixels.
+    /// Adds how small the recording would be without evidence, and without pixels.
     fn write_smaller(&self, text: &mut String) -> core::fmt::Result {
         let [pixels, evidence] = self.without;
         if !evidence {
@@ -164,7 +164,7 @@ impl Forecast {
     }
 }
 
-/// The free space on the disk of a file that will be written, bytes.
+/// Returns the free space on the disk of a file that will be written, in bytes.
 pub(super) fn free_beside(file: &Path) -> Result<u64, Failure> {
     let folder = file.parent().unwrap_or(Path::new("/"));
     if !folder.is_dir() {
@@ -196,7 +196,7 @@ impl Growth {
         }
     }
 
-    /// The next message, if it is due; called on every event of the run.
+    /// Returns the next message if it is due. Called on every event of the run.
     pub(super) fn message(&mut self) -> Option<String> {
         if self.reported_at.elapsed() < PERIOD {
             return None;

@@ -1,4 +1,4 @@
-//! `--print`: a board as PDF or SVG.
+//! `--print`: draws a board as PDF or SVG.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

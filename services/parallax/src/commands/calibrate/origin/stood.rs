@@ -1,4 +1,4 @@
-//! The floor that people stood on in a finished run.
+//! Finds the floor below people who stood in a finished run.
 
 use std::path::Path;
 
@@ -12,15 +12,15 @@ use skeleton::PARSE14;
 use statistics::Sorted;
 use terminal::output;
 
-/// How far the skeletons of a run may be from what its cameras saw, as a share of the size of the person in the picture.
+/// Largest distance of the run's skeletons from the joints that its cameras saw, as a share of the person's size in the picture.
 const MOST_OFF: f64 = 0.15;
-/// The fewest joints in pictures for this check.
+/// Minimum number of joints seen in pictures for this check.
 const LEAST_SEEN: usize = 50;
 
-/// Finds the floor, after checking that the run was made with this rig. Of several people it uses the followed person,
-/// who may change: all of them stand on the same floor.
+/// Finds the floor, after checking that the run was made with this rig. If the run has several people, only the followed person is used.
+/// The followed person may change, because all of them stand on the same floor.
 ///
-/// * `rate_hz`: frames a second, for a run that does not know.
+/// * `rate_hz`: frames per second, if the run has no frame rate.
 pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
     let mut times_s: Vec<f64> = Vec::new();
     let mut skeletons: Skeletons = Vec::new();
@@ -64,7 +64,7 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
     Ok(found)
 }
 
-/// A failure where the skeletons are not where the cameras of the rig saw them: the run was made with another rig.
+/// Fails if the skeletons are not where the cameras of this rig saw them, because the run was made with another rig.
 fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result<(), Failure> {
     let file = run.join(ViewLine::FILE);
     let text = failure::read_text(&file)?;
