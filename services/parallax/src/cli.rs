@@ -11,8 +11,8 @@ use terminal::{EXIT_CODES, Globals, completions};
 const LONG_ABOUT: &str = "\
 Calibrated, synchronised cameras in, 3D human skeletons out.
 
-A deployment file (ten lines: the cameras, their calibration, an output folder) describes a run.
-A run has one process per stage and camera; `parallax run` starts and watches all of them:
+A deployment file describes a run in about ten lines: the cameras, their calibration, an output folder.
+A run has one process per stage and camera. `parallax run` starts and watches all of them:
 
     capture -> pose -> (quality) -> fuse -> triangulate -> results
 
@@ -23,27 +23,27 @@ Examples:
     parallax doctor                                     check this machine
     parallax demo                                       run four synthetic cameras, and write a report
     parallax run my.toml                                run a deployment: from its cameras to 3D
-    parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
-    parallax run my.toml --dry-run                      show the processes and their memory, and start nothing
-    parallax run my.toml --latency-budget-ms 150        fail if 1 frame in 100 takes longer
-    parallax demo --view                                the demo, watched in the browser
-    parallax view my.toml                               a page about a deployment, while it runs
-    parallax publish my.toml udp://127.0.0.1:9000       its skeletons as datagrams, for programs of any language
-    parallax top                                        the times of a running deployment
-    parallax record my.toml --out run.mcap              run, and record every message
+    parallax run my.toml --set capture.n_frames=20      run it with one value replaced
+    parallax run my.toml --dry-run                      show the processes and their memory, but start nothing
+    parallax run my.toml --latency-budget-ms 150        fail if more than 1 frame in 100 takes longer
+    parallax demo --view                                run the demo, and watch it in the browser
+    parallax view my.toml                               watch a running deployment in the browser
+    parallax publish my.toml udp://127.0.0.1:9000       send its skeletons as datagrams to another program
+    parallax top                                        watch the times of a running deployment
+    parallax record my.toml --out run.mcap              run a deployment, and record every message
     parallax replay run.mcap --from fuse --set paper.alpha=2     run the later stages again, with another value
-    parallax export out/my --to c3d,glb,bvh             write the run in formats of other tools
+    parallax export out/my --to c3d,glb,bvh             export a run to the formats of other tools
     parallax chaos                                      inject faults into a deployment, and check limits
     parallax bench transport                            measure the time of a message between processes
-    parallax config show my.toml                        every value and its origin
-    parallax config schema > parallax.schema.json       completion and checks in an editor
-    parallax detect photo.jpg --model parse.mat --json  people in single images
-    parallax smooth out/run                             smoothed trajectories and joint angles of a run
-    parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
+    parallax config show my.toml                        print every setting and its origin
+    parallax config schema > parallax.schema.json       get completion and checks in an editor
+    parallax detect photo.jpg --model parse.mat --json  find people in single images
+    parallax smooth out/run                             smooth the trajectories of a run, and compute joint angles
+    parallax cameras view /dev/video0 --out shot.png    take a picture with a live camera
     parallax sync estimate my.toml --write              find the clock offsets of recorded cameras
-    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   a rig from a person who walks about
-    parallax calibrate board --board charuco:7x5:40mm a.mp4 b.mp4 --out rig.toml    a rig from a board
-    parallax calib show Calib.toml                      the content of a calibration file
+    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   make a rig from a person walking about
+    parallax calibrate board --board charuco:7x5:40mm a.mp4 b.mp4 --out rig.toml    make a rig from a board
+    parallax calib show Calib.toml                      print the content of a calibration file
 ";
 
 /// Calibrated cameras in, 3D human skeletons out.

@@ -71,7 +71,7 @@ fn a_room_that_is_kept_is_said_to_differ_from_new_options() {
     );
     let ended = new("somebody=a.mp4");
     assert!(
-        ended.stderr.contains("differs from what these options"),
+        ended.stderr.contains("differs from the file that these options"),
         "{}",
         ended.stderr
     );

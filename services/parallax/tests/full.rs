@@ -84,7 +84,7 @@ fn a_recording_is_refused_if_the_disk_has_too_little_room() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     for words in [
-        "there is no room for",
+        "not enough disk space for",
         "2 frames of",
         "kB are free",
         "--without evidence",

@@ -229,7 +229,7 @@ fn options_of_the_filters_are_refused_beside_a_network() {
             &[&detect[..], &["--card", "card.toml"], &option].concat(),
         );
         assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-        let said = format!("{} is about the filters", option[0]);
+        let said = format!("{} is an option of the filters", option[0]);
         assert!(ended.stderr.contains(&said), "{}", ended.stderr);
     }
 }

@@ -77,7 +77,7 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     let ended = replayed(&case, &[&other[..], &["paper.candidates=1"]].concat());
     assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("given by the recording"),
+        ended.stderr.contains("the recording determines this value"),
         "{}",
         ended.stderr
     );
@@ -127,7 +127,7 @@ fn omitted_messages_and_existing_files_are_reported() {
     let ended = case.start(&elsewhere).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("is there already"),
+        ended.stderr.contains("already exists"),
         "{}",
         ended.stderr
     );

@@ -96,7 +96,7 @@ fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
     assert_eq!(ended.status.code(), Some(0), "{said}{}", ended.stderr);
     for words in [
         "folder clean: 0",
-        "photos: not a deployment: left alone",
+        "photos: not a deployment: ignored",
         "folder clean photos: 1",
         "folder run deployment.toml: 1",
         "is not the directory of a deployment (files in it: 1;",

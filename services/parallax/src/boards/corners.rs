@@ -57,7 +57,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     for (nth, row) in reader.records().enumerate() {
         let row = row.map_err(|error| error.to_string())?;
         let cell = |which: usize| row.get(columns[which]).unwrap_or_default().trim();
-        let wrong = |which: usize| format!("row {}: {:?} is no number", nth + 2, cell(which));
+        let wrong = |which: usize| format!("row {}: {:?} is not a number", nth + 2, cell(which));
         let whole = |which: usize| {
             without_fraction(cell(which))
                 .parse::<usize>()
@@ -73,7 +73,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         let (frame, id) = (whole(0)?, whole(2)?);
         if id >= MOST_CORNERS {
             return Err(format!(
-                "row {}: {id} is not the number of a corner",
+                "row {}: {id} is not a corner number",
                 nth + 2
             ));
         }
@@ -85,7 +85,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         groups.entry((camera, frame)).or_default().push((id, at));
     }
     if groups.is_empty() {
-        return Err(format!("no corner of the cameras {}", names.join(", ")));
+        return Err(format!("no corners of the cameras {}", names.join(", ")));
     }
     let sights = groups
         .into_iter()

@@ -123,7 +123,7 @@ fn frame_table(
         (None, Some(first)) if cameras.len() > 1 => {
             let table = beside(&first.paths[0])?;
             if table.is_some() {
-                console.message("frames by timestamps.csv beside the footage");
+                console.message("pictures are assigned to frames by timestamps.csv beside the footage");
             }
             table
         }
@@ -140,7 +140,7 @@ fn unknown(table: &FrameTable, camera: &str) -> Failure {
             known.join(", ")
         ),
     )
-    .with_hint("name the footage as NAME=PATH, with the name or number from the table")
+    .with_hint("pass the footage as NAME=PATH, with the name or number from the table")
 }
 
 struct CameraTask<'a> {
@@ -173,7 +173,7 @@ impl CameraTask<'_> {
                 return Err(Failure::new(
                     ExitKind::Input,
                     format!(
-                        "{path}: {}x{}, other pictures of {} have {}x{}",
+                        "{path}: {}x{} pixels, but other pictures of {} have {}x{}",
                         size[0], size[1], self.camera.name, raw.size[0], raw.size[1]
                     ),
                 ));

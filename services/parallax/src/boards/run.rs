@@ -111,7 +111,7 @@ pub fn calibrate(
         for (name, seen) in task.names.iter().zip(&looked.cameras) {
             if 2 * seen.n_inverted > seen.sights.len() {
                 notes.push(format!(
-                    "{name}: black and white are exchanged in its pictures"
+                    "{name}: black and white are exchanged in the pictures"
                 ));
             }
         }
@@ -129,8 +129,8 @@ pub fn calibrate(
     let outcome = outcome.map_err(|error| refused(&error, looked.as_ref(), &task))?;
     if let Some(it) = outcome.out_of_step {
         notes.push(format!(
-            "boards fit each camera alone to {:.2} px, all together to {:.2} px with focal lengths changed by up to {:.1} %: the pictures of a frame \
-             were not taken at the same time. The lens of each camera follows from its own pictures, and the places of \
+            "boards fit each camera alone to {:.2} px, but all cameras together to {:.2} px, with focal lengths changed by up to {:.1} %: the pictures of a frame \
+             were not taken at the same time. The lens of each camera was found from its own pictures, and the poses of \
              the cameras from the frames in which the board moves least",
             it.alone_px,
             it.together_px,
@@ -154,7 +154,7 @@ fn refuse_twins(names: &[String]) -> Result<(), Failure> {
         if names[..nth].contains(name) {
             return Err(
                 Failure::new(ExitKind::Usage, format!("two cameras are named {name}"))
-                    .with_hint("name them: NAME=PATH"),
+                    .with_hint("give them different names: NAME=PATH"),
             );
         }
     }
@@ -209,7 +209,7 @@ fn mirrored(
     if settings.back.is_none() && !settings.is_mirrored {
         if looked.cameras.iter().any(|seen| sees_both(&seen)) {
             notes.push(
-                "a camera saw codes both ways round: the back of the board has the mirror image of its front".to_owned(),
+                "a camera saw both normal and mirrored codes: the back of the board has the mirror image of its front".to_owned(),
             );
             return Ok(Mirrored::Known);
         }
@@ -228,7 +228,7 @@ fn mirrored(
     turned(&mut task.board);
     task.sights.iter_mut().for_each(|sight| turned(&mut sight.on_board));
     notes.push(
-        "all footage is mirrored: left and right of what is found with this rig are exchanged"
+        "all footage is mirrored: this rig exchanges left and right in its results"
             .to_owned(),
     );
     Ok(Mirrored::Known)
@@ -251,7 +251,7 @@ fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
 fn two_sided(names: &[String], behind: &[usize]) -> String {
     let names: Vec<&str> = behind.iter().map(|behind| names[*behind].as_str()).collect();
     format!(
-        "{} saw the back of the board: it has the mirror image of the front, and the cameras agree about that",
+        "{} saw the back of the board: it has the mirror image of the front, and the positions of the cameras confirm this",
         names.join(", ")
     )
 }
@@ -266,15 +266,15 @@ fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
         named.join(", ")
     };
     let message = format!(
-        "{which} saw the codes of the board mirrored: its back has the mirror image of the front, or the pictures are mirrored"
+        "{which} saw mirrored codes: either the back of the board has the mirror image of the front, or the pictures are mirrored"
     );
     let more = if is_all {
-        "; or pass --mirrored, which calibrates mirrored footage as it is, if all recordings are mirrored"
+        "; or, if all recordings are mirrored, pass --mirrored to calibrate mirrored footage"
     } else {
         ""
     };
     Failure::new(ExitKind::Input, message).with_hint(format!(
-        "for a board with two sides pass --back mirrored; if the pictures are mirrored (a preview of a webcam), switch mirroring off in the camera and record again{more}"
+        "for a board with two sides, pass --back mirrored; if the pictures are mirrored (as in a webcam preview), switch mirroring off in the camera and record again{more}"
     ))
 }
 
@@ -292,7 +292,7 @@ fn known(
                 Err(Failure::new(
                     ExitKind::Calibration,
                     format!(
-                        "camera {name}: its intrinsics are for {}x{} pixels, its footage has {}x{}",
+                        "camera {name}: the intrinsics are for {}x{} pixels, but the footage has {}x{}",
                         known[0], known[1], size[0], size[1]
                     ),
                 ))
@@ -313,7 +313,7 @@ fn known(
                     names.join(", ")
                 ),
             )
-            .with_hint("name the footage as the calibration names its cameras: NAME=PATH"))
+            .with_hint("pass the footage as NAME=PATH, with the names from the calibration"))
         }
         _ => Ok(known),
     }
@@ -355,7 +355,7 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
         let found = look(&board, &settings.cameras[..1], &settings_of, stop, &quiet).ok()?;
         if !found.sights().is_empty() {
             return Some(format!(
-                "there are markers of {name}: --board {}",
+                "the pictures show markers of {name}: try --board {}",
                 found.board
             ));
         }
@@ -374,15 +374,15 @@ fn reasons(looked: &Looked) -> String {
     });
     match most.map(|most| most.0) {
         Some(Nothing::OtherGrid { columns, rows }) => format!(
-            "a chessboard of {columns}x{rows} inner corners is there: inner corners are counted, not squares"
+            "the pictures show a chessboard with {columns}x{rows} inner corners: give the number of inner corners, not of squares"
         ),
         Some(Nothing::Elsewhere { n_markers }) => format!(
-            "markers are there (up to {n_markers} in a picture), but not where this board has them: are its counts and dictionary right?"
+            "there are markers (up to {n_markers} in a picture), but in other places than on this board: are its numbers of squares and its dictionary right?"
         ),
         Some(Nothing::NoCorners) => {
-            "the board is there, but its corners are not sharp: move it more slowly, with more light".to_owned()
+            "there is a board, but its corners are not sharp: move it more slowly, or use more light".to_owned()
         }
-        _ => "is it the right kind of board, and large enough in the pictures (squares of 15 px and more)?".to_owned(),
+        _ => "is this the right kind of board, and is it large enough in the pictures (squares of at least 15 px)?".to_owned(),
     }
 }
 
@@ -393,12 +393,12 @@ fn refused(error: &BoardError, looked: Option<&Looked>, task: &Task) -> Failure 
             let seen = nth.and_then(|nth| looked?.cameras.get(nth));
             seen.map_or_else(String::new, |seen| {
                 let n = seen.sights.len();
-                format!("{n} of its {} pictures show some of the board; {}", seen.n_pictures, looked.map_or_else(String::new, reasons))
+                format!("{n} of {} pictures show a part of the board; {}", seen.n_pictures, looked.map_or_else(String::new, reasons))
             })
         }
-        BoardError::NoStart { .. } => "try --lens fisheye for a wide lens".to_owned(),
+        BoardError::NoStart { .. } => "for a wide lens, try --lens fisheye".to_owned(),
         BoardError::Apart { .. } => {
-            "if boards were seen together, the frames do not belong together: --timestamps, or start the videos at the same time".to_owned()
+            "if two cameras saw the board at the same time, their pictures are assigned to wrong frames: pass --timestamps, or start the videos at the same time".to_owned()
         }
         BoardError::NotFinite => "try fewer coefficients (--lens five), or known intrinsics (--known)".to_owned(),
     };
@@ -427,7 +427,7 @@ impl Calibrated {
             self.outcome.cameras.iter().map(|camera| camera.camera.clone()).collect();
         let mut source = format!("calibrate board {}", self.board);
         if !self.task.wants_rig {
-            source += "; intrinsics alone: the poses are not known";
+            source += "; intrinsics only, without poses";
         }
         if !self.outcome.doubts.is_empty() {
             source += "; not to be trusted: ";

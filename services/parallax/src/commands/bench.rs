@@ -52,8 +52,8 @@ struct Output {
 
 /// The exit codes of all benchmarks.
 const EXITS: &str = "\
-Exit codes: 0 measured, and every limit that was asked for held; 6 a limit was missed (the report says which); 1 it \
-could not be measured; 2 the command line is wrong; 3, 4, 5 the deployment or its inputs are wrong, as for `run`; \
+Exit codes: 0 measured, and within all given limits; 6 a limit was exceeded (the report says which); 1 the measurement \
+failed; 2 the command line is wrong; 3, 4, 5 the deployment or its inputs are wrong, as for `run`; \
 130 stopped by Ctrl-C.";
 
 /// Runs the benchmark.
@@ -84,7 +84,7 @@ pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failu
 /// * `report`: `None` if the benchmark was interrupted.
 fn publish(report: Option<Report>, to: &Output, globals: Globals) -> Result<ExitCode, Failure> {
     let Some(report) = report else {
-        output::message("stopped: nothing is reported");
+        output::message("stopped: there is no report");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if let Some(file) = &to.record {

@@ -25,7 +25,7 @@ pub(crate) enum Command {
         json: bool,
     },
     /// Check units, handedness and image sizes. With --detections, also check that each view's own poses agree with the rig.
-    #[command(after_help = "Ends with 5 if something is probably wrong.")]
+    #[command(after_help = "The exit code is 5 if something is probably wrong.")]
     Check {
         #[command(flatten)]
         input: Input,
@@ -115,7 +115,7 @@ impl Input {
         let up = match self.up.as_deref() {
             Some(&[x, y, z]) => {
                 let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
-                let message = format!("--up {x} {y} {z} is no direction");
+                let message = format!("--up {x} {y} {z} is not a direction");
                 Some(up.ok_or(message).or_fail(ExitKind::Usage)?)
             }
             _ => None,
@@ -169,7 +169,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             up.x, up.y, up.z
         ))?,
         None => output::line(
-            "which way is up is not known: a run finds it, or `up` in its deployment sets it",
+            "the upward direction is not known: a run finds it, unless `up` in its deployment sets it",
         )?,
     }
     for camera in rig.cameras() {
@@ -184,7 +184,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
                 centre.x, centre.y, centre.z
             )
         } else {
-            "place not known".to_owned()
+            "position not known".to_owned()
         };
         output::line(format_args!(
             "  {:<10} {}x{} px, f ({:.1}, {:.1}), c ({:.1}, {:.1}), {place}",
@@ -254,7 +254,7 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
         }
         output::line(survey_text(&geometry::survey(rig)))?;
         if findings.is_empty() {
-            output::line("OK: nothing odd was found; compare these numbers with a tape measure")?;
+            output::line("OK: no problems were found; check these numbers with a tape measure")?;
         }
         for camera in report.iter().flat_map(|report| &report.errors.cameras) {
             output::line(format_args!(
@@ -287,18 +287,18 @@ fn survey_text(survey: &Survey) -> String {
     }
     if let Some([least, most]) = survey.apart_m {
         lines.push(format!(
-            "distance of two cameras: {least:.2} to {most:.2} m"
+            "distances between cameras: {least:.2} to {most:.2} m"
         ));
     }
     lines.push(match survey.shared {
         Some(Shared { sides_m: [x, y, z], volume_m3 }) => format!(
-            "space that all cameras see: {volume_m3:.1} m3 in a box of {x:.1} x {y:.1} x {z:.1} m around the middle"
+            "volume that all cameras see: {volume_m3:.1} m3, in a box of {x:.1} x {y:.1} x {z:.1} m around the middle"
         ),
-        None => "space that all cameras see: none".to_owned(),
+        None => "volume that all cameras see: none".to_owned(),
     });
     if let Some(mm) = survey.error_mm {
         lines.push(format!(
-            "a point in the middle that is off by 1 px in every view is off by {mm:.1} mm in space"
+            "an error of 1 px in every view moves a point in the middle by {mm:.1} mm"
         ));
     }
     lines.join("\n")

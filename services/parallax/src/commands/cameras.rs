@@ -73,10 +73,10 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
     let name = &arguments.camera;
     let Some(file) = &arguments.deployment else {
         let address = LiveAddress::parse(name).ok_or_else(|| {
-            let message = format!("{name:?} is no live camera");
+            let message = format!("{name:?} is not a live camera");
             Failure::new(ExitKind::Usage, message).with_hint(
-                "a live camera is /dev/video0, rtsp://..., udp://... or http://...; for the name of a camera give its \
-                 deployment too: --deployment my.toml",
+                "a live camera is /dev/video0, rtsp://..., udp://... or http://...; to name a camera of a deployment, \
+                 also pass --deployment my.toml",
             )
         })?;
         return Ok(LiveCamera::new(address));
@@ -92,7 +92,7 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
         let names: Vec<&str> = live.map(|camera| camera.name.as_str()).collect();
         let message = format!("{} has no live camera {name:?}", file.display());
         let hint = if names.is_empty() {
-            "it has none".to_owned()
+            "it has no live cameras".to_owned()
         } else {
             format!("it has {}", names.join(", "))
         };
@@ -128,8 +128,8 @@ fn list(as_json: bool) -> Result<ExitCode, Failure> {
     }
     if found.is_empty() {
         output::line(
-            "no video devices here (/dev/video*): plug in a camera; in a container, pass its device in. Cameras of a network \
-             are not listed: `parallax cameras view rtsp://... --out shot.png` takes a picture of one",
+            "no video devices (/dev/video*): plug in a camera; in a container, pass its device in. Network cameras \
+             are not listed: `parallax cameras view rtsp://... --out shot.png` takes a picture with one",
         )?;
     }
     for it in &found {
@@ -201,7 +201,7 @@ fn text(it: &Found) -> String {
     let rate = it
         .mode
         .rate_hz
-        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} a second"));
+        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} per second"));
     let about = &it.about;
     let mut lines = vec![
         format!(
@@ -225,7 +225,7 @@ fn text(it: &Found) -> String {
             let rates: Vec<String> =
                 size.rates_hz.iter().map(|rates_hz| format!("{rates_hz:.2}")).collect();
             lines.push(format!(
-                "    {} at {} a second",
+                "    {} at {} per second",
                 size.text(),
                 rates.join(", ")
             ));

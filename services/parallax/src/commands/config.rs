@@ -26,7 +26,7 @@ pub(crate) enum Command {
 
 const SCHEMA_HELP: &str = "\
 The schema (JSON Schema, draft 2020-12) lets an editor complete and explain the keys of a deployment file, and mark unknown
-ones. `config check` finds the rest, such as values that contradict each other.
+keys. `config check` finds other mistakes, such as values that contradict each other.
 
 For VS Code with \"Even Better TOML\", and other editors that use taplo:
     parallax config schema > parallax.schema.json
@@ -119,7 +119,7 @@ fn document(entries: &[Entry]) -> Vec<String> {
         lines.push(match &entry.value {
             Some(value) => format!("{name} = {value}  # {}", entry.origin.name()),
             None if entry.key == "capture.scale" && is_by_itself => {
-                format!("# {name} is chosen by the run: `run --dry-run` shows it")
+                format!("# the run chooses {name}: `run --dry-run` shows it")
             }
             None => format!("# {name} is not set"),
         });

@@ -12,31 +12,34 @@ use trials::demo::{self, Options};
 use super::view;
 
 const HELP: &str = "\
-The demo needs nothing but this program: the capture processes render pictures of a synthetic person during the run (see \
-`parallax-lab synth --help`), and the network that ships finds the joints. Four cameras around the person, 320x240 pixels, capture in \
-real time. A measurement of about two seconds chooses the frame rate: frames are rendered and searched on all \
-cores, beside any other load. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
-or busy machine is reported with numbers. Below 2.5 frames a second every frame is searched for the person, which takes \
-longer. Every stage and camera is a separate process, as in `parallax run`. After two \
-fifths of the frames, the process of camera c3 is killed (SIGKILL), as in a crash: the other three go on, the \
-supervisor restarts it, and it continues with the current frame.
+The demo needs only this program. The capture processes render pictures of a synthetic person during the run (see \
+`parallax-lab synth --help`), and the shipped network finds the joints. Four cameras around the person capture 320x240 pixels in \
+real time. Every stage and camera is a separate process, as in `parallax run`. After two fifths of the frames, the process of \
+camera c3 is killed (SIGKILL), as in a crash. The other three cameras continue. The supervisor restarts the process, which continues with \
+the current frame.
 
-OUT holds report.html (open it in a browser: the skeleton in space, beside the truth; the views of every \
-result; the cost of the kill; latency of every stage; the account of all frames; pictures with skeletons), report.json \
-(the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs them again), and run/ with the \
-results of the run. Files of an earlier demo are replaced.
+The frame rate is chosen by a measurement of about two seconds, in which frames are rendered and searched on all cores. Other \
+programs that run at that time slow the measurement down. The rate is at most 5 frames per second, and computing takes at most half of the time between \
+two frames. If the machine is slow or busy, the demo says so, with numbers. Below 2.5 frames per second, every frame is searched for the person, which takes \
+longer.
 
-The demo checks limits that a broken pipeline would miss: --min-results of the frames have a result, --min-skeletons of \
-these a skeleton, and PCP3D over all of them is at least --min-pcp3d; the killed camera is back within --max-return-ms; \
-meanwhile there are results of the others, if it was away for longer than the interval of results and the deadline of a \
-stage, with no pause longer than --max-pause-ms; every frame of every view is accounted for, except two that the killed \
-process may have held; no other process failed; all results were written.
-Limits on times are for a machine that keeps up with 5 frames a second. At a lower frame rate --max-return-ms grows in \
-proportion to the interval of frames (by 20 at most). The time that one frame takes on all cores is measured before \
-and after the run; if the longer one is above 100 ms, --max-pause-ms (20 times 100 ms) grows in proportion. A stage waits for \
-1.5 intervals of frames, at least 500 ms. With --rate nothing is measured or scaled.
+OUT contains report.html, report.json with the same numbers, deployment.toml and rig.toml, and run/ with the \
+results of the run. Open report.html in a browser. It shows the skeleton in space beside the truth, the views of every \
+result, the cost of the kill, the latency of every stage, the account of all frames, and pictures with skeletons. \
+`parallax run OUT/deployment.toml` runs the deployment again. Files of an earlier demo are replaced.
 
-Exit codes: 0 all limits held; 6 a limit was missed (the report says which); 1 the run failed; 2 the command line is \
+The demo checks limits that a broken pipeline would exceed. At least --min-results of the frames have a result, at least --min-skeletons of \
+the results have a skeleton, and PCP3D over all results is at least --min-pcp3d. The killed camera is back within --max-return-ms. \
+Meanwhile there are results from the other cameras, with no pause longer than --max-pause-ms. This is checked only if the camera was away for \
+longer than the interval of results and the deadline of a stage. Every frame of every view is accounted for, except two frames that the killed \
+process may have been processing. No other process fails, and all results are written.
+
+Limits on times are for a machine that keeps up with 5 frames per second. At a lower frame rate, --max-return-ms grows in \
+proportion to the interval between frames, at most by a factor of 20. The time for one frame on all cores is measured before \
+and after the run. If the longer of the two is above 100 ms, --max-pause-ms (20 times 100 ms) grows in proportion. A stage waits for \
+1.5 frame intervals, at least 500 ms. With --rate, nothing is measured or scaled.
+
+Exit codes: 0 all limits were met; 6 a limit was exceeded (the report says which); 1 the run failed; 2 the command line is \
 wrong; 130 stopped by Ctrl-C.
 
 Examples:
@@ -151,7 +154,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let outcome = demo::run(&arguments.options(), globals.verbosity());
     drop(page);
     let Some(outcome) = outcome? else {
-        output::message("stopped: nothing is judged, and no report written");
+        output::message("stopped: no limits were checked, and no report was written");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if arguments.json {

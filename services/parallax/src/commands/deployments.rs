@@ -10,13 +10,13 @@ use serde_json::{Value, json};
 use terminal::output;
 
 /// Shown for a directory that does not belong to a deployment.
-const UNMARKED: &str = "not a deployment: left alone";
+const UNMARKED: &str = "not a deployment: ignored";
 
 /// Options of `parallax status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-With a DEPLOYMENT it prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages
-(`parallax top --help` explains them). Times are in milliseconds, memory in bytes with --json.")]
+With a DEPLOYMENT, prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages.
+`parallax top --help` explains the table. With --json, times are in milliseconds, and memory is in bytes.")]
 pub(crate) struct StatusArguments {
     /// Name or file of a running deployment whose processes and times are shown.
     deployment: Option<String>,
@@ -47,20 +47,20 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     if found.is_empty() {
-        output::message("no deployment runs, and none has left anything behind");
+        output::message("no deployment is running, and no dead one has left shared memory behind");
     }
     for deployment in &found {
         let name = deployment.namespace.name();
         let how = match deployment.supervisor {
             _ if !deployment.is_marked => UNMARKED.to_owned(),
             Some(pid) => format!(
-                "runs (process {pid}), {} processes",
+                "running (process {pid}), {} processes",
                 deployment.processes.len()
             ),
             None if deployment.processes.is_empty() => {
                 "dead: `parallax clean` removes it".to_owned()
             }
-            None => format!("dead, but for {}", deployment.processes.join(", ")),
+            None => format!("dead, except for {}", deployment.processes.join(", ")),
         };
         output::line(format_args!("{name:<32} {:>10}  {how}", size(deployment)))?;
     }
@@ -84,7 +84,7 @@ pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
     let found = deployments(&Namespace::usual_base())?;
     for name in &arguments.names {
         if !found.iter().any(|remains| remains.namespace.name() == name) {
-            let message = format!("there is nothing of a deployment {name:?}");
+            let message = format!("there is no shared memory of a deployment {name:?}");
             return Err(Failure::new(ExitKind::Usage, message));
         }
     }

@@ -35,29 +35,30 @@ const LEAST_HEAT: f64 = 0.5;
 /// Options of `parallax detect`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Pictures are turned as their orientation tag (EXIF) says. Of a video every \
-frame is searched, or every n-th with --every. Unreadable pictures are named, the others are searched, and the exit code is 7 \
-(4 if nothing could be read).
+Pictures are rotated according to their orientation tag (EXIF). In a video every frame is searched, or every n-th frame with \
+--every. Pictures that cannot be read are listed, and the other pictures are searched. The exit code is then 7, or 4 if no picture \
+could be read.
 
-The detector that ships finds boxes, at most --max, and the network that ships finds the joints in them, as in a deployment. \
-People with less heat than --heat (mean over the joints) are left out. \
-Each person is printed once, in order of heat. --network and --detector name your own (docs/networks.md); --box gives the box.
+As in a deployment, the shipped detector finds boxes, and the shipped network finds the joints in each box. At most --max boxes are used. \
+A person's heat is the mean over the joints. People with less heat than --heat are left out. \
+Each person is printed once, in order of heat. Use --network and --detector for your own networks (docs/networks.md), and --box for \
+your own box.
 
-The detector that ships did not learn people who are less than an eighth of the picture high: crop the picture, or give --box.
+The shipped detector was not trained on people smaller than an eighth of the picture's height. For such people, crop the picture, or give --box.
 
-With --network none, and with --model, --joints or --joint-map, the parts of the filters are printed. A picture with a \
-side longer than --size is then reduced to that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
-about 150 pixels there are not found; --full searches all pixels, with about 460 bytes of memory for each. \
-The card configs/models/person.md has the false alarms for each --threshold.
+With --network none, --model, --joints or --joint-map, the filters find parts, and these are printed. A picture with a \
+side longer than --size is then scaled down to that size. The output says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
+about 150 pixels in the scaled picture are not found. --full searches all pixels, and needs about 460 bytes of memory per pixel. \
+The card configs/models/person.md lists the false alarms for each --threshold.
 
-With --json one line per image, best detection first:
-    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"detections\": [{\"score\": the
-     mean of its joints', \"box\": [x1, y1, x2, y2], \"box_from\": \"given\" or \"detector\", \"box_score\" (of a detector),
+With --json, one line per image, with the best detection first:
+    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"detections\": [{\"score\": mean
+     over the joints, \"box\": [x1, y1, x2, y2], \"box_from\": \"given\" or \"detector\", \"box_score\" (with a detector),
      \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}]}
-and by the filters alone
+and with the filters:
     {\"image\", \"frame\", \"width\", \"height\", \"searched\": [width, height], \"detections\": [{\"score\", \"level\", \"scale\",
      \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
-Coordinates are pixels of the whole image, turned as its tag says; the centre of its top-left pixel is (0, 0). Types and levels count from 1.
+Coordinates are pixels of the whole image, rotated according to its tag. The centre of its top-left pixel is (0, 0). Types and levels are counted from 1.
 
 Examples:
     parallax detect photo.jpg
@@ -182,7 +183,7 @@ impl Arguments {
         match wrong {
             None => Ok(network),
             Some((option, of, by, other)) => {
-                let message = format!("{option} is about {of}, but {by} finds the keypoints here");
+                let message = format!("{option} is an option of {of}, but {by} would find the keypoints");
                 let hint = format!("leave {option} out, or give --network {other}");
                 Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
             }
@@ -261,7 +262,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         0 => Ok(ExitCode::SUCCESS),
         n => {
             let message = format!(
-                "{n} of {} files could not be searched to their end",
+                "{n} of {} files could not be searched completely",
                 files.len()
             );
             let kind = if n_searched == 0 {
@@ -269,7 +270,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             } else {
                 ExitKind::Degraded
             };
-            Err(Failure::new(kind, message).with_hint("each is named above, with the cause"))
+            Err(Failure::new(kind, message).with_hint("the messages above say why"))
         }
     }
 }

@@ -20,7 +20,7 @@ const STACK: u64 = 1 << 20;
 /// Options of `parallax doctor`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit code 0 if everything needed is there, 3 if something is missing; optional things do not count.
+The exit code is 0 if nothing is missing that Parallax needs, otherwise 3. Optional items do not affect the exit code.
 
 Examples:
     parallax doctor
@@ -120,13 +120,13 @@ fn processor() -> Finding {
     let isa = Isa::best().name();
     let found = Finding::good("processor", format!("{cores} cores, {isa}"));
     if isa == "portable" {
-        let advice = "without AVX2 everything is several times slower";
+        let advice = "without AVX2, Parallax is several times slower";
         return found.but(State::Note, advice);
     }
     if cores < 2 {
         return found.but(
             State::Note,
-            "one core: a camera or two at a few frames a second",
+            "one core is enough for one or two cameras at a few frames per second",
         );
     }
     found
@@ -145,10 +145,10 @@ fn program(name: &'static str, without: State) -> Finding {
             Finding::good(name, words.unwrap_or_default())
         }
         Ok(output) => Finding::good(name, format!("ends with {}", output.status))
-            .but(without, "install it anew: Debian's package is `ffmpeg`"),
+            .but(without, "reinstall it: Debian's package is `ffmpeg`"),
         Err(error) => Finding::good(name, format!("cannot be run: {error}")).but(
             without,
-            "videos and live cameras need it: `apt install ffmpeg`; folders of pictures do not",
+            "needed for videos and live cameras, but not for folders of pictures: `apt install ffmpeg`",
         ),
     }
 }
@@ -161,8 +161,8 @@ fn shared_memory() -> Finding {
             if bytes >= SHARED_MEMORY {
                 return found;
             }
-            let advice = "four cameras need 100 to 500 MB (`parallax run FILE --dry-run` says how much): \
-                          `mount -o remount,size=1g /dev/shm`, in Docker --shm-size=1g";
+            let advice = "four cameras need 100 to 500 MB (`parallax run FILE --dry-run` shows how much): run \
+                          `mount -o remount,size=1g /dev/shm`, or in Docker pass --shm-size=1g";
             found.but(State::Note, advice)
         }
         Err(error) => Finding::good(what, error.to_string()).but(
@@ -176,8 +176,8 @@ fn limit(what: &'static str, resource: Resource, needed: u64, advice: &str) -> F
     match getrlimit(resource).current {
         None => Finding::good(what, "no limit"),
         Some(limit) if limit >= needed => Finding::good(what, format!("limit {limit}")),
-        Some(limit) => Finding::good(what, format!("limit {limit}, {needed} are needed"))
-            .but(State::Missing, format!("allow more: `{advice}`")),
+        Some(limit) => Finding::good(what, format!("limit {limit}, but {needed} are needed"))
+            .but(State::Missing, format!("raise the limit: `{advice}`")),
     }
 }
 
@@ -194,7 +194,7 @@ fn cameras() -> Vec<Finding> {
         Ok(_) => Finding::good(what, path.display().to_string()),
         Err(error) => Finding::good(what, format!("{}: {error}", path.display())).but(
             State::Note,
-            "`parallax cameras` says more; members of the group `video` may open it",
+            "`parallax cameras` shows the reason; often the user must be a member of the group `video`",
         ),
     });
     looked.collect()
@@ -206,18 +206,18 @@ fn adapters() -> Vec<Finding> {
     if !gpu::IS_BUILT {
         return vec![Finding::good(
             what,
-            "none is used: this build has no GPU support",
+            "not used: this build has no GPU support",
         )];
     }
     let all = gpu::adapters();
     if all.is_empty() {
-        let advice = "for a card install its driver and Vulkan: Debian's package is `libvulkan1`";
+        let advice = "to use a graphics card, install its driver and Vulkan (Debian's package is `libvulkan1`)";
         return vec![Finding::good(what, "no Vulkan adapter").but(State::Note, advice)];
     }
     let found = |adapter: &gpu::Adapter| {
         let found = Finding::good(what, adapter.to_string());
         if adapter.kind == gpu::Kind::Software {
-            return found.but(State::Note, "computes on the processor: for tests only");
+            return found.but(State::Note, "software rendering on the processor, for tests only");
         }
         found
     };
@@ -237,7 +237,7 @@ fn remains() -> Finding {
         format!("{running} running, {dead} left by dead processes"),
     );
     if dead > 0 {
-        return found.but(State::Note, "`parallax clean` removes what dead ones left");
+        return found.but(State::Note, "`parallax clean` removes the leftovers of dead deployments");
     }
     found
 }

@@ -28,9 +28,9 @@ pub(crate) enum Command {
 /// Options of `parallax hosts status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Asks the fusing host over the link, so it works from every host that has keys.
+The command asks the fusing host over the network, so it works on every host that has keys.
 
-Exit codes: 0 all hosts answer; 7 some do not; 4 the fusing host does not answer.
+Exit codes: 0 all hosts answer; 7 some hosts do not answer; 4 the fusing host does not answer.
 
 Examples:
     parallax hosts status my.toml
@@ -49,8 +49,9 @@ pub(crate) struct StatusArguments {
 /// Options of `parallax hosts keys`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Writes ca.pem, ca.key, and HOST.pem and HOST.key of every host into `link.keys` of the deployment. Every host needs ca.pem and its
-own two files there. ca.key is needed only to add hosts; keep it off all of them. Nothing is replaced.
+Writes ca.pem, ca.key, and HOST.pem and HOST.key for every host into the folder `link.keys` of the deployment. In that folder, every
+host needs ca.pem and its own two files. ca.key is only needed to add hosts later; do not copy it to any host. Existing files are not
+replaced.
 
 Example:
     parallax hosts keys my.toml")]
@@ -112,7 +113,7 @@ fn in_one_thread() -> Result<(), Failure> {
     let error = Program::new(program).args(arguments).env(name, value).exec();
     Err(Failure::new(
         ExitKind::Run,
-        format!("this program cannot be started anew: {error}"),
+        format!("this program cannot restart itself: {error}"),
     ))
 }
 
@@ -135,7 +136,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     let text = bridge::status(&address, PATIENCE).or_fail(ExitKind::Run)?;
     let Some(text) = text else {
         let message = format!(
-            "{} does not answer: does the deployment run there?",
+            "{} does not answer: is the deployment running there?",
             address.address
         );
         return Err(Failure::new(ExitKind::Input, message));
@@ -168,7 +169,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
     } else if host["refused"].is_null() {
         "does not answer"
     } else {
-        "is refused: it has other files"
+        "is refused: its files differ"
     };
     let clock = &host["clock"];
     let clock = if clock.is_null() {
@@ -188,7 +189,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
         // Writing to a string cannot fail.
         let _infallible = writeln!(
             text,
-            "    {camera}: {} used, {} late, {} gone, {} left out; from there to here {:.1} ms (99 of 100 within {:.1})",
+            "    {camera}: {} used, {} late, {} lost, {} left out; transfer {:.1} ms (99 of 100 within {:.1} ms)",
             view["used"],
             view["late"],
             view["gone"],
@@ -222,6 +223,6 @@ fn keys(arguments: &KeysArguments) -> Result<ExitCode, Failure> {
     for file in made {
         output::line(file.display())?;
     }
-    output::message("give every host ca.pem and its own two files; keep ca.key elsewhere");
+    output::message("copy ca.pem and the host's own two files to every host; keep ca.key elsewhere");
     Ok(ExitCode::SUCCESS)
 }

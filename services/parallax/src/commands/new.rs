@@ -16,17 +16,17 @@ use crate::commands::calibrate::height;
 /// Options of `parallax new`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every step is a command, which is printed before it runs. Files of finished steps are kept, so
-that `new`, started again, continues after them; delete a file to have it made anew. A step that
-fails ends it, with its exit code; an answer with doubts (7) also ends it, unless --go-on is given.
+Each step is a command, which is printed before it runs. Files of finished steps are kept. If `new` is run
+again, it continues after these steps; delete a file to repeat its step. If a step fails, `new` ends with the
+exit code of the step. It also ends after a doubtful result (exit code 7), unless --go-on is given.
 
-    1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
-    2  the floor: --floor puts the rig on it (`parallax calibrate origin`)
-    3  ROOM/deployment.toml, which is yours from then on (`parallax config check`)
-    4  with --people: the places of the cameras from the person who walks about in their footage (`parallax calibrate people`),
-       and the floor; only the lenses of --rig, or of the board, are used, and no board is needed on the floor
-    5  clocks: --sync finds offsets of recorded cameras from people (`parallax sync estimate --write`)
-    6  a first run: --run (`parallax run`)
+    1  Get the rig: --rig converts a calibration, --board with --show finds one (`parallax calibrate board`).
+    2  Move the origin of the rig to the floor: --floor (`parallax calibrate origin`).
+    3  Write ROOM/deployment.toml. You may edit this file: `new` does not replace it (`parallax config check`).
+    4  With --people, find the poses of the cameras and the floor from a person who walks about in their footage
+       (`parallax calibrate people`). Only the lenses of --rig or of the board are used. No board on the floor is needed.
+    5  With --sync, find the clock offsets of recorded cameras from people (`parallax sync estimate --write`).
+    6  With --run, start a first run (`parallax run`).
 
 Examples:
     parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --rig Calib.toml --run
@@ -107,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if deployment.exists() {
         let is_other = fs::read_to_string(&deployment).is_ok_and(|kept| kept != text);
         let differs = if is_other {
-            ", which differs from what these options would make: edit it, or delete it to have it made anew"
+            ", which differs from the file that these options would create: edit it, or delete it to create it again"
         } else {
             ""
         };
@@ -164,7 +164,7 @@ impl Step {
         }
         if let Some(file) = self.done.as_ref().filter(|file| is_doubt && file.exists()) {
             output::message(format_args!(
-                "{} is written: the same command again goes on with it",
+                "{} is written: run the same command again to continue with it",
                 file.display()
             ));
         }
@@ -260,7 +260,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         "room".to_owned()
     };
     let mut text = format!(
-        "# Made by `parallax new`. Everything that is not said here has a default: `parallax config show` prints it.\n\n\
+        "# Created by `parallax new`. All other settings have defaults: `parallax config show` prints them.\n\n\
          name = {name:?}\nrig = \"rig.toml\"\noutput = \"out\"\n"
     );
     if let Some(up) = arguments.up {
@@ -271,7 +271,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         names.into_iter().any(|camera| camera == name)
     };
     if let Some(stray) = arguments.offset.iter().find(|offset| !is_camera(&offset.camera)) {
-        let message = format!("--offset {}: no --camera has that name", stray.camera);
+        let message = format!("--offset {}: no --camera has this name", stray.camera);
         return Err(Failure::new(ExitKind::Usage, message));
     }
     for camera in &arguments.camera {
@@ -303,7 +303,7 @@ fn offset(text: &str) -> Result<Offset, String> {
         let camera = camera.to_owned();
         Some(Offset { camera, px })
     };
-    parsed().ok_or_else(|| "not NAME=X,Y with whole pixels, for example left=0,240".to_owned())
+    parsed().ok_or_else(|| "expected NAME=X,Y in whole pixels, for example left=0,240".to_owned())
 }
 
 /// Returns an absolute path for a file. Addresses and devices are returned unchanged.

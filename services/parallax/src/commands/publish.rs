@@ -11,9 +11,9 @@ use terminal::{Globals, output};
 /// Options of `parallax publish`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Reads the deployment like any other program: no process of the deployment waits for this command, which may come and go at any time. Every person of
-a frame is one datagram of at most 1400 bytes, JSON on one line, or OSC bundles. A joint without a position is sent with the reason,
-never as zeros. Datagrams that nobody receives are lost. docs/guide/programs.md describes both formats.
+No process of the deployment waits for this command, so it may be started and stopped at any time. Each person of
+a frame is sent in a datagram of at most 1400 bytes, as JSON on one line or as OSC bundles. A joint without a position is sent with the
+reason, never as zeros. Datagrams that no program receives are lost. docs/guide/programs.md describes both formats.
 
 Examples:
     parallax publish demo udp://127.0.0.1:9000
@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }))?;
     } else if !globals.quiet {
         output::message(format_args!(
-            "{} frames in {} datagrams, {} not taken, {} frames too large, {} missed",
+            "{} frames in {} datagrams, {} datagrams not sent, {} frames too large, {} frames missed",
             counts.frames, counts.sent, counts.unsent, counts.too_large, counts.missed
         ));
     }
@@ -74,7 +74,7 @@ fn targets(texts: &[String], beyond: bool) -> Result<Vec<Target>, Failure> {
             Ok(()) => {}
             Err(error) if beyond => output::message(error),
             Err(error) => {
-                return Err(usage(&error).with_hint("allow it with --beyond-this-machine"));
+                return Err(usage(&error).with_hint("pass --beyond-this-machine to allow it"));
             }
         }
         targets.push(target);

@@ -22,17 +22,17 @@ use crate::stage;
 /// Options of `parallax replay`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The stages before --from are not run: processes with their names send the recorded messages instead. The other
-stages run with the settings of the recorded run, except those that --set replaces. With lossless delivery, and with
-the same settings and files, their results are those of the recorded run, bit for bit.
+The stages before --from are not run. Instead, processes with their names send the recorded messages. The other
+stages run with the settings of the recorded run, except settings that --set replaces. With lossless delivery, and with
+the same settings and files, the results are equal to the recorded ones, bit for bit.
 
-A truncated file is replayed up to its end. Every chunk, a frame or 4 MiB, has a checksum; the messages of a damaged
-one are named, counted and left out. In both cases the exit code is 7. End-to-end latency is meaningful at --speed 1 only; the times of the
-stages that run are always meaningful.
+A truncated file is replayed up to its end. Every chunk (a frame or 4 MiB) has a checksum. The messages of a damaged
+chunk are listed, counted and left out. In both cases the exit code is 7. End-to-end latency is only meaningful at --speed 1. The times
+of the stages that are run are always meaningful.
 
 Examples:
-    parallax replay run.mcap                                         from pose on, with the recorded frames
-    parallax replay run.mcap --from fuse --set paper.alpha=2          without the frames
+    parallax replay run.mcap                                         run pose and later stages on the recorded frames
+    parallax replay run.mcap --from fuse --set paper.alpha=2          run fuse and later stages, which need no frames
     parallax replay run.mcap --speed 2 --set capture.mode=realtime   twice as fast, with realtime delivery")]
 pub(crate) struct Arguments {
     /// The recording.
@@ -177,7 +177,7 @@ fn resolve(
 fn refused(key: &str, from: Stage) -> Option<String> {
     let is_given = stage_of(key).is_some_and(|stage| stage < from);
     let from = from.name();
-    is_given.then(|| format!("this is given by the recording with --from {from}"))
+    is_given.then(|| format!("with --from {from}, the recording determines this value"))
 }
 
 /// Returns the first stage that a setting affects, or `None` if the recording does not depend on it.
@@ -206,7 +206,7 @@ fn warn_of_changed_files(settings: &Settings) {
         };
         if now != Some(*recorded) {
             let file = file.display();
-            output::message(format_args!("{file} is not the file of the recorded run"));
+            output::message(format_args!("{file} has changed since the recorded run"));
         }
     }
 }
@@ -256,7 +256,7 @@ fn check(
     let failure = Failure::new(ExitKind::Input, message);
     Err(match recording.counts.keys().find(|key| kind.is_of_another_version(key)) {
         Some(topic) => failure.with_hint(format!(
-            "its messages of {topic} have another layout than those of this Parallax: replay it with the one that recorded it"
+            "its messages of {topic} have another layout than in this version of Parallax: replay the file with the version that recorded it"
         )),
         None => failure,
     })
@@ -298,8 +298,8 @@ fn check_views(
             );
             let failure = Failure::new(ExitKind::Input, message);
             return Err(failure.with_hint(
-                "the recording of one host of several has only what reached this host: if poses were sent, use `--from fuse`, which needs \
-                 no frames; pictures of live cameras are in the recordings of their own hosts",
+                "with several hosts, a recording has only the messages that reached its host: if poses were sent, use `--from fuse`, which needs \
+                 no frames; pictures of live cameras are in the recordings of the hosts with these cameras",
             ));
         }
     }

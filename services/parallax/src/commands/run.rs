@@ -15,13 +15,16 @@ use super::{hosts, publish, view};
 /// Options of `parallax run`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
-pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
-overlays/. Only the user can read them; they are called *.part until they are complete. --force replaces the results of an earlier run
-when the new ones are complete; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
-in order: its result, or status \"no result\" and the reason. pose3d.trc has a row of NaN for a frame without a result; it is written only if
-the frame rate is known. The folder belongs to one run at a time. A run without
-any result is degraded, and says why.
+Ctrl-C stops the run. A second Ctrl-C, at least half a second after the first, ends it at once.
+
+The output folder contains pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json,
+deployment.json and overlays/. Only the user who started the run can read these files. They are called *.part until they are
+complete. With --force, the results of an earlier run are replaced when the new ones are complete. A file that no run has
+written is never replaced. Only one run at a time can use the folder.
+
+pose3d.jsonl has one line per frame, in order: the result, or the status \"no result\" with the reason. pose3d.trc has a row of NaN
+for a frame without a result. It is written only if the frame rate is known. A run without any result is degraded, and the
+summary says why.
 
 Examples:
     parallax run my.toml
@@ -29,11 +32,11 @@ Examples:
     parallax run my.toml --latency-budget-ms 150
     parallax run my.toml --publish udp://127.0.0.1:9000
     parallax run my.toml --dry-run
-    parallax run my.toml --host left        one of several machines
+    parallax run my.toml --host left        run the part of one of several machines
 
 During the run, `parallax top` and `parallax status NAME --json` show every process and its times. With a
-latency budget the run ends with exit code 6 if the 99th percentile from capture to result exceeds it, or if no frame
-was measured (unless it was stopped by Ctrl-C before any was).")]
+latency budget, the run ends with exit code 6 if the 99th percentile from capture to result exceeds the budget. It also does so
+if no frame was measured, unless Ctrl-C stopped the run before the first measurement.")]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a flag of the command line"
@@ -94,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if resolved.is_far() && (arguments.view || !arguments.publish.is_empty()) {
-        let message = "--view and --publish are for the host that fuses: this one has no skeletons";
+        let message = "--view and --publish only work on the host that fuses, because this host has no skeletons";
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let device = launch::device(&loaded.deployment)?;

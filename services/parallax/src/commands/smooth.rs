@@ -16,21 +16,21 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions{left} {prefix}
 /// Options of `parallax smooth`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-FOLDER holds the results of a run, which stay unchanged. The command adds
+FOLDER contains the results of a run. They are not changed. The command adds the files
     pose3d-smooth.jsonl   like pose3d.jsonl; `states` says whether a joint is measured, exchanged, filled or rejected
-    angles.csv            hips, knees, ankles, shoulders, elbows and trunk, degrees, with standard deviations
-    smooth.json           the method and its numbers, and counts of measurements by their fate
+    angles.csv            hips, knees, ankles, shoulders, elbows and trunk, in degrees, with standard deviations
+    smooth.json           the method, its parameters, and how many measurements were used, exchanged, filled or rejected
 
-Everything has a default: process noise and scale of the covariances of each joint are estimated from the measurements.
-docs/guide/smooth.md explains.
+No options are needed: the process noise and the scale of the covariances of each joint are estimated from the measurements.
+See docs/guide/smooth.md.
 
-`parallax-lab smooth` compares the result with the truth, if you have it.
+If you have ground truth, `parallax-lab smooth` compares the result with it.
 
-Exit codes: 0 done; 7 done with doubts (`doubts`: the file is truncated, nothing was measured, many
-measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder cannot be read, a line is
-wrong, times do not ascend.
+Exit codes: 0 done; 7 done, but with doubts (`doubts`: the file is truncated, nothing was measured, or many
+measurements contradict each other); 2 an option is wrong, or the cutoff is too high for the rate; 4 the folder cannot be read, a line
+is wrong, or times do not ascend.
 
-With --json one object:
+With --json, prints one object:
     {\"report\": the content of smooth.json, \"files\": [path], \"has_up\"}
 
 Examples:
@@ -95,7 +95,7 @@ fn up(text: &str) -> Result<UnitVector3<f64>, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     let direction = numbers.filter(|number| number.len() == 3).map(Vector3::from_vec);
     let direction = direction.and_then(|direction| UnitVector3::try_new(direction, 1e-9));
-    direction.ok_or_else(|| "expected three numbers, not all 0, as 0,0,1".to_owned())
+    direction.ok_or_else(|| "expected three numbers, not all 0, such as 0,0,1".to_owned())
 }
 
 /// Runs the command.
@@ -153,7 +153,7 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
         n => format!(" of {n} people"),
     };
     output::line(format_args!(
-        "{} over {} frames{of} of {n_joints} joints, {:.0} ms late",
+        "{} over {} frames{of} with {n_joints} joints, delay {:.0} ms",
         report.method, report.n_frames, report.delay_ms
     ))?;
     let counts: Vec<String> =
@@ -165,19 +165,19 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
     if let Some(scale) = scale {
         let sd = scale.sqrt();
         output::line(format_args!(
-            "errors from frame to frame are {sd:.2} times what the covariances say (median of the joints)"
+            "errors from frame to frame are {sd:.2} times as large as the covariances predict (median of the joints)"
         ))?;
     }
     let breaks = report.people.iter().map(|person| &person.frames_of_breaks);
     for frames in breaks.filter(|frames| !frames.is_empty()) {
         output::line(format_args!(
-            "another person begins in {} frames: {frames:?}",
+            "the followed person changes in {} frames: {frames:?}",
             frames.len()
         ))?;
     }
     if !outcome.has_up {
         output::line(
-            "angles with the vertical are missing: the calibration does not say which way is up; --up X,Y,Z does",
+            "angles with the vertical are missing, because the calibration does not define the upward direction; use --up X,Y,Z",
         )?;
     }
     for name in finished::FILES {

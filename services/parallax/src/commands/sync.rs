@@ -28,20 +28,21 @@ pub(crate) enum Command {
 /// Options of `parallax sync estimate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-People come from the `keypoints` of a camera, otherwise from its network; with the paper's method, from the network that ships. \
-The calibration must fit; identities are not needed. A joint that two cameras see at one instant satisfies their epipolar constraint: the offset of a pair is where this holds best, and all cameras must \
-agree. Offsets are against the first camera (--reference), and do not depend on `offset_ms` and `drift_ppm` in the file.
+People are read from the `keypoints` of a camera. If it has none, the camera's network finds them, or the shipped network with the \
+paper's method. The calibration must be right; identities of people are not needed. If two cameras see a joint at the same instant, the \
+two pixels satisfy the epipolar constraint. The offset of a pair is the one that satisfies this constraint best, and the offsets of all pairs must \
+agree. Offsets are relative to the first camera, or to --reference. They do not depend on `offset_ms` and `drift_ppm` in the file.
 
-An answer is refused, with exit code 7 and the reason, if another offset is nearly as good (people on a treadmill), the minimum \
+A result is refused, with exit code 7 and the reason, in these cases: another offset is nearly as good (people on a treadmill), the minimum \
 is flat (nobody moves), a pair or a part of the footage contradicts the rest, the views do not fit each other, or a camera sees \
-nobody. Nothing is written then. Short footage gives no drift; the table says so.
+nobody. Nothing is written then. If the footage is too short to find the drift, the table says so.
 
---by sound compares the times at which sounds begin instead: steps, voices, doors, claps. Nobody needs to be visible. Sound \
-travels a metre in 2.9 ms, so offsets are uncertain by the distance of two cameras divided by 343 m/s: +- includes this. \
-In JSON `joints` then counts sounds, and pixels are null. These are refused: too few sounds, sounds that only one camera has, a \
-regular beat, and pairs or parts that contradict each other.
+With --by sound, the times are compared at which sounds begin: steps, voices, doors, claps. Nobody needs to be visible. Sound \
+travels a metre in 2.9 ms, so an offset is uncertain by the distance of the two cameras divided by 343 m/s. The printed uncertainties include this. \
+In JSON, `joints` then counts sounds, and pixels are null. A result is refused if there are too few sounds, sounds that only one camera recorded, a \
+regular beat, or pairs or parts that contradict each other.
 
-With --json one object:
+With --json, prints one object:
     {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",
      \"cameras\": [{\"name\", \"offset_ms\", \"error_ms\", \"drift_ppm\", \"drift_error_ppm\", \"joints\", \"before_px\", \"after_px\",
                   \"found_by\"}],
@@ -218,7 +219,7 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
         By::Sound => "sounds",
     };
     output::line(format_args!(
-        "offsets against {} from {:.1} s of footage, to be added to a camera's times to get common times",
+        "offsets relative to {} from {:.1} s of footage; add them to a camera's times to get common times",
         names[reference], outcome.length_s
     ))?;
     let mut table = Table::new([
@@ -248,9 +249,9 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     }
     output::line(table)?;
     if outcome.cameras.iter().all(|camera| camera.drift_error.is_none()) {
-        output::line("drift: the footage does not determine it, 0 is used")?;
+        output::line("drift: not determined by the footage, so 0 is used")?;
     } else if outcome.cameras.iter().any(|camera| camera.drift == 0.0) {
-        output::line("drift: 0 if it is not significant")?;
+        output::line("drift: 0 if not significant")?;
     }
     output::line(format_args!(
         "{:<25} {:>9} {:>15} {:>12} {:>8}",
@@ -362,11 +363,11 @@ fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     let failure = Failure::new(ExitKind::Degraded, message);
     Err(failure.with_hint(match by {
         By::Movement => {
-            "footage in which people walk through the view of all cameras helps most; --window searches further; --by sound compares \
-             what the cameras heard; `parallax calib check` looks at the calibration"
+            "best is footage in which people walk through the view of all cameras; --window sets a larger range of offsets; --by sound compares \
+             recorded sounds; `parallax calib check` checks the calibration"
         }
         By::Sound => {
-            "sounds that all cameras hear help most: clap a few times, unevenly; --window searches further; without --by sound the \
+            "best are sounds that all cameras record: clap a few times, unevenly; --window sets a larger range of offsets; without --by sound, the \
              movement of people is compared"
         }
     }))
@@ -388,7 +389,7 @@ fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> 
             format!("{}: offset_ms = {:.3}{drift}", key.name, key.offset_ms)
         });
         let hint = format!(
-            "write them by hand: {}",
+            "write the offsets by hand: {}",
             lines.collect::<Vec<_>>().join("; ")
         );
         Failure::new(ExitKind::Config, format!("{}: {error}", file.display())).with_hint(hint)

@@ -20,22 +20,22 @@ const SHORTEST_TOKEN: usize = 16;
 /// Options of `parallax view`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The page shows the skeleton in space with its uncertainty, every camera's picture with the pose found in it, epipolar \
-lines of a joint or a point, rates and latency, missing processes, and events; a button records into the \
-results folder. It only listens: no process of the deployment waits for it, and it skips frames when it is slow. \
-Open and close it at any time, also several at once. It waits for a deployment that does not run yet, and \
-for the next run when one ends. A finished run has a time line.
+The page shows the skeleton in space with its uncertainty, every camera's picture with the detected pose, epipolar \
+lines of a joint or a point, rates and latency, missing processes, and events. A button records into the \
+results folder. No process of the deployment waits for the page, which skips frames when it is slow. \
+You can open and close pages at any time, also several at once. A page waits for a deployment that does not run yet, and \
+for the next run when a run ends. For a finished run, the page has a time line.
 
-The page is served on the loopback only, and pages of other sites cannot read it. Other users of this machine can, unless you ask \
-for a token. Only your own pages, or those with the token, can record, and a recording ends with the page that began it. With \
---listen 0.0.0.0 other machines can read the page too; they need a token, which is made if you give none. Nothing is encrypted: \
+By default, the page is only available on this machine (on the loopback), and pages of other sites cannot read it. Other users of this machine can read it, \
+unless --token or --token-file is given. Only your own pages, or pages with the token, can record. A recording ends when the page that started it is closed. With \
+--listen 0.0.0.0, other machines can also read the page. They need a token, which is created if you give none. Nothing is encrypted: \
 over a shared network, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
 
-Keys in the page: ? lists them. Ctrl-C ends the view only.
+Press ? in the page for a list of its keys. Ctrl-C ends the view, but not the deployment.
 
 Examples:
-    parallax view                        the deployment that runs
-    parallax view my.toml                the one of that file, now or when it runs
+    parallax view                        the only running deployment
+    parallax view my.toml                the deployment of this file, now or when it runs
     parallax view out/                   a finished run, by its folder
     parallax view run.mcap               a recording
     parallax run my.toml --view          a run and its page together
@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     view::run(&options, &stop, &mut |url| {
         if arguments.port.is_none() && !url.contains(&format!(":{}/", Listen::PORT)) {
             let usual = Listen::PORT;
-            output::message(format_args!("port {usual} is in use: another one is taken"));
+            output::message(format_args!("port {usual} is in use: using another port"));
         }
         if arguments.with_parent {
             output::message(format_args!("the page: {url}"));
@@ -150,7 +150,7 @@ fn subject(named: Option<&str>) -> Result<Subject, Failure> {
     Namespace::new(named).or_fail(ExitKind::Usage)?;
     if !path.exists() && !runs(named)? {
         output::message(format_args!(
-            "no folder, no file and no running deployment is called {named}: waiting for a deployment of that name"
+            "no folder, file or running deployment has the name {named}: waiting for a deployment with this name"
         ));
     }
     Ok(Subject::Deployment(Some(named.to_owned())))

@@ -140,7 +140,7 @@ const LINES: &[Mistake] = &[
         command: "record deployment.toml --out none/run.mcap",
         code: 4,
         says: &["run.mcap cannot be written", "there is no folder"],
-        tries: &["make the folder first"],
+        tries: &["create the folder first"],
     },
     Mistake {
         what: "results in the place of a file",

@@ -6,9 +6,9 @@ use trials::bench::Gpu;
 use super::{EXITS, Output};
 
 const HELP: &str = "\
-Searches frames with the model that ships, and measures the time from the picture to poses and evidence: at rates of cameras, where a \
-card may slow its clock between frames, and as fast as possible (0). All views of a frame are searched at once, by threads of one \
-process, which share the GPU. The picture is artificial.";
+Searches frames with the shipped model, and measures the time from the picture to poses and evidence. Frames are searched at the rates of \
+cameras, and as fast as possible (0). At a camera's rate, a graphics card may lower its clock between frames. All views of a frame are searched \
+at the same time, by threads of one process, which share the GPU. The picture is artificial.";
 
 /// Options of the GPU benchmark.
 #[derive(Debug, Args)]

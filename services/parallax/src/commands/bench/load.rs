@@ -10,21 +10,21 @@ use super::{EXITS, Output};
 use terminal::rate;
 
 const HELP: &str = "\
-Every run is a deployment of real processes, started like `parallax run`. Without a deployment file its cameras are \
-synthetic, 320x240 pixels, `--rate` frames a second. Their pictures are rendered in advance into OUT/pictures; \
-with --live the capture processes render them during the run, and compete with the others for the cores. The pictures \
-are searched near the last pose (`--set paper.search=full`: everywhere).
+Each run is a deployment of real processes, started like with `parallax run`. Without a deployment file, the cameras are \
+synthetic, with 320x240 pixels and `--rate` frames per second. Their pictures are rendered in advance into OUT/pictures. \
+With --live, the capture processes render the pictures during the run, and compete with the other processes for the cores. The pictures \
+are searched near the last pose, or everywhere with `--set paper.search=full`.
 
-latency     --views cameras in real time; then the same with the process of the last camera killed
+latency     --views cameras in real time; then a second run in which the last camera's process is killed
 throughput  --views cameras, every frame, as fast as possible
-scale       as latency with 1, 2, ... --views cameras; then all of them with the last one killed
+scale       as latency, with 1, 2, ... --views cameras; then a run with all cameras in which the last one is killed
 
-The table shows for every run the number of results and their rate, the latency from the capture of \
-the first picture to the result (end to end) and that of every stage, milliseconds, and the processor \
-time per result, all processes together. The camera is killed at the first result and not restarted; only results \
-after its death are measured.
+For every run, the table shows the number of results and their rate, the latency from the capture of \
+the first picture to the result (end to end), the latency of every stage, and the processor \
+time per result of all processes together. Times are in milliseconds. The last camera is killed at the first result, and is not \
+restarted. Only results after its death are measured.
 
-The results of a run are in its folder, OUT/<run>.";
+The results of each run are in the folder OUT/<run>.";
 
 /// Options of the load benchmarks.
 #[derive(Debug, Args)]

@@ -6,17 +6,17 @@ use trials::bench::Transport;
 use super::{EXITS, Output};
 
 const HELP: &str = "\
-One process writes messages into shared memory at a fixed interval, another receives them. A hop is the time from just \
-before sending to just after receiving, by the clock of the machine. It includes the wake-up of the receiver, and \
-excludes the writing of the message. It measures a small message and a frame of pixels, each with a receiver that sleeps until \
-an event wakes it (the default of a deployment) and with one that polls (`runtime.spin`), which occupies a \
+One process writes messages into shared memory at a fixed interval, and another process receives them. A hop is the time from just \
+before sending to just after receiving, by the clock of the machine. It includes the wake-up of the receiver, but not \
+the writing of the message. The benchmark measures a small message and a frame of pixels. Each is measured with a receiver that sleeps until \
+an event wakes it (the default of a deployment), and with a receiver that polls (`runtime.spin`), which occupies a \
 core.
 
-It also checks that nothing is copied: both processes record the file in /dev/shm and the offset of the first messages, \
-which must be the same, and count the bytes that their ports copied, which must be none.
+The benchmark also checks that nothing is copied. Both processes record the file in /dev/shm and the offset of the first messages, \
+which must be equal. Both count the bytes that their ports copied, which must be 0.
 
-On a machine with one core, or with other load, the numbers depend more on the scheduler than on the transport: --cores \
-and --priority reduce that, and the report shows the load average.";
+On a machine with one core, or with other load, the numbers depend more on the scheduler than on the transport. --cores \
+and --priority reduce this effect, and the report shows the load average.";
 
 /// Options of the transport benchmark.
 #[derive(Debug, Args)]

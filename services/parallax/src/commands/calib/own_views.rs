@@ -30,10 +30,10 @@ pub(super) fn agreement(rig: &Rig, file: &Path) -> Result<Agreement, Failure> {
     let n_seen = |views: &&Vec<Option<Points>>| views.iter().flatten().count();
     if !frames.iter().any(|views| n_seen(&views) > 1) {
         let message = format!(
-            "{}: no frame has own poses (`single`) of two cameras of the rig, and poses after fusion agree with any rig",
+            "{}: no frame has single-view poses (`single`) of two cameras of the rig, and poses after fusion agree with any rig",
             file.display()
         );
-        let hint = "name `pose2d.jsonl` of a run whose cameras have the names of the rig";
+        let hint = "pass `pose2d.jsonl` of a run whose cameras have the same names as in the rig";
         return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
     }
     let cameras = rig.cameras();
@@ -74,11 +74,11 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
         let sure = if swap.is_sure {
             ""
         } else {
-            "; it may be other two"
+            "; it may also be two other cameras"
         };
         return vec![format!(
-            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, with the footage of the two exchanged by \
-             {:.1}{sure}",
+            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, but only by \
+             {:.1} if the footage of these two is exchanged{sure}",
             name(swap.views[0]),
             name(swap.views[1]),
             swap.degrees,
@@ -99,7 +99,7 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
     let text = |view: usize| {
         let pixels = |px: Option<f64>| px.map_or_else(|| "?".to_owned(), |px| format!("{px:.1}"));
         format!(
-            "{} does not stand where the rig says: cameras differ by {} px with it, by {} px without it",
+            "{} is not where the rig says: the cameras differ by {} px with this camera, and by {} px without it",
             name(view),
             pixels(moved.residual_px(view)),
             pixels(moved.without_px(view))

@@ -27,20 +27,20 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{le
 #[command(after_help = "\
 A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
     charuco:7x5:40mm                  7 x 5 squares; markers of 4x4_1000 (4x4_50 has the same first markers), 0.75 of a square
-    charuco:4x5:5.4cm:5x5_250:marker=0.8:legacy      another dictionary, larger markers, drawn as OpenCV before 4.6 did
+    charuco:4x5:5.4cm:5x5_250:marker=0.8:legacy      another dictionary, larger markers, the layout of OpenCV before 4.6
     chessboard:9x6:25mm               9 x 6 inner corners
     aprilgrid:6x6:88mm:36h11:gap=0.3  6 x 6 tags with gaps of 0.3 of a tag
 
-Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. At least two \
-cameras at a time must see it. Pictures that were taken together are named by timestamps.csv beside the first video (Caliscope's: \
-the n-th row of a camera is its n-th picture) or by --timestamps. Without such a table, pictures with the same number \
-belong together, or with the same time if frame rates differ.
+Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, and into the corners of every picture. At least two \
+cameras at a time must see the board. A table says which pictures were taken together: --timestamps, or timestamps.csv beside the first video. \
+It has the format of Caliscope: the n-th row of a camera is its n-th picture. Without a table, pictures with the same number \
+belong together; if frame rates differ, pictures with the same time.
 
-The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. If there are doubts,
-the files are written, the report and the rig state the doubts, and the exit code is 7. If there is no answer, the exit code is 5,
+The world has the axes and origin of the first camera. `parallax calibrate origin` moves its origin to the floor. If the result is doubtful,
+the files are written, the report and the rig state the doubts, and the exit code is 7. Without a result, the exit code is 5,
 or 4 if no picture shows the board.
 
-With --json one object:
+With --json, prints one object:
     {\"is_trusted\", \"doubts\", \"notes\", \"board\", \"sigma_px\",
      \"cameras\": [{\"name\", \"size_px\", \"pictures\", \"boards\", \"boards_used\", \"corners\", \"left_out\", \"rms_px\", \"rms_of_all_px\",
                   \"coverage\", \"numbers\": {NAME: {\"value\", \"sd\"}}}],
@@ -157,7 +157,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Ok(ExitCode::SUCCESS);
     }
     let message = format!(
-        "the calibration is not to be trusted as it is:\n  {}",
+        "the calibration is doubtful:\n  {}",
         doubts.join("\n  ")
     );
     Err(Failure::new(ExitKind::Degraded, message))

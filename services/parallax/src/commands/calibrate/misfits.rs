@@ -43,7 +43,7 @@ pub(super) fn of(
             Ok(None) => {}
             Ok(Some(jpeg)) => {
                 let (time_s, off_px) = (misfit.time_s, misfit.residual_px);
-                let caption = format!("{name} at {time_s:.2} s: {off_px:.1} px off");
+                let caption = format!("{name} at {time_s:.2} s: off by {off_px:.1} px");
                 pictures.push((caption, jpeg));
             }
             Err(why) => output::message(format_args!("a picture of {name} is left out: {why}")),

@@ -15,34 +15,34 @@ use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
 /// Hint for a refused result.
-const HINT: &str = "let one person walk through the whole volume, in view of at least two cameras at every moment, for half a minute, \
-with arms and turns; check that the intrinsics are those of the pictures (`parallax calib show`); if the cameras were not started \
-together, search their clocks with --window 2; if there is no telling, calibrate with a board";
+const HINT: &str = "let one person walk through the whole volume for half a minute, in view of at least two cameras at every moment, \
+moving the arms and turning; check that the intrinsics fit the pictures (`parallax calib show`); if the cameras were not started \
+together, search for clock offsets with --window 2; if nothing helps, calibrate with a board";
 
 /// Hint for a result that is too uncertain.
-const CAUTION_HINT: &str = "longer footage, with more of the volume walked through in all directions, makes it better; how much joints in \
-space are off on account of it, a run with this rig tells by its residuals";
+const CAUTION_HINT: &str = "to improve it, use longer footage in which the person walks through more of the volume, in all directions; the residuals \
+of a run with this rig show how large the errors of joints are";
 
 /// Options of `parallax calibrate people`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-People come from the `keypoints` of a camera, otherwise from its network, as in `parallax sync estimate`. \
-The person whom the cameras see longest together is used; one person alone is better. The deployment's rig gives intrinsics and \
-names; its poses are used only with `--scale rig`.
+People are read from the `keypoints` of a camera, or found by its network, as in `parallax sync estimate`. \
+It is best if only one person walks about. Of several people, the person is used whom the cameras see together for the longest time. The \
+deployment's rig supplies intrinsics and names. Its poses are only used with `--scale rig`.
 
-Pictures have no scale. Give the person's standing height (--height-m), which is compared with the lengths of the bones: right to 2 \
-or 3 percent for usual proportions. Or give the distance of two cameras (--distance), or keep scale and world of the given rig \
-(--scale rig). Otherwise the world has its floor at z = 0, its origin under the middle of the walk, and z against \
-gravity: by the standing feet, or else by upright bodies.
+Pictures do not show the scale. Give the person's standing height (--height-m), which is compared with the lengths of the bones. The scale is then \
+right to 2 or 3 percent for usual proportions. Or give the distance between two cameras (--distance), or keep the scale and the world of the given rig \
+(--scale rig). Without `--scale rig`, the world has its floor at z = 0, its origin under the middle of the walk, and z pointing \
+up. The vertical is found from the standing feet, or else from upright bodies.
 
-An answer is refused, with exit code 7 and every reason, if two halves of the recording give different rigs, a camera has too \
-little in common with the others, its pose is too uncertain, or no person was found. Nothing is written then. If the pose of a camera is \
-uncertain by more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written with a \
-note, every such camera is printed, and the exit code is 6.
+A result is refused if two halves of the recording give different rigs, a camera has too \
+little in common with the others, its pose is too uncertain, or no person was found. All reasons are printed, nothing is written, and the exit code is 7. \
+If the pose of a camera is uncertain by more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written with a \
+note. Every such camera is printed, and the exit code is 6.
 
-The clocks of the deployment are used unless joints fit clearly better with others, or --window is given.
+The clock offsets of the deployment are used, unless --window is given, or joints fit clearly better with other offsets.
 
-With --json one object:
+With --json, prints one object:
     {\"is_determined\", \"doubts\": [text], \"cautions\": [text], \"clocks_are_found\", \"instants\", \"span_s\", \"vertical\", \"scale_error\", \"stature_metres\", \"exchanged\",
      \"cameras\": [{\"name\", \"found_by\", \"centre_metres\", \"joints\", \"residual_px\", \"inliers\", \"rotation_sd_degrees\",
                   \"centre_sd_metres\", \"focal_px\", \"focal_sd_px\", \"halves_degrees\", \"halves_metres\", \"offset_ms\",
@@ -109,13 +109,13 @@ fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
     );
     let failure = Failure::new(ExitKind::Calibration, message);
     Err(failure
-        .with_hint("without places there is no scale to keep: give --height-m or --distance"))
+        .with_hint("the rig has no camera poses, so it has no scale to keep: give --height-m or --distance"))
 }
 
 pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     if arguments.height_m.is_none() && arguments.distance.is_none() && arguments.scale.is_none() {
-        let message = "pictures have no scale: say how tall the person is (--height-m), how far apart two cameras are (--distance), \
-                       or that the rig of the deployment is to be kept (--scale rig)";
+        let message = "pictures do not show the scale: give the height of the person (--height-m), the distance between two cameras (--distance), \
+                       or keep the scale of the deployment's rig (--scale rig)";
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
@@ -165,7 +165,7 @@ fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
     }
     let texts: Vec<String> = cautions.iter().map(|caution| caution.text(names)).collect();
     let message = format!(
-        "the rig is usable, but not known well:\n  {}",
+        "the rig is usable, but uncertain:\n  {}",
         texts.join("\n  ")
     );
     Err(Failure::new(ExitKind::Limit, message).with_hint(CAUTION_HINT))
@@ -184,9 +184,9 @@ fn how_sure(outcome: &Outcome) -> String {
 
 fn source_of_scale(arguments: &Arguments) -> String {
     match (&arguments.height_m, &arguments.distance) {
-        (Some(metres), _) => format!(", scale by a height of {metres} m"),
-        (None, Some((a, b, metres))) => format!(", scale by {metres} m from {a} to {b}"),
-        (None, None) => ", scale and world of the rig before".to_owned(),
+        (Some(metres), _) => format!(", scale from a height of {metres} m"),
+        (None, Some((a, b, metres))) => format!(", scale from {metres} m between {a} and {b}"),
+        (None, None) => ", scale and world of the previous rig".to_owned(),
     }
 }
 
@@ -206,7 +206,7 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
         (None, Some((a, b, metres))) => {
             let (a, b) = (number(a)?, number(b)?);
             if a == b {
-                let message = "--distance: of a camera to itself";
+                let message = "--distance names the same camera twice";
                 return Err(Failure::new(ExitKind::Usage, message));
             }
             Scale::Distance(a, b, *metres)
@@ -229,19 +229,19 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
 /// Describes the origin of the vertical.
 fn vertical(outcome: &Outcome) -> &'static str {
     match outcome.vertical {
-        Vertical::Feet => "the feet that stand",
-        Vertical::Bodies => "bodies that stand upright",
+        Vertical::Feet => "standing feet",
+        Vertical::Bodies => "upright bodies",
         Vertical::Leaning => {
-            "the mean of all bodies: nobody stood upright, so it may be off by many degrees"
+            "the mean of all bodies (nobody stood upright, so the vertical may be off by many degrees)"
         }
-        Vertical::Rig => "the rig before",
+        Vertical::Rig => "the previous rig",
     }
 }
 
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     let [from, to] = outcome.span_s;
     output::line(format_args!(
-        "{} instants over {:.1} s; vertical by {}; scale to {:.1} %; a person of {:.3} m by the bones; sides of {} views exchanged; clocks {}",
+        "{} instants over {:.1} s; vertical from {}; scale known to {:.1} %; height of the person from the bones {:.3} m; sides of {} views exchanged; clocks {}",
         outcome.n_instants,
         to - from,
         vertical(outcome),

@@ -298,7 +298,7 @@ impl Person {
 fn nobody(eyes: &Eyes) -> String {
     let card = eyes.detector.card();
     format!(
-        "{} finds nobody (no box scores `least_score` = {} of its card), or the network sees nobody with a heat of {}; --box says where to look",
+        "{} finds nobody (no box reaches `least_score` = {} of its card), or the network finds nobody with a heat of {}; use --box to give a box",
         card.name, card.least_score, eyes.least_heat
     )
 }

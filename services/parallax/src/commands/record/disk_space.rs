@@ -98,7 +98,7 @@ impl Forecast {
     /// Returns the forecast as text.
     pub(super) fn text(&self, file: &Path) -> String {
         let mut text = format!(
-            "recording {}: up to {} a frame",
+            "recording {}: up to {} per frame",
             file.display(),
             size(self.frame_bytes())
         );
@@ -110,7 +110,7 @@ impl Forecast {
     fn write(&self, text: &mut String) -> core::fmt::Result {
         if let Some(rate) = self.rate_hz {
             let second = (self.frame_bytes() as f64 * rate) as u64;
-            write!(text, ", {} for a second of {rate:.0} frames", size(second))?;
+            write!(text, ", {} per second of {rate:.0} frames", size(second))?;
         }
         if let Some(n_frames) = self.n_frames {
             let all = size(self.frame_bytes().saturating_mul(n_frames));
@@ -120,7 +120,7 @@ impl Forecast {
         if self.n_frames.is_none_or(|frame| self.n_that_fit() < frame) {
             write!(
                 text,
-                ", which may be full after {} frames",
+                ", enough for at least {} frames",
                 self.n_that_fit()
             )?;
         }
@@ -132,14 +132,14 @@ impl Forecast {
         let [pixels, evidence] = self.without;
         if !evidence {
             let left = self.per_frame.bytes([pixels, true]);
-            write!(text, "\n  --without evidence: {} a frame", size(left))?;
+            write!(text, "\n  --without evidence: {} per frame", size(left))?;
         }
         if !evidence && !pixels {
             let left = self.per_frame.bytes([true, true]);
             write!(text, "; and --without pixels: {}", size(left))?;
         } else if !pixels {
             let left = self.per_frame.bytes([true, true]);
-            write!(text, "\n  --without pixels too: {} a frame", size(left))?;
+            write!(text, "\n  also --without pixels: {} per frame", size(left))?;
         }
         Ok(())
     }
@@ -151,13 +151,13 @@ impl Forecast {
             return Ok(());
         }
         let message = format!(
-            "there is no room for {}: {n} frames of {} take {}, {} are free",
+            "not enough disk space for {}: {n} frames of {} need {}, but only {} are free",
             file.display(),
             size(self.frame_bytes()),
             size(self.frame_bytes().saturating_mul(n)),
             size(self.free_bytes)
         );
-        let mut hint = "make room, or name a file on another disk".to_owned();
+        let mut hint = "free some space, or choose a file on another disk".to_owned();
         // Writing to a string cannot fail.
         let _infallible = self.write_smaller(&mut hint);
         Err(Failure::new(ExitKind::Input, message).with_hint(hint))
@@ -174,7 +174,7 @@ pub(super) fn free_beside(file: &Path) -> Result<u64, Failure> {
             folder.display()
         );
         let failure = Failure::new(ExitKind::Input, message);
-        return Err(failure.with_hint("make the folder first, or name another file"));
+        return Err(failure.with_hint("create the folder first, or choose another file"));
     }
     free_space(folder).or_fail(ExitKind::Input)
 }
@@ -206,7 +206,7 @@ impl Growth {
         let free = free_space(&self.file).ok()?;
         let n = free / self.frame_bytes;
         Some(format!(
-            "recorded {}; {} are free, for {n} frames or more",
+            "recorded {}; {} are free, enough for at least {n} frames",
             size(bytes),
             size(free)
         ))
@@ -249,12 +249,12 @@ mod tests {
         let text = forecast(70_000_000_000, [false; 2]).text(Path::new("run.mcap"));
         assert_eq!(
             text,
-            "recording run.mcap: up to 172.4 MB a frame, 10.3 GB for a second of 60 frames, 17.2 GB for all 100 frames; \
-             70.0 GB are free\n  --without evidence: 4.4 MB a frame; and --without pixels: 400.0 kB"
+            "recording run.mcap: up to 172.4 MB per frame, 10.3 GB per second of 60 frames, 17.2 GB for all 100 frames; \
+             70.0 GB are free\n  --without evidence: 4.4 MB per frame; and --without pixels: 400.0 kB"
         );
         let text = forecast(70_000_000_000, [false, true]).text(Path::new("run.mcap"));
         assert!(
-            text.ends_with("\n  --without pixels too: 400.0 kB a frame"),
+            text.ends_with("\n  also --without pixels: 400.0 kB per frame"),
             "{text}"
         );
         let text = forecast(70_000_000_000, [true; 2]).text(Path::new("run.mcap"));
@@ -267,7 +267,7 @@ mod tests {
         assert!(
             small
                 .text(Path::new("a"))
-                .contains("5.0 GB are free, which may be full after 29 frames")
+                .contains("5.0 GB are free, enough for at least 29 frames")
         );
         let endless = Forecast {
             n_frames: None,
@@ -275,7 +275,7 @@ mod tests {
         };
         let text = endless.text(Path::new("a"));
         assert!(
-            text.contains("frames; 5.0 GB are free, which may be full after 29 frames"),
+            text.contains("frames; 5.0 GB are free, enough for at least 29 frames"),
             "{text}"
         );
         small.check(Path::new("a")).unwrap();
@@ -286,7 +286,7 @@ mod tests {
         let refused = forecast(1_723_999_999, [false; 2]).check(Path::new("a")).unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "there is no room for a: 10 frames of 172.4 MB take 1.7 GB, 1.7 GB are free"
+            "not enough disk space for a: 10 frames of 172.4 MB need 1.7 GB, but only 1.7 GB are free"
         );
         forecast(1_724_000_000, [false; 2]).check(Path::new("a")).unwrap();
         forecast(1_723_999_999, [false, true]).check(Path::new("a")).unwrap();

@@ -43,7 +43,7 @@ pub(super) fn settle(
             );
             let failure = Failure::new(ExitKind::Input, message);
             return Err(failure.with_hint(
-                "`--from pose` replays the frames that the run used; `parallax record` keeps the pictures unless it has `--without camera`",
+                "use `--from pose` to replay the frames that the run used; `parallax record` keeps the pictures, except with `--without camera`",
             ));
         }
         camera.source = Recorded::address(file, &camera.name);

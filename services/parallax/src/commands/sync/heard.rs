@@ -62,6 +62,6 @@ fn sound(name: &str, spec: &SourceSpec, part: Part) -> Result<Sound, Failure> {
 
 fn silent(name: &str, why: &str) -> Failure {
     let message = format!("camera {name:?}: {why}");
-    let hint = "without --by sound the movement of people is compared";
+    let hint = "leave out --by sound to compare the movement of people";
     Failure::new(ExitKind::Input, message).with_hint(hint)
 }
