@@ -126,11 +126,7 @@ fn omitted_messages_and_existing_files_are_reported() {
     let elsewhere = [&again[..], &["--set", "output=other"]].concat();
     let ended = case.start(&elsewhere).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("already exists"),
-        "{}",
-        ended.stderr
-    );
+    assert!(ended.stderr.contains("already exists"), "{}", ended.stderr);
     case.write("run.mcap", "something else");
     let ended = replayed(&case, &[]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);

@@ -72,10 +72,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         };
         let (frame, id) = (whole(0)?, whole(2)?);
         if id >= MOST_CORNERS {
-            return Err(format!(
-                "row {}: {id} is not a corner number",
-                nth + 2
-            ));
+            return Err(format!("row {}: {id} is not a corner number", nth + 2));
         }
         if board.len() <= id {
             board.resize(id + 1, Point2::origin());

@@ -123,7 +123,9 @@ fn frame_table(
         (None, Some(first)) if cameras.len() > 1 => {
             let table = beside(&first.paths[0])?;
             if table.is_some() {
-                console.message("pictures are assigned to frames by timestamps.csv beside the footage");
+                console.message(
+                    "pictures are assigned to frames by timestamps.csv beside the footage",
+                );
             }
             table
         }

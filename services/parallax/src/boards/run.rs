@@ -228,8 +228,7 @@ fn mirrored(
     turned(&mut task.board);
     task.sights.iter_mut().for_each(|sight| turned(&mut sight.on_board));
     notes.push(
-        "all footage is mirrored: this rig exchanges left and right in its results"
-            .to_owned(),
+        "all footage is mirrored: this rig exchanges left and right in its results".to_owned(),
     );
     Ok(Mirrored::Known)
 }

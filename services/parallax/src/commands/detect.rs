@@ -183,7 +183,8 @@ impl Arguments {
         match wrong {
             None => Ok(network),
             Some((option, of, by, other)) => {
-                let message = format!("{option} is an option of {of}, but {by} would find the keypoints");
+                let message =
+                    format!("{option} is an option of {of}, but {by} would find the keypoints");
                 let hint = format!("leave {option} out, or give --network {other}");
                 Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
             }

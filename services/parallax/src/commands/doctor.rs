@@ -217,7 +217,10 @@ fn adapters() -> Vec<Finding> {
     let found = |adapter: &gpu::Adapter| {
         let found = Finding::good(what, adapter.to_string());
         if adapter.kind == gpu::Kind::Software {
-            return found.but(State::Note, "software rendering on the processor, for tests only");
+            return found.but(
+                State::Note,
+                "software rendering on the processor, for tests only",
+            );
         }
         found
     };
@@ -237,7 +240,10 @@ fn remains() -> Finding {
         format!("{running} running, {dead} left by dead processes"),
     );
     if dead > 0 {
-        return found.but(State::Note, "`parallax clean` removes the leftovers of dead deployments");
+        return found.but(
+            State::Note,
+            "`parallax clean` removes the leftovers of dead deployments",
+        );
     }
     found
 }

@@ -10,7 +10,8 @@ use nalgebra::{UnitVector3, Vector3};
 use terminal::{Globals, Terminal, output};
 
 /// Note for a build without the format.
-const NO_PARQUET: &str = "this build cannot write parquet: cargo build --release --features parquet";
+const NO_PARQUET: &str =
+    "this build cannot write parquet: cargo build --release --features parquet";
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 
@@ -207,7 +208,9 @@ fn found(trials: &[Trial]) -> String {
         let found = format!("{} of them have joints", only.n_with_points());
         return match &only.ids[..] {
             [_] => found,
-            ids => format!("{found}, which belong to people followed one after the other, with ids {ids:?}"),
+            ids => format!(
+                "{found}, which belong to people followed one after the other, with ids {ids:?}"
+            ),
         };
     }
     let one = |trial: &Trial| format!("person {} in {}", trial.id(), trial.n_with_points());

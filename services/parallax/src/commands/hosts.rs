@@ -223,6 +223,8 @@ fn keys(arguments: &KeysArguments) -> Result<ExitCode, Failure> {
     for file in made {
         output::line(file.display())?;
     }
-    output::message("copy ca.pem and the host's own two files to every host; keep ca.key elsewhere");
+    output::message(
+        "copy ca.pem and the host's own two files to every host; keep ca.key elsewhere",
+    );
     Ok(ExitCode::SUCCESS)
 }

@@ -183,14 +183,14 @@ fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
         if file.is_dir() {
             let message = format!("{} is a folder", file.display());
             let failure = Failure::new(ExitKind::Usage, message);
-            return Err(
-                failure.with_hint("give the name of the recording file, such as run.mcap")
-            );
+            return Err(failure.with_hint("give the name of the recording file, such as run.mcap"));
         }
         if !force {
             let message = format!("{} already exists", file.display());
             let failure = Failure::new(ExitKind::Usage, message);
-            return Err(failure.with_hint("choose another name, or pass --force to replace the file"));
+            return Err(
+                failure.with_hint("choose another name, or pass --force to replace the file")
+            );
         }
         let is_busy = files::open(&file)
             .is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));

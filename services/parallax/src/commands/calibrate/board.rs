@@ -156,10 +156,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if doubts.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    let message = format!(
-        "the calibration is doubtful:\n  {}",
-        doubts.join("\n  ")
-    );
+    let message = format!("the calibration is doubtful:\n  {}", doubts.join("\n  "));
     Err(Failure::new(ExitKind::Degraded, message))
 }
 

@@ -163,7 +163,9 @@ fn by_board(
     }
     from_board(rig, &looked.layout.points, &sights).map_err(|error| {
         let hint = match error {
-            OriginError::BoardApart { .. } => "use --frames for the number of frames in which the board does not move",
+            OriginError::BoardApart { .. } => {
+                "use --frames for the number of frames in which the board does not move"
+            }
             _ => "is the board flat on the floor and in view of a camera in the first frames?",
         };
         Failure::new(ExitKind::Calibration, error).with_hint(hint)

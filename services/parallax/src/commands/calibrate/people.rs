@@ -108,8 +108,9 @@ fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
         rig.lacks(&camera.name)
     );
     let failure = Failure::new(ExitKind::Calibration, message);
-    Err(failure
-        .with_hint("the rig has no camera poses, so it has no scale to keep: give --height-m or --distance"))
+    Err(failure.with_hint(
+        "the rig has no camera poses, so it has no scale to keep: give --height-m or --distance",
+    ))
 }
 
 pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {

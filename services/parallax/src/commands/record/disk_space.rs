@@ -118,11 +118,7 @@ impl Forecast {
         }
         write!(text, "; {} are free", size(self.free_bytes))?;
         if self.n_frames.is_none_or(|frame| self.n_that_fit() < frame) {
-            write!(
-                text,
-                ", enough for at least {} frames",
-                self.n_that_fit()
-            )?;
+            write!(text, ", enough for at least {} frames", self.n_that_fit())?;
         }
         self.write_smaller(text)
     }

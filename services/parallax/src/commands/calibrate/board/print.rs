@@ -29,7 +29,10 @@ pub(super) fn run(board: &Board, paper: Paper, out: Option<&Path>) -> Result<Exi
             _ => {
                 return Err(Failure::new(
                     ExitKind::Usage,
-                    format!("{}: a board can only be written as .pdf or .svg", file.display()),
+                    format!(
+                        "{}: a board can only be written as .pdf or .svg",
+                        file.display()
+                    ),
                 ));
             }
         };

@@ -126,7 +126,10 @@ pub(super) fn about(arguments: &Arguments, calibrated: &Calibrated) -> Vec<(Stri
         about.push(("corners of".to_owned(), corners.display().to_string()));
     }
     if let Some(known) = &arguments.known {
-        about.push(("intrinsics kept for".to_owned(), known.display().to_string()));
+        about.push((
+            "intrinsics kept for".to_owned(),
+            known.display().to_string(),
+        ));
     }
     about.extend(calibrated.notes.iter().map(|note| ("note".to_owned(), note.clone())));
     about

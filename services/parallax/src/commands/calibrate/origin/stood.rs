@@ -29,7 +29,8 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
         let time_s = rate_hz.map_or(line.time_s, |rate_hz| Some(line.frame as f64 / rate_hz));
         let time_s = time_s.ok_or_else(|| {
             let message = format!("{}: the frames of the run have no times", run.display());
-            Failure::new(ExitKind::Input, message).with_hint("pass the frames per second with --rate")
+            Failure::new(ExitKind::Input, message)
+                .with_hint("pass the frames per second with --rate")
         })?;
         let person = line.followed();
         let joints = PARSE14.joints.iter().map(|joint| {
@@ -53,7 +54,8 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
             run.display(),
             frames.len()
         );
-        Failure::new(ExitKind::Degraded, message).with_hint("use a run in which a person walks about, or stands")
+        Failure::new(ExitKind::Degraded, message)
+            .with_hint("use a run in which a person walks about, or stands")
     })?;
     if found.vertical == Vertical::Leaning {
         let message =
