@@ -1,11 +1,11 @@
-//! Warns about frames that are largely padding because their aspect ratio differs from that of the camera's image.
+//! Warns of frames that are largely padding, because their aspect ratio differs from that of the camera's image.
 
-/// The smallest share of padding that is reported.
+/// Minimum share of padding that is reported.
 const MIN_SHARE: f64 = 0.1;
 
-/// A warning about the cameras whose frames are largely padding; none if there are none.
+/// Returns a warning about the cameras whose frames are largely padding, if there are any.
 ///
-/// * `frame`: width and height of the frames, pixels.
+/// * `frame`: width and height of the frames, in pixels.
 /// * `cameras`: name, and width and height of the image in pixels, of every camera.
 pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option<String> {
     let padded = cameras.iter().filter(|camera| share(camera.1, frame) > MIN_SHARE);
@@ -30,20 +30,20 @@ pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option
     ))
 }
 
-/// The factor by which an image is scaled to fit into a frame.
+/// Returns the factor by which an image is scaled to fit into a frame.
 fn scale(image: [u32; 2], frame: [usize; 2]) -> f64 {
     let of_axis = |axis: usize| frame[axis] as f64 / f64::from(image[axis].max(1));
     of_axis(0).min(of_axis(1))
 }
 
-/// The share of a frame that remains empty when an image is scaled to fit into it.
+/// Returns the share of a frame that remains empty when an image is scaled to fit into it.
 fn share(image: [u32; 2], frame: [usize; 2]) -> f64 {
     let scale = scale(image, frame);
     let area = f64::from(image[0]) * f64::from(image[1]) * scale * scale;
     1.0 - area / (frame[0] as f64 * frame[1] as f64)
 }
 
-/// The size of the image scaled to fit into the frame, pixels.
+/// Returns the size of the image when it is scaled to fit into the frame, in pixels.
 fn fitting(image: [u32; 2], frame: [usize; 2]) -> [u32; 2] {
     let scale = scale(image, frame);
     image.map(|image| (f64::from(image) * scale).round().max(1.0) as u32)

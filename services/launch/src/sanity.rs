@@ -1,4 +1,4 @@
-//! Checks of footage and calibration of a deployment, before any process is started.
+//! Checks footage and calibration of a deployment before any process is started.
 
 use std::path::PathBuf;
 
@@ -16,30 +16,32 @@ use crate::resolved::Resolved;
 
 /// The largest ratio of two frame rates at which frames can be paired by number.
 const MAX_RATE_RATIO: f64 = 1.02;
-/// The least range of brightness, of 255, over the cells of an image at which it is compared with others.
+/// Minimum range of brightness over the cells of an image, of 255. Images with less contrast are not compared.
 const MIN_CONTRAST: f64 = 16.0;
-/// Warning about footage without a rate.
+/// Warning about footage without a frame rate.
 const NO_RATE: &str = "nothing says how many frames per second the footage has: times, speeds and pose3d.trc are left out; \
     `capture.frame_rate_hz` says it";
-/// A picture whose brightest value is less, of 255, uses a small part of its range.
+/// If the brightest value of a picture is below this, of 255, the picture uses a small part of its range.
 const LEAST_BRIGHTEST: u8 = 64;
-/// Images whose mean difference of brightness over the cells is less than this, of 255, look the same.
+/// Two images look the same if their mean difference of brightness over the cells is below this, of 255.
 const MIN_DIFFERENCE: f64 = 1.0;
-/// Cells of the grid of brightness, in each direction.
+/// Number of cells of the brightness grid, in each direction.
 const CELLS: usize = 32;
 
-/// Checks footage and calibration; returns warnings.
+/// Checks footage and calibration, and returns warnings.
 ///
 /// # Errors
 ///
-/// No joints can be located in space: a single camera, cameras in one place, a wrong unit, one source for two
-/// cameras, or different frame rates.
+/// Fails if no joints can be located in space: there is a single camera, cameras are in one place, the unit is wrong, two cameras have
+/// the same source, or frame rates differ.
 fn check(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
     let mut warnings = deployment.doubts(n_cores());
     check_number(deployment)?;
     if resolved.host.is_some() {
-        // Devices of two machines have the same names, and footage of another cannot be read.
+        // With several hosts, sources are not compared: devices of two machines may have the same name, and footage of another machine
+        // cannot
+        // be read.
         warnings.extend(check_cameras(deployment)?);
         return Ok(warnings);
     }
@@ -102,7 +104,7 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     let named = deployment.cameras.iter().filter_map(|camera| rig.camera(&camera.name));
     let used = Rig::new(named.cloned().collect(), rig.up_in_world(), rig.source());
-    // A camera that the rig does not contain is reported elsewhere, by name.
+    // If the rig lacks a camera, this is reported elsewhere, with its name.
     let Ok(used) = used else {
         return Ok(Vec::new());
     };
@@ -129,7 +131,7 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
         .collect())
 }
 
-/// The hint for a finding.
+/// Returns the hint for a finding.
 fn hint(finding: &Finding) -> String {
     match finding {
         Finding::Distance { metres, .. } => format!(
@@ -179,7 +181,7 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     ))
 }
 
-/// Names the cameras whose frame rate nothing says, while it is known for others; none if there are none.
+/// Returns a warning about the cameras whose frame rate is unknown, if the rate of other cameras is known.
 fn without_rate(resolved: &Resolved) -> Option<String> {
     let views = resolved.deployment.cameras.iter().zip(&resolved.footage);
     let unknown = views.filter(|view| view.1.frame_rate_hz.is_none());
@@ -192,7 +194,8 @@ fn without_rate(resolved: &Resolved) -> Option<String> {
     })
 }
 
-/// The pictures of live cameras are paired by their times: another rate only means that some have none for an instant.
+/// Warns of live cameras with different rates. Their pictures are paired by time, so a slower camera only has no picture for some
+/// instants.
 fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<String>, Failure> {
     if ratio <= MAX_RATE_RATIO || resolved.deployment.capture.frame_rate_hz.is_some() {
         return Ok(None);
@@ -203,7 +206,7 @@ fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<
     ))
 }
 
-/// Warns of cameras whose footage is much shorter than that of another.
+/// Warns of cameras whose footage is much shorter than that of another camera.
 fn check_lengths(resolved: &Resolved) -> Option<String> {
     if resolved.has_live() {
         return None;
@@ -213,7 +216,7 @@ fn check_lengths(resolved: &Resolved) -> Option<String> {
     shorter(&names.zip(lengths).collect::<Vec<_>>())
 }
 
-/// The cameras that are much shorter than the longest, and by how much; none if there are none.
+/// Describes the cameras whose footage is much shorter than the longest, and by how much. Returns `None` if there are none.
 fn shorter(all: &[(&str, u64)]) -> Option<String> {
     const LEAST_FRAMES: u64 = 5;
     const LEAST_SHARE: f64 = 0.05;
@@ -294,14 +297,14 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
 /// The first images of a camera.
 struct FirstImages {
     rgb: Vec<Vec<u8>>,
-    /// True if the first image has contrast.
+    /// True if the first image has enough contrast.
     has_contrast: bool,
     /// Mean brightness of the cells of the first image, row by row.
     grid: Vec<f64>,
 }
 
 impl FirstImages {
-    /// None for a live or a synthetic camera, for one without pictures, and for unreadable footage.
+    /// Reads the first images. Returns `None` for a live or synthetic camera, a camera without pictures, and unreadable footage.
     fn read(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
@@ -316,7 +319,7 @@ impl FirstImages {
             most_shrink: 4,
             ..crate::cameras::source(camera, capture)
         };
-        // Unreadable footage is reported where it is read.
+        // Unreadable footage is reported when it is read.
         let mut feed = Feed::open(&spec).ok()?;
         let mut rgb = Vec::new();
         while let Ok(Some(frame)) = feed.next_frame() {
@@ -337,7 +340,7 @@ impl FirstImages {
         self.rgb.iter().flatten().copied().max().unwrap_or(0)
     }
 
-    /// Mean absolute difference of brightness over the cells.
+    /// Returns the mean absolute difference of brightness over the cells.
     fn difference(&self, other: &Self) -> f64 {
         let pairs = self.grid.iter().zip(&other.grid);
         let sum: f64 = pairs.map(|(a, b)| (a - b).abs()).sum();
@@ -345,7 +348,7 @@ impl FirstImages {
     }
 }
 
-/// Mean brightness of the cells of an image, row by row.
+/// Returns the mean brightness of the cells of an image, row by row.
 ///
 /// * `rgb`: the pixels, three bytes each.
 fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
@@ -363,11 +366,11 @@ fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
 
 /// Runs the checks and logs the warnings.
 ///
-/// * `lengths`: number of frames of the keypoints of every camera, where it has some.
+/// * `lengths`: number of frames in the keypoints of each camera, if it has keypoints.
 ///
 /// # Errors
 ///
-/// As for [`check`].
+/// Fails like [`check`].
 pub(crate) fn warn(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<(), Failure> {
     for warning in check(resolved, lengths)? {
         tracing::warn!("{warning}");
@@ -375,7 +378,7 @@ pub(crate) fn warn(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<(), F
     Ok(())
 }
 
-/// Number of cores that this process may use, if it is known.
+/// Returns the number of cores that this process may use, if it is known.
 fn n_cores() -> Option<usize> {
     let known = std::thread::available_parallelism();
     known.ok().map(usize::from)

@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 use capture::FeedError;
 use footage::FootageError;
 
-/// The hint for footage that cannot be used.
+/// Returns the hint for footage that cannot be used.
 ///
 /// * `camera`: the camera of the footage.
 pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {

@@ -1,4 +1,4 @@
-//! Properties of the pictures of every camera before the run: of files, and of live cameras.
+//! Determines the properties of every camera's pictures before the run, for files and live cameras.
 
 use std::path::Path;
 use std::thread;
@@ -12,15 +12,15 @@ use scene::Address;
 
 use super::{Footage, advice, source};
 
-/// Frames of a live camera that runs until it is stopped: the most of any footage.
+/// Number of frames of a live camera without an end. It is larger than that of any footage.
 pub(crate) const ENDLESS: u64 = 1_000_000_000_000;
 
-/// Returns true if the source of a camera is live: a file of such a name is not.
+/// Returns true if the source of a camera is live. If a file has this name, the source is the file.
 pub fn is_live(source: &str) -> bool {
     footage::is_live(source) && !Path::new(source).is_file()
 }
 
-/// The live camera of an entry of a deployment; none if its source is footage.
+/// Returns the live camera of an entry of a deployment; `None` if its source is footage.
 pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
     let address = LiveAddress::parse(&camera.source).filter(|_| is_live(&camera.source))?;
     Some(LiveCamera {
@@ -37,9 +37,9 @@ pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
     })
 }
 
-/// Reads the metadata of every camera's footage; live cameras are asked all at once.
+/// Reads the metadata of every camera's footage. All live cameras are queried at the same time.
 ///
-/// * `is_here`: whether a camera is on this machine; of others what the calibration says.
+/// * `is_here`: returns true if a camera is on this machine. For other cameras, the calibration gives the properties.
 pub(crate) fn footage(
     deployment: &Deployment,
     is_here: &dyn Fn(usize) -> bool,
@@ -82,7 +82,7 @@ pub(crate) fn footage(
     }
 }
 
-/// The footage at common instants.
+/// Returns the footage at common instants.
 fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage>, Failure> {
     let capture = &deployment.capture;
     let mut clocks = Vec::new();
@@ -114,8 +114,8 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     looked.collect()
 }
 
-/// From the beginning of a run to its first frame in real time, nanoseconds: until every process has started, and streams
-/// have shown their first picture.
+/// Returns the time from the beginning of a run to its first frame in real time, in nanoseconds. By then every process has started, and
+/// streams have delivered their first picture.
 pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
     const FOOTAGE: u64 = 2_000_000_000;
     const DEVICES: u64 = 3_000_000_000;
@@ -173,7 +173,7 @@ fn of_live((size, rate_hz): (footage::Size, f64), capture: &Config) -> Footage {
 fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failure> {
     let capture = &deployment.capture;
     let rig = inputs::rig_of(deployment)?;
-    // One that is not in the rig is reported later, by name.
+    // If the camera is not in the rig, this is reported later, with its name.
     let size = rig.camera(&camera.name).map_or([1; 2], |camera| camera.intrinsics.size);
     let rate_hz = capture.frame_rate_hz;
     Ok(Footage {

@@ -11,10 +11,10 @@ use footage::{Canvas, FootageError, Size, VideoWriter};
 use super::pictures::Pictures;
 use super::{Written, cannot_write, interrupted};
 
-/// The file that says that a folder was made by Parallax, and may be replaced.
+/// File that marks a folder as written by Parallax, so that it may be replaced.
 const MARK: &str = ".parallax";
 
-/// A folder of keypoints: in it one for each view, with a file for each frame.
+/// Writes a folder of keypoints. It contains a folder for each view, with a file for each frame.
 pub(super) fn openpose(
     trials: &[Trial],
     cameras: &[ViewCamera],
@@ -29,7 +29,7 @@ pub(super) fn openpose(
         fs::rename(&beside, path).map_err(|error| cannot_write(path, &error))
     });
     if placed.is_err() {
-        // The error that is reported came first.
+        // The first error is reported, so an error here is ignored.
         drop(fs::remove_dir_all(&beside));
     }
     placed?;
@@ -65,7 +65,7 @@ fn write_all(
     let at = |path: &Path, done: io::Result<()>| done.map_err(|error| cannot_write(path, &error));
     let trial = &trials[0];
     if folder.exists() {
-        // Of a process that was killed.
+        // The folder was left by a process that was killed.
         at(folder, fs::remove_dir_all(folder))?;
     }
     let room = files::Folder::create(folder).map_err(|error| cannot_write(folder, &error))?;
@@ -90,7 +90,7 @@ fn write_all(
     Ok(())
 }
 
-/// The video of a view with the pose drawn on it.
+/// Writes the video of a view, with the pose drawn on it.
 pub(super) fn video(
     trials: &[Trial],
     pictures: &mut Pictures,
@@ -105,7 +105,7 @@ pub(super) fn video(
         Ok(n_without)
     });
     if placed.is_err() {
-        // The error that is reported came first.
+        // The first error is reported, so an error here is ignored.
         drop(fs::remove_file(&beside));
     }
     let n_without = placed?;
@@ -129,7 +129,7 @@ pub(super) fn video(
     })
 }
 
-/// Returns how many frames have no picture.
+/// Draws all frames. Returns the number of frames without a picture.
 fn draw_all(
     trials: &[Trial],
     pictures: &mut Pictures,

@@ -1,4 +1,4 @@
-//! The pictures of a view, frame by frame: of its footage, else of the recording.
+//! The pictures of a view, frame by frame, from its footage or from the recording.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,7 +16,7 @@ use super::{Origin, of_footage};
 use crate::prepare;
 use crate::resolved::Resolved;
 
-/// The pictures of a view. Frames are asked for in order.
+/// The pictures of a view. Frames must be requested in order.
 #[derive(Debug)]
 pub(super) struct Pictures {
     /// The camera, as these pictures show it.
@@ -28,7 +28,7 @@ pub(super) struct Pictures {
 enum From {
     Footage {
         feed: Box<Retimed>,
-        /// The frame that the feed gave last.
+        /// Number of the last frame that the feed returned.
         at: Option<u64>,
         is_over: bool,
     },
@@ -41,11 +41,12 @@ enum From {
 }
 
 impl Pictures {
-    /// Those of all views.
+    /// Opens the pictures of all views.
     ///
     /// # Errors
     ///
-    /// A view has none: it was live and was not recorded, or consists of keypoints alone; or its footage cannot be read.
+    /// Fails if a view has no pictures, because it was live and not recorded, or has only keypoints. Also fails if its footage cannot be
+    /// read.
     pub(super) fn all(origin: &Origin) -> Result<Vec<Self>, Failure> {
         let (resolved, rig) = origin.setup()?;
         let cameras = resolved.deployment.cameras.iter().enumerate();
@@ -71,11 +72,11 @@ impl Pictures {
         all.collect()
     }
 
-    /// The picture of a frame: RGB, row major, of the size of the view; none where there is none.
+    /// Returns the picture of a frame: RGB, row major, of the size of the view. Returns `None` if the frame has no picture.
     ///
     /// # Errors
     ///
-    /// The footage or the recording cannot be read.
+    /// Fails if the footage or the recording cannot be read.
     pub(super) fn at(&mut self, frame: u64) -> Result<Option<&[u8]>, Failure> {
         let n_bytes = 3 * self.view.size.iter().map(|size| *size as usize).product::<usize>();
         match &mut self.from {
@@ -100,7 +101,7 @@ impl Pictures {
                 match recording::read(file, Kind::Frame, entry, buffer) {
                     Ok(message) if message.elements.len() == n_bytes => Ok(Some(message.elements)),
                     Err(error @ recording::ReadError::Read(_)) => Err(in_file(path, &error)),
-                    // A damaged picture is none.
+                    // A damaged picture counts as missing.
                     Ok(_) | Err(_) => Ok(None),
                 }
             }
@@ -123,7 +124,7 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
     if crate::cameras::is_live(&camera.source) {
         return Err("it was live".to_owned());
     }
-    // All have the same places.
+    // All trials have the same frames and times.
     let trial = &origin.trials[0];
     let spec = SourceSpec {
         start: trial.first_frame,

@@ -1,4 +1,4 @@
-//! A snapshot of a deployment as text: a table of the processes, and one of their times.
+//! A snapshot of a deployment as text: a table of the processes, and a table of their times.
 
 use failure::wording::Table;
 use messages::{Cause, UNMEASURED};
@@ -6,10 +6,10 @@ use runtime::metrics::{Reading, Timed};
 
 use super::snapshot::{ProcessSnapshot, Snapshot, State};
 
-/// The cell of an unknown value.
+/// Cell for an unknown value.
 const NONE: &str = "-";
 
-/// A deployment as two tables. The titles contain the units.
+/// Formats a deployment as two tables. The titles contain the units.
 pub fn table(snapshot: &Snapshot) -> String {
     let alive = snapshot.processes.iter().filter(|process| process.pid.is_some()).count();
     let mut text = format!(
@@ -53,7 +53,7 @@ const CAMERAS: [&str; 13] = [
     "<TIMED BY",
 ];
 
-/// Returns the table of the pictures of live cameras; empty without any.
+/// Returns the table of live cameras' pictures; empty if there are no live cameras.
 fn cameras(snapshot: &Snapshot) -> String {
     let rows: Vec<Vec<String>> = snapshot
         .processes
@@ -161,7 +161,7 @@ fn process_row(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<String> {
     ]
 }
 
-/// The counts of dropped messages by cause, without zeros; `none` if nothing was dropped.
+/// Returns the counts of dropped messages by cause, without zeros; `none` if nothing was dropped.
 fn dropped(reading: &Reading) -> String {
     let causes: Vec<String> = Cause::ALL
         .into_iter()
@@ -179,7 +179,7 @@ const TIMES: [&str; 9] = [
     "<PROCESS", "<STAGE", "<VIEW", "COUNT", "PER s", "p50 ms", "p99 ms", "p99.9 ms", "max ms",
 ];
 
-/// One row per kind of time and view; the name of the process is in the first row only.
+/// Returns one row per kind of time and view. Only the first row has the name of the process.
 fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>> {
     let Some(reading) = &process.reading else {
         return Vec::new();
@@ -209,13 +209,13 @@ fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>>
     rows.collect()
 }
 
-/// The name of a view, or its number if the name is unknown.
+/// Returns the name of a view, or its number if the name is unknown.
 fn view(snapshot: &Snapshot, index: usize) -> String {
     let name = snapshot.views().get(&index).map(|view| (*view).to_owned());
     name.unwrap_or_else(|| format!("view {index}"))
 }
 
-/// A rate in hertz: two decimals below 10, else one.
+/// Formats a rate in hertz: two decimals below 10, otherwise one.
 fn rate(millihertz: u64) -> String {
     let hertz = millihertz as f64 / 1e3;
     if hertz < 10.0 {
@@ -225,7 +225,7 @@ fn rate(millihertz: u64) -> String {
     }
 }
 
-/// A time in milliseconds: three decimals below 10, else one.
+/// Formats a time in milliseconds: three decimals below 10, otherwise one.
 fn milliseconds(nanos: u64) -> String {
     let ms = nanos as f64 / 1e6;
     if ms < 10.0 {

@@ -1,11 +1,11 @@
-//! Text on cameras that contradict each other.
+//! Texts about cameras that contradict each other.
 
 use messages::{CameraCounts, TimedBy, UNMEASURED};
 use runfiles::{CameraFit, Contradicted, Exchanged};
 use runtime::metrics::Reading;
 use supervise::Outcome;
 
-/// Text on two cameras whose footage seems to be exchanged.
+/// Returns the text about two cameras whose footage seems to be exchanged.
 pub(super) fn exchanged(exchanged: &Exchanged) -> String {
     let [first, second] = &exchanged.cameras;
     format!(
@@ -21,7 +21,7 @@ pub(super) fn exchanged(exchanged: &Exchanged) -> String {
     )
 }
 
-/// Text on cameras whose views contradict each other.
+/// Returns the text about cameras whose views contradict each other.
 pub(super) fn contradicted(contradicted: &Contradicted) -> String {
     let likely = contradicted.likely.as_ref().map_or_else(String::new, |[first, second]| {
         format!(" ({first} and {second} exchanged would fit best)")
@@ -34,7 +34,7 @@ pub(super) fn contradicted(contradicted: &Contradicted) -> String {
     )
 }
 
-/// Text on a camera whose pictures were taken at other times than they say.
+/// Returns the text about a camera whose pictures were taken at other times than they state.
 pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     let [offset, error] = [fit.offset_ms, fit.offset_error_ms].map(|ms| ms.unwrap_or(f64::NAN));
     let how = if offset < 0.0 { "before" } else { "after" };
@@ -45,7 +45,8 @@ pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     )
 }
 
-/// Returns the counts of the pictures of every live camera, a line each; those of a restarted process since its restart. A warning
+/// Returns the counts of every live camera's pictures, one line per camera. The counts of a restarted process begin at its restart. A
+/// warning
 /// follows if the times of some cameras cannot be compared with those of others.
 pub(super) fn live(outcome: &Outcome) -> String {
     let readings = outcome
@@ -98,7 +99,7 @@ fn line((name, it): &(String, CameraCounts)) -> String {
     format!("  live camera   {name}: {}\n", parts.join(", "))
 }
 
-/// Text on what says when the pictures of a camera were taken, unless that is the kernel.
+/// Returns the text about the source of a camera's picture times, unless the kernel gives the times.
 fn times(it: &CameraCounts) -> Option<String> {
     let ms = it.delay_nanos as f64 / 1e6;
     match it.timed_by {
@@ -112,9 +113,9 @@ fn times(it: &CameraCounts) -> Option<String> {
     }
 }
 
-/// Text on live cameras of which some say when their pictures were taken and others do not; none where all are alike.
+/// Returns the text about live cameras if only some of them state when their pictures were taken. Returns `None` if all cameras are alike.
 ///
-/// * `cameras`: name and counts.
+/// * `cameras`: name and counts of each camera.
 fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {
     let named = |which: fn(TimedBy) -> bool| -> Vec<&str> {
         let those = cameras.iter().filter(|(_, counts)| which(counts.timed_by));

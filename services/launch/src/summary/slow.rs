@@ -2,12 +2,14 @@
 
 use runfiles::Summary;
 
-/// A run that has a result for a smaller share of its frames says so.
+/// The warning is given if a smaller share of the frames has a result.
 const MOST: f64 = 0.8;
 
-/// A line of how many frames the machine had time for, and what helps. None where it had time for most of them, and with lossless delivery.
+/// Returns a line with the number of frames that the machine had time for, and what would help. Returns `None` if it had time for most
+/// frames, and with lossless delivery.
 ///
-/// * `n_frames`: of the footage, as far as the run got; `seconds`: how long it took.
+/// * `n_frames`: number of frames of the footage that the run reached.
+/// * `seconds`: duration of the run.
 pub(super) fn text(
     summary: &Summary,
     n_frames: u64,
