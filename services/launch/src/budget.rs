@@ -50,12 +50,16 @@ impl Budget {
             limit_ms, n_frames, ..
         } = self;
         match self.p99_ms {
-            None => format!("{limit_ms} ms could not be judged: no frame has an end-to-end time"),
+            None => format!("{limit_ms} ms could not be checked: no frame has an end-to-end time"),
             Some(p99) if self.is_held() => {
-                format!("{limit_ms} ms held: p99 end to end is {p99:.1} ms of {n_frames} frames")
+                format!(
+                    "{limit_ms} ms met: the 99th percentile end to end is {p99:.1} ms ({n_frames} frames)"
+                )
             }
             Some(p99) => {
-                format!("{limit_ms} ms missed: p99 end to end is {p99:.1} ms of {n_frames} frames")
+                format!(
+                    "{limit_ms} ms exceeded: the 99th percentile end to end is {p99:.1} ms ({n_frames} frames)"
+                )
             }
         }
     }
@@ -139,7 +143,7 @@ mod tests {
         assert!(budget.is_held() && !budget.is_exceeded());
         assert_eq!(
             budget.verdict(),
-            "50 ms held: p99 end to end is 50.0 ms of 100 frames"
+            "50 ms met: the 99th percentile end to end is 50.0 ms (100 frames)"
         );
     }
 
@@ -148,7 +152,7 @@ mod tests {
         let budget = Budget::new(49.9, Some(&latency(100)));
         assert!(budget.is_exceeded());
         let expected = "\
-latency budget of 49.9 ms missed: p99 end to end is 50.0 ms of 100 frames
+latency budget of 49.9 ms exceeded: the 99th percentile end to end is 50.0 ms (100 frames)
   latency, ms         p50       p99     p99.9       max
     pose             20.0      50.0      60.0     123.0
     end to end       20.0      50.0      60.0     123.0";

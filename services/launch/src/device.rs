@@ -25,7 +25,7 @@ pub fn device(deployment: &Deployment) -> Result<Option<String>, Failure> {
     }
     let best = gpu::adapters().into_iter().next();
     let usable = match (asked, best) {
-        (Device::Cpu, _) => return Ok(Some("device: cpu, as the deployment says".to_owned())),
+        (Device::Cpu, _) => return Ok(Some("device: cpu, as set in the deployment".to_owned())),
         _ if !gpu::IS_BUILT => Err(OpenError::NotBuilt),
         (_, None) => Err(OpenError::NoAdapter),
         (Device::Auto | Device::Gpu, Some(adapter)) if adapter.kind == Kind::Software => {
@@ -35,7 +35,7 @@ pub fn device(deployment: &Deployment) -> Result<Option<String>, Failure> {
     };
     match usable {
         Ok(adapter) => Ok(Some(format!("device: gpu for the filters, {adapter}"))),
-        Err(error) if asked == Device::Auto => Ok(Some(format!("device: cpu, since {error}"))),
+        Err(error) if asked == Device::Auto => Ok(Some(format!("device: cpu, because {error}"))),
         Err(error) => Err(error).or_fail(ExitKind::Config),
     }
 }
@@ -43,7 +43,7 @@ pub fn device(deployment: &Deployment) -> Result<Option<String>, Failure> {
 /// Like [`device`], for a deployment whose frames are searched by networks.
 fn by_networks(deployment: &Deployment) -> Result<Option<String>, Failure> {
     if deployment.network.onnx_runtime.is_none() && deployment.device == Device::Gpu {
-        let message = "device = \"gpu\": networks run on a GPU by ONNX Runtime only: set `network.onnx_runtime`, or `device = \"auto\"`";
+        let message = "device = \"gpu\": networks need ONNX Runtime to run on a GPU: set `network.onnx_runtime`, or `device = \"auto\"`";
         return Err(Failure::new(ExitKind::Config, message));
     }
     Ok(None)

@@ -61,11 +61,11 @@ pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
     };
     let Some(name) = deployment_of(folder) else {
         let message = format!(
-            "{}: {first} lies there, and no run of parallax has written it",
+            "{} contains {first}, which no run of parallax has written",
             folder.display()
         );
         let failure = Failure::new(ExitKind::Config, message);
-        return Err(failure.with_hint("move it away, or name another folder with --out"));
+        return Err(failure.with_hint("move it away, or choose another folder with --out"));
     };
     if !force {
         let message = format!(
@@ -74,7 +74,7 @@ pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
         );
         let failure = Failure::new(ExitKind::Config, message);
         return Err(
-            failure.with_hint("replace them with --force, or choose another folder with --out")
+            failure.with_hint("pass --force to replace them, or choose another folder with --out")
         );
     }
     remove_exports(&folder.join(EXPORT)).map_err(|error| in_file(&folder.join(EXPORT), &error))
@@ -136,7 +136,10 @@ mod tests {
         fs::write(folder.join("pose3d.csv"), "mine").unwrap();
         for force in [false, true] {
             let text = refused(folder, force);
-            assert!(text.contains("no run of parallax has written it"), "{text}");
+            assert!(
+                text.contains("which no run of parallax has written"),
+                "{text}"
+            );
         }
         let about = "{\"deployment\": {\"name\": \"room\"}}";
         fs::write(folder.join("deployment.json"), about).unwrap();

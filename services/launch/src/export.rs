@@ -215,15 +215,17 @@ fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     if origin.trials[0].rate_hz.is_none()
         && let Some(formats) = lacks(Format::needs_rate)
     {
-        let message = format!(
-            "the run does not say how many frames per second it has, which {formats} must contain"
-        );
-        return Err(Failure::new(ExitKind::Usage, message).with_hint("give it: --rate 30"));
+        let message = format!("the run has no frame rate, which {formats} must contain");
+        return Err(Failure::new(ExitKind::Usage, message)
+            .with_hint("give the frame rate, for example --rate 30"));
     }
     if let (Some(why), Some(formats)) = (&origin.up_unknown, lacks(Format::needs_up)) {
-        let message = format!("which way is up is not known, and {formats} must say it: {why}");
+        let message =
+            format!("the upward direction is not known, and {formats} must contain it: {why}");
         let failure = Failure::new(ExitKind::Input, message);
-        return Err(failure.with_hint("give it in the world of the rig: --up 0,0,1"));
+        return Err(
+            failure.with_hint("give the direction in the world of the rig, for example --up 0,0,1")
+        );
     }
     Ok(())
 }
@@ -253,7 +255,7 @@ fn refuse_existing(format: Format, path: &Path, force: bool) -> Result<(), Failu
     if !force {
         let failure = Failure::new(ExitKind::Usage, format!("{name} exists"));
         return Err(
-            failure.with_hint("choose another folder with --out, or replace it with --force")
+            failure.with_hint("choose another folder with --out, or pass --force to replace it")
         );
     }
     let is_folder = matches!(format, Format::OpenPose);

@@ -125,11 +125,11 @@ pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failur
     let of_entry = |camera: &deployment::capture::Camera| {
         if crate::cameras::is_live(&camera.source) {
             let message = format!(
-                "camera {:?} is live: it has no footage to compare with that of others",
+                "camera {:?} is live, so it has no footage to compare with that of other cameras",
                 camera.name
             );
             let failure = Failure::new(ExitKind::Config, message);
-            return Err(failure.with_hint("name footage that was recorded with it"));
+            return Err(failure.with_hint("use footage that was recorded with this camera"));
         }
         inputs::camera_of(rig, &camera.name, deployment).cloned()
     };
@@ -165,7 +165,7 @@ impl Finder {
 
     fn text(&self) -> String {
         match self {
-            Self::Keypoints(_) => "keypoints of files".to_owned(),
+            Self::Keypoints(_) => "keypoint files".to_owned(),
             Self::Eyes(eyes) => eyes.text(),
         }
     }
@@ -223,9 +223,9 @@ fn keypoint_rate(deployment: &Deployment, camera: usize) -> Result<f64, Failure>
 }
 
 fn no_rate(name: &str) -> Failure {
-    let message = format!("nothing says how many frames per second camera {name:?} has");
+    let message = format!("the frame rate of camera {name:?} is not known");
     Failure::new(ExitKind::Config, message)
-        .with_hint("give `capture.frame_rate_hz` in the deployment")
+        .with_hint("set `capture.frame_rate_hz` in the deployment")
 }
 
 fn whole(deployment: &Deployment, camera: usize, start: u64, step: u64) -> SourceSpec {

@@ -48,18 +48,18 @@ pub fn choose<'a>(
             known.join(", ")
         );
         let failure = Failure::new(ExitKind::Usage, message);
-        return Err(failure.with_hint("say which one this machine is: --host NAME"));
+        return Err(failure.with_hint("pass --host NAME to say which host this machine is"));
     };
     let has_keypoints = deployment.cameras.iter().find(|camera| camera.keypoints.is_some());
     if let Some(camera) = has_keypoints {
         let message = format!(
-            "camera {:?} has `keypoints`, and the deployment has hosts: files of keypoints are for one machine",
+            "camera {:?} has `keypoints`, which a deployment with hosts cannot use: keypoint files only work on one machine",
             camera.name
         );
         return Err(Failure::new(ExitKind::Config, message));
     }
     if !bridge::HAS_LINK {
-        let failure = Failure::new(ExitKind::Usage, "this build has no hosts");
+        let failure = Failure::new(ExitKind::Usage, "this build does not support hosts");
         return Err(failure.with_hint("build it with `cargo build --release --features hosts`"));
     }
     Ok(Some(host))
@@ -76,7 +76,7 @@ pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure>
         Some(folder) if !deployment.link.insecure => {
             Some(KeyFiles::find(folder, &host.name).map_err(|error| {
                 let failure = Failure::new(ExitKind::Input, error);
-                failure.with_hint("`parallax hosts keys FILE` makes them; every host needs ca.pem and its own two files")
+                failure.with_hint("`parallax hosts keys FILE` creates the keys; every host needs ca.pem and its own two files")
             })?)
         }
         _ => None,
@@ -182,7 +182,7 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
     let deployment = &resolved.deployment;
     let host = resolved
         .own_host()
-        .ok_or("the deployment has no host of that name")
+        .ok_or("the deployment has no host with this name")
         .or_fail(ExitKind::Config)?;
     let prepared = Prepared::new(resolved)?;
     let capture = &deployment.capture;

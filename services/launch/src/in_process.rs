@@ -55,7 +55,7 @@ impl InProcess {
                     keypoints.push(Some(source));
                 }
                 pose::Step::Filters(_) => {
-                    let message = "the filters find people in this deployment, not a network";
+                    let message = "in this deployment the filters find people, not a network";
                     return Err(Failure::new(ExitKind::Config, message));
                 }
             }

@@ -25,8 +25,8 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
     let names = names.transpose().or_fail(ExitKind::Config)?;
     let source = KeypointSource::open(path, names).map_err(|error| {
         let hint = format!(
-            "these are the `keypoints` of camera {:?}: a folder with a JSON file for every frame, in the layout of OpenPose, or one JSON \
-             file in that of COCO; `keypoint_names` says what they are called",
+            "these are the `keypoints` of camera {:?}: use a folder with a JSON file for every frame, in the layout of OpenPose, or one JSON \
+             file in the layout of COCO; `keypoint_names` gives their names",
             camera.name
         );
         Failure::new(ExitKind::Input, error).with_hint(hint)
@@ -76,8 +76,8 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
     }
     if extra.len() > MAX_KEYPOINTS {
         let message = format!(
-            "the networks and keypoint files of the cameras have {} different keypoints beside the joints, and there is room for \
-             {MAX_KEYPOINTS}",
+            "the networks and keypoint files of the cameras have {} different keypoints besides the joints, but at most \
+             {MAX_KEYPOINTS} are possible",
             extra.len()
         );
         let hint = "use the same set of keypoints for all cameras";
@@ -125,9 +125,9 @@ pub(crate) fn with_pictures(
 fn grey(name: &str, size: Size, n_frames: u64, rate_hz: Option<f64>) -> Result<Blank, Failure> {
     let rate_hz = rate_hz.ok_or_else(|| {
         let message = format!(
-            "camera {name:?} has keypoints and no `source`, and nothing says how many frames they have per second"
+            "camera {name:?} has keypoints without a `source`, and their frame rate is not known"
         );
-        let hint = "give `capture.frame_rate_hz` in the deployment: frames per second of the footage that they were found in";
+        let hint = "set `capture.frame_rate_hz` in the deployment to the frame rate of the footage in which they were found";
         Failure::new(ExitKind::Config, message).with_hint(hint)
     })?;
     Ok(Blank {
@@ -154,8 +154,8 @@ pub(crate) fn check_lengths(resolved: &Resolved, lengths: &[Option<u64>]) -> Vec
             core::cmp::Ordering::Less => "the last keypoints have no frames",
         };
         Some(format!(
-            "camera {:?}: {used} frames of footage and keypoints of {known} frames are to be used: {what}; both are counted from the \
-             first one, so do they begin together?",
+            "camera {:?}: {used} frames of footage and keypoints of {known} frames are used: {what}; both are counted from the \
+             first frame: do they begin at the same time?",
             camera.name
         ))
     });

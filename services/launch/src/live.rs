@@ -108,9 +108,11 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     if running.len() > 1 {
         let names: Vec<&str> = running.iter().map(|running| running.namespace.name()).collect();
         let message = format!("{} deployments run: {}", names.len(), names.join(", "));
-        return Err(Failure::new(ExitKind::Usage, message).with_hint("name one of them"));
+        return Err(
+            Failure::new(ExitKind::Usage, message).with_hint("give the name of one of them")
+        );
     }
-    let none = || Failure::new(ExitKind::Usage, "no deployment runs");
+    let none = || Failure::new(ExitKind::Usage, "no deployment is running");
     running.pop().map(|running| running.namespace).ok_or_else(none)
 }
 
@@ -122,7 +124,7 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
 pub fn description(namespace: &Namespace) -> Result<Resolved, Failure> {
     let name = namespace.name();
     let text = namespace.description().map_err(|error| {
-        let text = format!("deployment {name:?} does not say what it is: {error}");
+        let text = format!("deployment {name:?} has no description: {error}");
         Failure::new(ExitKind::Usage, text)
     })?;
     serde_json::from_str(&text).map_err(|error| {

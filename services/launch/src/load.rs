@@ -116,9 +116,9 @@ impl Machine for ThisMachine {
 /// Explains why a file is not a deployment file. Returns an empty text if the system's error is sufficient.
 fn why_not(file: &Path, error: &std::io::Error) -> &'static str {
     if error.kind() == ErrorKind::InvalidData {
-        ": it is no text (not UTF-8)"
+        ": it is not a text file (not UTF-8)"
     } else if file.is_dir() {
-        ": it is a folder; name the .toml file in it"
+        ": it is a folder; pass the .toml file in it"
     } else {
         ""
     }

@@ -18,8 +18,8 @@ pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option
         .collect();
     let [width, height] = fitting(image, frame);
     Some(format!(
-        "{:.0} % of every {}x{} frame of {} is padding, for the camera's image is {}x{}: the padding is searched in \
-         vain, and the person is small. Try capture.size = [{width}, {height}], or capture.scale = {:.3} in place of it",
+        "{:.0} % of every {}x{} frame of {} is padding, because the camera's image has {}x{} pixels: searching the padding wastes \
+         time, and the person is small. Try capture.size = [{width}, {height}], or replace it by capture.scale = {:.3}",
         100.0 * share(image, frame),
         frame[0],
         frame[1],

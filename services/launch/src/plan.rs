@@ -71,10 +71,10 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     // The vertical is stored in the deployment, so that every process and a replay use the same one.
     if let Some(found) = vertical::find(deployment)? {
         if host.is_some() {
-            let message = "neither the calibration nor the deployment says where up is";
+            let message = "neither the calibration nor the deployment gives the upward direction";
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint(format!(
-                "hosts must agree on it: `up = {:?}` in the deployment, which is what this one found",
+                "all hosts must use the same direction: set `up` in the deployment; this host found `up = {:?}`",
                 found.up
             )));
         }
@@ -115,7 +115,7 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
         tracing::warn!("{small}");
     }
     let n_frames = if resolved.is_endless() {
-        "frames until it is stopped".to_owned()
+        "frames until the run is stopped".to_owned()
     } else {
         format!("{} frames", resolved.n_frames())
     };

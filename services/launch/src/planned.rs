@@ -131,7 +131,7 @@ impl Planned {
         let elapsed = begin.elapsed();
         let report = Report::new(&self.resolved, self.plan.session, &outcome?, elapsed);
         if let Err(failure) = report.write_page(&self.resolved) {
-            tracing::warn!(%failure, "the page of the run is not written");
+            tracing::warn!(%failure, "the page of the run could not be written");
         }
         Ok(report)
     }

@@ -136,8 +136,8 @@ impl Prepared {
         let has_other_model = paper.model.is_some() && !is_shipped(paper.model.as_ref());
         if has_other_model && is_shipped(errors.and_then(Errors::network)) {
             tracing::warn!(
-                "paper.errors is the network that ships, which was trained on poses of the model that ships; it knows \
-                 nothing about those of another model"
+                "paper.errors is the shipped network, which was trained on poses of the shipped model; it cannot predict the \
+                 errors of another model"
             );
         }
         inputs::quality_network(errors, self.model.n_parts())?;
@@ -150,8 +150,8 @@ impl Prepared {
             if !(0..footage.n_frames).any(|nth| predictor.sigma_px(frame(nth)).is_some()) {
                 tracing::warn!(
                     view = self.views[view].name,
-                    "the table of paper.errors has no row for any frame of this view: see its frame_offset \
-                     and frame_step; every part counts as usable"
+                    "the table of paper.errors has no row for any frame of this view: check its frame_offset \
+                     and frame_step; all parts are treated as usable"
                 );
             }
         }
@@ -197,13 +197,13 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
         let [width, height] = camera.intrinsics.size;
         if size == [height, width] {
             return failure.with_hint(
-                "the size agrees once the pictures are turned: set `rotate = 90` or `rotate = 270` (degrees to the right) in its [[camera]], or \
-                 `rotate = \"tag\"` to turn them as the file asks",
+                "the sizes agree if the pictures are rotated: set `rotate = 90` or `rotate = 270` (degrees to the right) in its [[camera]], or \
+                 `rotate = \"tag\"` to rotate them as the file's tag says",
             );
         }
         failure.with_hint(
-            "calibrate at the size of the footage; if the footage lacks rows or columns of the \
-             calibrated image, say where it begins: source_offset_px = [x, y] in its [[camera]], [0, 0] if they are missing on the right or below",
+            "calibrate at the size of the footage; if the footage is a part of the \
+             calibrated image, set its position: source_offset_px = [x, y] in its [[camera]], [0, 0] if only columns on the right or rows below are missing",
         )
     })
 }
@@ -226,7 +226,7 @@ fn settings(
     let n_thresholds = fuse::tau_px(&config.tau).len();
     if ![0, model.n_parts()].contains(&n_thresholds) {
         let message = format!(
-            "`paper.tau` has {n_thresholds} thresholds, the model has {} parts",
+            "`paper.tau` has {n_thresholds} thresholds, but the model has {} parts",
             model.n_parts()
         );
         return Err(Failure::new(ExitKind::Config, message));

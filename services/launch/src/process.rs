@@ -84,15 +84,15 @@ impl Name {
     /// Returns the description for the help of the command line.
     pub fn help(self) -> &'static str {
         match self {
-            Self::Capture => "One per view: footage to frames",
-            Self::Pose => "One per view: frames to candidates and evidence",
-            Self::Quality => "One per view: expected errors",
-            Self::Fuse => "One per worker: pairs of views",
-            Self::Triangulate => "Joints in the world",
-            Self::Results => "The output folder",
-            Self::Record => "Every message into one file",
-            Self::Replay => "The recorded messages of another process",
-            Self::Bridge => "Messages between hosts",
+            Self::Capture => "One per view: turns footage into frames",
+            Self::Pose => "One per view: finds candidates and evidence in frames",
+            Self::Quality => "One per view: predicts expected errors",
+            Self::Fuse => "One per worker: fuses pairs of views",
+            Self::Triangulate => "Triangulates joints in the world",
+            Self::Results => "Writes the output folder",
+            Self::Record => "Records every message in one file",
+            Self::Replay => "Sends the recorded messages of another process",
+            Self::Bridge => "Transfers messages between hosts",
         }
     }
 }
@@ -120,7 +120,7 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
     let n_views = resolved.deployment.cameras.len();
     let per_view = matches!(name, Name::Capture | Name::Pose | Name::Quality);
     if per_view && arguments.index >= n_views {
-        let message = format!("there is no view {}, only {n_views}", arguments.index);
+        let message = format!("there is no view {}, only {n_views} views", arguments.index);
         return Err(Failure::new(ExitKind::Usage, message));
     }
     if per_view {
@@ -232,7 +232,7 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         None => quality::Source::Table(
             prepared
                 .predictor(resolved, view)?
-                .ok_or("there is no paper.errors")
+                .ok_or("paper.errors is not set")
                 .or_fail(ExitKind::Config)?,
         ),
     };

@@ -126,7 +126,7 @@ pub fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure>
         let failure = failure::in_file(file, &error);
         let (theirs, ours) = (&about.version, env!("CARGO_PKG_VERSION"));
         failure.with_hint(format!(
-            "recorded by version {theirs}, this is version {ours}"
+            "recorded by version {theirs}, but this is version {ours}"
         ))
     })
 }
@@ -179,7 +179,7 @@ pub fn damaged(
 pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     let chunks: BTreeSet<u64> = damaged.iter().map(|message| message.chunk).collect();
     let mut text = format!(
-        "  {} messages of {} damaged chunks are left out: the chunks are not what their checksums say",
+        "  {} messages of {} damaged chunks are left out: the chunks do not match their checksums",
         damaged.len(),
         chunks.len()
     );
@@ -196,7 +196,7 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     text.extend(named);
     if damaged.len() > MAX_LISTED {
         let more = damaged.len() - MAX_LISTED;
-        text.extend([format!("\n    and {more} more; --json names all")]);
+        text.extend([format!("\n    and {more} more; --json lists all")]);
     }
     (!damaged.is_empty()).then_some(text)
 }
@@ -213,7 +213,7 @@ pub fn damaged_json(damaged: &[Damaged]) -> Value {
 pub fn text(file: &Path, recording: &Recording) -> String {
     let extent = &recording.extent;
     let mut text = format!(
-        "{}: {} messages of {} topics in {:.1} MB",
+        "{}: {} messages of {} topics, {:.1} MB",
         file.display(),
         recording.n_messages(),
         recording.tracks.len(),
@@ -246,7 +246,10 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
         write!(text, "\n  and at {more} more places")?;
     }
     for (topic, n) in &extent.missing {
-        write!(text, "\n  {topic}: {n} messages are damaged and not found")?;
+        write!(
+            text,
+            "\n  {topic}: {n} messages are damaged and cannot be found"
+        )?;
     }
     if extent.n_malformed > 0 {
         let n = extent.n_malformed;

@@ -19,8 +19,8 @@ const MAX_RATE_RATIO: f64 = 1.02;
 /// Minimum range of brightness over the cells of an image, of 255. Images with less contrast are not compared.
 const MIN_CONTRAST: f64 = 16.0;
 /// Warning about footage without a frame rate.
-const NO_RATE: &str = "nothing says how many frames per second the footage has: times, speeds and pose3d.trc are left out; \
-    `capture.frame_rate_hz` says it";
+const NO_RATE: &str = "the frame rate of the footage is not known: times, speeds and pose3d.trc are left out; \
+    set `capture.frame_rate_hz`";
 /// If the brightest value of a picture is below this, of 255, the picture uses a small part of its range.
 const LEAST_BRIGHTEST: u8 = 64;
 /// Two images look the same if their mean difference of brightness over the cells is below this, of 255.
@@ -60,12 +60,12 @@ fn check_number(deployment: &Deployment) -> Result<(), Failure> {
         return Ok(());
     };
     let message = format!(
-        "the deployment has one camera, {:?}: nothing can be located in space by one alone",
+        "the deployment has only one camera, {:?}: a single camera cannot locate anything in space",
         camera.name
     );
     let failure = Failure::new(ExitKind::Config, message);
     Err(failure.with_hint(
-        "add a [[camera]] that sees the same people from elsewhere; `parallax detect` finds people in single images",
+        "add a [[camera]] that sees the same people from another position; `parallax detect` finds people in single images",
     ))
 }
 
@@ -90,7 +90,7 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         };
         let [a, b] = [first, nth].map(|i| &deployment.cameras[i].name);
         let message = format!(
-            "cameras {a:?} and {b:?} have one source, {}",
+            "cameras {a:?} and {b:?} have the same source, {}",
             footage::without_passwords(&source.to_string_lossy())
         );
         let failure = Failure::new(ExitKind::Config, message);
@@ -135,17 +135,17 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
 fn hint(finding: &Finding) -> String {
     match finding {
         Finding::Distance { metres, .. } => format!(
-            "say in the deployment what the numbers of the file are: `unit = \"mm\"` makes this {:.3} m, `unit = \"cm\"` {:.3} m, \
-             `unit = \"m\"` says that it is right",
+            "set the unit of the file in the deployment: with `unit = \"mm\"` this is {:.3} m, with `unit = \"cm\"` {:.3} m; \
+             use `unit = \"m\"` if the distance is right",
             metres / 1000.0,
             metres / 100.0
         ),
         Finding::OnePlace { .. } => {
-            "joints in space need cameras that stand apart, best a metre or more; `unit` in the deployment says what \
-             the numbers of the file are"
+            "to locate joints in space, cameras must be apart, best by a metre or more; `unit` in the deployment sets the unit of \
+             the file"
                 .to_owned()
         }
-        _ => "`parallax calib check` says more; calibrate again, or leave the camera out".to_owned(),
+        _ => "`parallax calib check` shows details; calibrate again, or leave the camera out".to_owned(),
     }
 }
 
@@ -168,16 +168,16 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     }
     let drift = resolved.n_frames() as f64 * step * (high / low - 1.0);
     let text = format!(
-        "{rates}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
+        "{rates}: frames are paired by their numbers, so at the end they are {drift:.1} frames apart"
     );
     if high / low <= MAX_RATE_RATIO || deployment.capture.frame_rate_hz.is_some() {
         return Ok((drift >= 0.5).then_some(text).or_else(|| without_rate(resolved)));
     }
     let failure = Failure::new(ExitKind::Input, text);
     Err(failure.with_hint(
-        "if the cameras have clocks of their own, set `offset_ms` in each [[camera]], as `parallax sync estimate` finds it (0 if they \
-         began together): a run then brings cameras of any rates to common instants; if a file is wrong about its rate, give the \
-         true one as `capture.frame_rate_hz`",
+        "if the cameras have separate clocks, set `offset_ms` in each [[camera]]: use the values from `parallax sync estimate`, or 0 if the cameras \
+         began at the same time. A run then brings cameras of any rates to common instants. If a file states a wrong rate, set the \
+         right one as `capture.frame_rate_hz`",
     ))
 }
 
@@ -188,7 +188,7 @@ fn without_rate(resolved: &Resolved) -> Option<String> {
     let names: Vec<&str> = unknown.map(|unknown| unknown.0.name.as_str()).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "nothing says how many frames per second {} has: the rate of the other cameras is used; `capture.frame_rate_hz` sets it",
+            "the frame rate of {} is not known: the rate of the other cameras is used; `capture.frame_rate_hz` sets another rate",
             names.join(", ")
         )
     })
@@ -202,7 +202,7 @@ fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<
     }
     let failure = Failure::new(ExitKind::Config, rates.to_owned());
     Err(failure.with_hint(
-        "set the same `frame_rate_hz` in each [[camera]], or the rate of the common instants as `capture.frame_rate_hz`: a slower camera then has no picture at some of them",
+        "set the same `frame_rate_hz` in each [[camera]], or set `capture.frame_rate_hz` to the rate of the common instants: a slower camera then has no picture at some instants",
     ))
 }
 
@@ -237,7 +237,7 @@ fn shorter(all: &[(&str, u64)]) -> Option<String> {
         .collect();
     (!short.is_empty()).then(|| {
         format!(
-            "{} than {long} with {many}: frames are paired by their numbers; do they begin together, at one rate?",
+            "{} than {long} with {many}: frames are paired by their numbers; do all cameras begin at the same time, with the same rate?",
             short.join(", ")
         )
     })
@@ -275,7 +275,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
             let [a, b] = [other, nth].map(|i| &deployment.cameras[i].name);
             if own.rgb == theirs.rgb {
                 let message = format!(
-                    "the first {} pictures of cameras {a:?} and {b:?} are equal, bit for bit, which two cameras never see",
+                    "the first {} pictures of cameras {a:?} and {b:?} are equal, bit for bit, so they come from one camera",
                     own.rgb.len()
                 );
                 let failure = Failure::new(ExitKind::Input, message);
@@ -286,7 +286,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
             let difference = own.difference(theirs);
             if difference < MIN_DIFFERENCE {
                 warnings.push(format!(
-                    "the first pictures of {a} and {b} differ by {difference:.1} of 255 on average: is it one video, given for two cameras?"
+                    "the first pictures of {a} and {b} differ by only {difference:.1} of 255 on average: was one video given for two cameras?"
                 ));
             }
         }

@@ -49,7 +49,7 @@ pub(crate) fn remove_denied(
     let warning = |(denied, names): &(Denied, Vec<String>)| {
         let reason = core::error::Error::source(denied).map(|source| format!(" ({source})"));
         format!(
-            "{}: {denied}{}; going on without. Try: {}",
+            "{}: {denied}{}; continuing without it. Try: {}",
             names.join(", "),
             reason.unwrap_or_default(),
             denied.hint()

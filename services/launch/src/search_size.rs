@@ -87,7 +87,7 @@ impl SearchSize {
         let chosen: Vec<String> =
             groups.iter().map(|group| describe(group, groups.len() > 1)).collect();
         let why = match self.n_sharing {
-            0 => "no two cameras share a space in which a person can stand, so the frames are as large as time permits"
+            0 => "no two cameras share a space in which a person can stand, so the frames are as large as possible in the available time"
                 .to_owned(),
             n => format!("{n} cameras share the space in which a person of {PERSON_METRES:.2} m stands"),
         };
@@ -108,7 +108,7 @@ impl SearchSize {
         let scale = better_scale(&seen)?;
         let names: Vec<&str> = small.iter().map(|small| small.name.as_str()).collect();
         let mut text = format!(
-            "a person is about {:.0} px high in the frames of {}, where {} to {} are good: ",
+            "a person is about {:.0} px high in the frames of {}, but {} to {} px are best: ",
             px(first),
             names.join(", "),
             GOOD_PX[0],
@@ -118,14 +118,14 @@ impl SearchSize {
         let _infallible = if first.is_limited {
             write!(
                 text,
-                "frames have {MOST_PIXELS} pixels at most unless it is set, to limit the time; for larger ones \
+                "to limit the time, frames have at most {MOST_PIXELS} pixels by default; for larger frames, \
                  set capture.scale = {scale} ({:.0} times the pixels)",
                 (scale / first.scale).powi(2)
             )
         } else {
             write!(
                 text,
-                "the image has no more; set capture.scale = {scale} to search it enlarged"
+                "the image has no more pixels; set capture.scale = {scale} to enlarge it for the search"
             )
         };
         Some(text)
@@ -221,7 +221,7 @@ mod tests {
         );
         let small = size(&[(1.0, Some(100.0), false)], 1).warning().unwrap();
         assert!(
-            small.ends_with("set capture.scale = 2 to search it enlarged"),
+            small.ends_with("set capture.scale = 2 to enlarge it for the search"),
             "{small}"
         );
     }

@@ -267,7 +267,7 @@ impl Report {
         text.extend(doubts.first().map(|doubt| format!(": {doubt}")));
         let is_good = self.kind().is_none();
         if !is_good && doubts.is_empty() && !trust::are_cameras_doubtful(summary) {
-            text.push_str("; the run is not whole: see below");
+            text.push_str("; the run is incomplete: see below");
         }
         Verdict { text, is_good }
     }
@@ -413,7 +413,7 @@ impl Report {
             let px = |value: Option<f64>| value.unwrap_or(f64::NAN);
             writeln!(
                 text,
-                "  calibration   {camera} does not stand where it says: cameras are {:.0} px apart with it, {:.0} px without",
+                "  calibration   {camera} is not where it says: the cameras differ by {:.0} px with this camera, and by {:.0} px without it",
                 px(fit.residual_px),
                 px(fit.without_px),
             )?;
@@ -435,7 +435,7 @@ impl Report {
         for (process, n) in &self.without_gpu {
             writeln!(
                 text,
-                "  GPU           {process} lost it: the processor computed {n} frames"
+                "  GPU           {process} lost the GPU: the processor computed {n} frames"
             )?;
         }
         Ok(())
@@ -455,7 +455,7 @@ impl Report {
             .collect();
         writeln!(
             text,
-            "  memory        {} MB (peak of one process, with the shared memory it uses)",
+            "  memory        {} MB (peak of one process, including its shared memory)",
             peaks.join(", ")
         )
     }
@@ -467,7 +467,7 @@ fn write_latency(text: &mut String, latency: &LatencyReport) -> core::fmt::Resul
     if let (Some(waiting), Some(transport)) = (latency.share_waiting, latency.share_transport) {
         writeln!(
             text,
-            "    of the end-to-end time {} is waiting for busy processes, {} transport",
+            "    of the end-to-end time, {} is waiting for busy processes, and {} is transport",
             percent(waiting),
             percent(transport)
         )?;

@@ -75,14 +75,14 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     };
     let mut images = Images::new(deployment, &cameras)?;
     if images.views.is_empty() {
-        let message = "nothing says which way is up: neither the calibration nor the deployment does, no people with heads and ankles are \
-                       among the keypoints, and there are no pictures";
-        let hint = "give `up` in the deployment, the direction against gravity in the world of the calibration, such as [0, 0, 1]";
+        let message = "the upward direction is not known: neither the calibration nor the deployment gives it, the keypoints have no people with \
+                       heads and ankles, and there are no pictures";
+        let hint = "set `up` in the deployment: the upward direction in the world of the calibration, such as [0, 0, 1]";
         return Err(Failure::new(ExitKind::Config, message).with_hint(hint));
     }
     tracing::warn!(
-        "the calibration does not say which way is up: looking for people in the first pictures of {} cameras, which takes up to half a \
-         minute; `up` in the deployment spares this",
+        "the calibration does not give the upward direction: searching for people in the first pictures of {} cameras, which takes up to half a \
+         minute; set `up` in the deployment to avoid this",
         images.views.len()
     );
     let mut tried: Vec<Hypothesis> = Vec::new();
@@ -138,15 +138,15 @@ fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String
         next.and_then(|hypothesis| Some((hypothesis.up, hypothesis.score?))),
     ) {
         (Some(score), Some((up, other))) => format!(
-            "people are found with a score of {score:.2}; with up = {} the score is {other:.2}",
+            "people are found with a score of {score:.2}, but with up = {} the score is {other:.2}",
             text(&up)
         ),
         (Some(score), None) => format!("people are found with a score of {score:.2}"),
         (None, _) => "nobody was found in the first pictures".to_owned(),
     };
     format!(
-        "the calibration does not say which way is up; up = {} is used: cameras are held within {off:.0} degrees of level, and \
-         {people}; give `up` in the deployment if it is wrong, or to begin sooner",
+        "the calibration does not give the upward direction; up = {} is used: cameras are level to within {off:.0} degrees, and \
+         {people}; set `up` in the deployment if this is wrong, or to start faster",
         text(&best.up)
     )
 }

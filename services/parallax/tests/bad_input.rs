@@ -150,7 +150,7 @@ fn calibrations() {
                 "camera \"a\"",
                 "96x128",
                 "calibrated for 128x96",
-                "the size agrees once the pictures are turned",
+                "the sizes agree if the pictures are rotated",
             ],
         },
         Row {

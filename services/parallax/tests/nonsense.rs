@@ -74,7 +74,7 @@ const CALIBRATIONS: &[Row] = &[
         &[
             "rig.toml: a and b are 1",
             "m apart",
-            "`unit = \"mm\"` makes this 1.",
+            "with `unit = \"mm\"` this is 1.",
         ],
     ),
     (
@@ -306,7 +306,7 @@ fn an_unspecified_vertical_is_estimated_and_reported() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     // The planted figure looks like a person whichever way it is turned: what is said is what counts.
     for said in [
-        "the calibration does not say which way is up; up = [",
+        "the calibration does not give the upward direction; up = [",
         "people are found with a score of",
     ] {
         assert!(ended.stderr.contains(said), "{}", ended.stderr);
@@ -315,7 +315,7 @@ fn an_unspecified_vertical_is_estimated_and_reported() {
     add(&case, "up = [0, 0, 1]");
     let ended = case.start(CHECK).wait();
     assert!(
-        !ended.stderr.contains("which way is up"),
+        !ended.stderr.contains("the upward direction"),
         "{}",
         ended.stderr
     );

@@ -199,7 +199,7 @@ fn results_of_an_earlier_run_are_replaced_only_when_asked_for() {
     let before = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
     let ended = run();
     assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    let said = "replace them with --force";
+    let said = "pass --force to replace them";
     assert!(ended.stderr.contains(said), "{}", ended.stderr);
     let after = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
     assert_eq!(before.modified().unwrap(), after.modified().unwrap());

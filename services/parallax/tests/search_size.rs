@@ -163,7 +163,7 @@ fn a_run_says_that_people_are_too_small_and_what_to_set() {
     assert_eq!(json["recorded"]["summary"]["person_px"]["a"], json!(px));
     let scale = outside["scale"].as_f64().unwrap();
     assert!((1.0..=2.0).contains(&scale), "{scale}");
-    let advice = format!("(110 to 350 suits the search): set capture.scale = {scale}");
+    let advice = format!("(110 to 350 px are best for the search): set capture.scale = {scale}");
     assert!(text.contains(&advice), "{text}");
 
     let (json, text) = run(&case, &["--set", "capture.size=[96,128]"]);

@@ -67,7 +67,7 @@ pub(crate) fn footage(
                     found.map(|look| of_live(look, capture)).map_err(|error| refused(error, camera))
                 }
                 Some(Err(_panic)) => {
-                    Err(Failure::new(ExitKind::Run, "a camera could not be asked"))
+                    Err(Failure::new(ExitKind::Run, "a camera could not be queried"))
                 }
             }
         });
@@ -89,8 +89,10 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     for (camera, found) in footage.iter().enumerate() {
         let name = &deployment.cameras[camera].name;
         let rate_hz = found.frame_rate_hz.ok_or_else(|| {
-            let message = format!("cameras have `offset_ms`, and nothing says how many frames per second camera {name:?} has");
-            Failure::new(ExitKind::Config, message).with_hint("give `capture.frame_rate_hz`")
+            let message = format!(
+                "cameras have `offset_ms`, but the frame rate of camera {name:?} is not known"
+            );
+            Failure::new(ExitKind::Config, message).with_hint("set `capture.frame_rate_hz`")
         })?;
         clocks.push(deployment.clock(camera, rate_hz * capture.frame_step as f64));
     }
@@ -99,7 +101,7 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     let looked = cameras.map(|((camera, timeline), found)| {
         let info = Retimed::look(&source(camera, capture), Some(&timeline)).map_err(|error| {
             let hint = format!(
-                "camera {:?} with `offset_ms` and `drift_ppm`: does its footage overlap with that of the others?",
+                "camera {:?} with `offset_ms` and `drift_ppm`: does its footage overlap in time with that of the other cameras?",
                 camera.name
             );
             Failure::new(ExitKind::Input, error).with_hint(hint)
@@ -136,7 +138,7 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     })?;
     if let Some(depth) = info.depth {
         tracing::warn!(
-            "camera {:?}: the pictures of {} have 16 bits and use {}: the brightest value is {}; they are scaled by that",
+            "camera {:?}: the pictures of {} have 16 bits, but use only {}: the brightest value is {}; they are scaled accordingly",
             camera.name,
             camera.source,
             depth.bits,
@@ -146,8 +148,8 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     if info.is_interlaced {
         let file = failure::wording::shell(&camera.source);
         tracing::warn!(
-            "camera {:?}: {} is interlaced: every picture consists of two halves from different moments, so that \
-             people who move have edges like combs; `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` makes whole pictures of them",
+            "camera {:?}: {} is interlaced: every picture consists of two halves from different moments, so \
+             moving people have jagged edges; use `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` to deinterlace it",
             camera.name,
             camera.source
         );
@@ -186,7 +188,7 @@ fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failur
 
 fn refused(error: LiveError, camera: &Camera) -> Failure {
     let hint = format!(
-        "this is the live camera {:?}; `parallax cameras` lists the video devices of this machine with what they offer, and \
+        "this is the live camera {:?}; `parallax cameras` lists the video devices of this machine and their formats, and \
          `parallax cameras view {}` takes a picture",
         camera.name,
         failure::wording::shell(footage::without_passwords(&camera.source))

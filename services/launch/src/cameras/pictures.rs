@@ -95,9 +95,9 @@ impl<'a> Tagged<'a> {
     fn does_turn(&self, camera: &str, rig: &Rig) -> bool {
         let (does_turn, why) = by_calibration(camera, rig, self.stored, self.tag);
         let done = if does_turn {
-            "which is done"
+            "which is applied"
         } else {
-            "which is not done"
+            "which is not applied"
         };
         tracing::warn!(
             "camera {camera:?}: the orientation tag of {} asks for its pictures to be {}, {done}: {why}",
@@ -123,7 +123,8 @@ fn with_up(rig: Rig) -> Rig {
 
 /// Returns true if a calibration is of the rotated picture, and the reason for this decision.
 fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, String) {
-    const BY_HAND: &str = "`rotate = 0` (as they are stored) or `rotate = \"tag\"` of the [[camera]] says it for good";
+    const BY_HAND: &str =
+        "`rotate = 0` (as stored) or `rotate = \"tag\"` in the [[camera]] sets it explicitly";
     let Some(camera) = rig.camera(name) else {
         return (true, BY_HAND.to_owned());
     };
@@ -133,19 +134,15 @@ fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, Stri
     if tag.swaps_sides() && is_wide(turned) != is_wide(stored) && width != height {
         let does_turn = is_wide(turned) == (width > height);
         let pixels = if does_turn { turned } else { stored };
-        let how = if does_turn {
-            "turned"
-        } else {
-            "as they are stored"
-        };
+        let how = if does_turn { "turned" } else { "as stored" };
         let why = format!(
-            "the calibration is of {width}x{height} pixels, and the pictures have {pixels} {how}"
+            "the calibration is for {width}x{height} pixels, and the pictures have {pixels} {how}"
         );
         return (does_turn, why);
     }
     // The rotation that turns the calibrated picture upright.
     let Some(roll) = upright_roll(camera, rig).map(f64::to_degrees) else {
-        return (true, format!("players show it so; {BY_HAND}"));
+        return (true, format!("video players show it like this; {BY_HAND}"));
     };
     let most = if tag.swaps_sides() { 45.0 } else { 90.0 };
     let does_turn = roll.abs() < most;
@@ -187,8 +184,8 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
         Counting::InOrder => {
             if numbers.iter().any(|number| *number != numbers[0]) {
                 tracing::warn!(
-                    "the numbers of the pictures ({}) lie too far apart to be those of frames: pictures are paired in their order; \
-                     `numbers = [first, step]` of a [[camera]] says which numbers are frames",
+                    "the numbers of the pictures ({}) are too far apart to be frame numbers: pictures are paired in their order; \
+                     set `numbers = [first, step]` in a [[camera]] to define which numbers are frames",
                     ends()
                 );
             }
@@ -197,8 +194,8 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
         Counting::Common(common) => {
             if numbers.iter().any(|number| number[0] != numbers[0][0]) {
                 tracing::warn!(
-                    "cameras do not begin with the same picture ({}): frames are paired by these numbers; where each camera counts for \
-                     itself, `numbers = [first, step]` of its [[camera]] says which is the number of frame 0",
+                    "cameras do not begin with the same picture ({}): frames are paired by these numbers; if each camera counts \
+                     separately, set `numbers = [first, step]` in its [[camera]] to define the number of frame 0",
                     ends()
                 );
             }
@@ -206,8 +203,8 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
         }
         Counting::Own(own) => {
             tracing::warn!(
-                "the pictures of the cameras have numbers of their own ({}): the first of each is frame 0; do they begin together? \
-                 `numbers = [first, step]` of a [[camera]] says which is the number of frame 0",
+                "the pictures of each camera are numbered separately ({}): the first picture of each is frame 0; do the cameras begin at the same time? \
+                 Set `numbers = [first, step]` in a [[camera]] to define the number of frame 0",
                 ends()
             );
             own
@@ -215,7 +212,7 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
     };
     for (nth, counted) in of_cameras.iter().enumerate() {
         if let Some(gaps) = gaps(&numbers[nth], *counted) {
-            tracing::warn!("camera {:?} has no picture of {gaps}", name(nth));
+            tracing::warn!("camera {:?} has no picture for {gaps}", name(nth));
         }
     }
     for (camera, PictureNumbers { first, step }) in cameras.into_iter().zip(of_cameras) {

@@ -87,7 +87,7 @@ impl Origin {
             gathering = lines(source, given.lines, views, &mut flaws)?;
         } else if given.lines == Lines::Smooth {
             let message = format!(
-                "{} is not a folder: recordings hold only what was measured",
+                "{} is not a folder: recordings only contain measured trajectories",
                 source.display()
             );
             return Err(Failure::new(ExitKind::Usage, message));
@@ -106,7 +106,7 @@ impl Origin {
             };
             Failure::new(
                 kind,
-                format!("{}: {error}; nothing is written", source.display()),
+                format!("{}: {error}; nothing was written", source.display()),
             )
         })?;
         // All trials have the same frames and times.
@@ -164,7 +164,7 @@ fn check_rate(trial: &Trial, given: &Given) -> Result<(), Failure> {
     {
         let own = trial.rate_hz.unwrap_or_default();
         let message = format!(
-            "--rate {rate_hz} contradicts the times of the run, which has {own} frames a second"
+            "--rate {rate_hz} contradicts the times of the run, which has {own} frames per second"
         );
         return Err(Failure::new(ExitKind::Usage, message));
     }
@@ -234,12 +234,15 @@ fn lines(
     let path = if is_whole { whole } else { part };
     let file = files::open(&path).map_err(|error| {
         in_file(&path, &error).with_hint(match which {
-            Lines::Raw => "name the folder that a run has written, or an MCAP file",
-            Lines::Smooth => "`parallax smooth` writes it",
+            Lines::Raw => "give the folder of a finished run, or an MCAP file",
+            Lines::Smooth => "run `parallax smooth` first, which writes this file",
         })
     })?;
     if !is_whole {
-        flaws.push(format!("{} is of a run that has not ended", path.display()));
+        flaws.push(format!(
+            "{} belongs to a run that has not ended",
+            path.display()
+        ));
     }
     let mut gathering = Gathering::new(views);
     let mut input = BufReader::new(file);
@@ -255,7 +258,7 @@ fn lines(
             None => continue,
             Some(Err(_)) if !text.ends_with('\n') => {
                 flaws.push(format!(
-                    "{}: line {number} is cut off, and left out",
+                    "{}: line {number} is truncated, and left out",
                     path.display()
                 ));
                 break;

@@ -34,13 +34,13 @@ pub(super) fn openpose(
     }
     placed?;
     let mut notes = vec![
-        "BODY_25 without the points that no joint gives (nose, eyes, ears, toes, heels, unless a network names them)".to_owned(),
-        "the confidence is the share of the views that a joint was triangulated from; `pose_keypoints_sd_px` beside it is its \
+        "BODY_25 without the points that are not joints (nose, eyes, ears, toes, heels, unless a network finds them)".to_owned(),
+        "the confidence is the share of the views from which a joint was triangulated; `pose_keypoints_sd_px` is its \
          standard deviation in the picture"
             .to_owned(),
     ];
     if trials[0].joints.joints.iter().any(|joint| joint.name == "head") {
-        notes.push("the head is left out: BODY_25 has none".to_owned());
+        notes.push("the head is left out, because BODY_25 has no head".to_owned());
     }
     Ok(Written {
         format: "openpose",
@@ -49,7 +49,7 @@ pub(super) fn openpose(
             "pixels of the footage",
             "x right, y down, the centre of the top-left pixel at (0, 0)",
             "0, 0, 0; nobody in a frame without a result",
-            "standard deviation, pixels, beside the format",
+            "standard deviation in pixels, as an addition to the format",
         ],
         notes,
     })
@@ -110,7 +110,7 @@ pub(super) fn video(
     }
     let n_without = placed?;
     let mut notes = vec![format!(
-        "the ellipses are {} standard deviations of the joints, as the view sees them",
+        "the ellipses show {} standard deviations of the joints, as the view sees them",
         annotate::DEVIATIONS
     )];
     if n_without > 0 {

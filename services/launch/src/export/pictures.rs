@@ -112,14 +112,14 @@ impl Pictures {
 fn none(camera: &str, why: &str) -> Failure {
     let message = format!("camera {camera:?} has no pictures to draw on: {why}");
     Failure::new(ExitKind::Input, message).with_hint(
-        "leave out mp4, or export the recording of `parallax record`, which holds pictures (without `--without pixels`)",
+        "leave out mp4, or export a recording of `parallax record`, which contains pictures (except with `--without pixels`)",
     )
 }
 
 fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, String> {
     let camera = &resolved.deployment.cameras[nth];
     if camera.source.is_empty() || Blank::is_blank(&camera.source) {
-        return Err("it consists of keypoints".to_owned());
+        return Err("it has only keypoints".to_owned());
     }
     if crate::cameras::is_live(&camera.source) {
         return Err("it was live".to_owned());
@@ -139,7 +139,7 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
     let due = footage.map_or([0; 2], |footage| footage.size.map(|size| size as usize));
     if [size.width, size.height] != due {
         return Err(format!(
-            "{} is {size}, and was {}x{} in the run",
+            "{} is {size}, but was {}x{} in the run",
             camera.source, due[0], due[1]
         ));
     }

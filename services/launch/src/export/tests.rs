@@ -219,7 +219,7 @@ fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
     let origin = Origin::read(folder.path(), &Given::default()).unwrap();
     let refused =
         |formats: &[&str]| exported(&origin, &job(folder.path(), formats)).unwrap_err().to_string();
-    assert!(refused(&["c3d", "csv"]).contains("how many frames per second"));
+    assert!(refused(&["c3d", "csv"]).contains("the run has no frame rate"));
     assert!(refused(&["openpose"]).contains("deployment.json"));
     assert!(!folder.path().join("export").exists());
     exported(&origin, &job(folder.path(), &["csv"])).unwrap();
@@ -233,7 +233,10 @@ fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
     )
     .unwrap();
     let error = exported(&origin, &job(folder.path(), &["trc"])).unwrap_err();
-    assert!(error.to_string().contains("which way is up"), "{error}");
+    assert!(
+        error.to_string().contains("the upward direction is not known"),
+        "{error}"
+    );
     let folder = run(&[("pose3d.jsonl", &lines(2))]);
     let error = Origin::read(
         folder.path(),

@@ -13,7 +13,7 @@ const NONE: &str = "-";
 pub fn table(snapshot: &Snapshot) -> String {
     let alive = snapshot.processes.iter().filter(|process| process.pid.is_some()).count();
     let mut text = format!(
-        "{}: run by process {}, {alive} of {} processes live\n\n",
+        "{}: run by process {}, {alive} of {} processes alive\n\n",
         snapshot.name,
         snapshot.supervisor,
         snapshot.processes.len()
@@ -29,7 +29,7 @@ pub fn table(snapshot: &Snapshot) -> String {
     text.push_str(&cameras(snapshot));
     let counted = snapshot.processes.iter().filter_map(|process| {
         let n = process.reading.as_ref()?.n_people?;
-        Some(format!("people in view, of whom one is followed: {n}\n\n"))
+        Some(format!("people in view: {n} (one of them is followed)\n\n"))
     });
     text.extend(counted);
     let rows = snapshot.processes.iter().flat_map(|process| time_rows(snapshot, process));
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn a_deployment_is_shown_as_two_tables() {
         let expected = "\
-walk: run by process 3, 3 of 4 processes live
+walk: run by process 3, 3 of 4 processes alive
 
 PROCESS     VIEW  STATE   UP s  SENT  SENT/s  RESTARTS  QUEUE of MOST  MEMORY MB  EVIDENCE MB  DROPPED
 capture-9   -     begins     -     -       -         -              -          -            -  -
@@ -278,7 +278,7 @@ results  waiting     all       100   20.0  ";
         snapshot.processes[3].reading.as_mut().unwrap().n_people = Some(3);
         let text = table(&snapshot);
         assert!(
-            text.contains("people in view, of whom one is followed: 3\n"),
+            text.contains("people in view: 3 (one of them is followed)\n"),
             "{text}"
         );
     }

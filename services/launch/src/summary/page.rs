@@ -53,7 +53,7 @@ fn page(folder: &Path, content: &Content<'_>) -> Result<Page, Failure> {
         space: space(folder, content)?,
         marks: Vec::new(),
         tables,
-        legend: "Thick: the skeleton in space as the view sees it, right orange, left blue; thin and grey: what the view found by itself; pink: where the other views say that one part must lie. \
+        legend: "Thick lines: the skeleton in space as the view sees it, the right side orange, the left side blue. Thin grey lines: the pose that the view found alone. Pink: where one part must be according to the other views. \
                  All pictures are in overlays/."
             .to_owned(),
         strips: strips(folder, content.cameras),

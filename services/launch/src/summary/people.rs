@@ -44,7 +44,7 @@ impl Outside {
         let views: Vec<String> =
             views.map(|(name, px)| format!("{px:.0} px high in {name}")).collect();
         format!(
-            "people are {} ({} to {} suits the search): set capture.scale = {}{}",
+            "people are {} ({} to {} px are best for the search): set capture.scale = {}{}",
             views.join(", "),
             USABLE_PX[0],
             USABLE_PX[1],
@@ -91,7 +91,7 @@ mod tests {
         let said = outside(1.0, [Some(620.0), Some(300.0)]).unwrap();
         assert_eq!(
             said,
-            "people are 620 px high in c1 (110 to 350 suits the search): set capture.scale = 0.46"
+            "people are 620 px high in c1 (110 to 350 px are best for the search): set capture.scale = 0.46"
         );
         let said = outside(0.25, [Some(50.0), Some(50.0)]).unwrap();
         assert!(

@@ -54,8 +54,10 @@ impl Recorded {
     /// Returns the reason why there is no summary; `None` if there is one.
     pub(super) fn problem(&self) -> Option<String> {
         match self {
-            Self::Nothing => Some("nothing: the process `results` wrote no summary".to_owned()),
-            Self::Unreadable(why) => Some(format!("what cannot be read: {why}")),
+            Self::Nothing => {
+                Some("nothing: the process `results` did not write a summary".to_owned())
+            }
+            Self::Unreadable(why) => Some(format!("the summary cannot be read: {why}")),
             Self::Written(_) => None,
         }
     }

@@ -20,8 +20,8 @@ pub(super) fn text(
     let is_slow = !is_lossless && n > 0 && (n as f64) < MOST * n_frames as f64;
     is_slow.then(|| {
         format!(
-            "  slow          this machine had time for {n} of {n_frames} frames, {:.1} a second: smaller pictures (capture.scale), fewer cameras, less \
-             work beside it or more cores would help; `latency` below shows which stage takes long\n",
+            "  slow          this machine had time for {n} of {n_frames} frames, {:.1} per second. Smaller pictures (capture.scale), fewer cameras, fewer \
+             other programs or more cores would help; `latency` below shows which stage takes long\n",
             n as f64 / seconds.max(1e-3)
         )
     })

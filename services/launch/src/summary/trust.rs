@@ -19,7 +19,7 @@ pub(super) fn verdict(summary: &Summary, doubts: &[Doubt]) -> &'static str {
     } else if summary.trust.frames < Trust::MIN_FRAMES {
         "too few frames to judge"
     } else {
-        "nothing speaks against the results"
+        "no reason to doubt the results"
     }
 }
 

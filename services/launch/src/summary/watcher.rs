@@ -78,11 +78,13 @@ impl Watcher {
                 ));
             }
             Event::GivenUp { process, restarts } => {
-                self.print(&format!("{process} is given up after {restarts} restarts"));
+                self.print(&format!(
+                    "{process} is not restarted any more, after {restarts} restarts"
+                ));
             }
             Event::Dismissed { process } => {
                 self.print(&format!(
-                    "{process} is stopped: nothing is left that sends to it"
+                    "{process} is stopped, because no process sends to it any more"
                 ));
             }
             _ => {}
@@ -107,7 +109,7 @@ impl Watcher {
         let rate = self.n_done as f64 / self.begin.elapsed().as_secs_f64();
         let of = self.n_frames.map_or_else(String::new, |frame| format!(" of {frame}"));
         output::message(format_args!(
-            "{}{of} frames, {rate:.2} a second",
+            "{}{of} frames, {rate:.2} per second",
             self.n_done
         ));
     }

@@ -37,7 +37,7 @@ pub(super) fn read(rig: &Path, cameras: &[Camera]) -> Option<Vertical> {
         return None;
     }
     let why = format!(
-        "{} (as an earlier run found; kept in {}: delete it to search again)",
+        "{} (found by an earlier run and stored in {}: delete this file to search again)",
         kept.why,
         file.display()
     );
@@ -56,7 +56,10 @@ pub(super) fn write(rig: &Path, cameras: &[Camera], found: &Vertical) {
     };
     let file = file(rig);
     if let Err(error) = files::replace(&file, text.as_bytes()) {
-        tracing::info!("which way is up is not kept in {}: {error}", file.display());
+        tracing::info!(
+            "the upward direction could not be stored in {}: {error}",
+            file.display()
+        );
     }
 }
 

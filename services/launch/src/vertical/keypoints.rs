@@ -98,8 +98,8 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     }
     let up = snapped(up);
     let why = format!(
-        "the calibration does not say which way is up; up = {} is used: there {:.0} % of {} people in the keypoints have their heads above \
-         their ankles, and half of them lean by less than {lean:.0} degrees; give `up` in the deployment if it is wrong",
+        "the calibration does not give the upward direction; up = {} is used: with it, {:.0} % of {} people in the keypoints have their heads above \
+         their ankles, and half of them lean by less than {lean:.0} degrees; set `up` in the deployment if this is wrong",
         text(&up),
         100.0 * share,
         all.len()

@@ -208,7 +208,7 @@ const FOOTAGE: &[Mistake] = &[
         "text",
         |case| source(case, "rig.toml"),
         &["cannot decode", "rig.toml", "camera \"b\""],
-        &["shows whether the file is whole"],
+        &["check that the file is complete"],
     ),
     footage(
         "pattern without a match",
@@ -273,7 +273,7 @@ const MAY_NOT: &[Mistake] = &[
         "folder of images",
         |case| forbid(case, "b"),
         &["cannot read", "/b", "Permission denied"],
-        &["camera \"b\"", "must be able to read it"],
+        &["camera \"b\"", "you need permission to read it"],
     ),
     forbidden(
         "rig",

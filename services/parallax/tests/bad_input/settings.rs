@@ -47,7 +47,7 @@ const FILES: &[Mistake] = &[
         command: "config check a",
         code: 4,
         says: &["deployment file a", "is a folder"],
-        tries: &["name the .toml file in it"],
+        tries: &["pass the .toml file in it"],
     },
     Mistake {
         what: "a picture",
