@@ -58,7 +58,7 @@ fn verdict(person: &PersonSummary) -> String {
     if person.trust.frames < runfiles::Trust::MIN_FRAMES {
         "too few frames to judge".to_owned()
     } else {
-        "no reason to doubt it".to_owned()
+        "no reason for doubt".to_owned()
     }
 }
 
@@ -92,7 +92,7 @@ mod tests {
         let text = table(&people(10));
         let rows: Vec<&str> = text.lines().collect();
         assert_eq!(rows.len(), 10, "{text}");
-        let one = "         1       99        0      120   98.5 %        -  no reason to doubt it";
+        let one = "         1       99        0      120   98.5 %        -  no reason for doubt";
         assert_eq!(rows[1], one);
         assert!(rows[2].contains("4.2  may be wrong: "), "{text}");
         assert!(rows[9].contains("and 2 with fewer frames"), "{text}");
