@@ -41,6 +41,6 @@ pub enum LinkError {
         message: String,
     },
     /// This build has no link between hosts.
-    #[error("this build has no hosts: build with `--features hosts`")]
+    #[error("this build does not support hosts: build with `--features hosts`")]
     NotBuilt,
 }

@@ -69,7 +69,7 @@ impl Evidence {
             }
             match ViewMaps::pack(header, sample.payload()) {
                 Ok(bytes) => self.newest = Some((header.stamp.frame, bytes)),
-                Err(error) => tracing::warn!(%error, "evidence that does not cross"),
+                Err(error) => tracing::warn!(%error, "evidence that is not sent"),
             }
         }
         if let Item::Message { envelope, maps, .. } = item

@@ -85,7 +85,7 @@ pub fn join(
         if said.is_none_or(|said| said.elapsed() > SAY_EVERY) {
             if said.is_some() {
                 let what = if address.keys.is_some() {
-                    " (does it run, is it reachable, are its keys of the same authority, and is the common name of our certificate that of this host?)"
+                    " (is it running and reachable, are its keys from the same authority, and does our certificate have the name of this host?)"
                 } else {
                     ""
                 };

@@ -20,7 +20,7 @@ pub enum KeyError {
     #[error("there is no {0}")]
     Missing(PathBuf),
     /// A key file already exists.
-    #[error("{0} exists and is not replaced, because hosts that have it would be refused")]
+    #[error("{0} exists and is not replaced, because hosts with the old keys would be refused")]
     Exists(PathBuf),
     /// A file cannot be written.
     #[error("cannot write {file}")]
@@ -32,7 +32,7 @@ pub enum KeyError {
         source: std::io::Error,
     },
     /// A certificate cannot be created.
-    #[error("cannot make the certificate of {host}: {message}")]
+    #[error("cannot create the certificate of {host}: {message}")]
     Make {
         /// Name of the host.
         host: String,
@@ -40,7 +40,7 @@ pub enum KeyError {
         message: String,
     },
     /// This build cannot create keys.
-    #[error("this build has no hosts: build with `--features hosts`")]
+    #[error("this build does not support hosts: build with `--features hosts`")]
     NotBuilt,
 }
 

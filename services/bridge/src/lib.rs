@@ -49,7 +49,7 @@ pub const HAS_LINK: bool = cfg!(feature = "zenoh");
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     if job.address.keys.is_none() {
         tracing::warn!(
-            "link.insecure = true: anybody on the network can read the pictures of this deployment, and send others"
+            "link.insecure = true: anyone on the network can read the pictures of this deployment, and send false ones"
         );
     }
     match &job.role {

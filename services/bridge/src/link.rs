@@ -31,9 +31,7 @@ impl Link {
             message,
         };
         if address.keys.is_some() && !has_one_thread() {
-            tracing::warn!(
-                "the link has several threads: a host that dies can take this process along"
-            );
+            tracing::warn!("the link has several threads: if a host dies, this process may crash");
         }
         let config = zenoh::Config::from_json5(&config(address).to_string());
         let config = config.map_err(|error| failed(error.to_string()))?;
@@ -101,7 +99,7 @@ impl Link {
     /// Closes the link.
     pub(crate) fn close(self) {
         if let Err(error) = self.0.close().wait() {
-            tracing::debug!(%error, "the link does not close");
+            tracing::debug!(%error, "the link cannot be closed");
         }
     }
 }

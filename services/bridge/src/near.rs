@@ -166,7 +166,7 @@ impl Receiving<'_> {
                 Ok(it) => self.publish(&it)?,
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
                 Err(RecvTimeoutError::Disconnected) => {
-                    let message = "nothing receives from the link any more";
+                    let message = "no thread receives from the link any more";
                     return Err(Failure::new(ExitKind::Run, message));
                 }
             }

@@ -64,16 +64,16 @@ impl Blank {
             what: what.to_owned(),
         };
         let rest = address.strip_prefix(SCHEME);
-        let rest = rest.ok_or_else(|| layout("it begins otherwise"))?;
+        let rest = rest.ok_or_else(|| layout("it starts with something else"))?;
         let (size, options) = rest.split_once('?').unwrap_or((rest, ""));
         let sides = size.split_once('x');
-        let (width, height) = sides.ok_or_else(|| layout("no width and height"))?;
+        let (width, height) = sides.ok_or_else(|| layout("width and height are missing"))?;
         let [mut n_frames, mut rate_hz] = [None, None];
         for option in options.split('&').filter(|part| !part.is_empty()) {
             match option.split_once('=') {
                 Some(("frames", value)) => n_frames = Some(value),
                 Some(("rate", value)) => rate_hz = Some(value),
-                _ => return Err(layout(&format!("`{option}` is neither frames nor rate"))),
+                _ => return Err(layout(&format!("`{option}` is not `frames` or `rate`"))),
             }
         }
         let n_frames = n_frames.ok_or_else(|| layout("no `frames`"))?;
@@ -183,7 +183,7 @@ mod tests {
     fn addresses_that_cannot_be_are_refused_with_what_is_wrong() {
         for (address, words) in [
             ("blank.mp4", "begins otherwise"),
-            ("blank://?frames=1&rate=1", "no width and height"),
+            ("blank://?frames=1&rate=1", "width and height are missing"),
             ("blank://64x48?rate=1", "no `frames`"),
             ("blank://64x48?frames=1", "no `rate`"),
             ("blank://64x48?frames=1&rate=1&x=2", "`x=2` is neither"),

@@ -118,7 +118,7 @@ impl<'a> Camera<'a> {
             tracing::warn!(
                 n,
                 expected = self.n_expected,
-                "beginning without all receivers"
+                "starting before all receivers are connected"
             );
             self.n_expected = n;
         }
@@ -210,7 +210,7 @@ impl<'a> Camera<'a> {
                 tracing::warn!(
                     n,
                     expected = self.n_expected,
-                    "going on without all receivers"
+                    "continuing without some receivers"
                 );
                 self.n_expected = n;
                 break;
@@ -274,7 +274,7 @@ impl<'a> Camera<'a> {
     /// Saves the position at which a restarted process continues.
     pub(crate) fn note(&mut self, n_sent: u64) {
         if let Err(error) = self.place.note([n_sent]) {
-            tracing::debug!(%error, "cannot note the place in the footage");
+            tracing::debug!(%error, "cannot save the position in the footage");
         }
     }
 

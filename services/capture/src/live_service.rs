@@ -251,7 +251,7 @@ impl Live<'_, '_> {
                 view = self.job.view,
                 rate_hz,
                 wanted_hz = self.wanted.rate_hz,
-                "this camera has another rate than the run"
+                "the rate of this camera differs from that of the run"
             );
         }
     }

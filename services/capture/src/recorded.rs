@@ -31,7 +31,7 @@ pub struct Recorded {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedError {
     /// The address does not name a camera.
-    #[error("no camera is named: write run.mcap#NAME")]
+    #[error("no camera is named: use run.mcap#NAME")]
     NoName,
     /// The file cannot be opened.
     #[error("cannot open the recording")]
@@ -40,7 +40,7 @@ pub enum RecordedError {
     #[error("cannot read the recording")]
     Read(#[from] ReadError),
     /// The recording has no pictures of this camera.
-    #[error("it holds no original pictures of camera {camera:?}; {}", others(.known))]
+    #[error("it has no original pictures of camera {camera:?}; {}", others(.known))]
     NoCamera {
         /// Name of the camera.
         camera: String,
@@ -62,10 +62,9 @@ pub enum RecordedError {
 
 fn others(known: &[String]) -> String {
     if known.is_empty() {
-        "it holds pictures of no camera: only `parallax record` of live cameras keeps them"
-            .to_owned()
+        "it has no original pictures: only `parallax record` of live cameras keeps them".to_owned()
     } else {
-        format!("it holds those of {}", known.join(", "))
+        format!("it has those of {}", known.join(", "))
     }
 }
 

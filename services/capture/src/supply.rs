@@ -165,7 +165,7 @@ impl Supply {
                 messages = complaints.messages,
                 undecoded = complaints.undecoded,
                 last = complaints.last,
-                "the decoder complained about this camera's film; pictures that were not whole are left out"
+                "the decoder complained about this camera's video; incomplete pictures are left out"
             );
         }
     }
@@ -255,7 +255,7 @@ impl Supply {
             FaultKind::Unplug => Some(FootageError::NotFound { path: path() }),
             FaultKind::Damage => Some(FootageError::Video {
                 path: path().into(),
-                message: "a fault on purpose".to_owned(),
+                message: "a simulated fault".to_owned(),
             }),
             FaultKind::Size => {
                 let Size { width, height } = self.info.size;
@@ -371,7 +371,7 @@ impl Supply {
 
 /// Never returns, like a process that is stuck in a computation.
 fn spin() -> ! {
-    tracing::warn!("computing for ever, on purpose");
+    tracing::warn!("simulating an endless loop");
     loop {
         core::hint::spin_loop();
     }

@@ -62,7 +62,7 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         // The identities are saved before they are sent, so that no identity that was sent is ever lost.
         let noted = place.note_bytes(bytemuck::cast_slice(&step.memory()));
         if let Err(error) = noted.as_ref() && is_noted {
-            tracing::warn!(%error, "cannot note who is there: after a death of this process people have new identities");
+            tracing::warn!(%error, "cannot save the identities of people: if this process dies, people get new identities");
         }
         is_noted = noted.is_ok();
         let message = wire::people_to_message(&found, present).or_fail(ExitKind::Run)?;

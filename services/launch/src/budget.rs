@@ -165,7 +165,7 @@ latency budget of 49.9 ms exceeded: the 99th percentile end to end is 50.0 ms (1
         for latency in [None, Some(LatencyReport::default()), Some(latency(0))] {
             let budget = Budget::new(1e9, latency.as_ref());
             assert!(!budget.is_held() && !budget.is_exceeded(), "{latency:?}");
-            assert!(budget.error_text().contains("could not be judged"));
+            assert!(budget.error_text().contains("could not be checked"));
             assert_eq!(budget.json()["p99_ms"], Value::Null);
         }
     }

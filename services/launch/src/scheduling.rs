@@ -113,7 +113,9 @@ mod tests {
         assert!(priority.contains("permission denied"), "{priority}");
         assert!(priority.contains("ulimit -r"), "{priority}");
         assert!(
-            cores.starts_with("pose-1: cannot run on cores 1,7: 0,1 may be used; going on without"),
+            cores.starts_with(
+                "pose-1: cannot run on cores 1,7: 0,1 may be used; continuing without it"
+            ),
             "{cores}"
         );
         let got = processes.map(|process| process.scheduling.to_string());

@@ -193,7 +193,7 @@ fn footage_of_another_camera_is_refused_or_reported() {
             CHECK,
             3,
             &[
-                "cameras \"a\" and \"b\" have one source",
+                "cameras \"a\" and \"b\" have the same source",
                 "footage of its own camera",
             ],
         ),
@@ -202,7 +202,7 @@ fn footage_of_another_camera_is_refused_or_reported() {
             |fixture| fixture.edit("deployment.toml", "source = \"b\"", "source = \"./c/../a\""),
             RUN,
             3,
-            &["cameras \"a\" and \"b\" have one source"],
+            &["cameras \"a\" and \"b\" have the same source"],
         ),
         (
             "copies of one footage",

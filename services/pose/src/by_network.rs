@@ -21,11 +21,7 @@ impl View<'_> {
         if let Err(error) = step.look(image, &mut state.memory) {
             if !state.has_failed {
                 let error = failure::wording::in_one_line(&error);
-                tracing::warn!(
-                    frame = stamp.frame,
-                    error,
-                    "the network has no answer for a frame"
-                );
+                tracing::warn!(frame = stamp.frame, error, "the network failed on a frame");
                 state.has_failed = true;
             }
             return Ok(Err(Status::BAD_INPUT));

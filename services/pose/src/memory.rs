@@ -35,7 +35,7 @@ impl NetworkState {
             self.nobody = None;
         } else if now.saturating_sub(since) >= LONG_NANOS {
             tracing::warn!(
-                "nobody was seen in the last {} frames ({} s): is a person there, and does the detector fit (network.detector)?",
+                "nobody was seen in the last {} frames ({} s): is there a person, and is the detector suitable (network.detector)?",
                 n + 1,
                 now.saturating_sub(since) / 1_000_000_000
             );

@@ -126,7 +126,7 @@ fn predict(
         return no_prediction();
     }
     let Some(frame) = frame else {
-        tracing::debug!(frame_number, "the frame is gone");
+        tracing::debug!(frame_number, "the frame does not exist any more");
         return no_prediction();
     };
     let [width, height] = layout.image_size;
@@ -135,7 +135,7 @@ fn predict(
     let image = match Rgb8View::new(width, height, frame.payload()) {
         Ok(image) if has_expected_size => image,
         _ => {
-            tracing::warn!(frame_number, "a frame of another size");
+            tracing::warn!(frame_number, "a frame with another size");
             return no_prediction();
         }
     };

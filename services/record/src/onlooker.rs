@@ -40,7 +40,10 @@ pub fn look_on(
     is_over: impl Fn() -> bool,
 ) -> Result<Kept, Failure> {
     let file = create(&job.file).map_err(|error| {
-        let text = format!("cannot make the recording {}: {error}", job.file.display());
+        let text = format!(
+            "cannot create the recording {}: {error}",
+            job.file.display()
+        );
         Failure::new(ExitKind::Input, text)
     })?;
     let channels = job.topics.channels(job.about.without);

@@ -59,7 +59,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     };
     let name = file_of_life(&job.file, epoch);
     let file = create(&name).map_err(|error| {
-        let text = format!("cannot make the recording {}: {error}", name.display());
+        let text = format!("cannot create the recording {}: {error}", name.display());
         Failure::new(kind, text)
     })?;
     let channels = job.topics.channels(job.about.without);

@@ -100,7 +100,7 @@ pub(crate) fn write_all(task: Task, outlet: &Outlet) {
 fn log_error(error: &WriteError) {
     let source = core::error::Error::source(error);
     let why = source.map(ToString::to_string).unwrap_or_default();
-    tracing::error!(%error, why, "the recording ends here; what it holds can be read");
+    tracing::error!(%error, why, "the recording ends here; the messages in it can be read");
 }
 
 #[cfg(test)]

@@ -67,7 +67,7 @@ impl Calibration {
                     camera = scene.views[view].name,
                     residual_px = fit.residual_px,
                     without_px = fit.without_px,
-                    "does not stand where the calibration says"
+                    "is not where the calibration says"
                 );
             }
             fit.suspected = is_named;
@@ -102,7 +102,7 @@ impl Calibration {
                     camera = scene.views[view].name,
                     offset_ms = fit.offset_ms,
                     offset_error_ms = fit.offset_error_ms,
-                    "is out of step: its pictures were taken at other times than they say"
+                    "is out of step: its pictures were taken at other times than they state"
                 );
             }
             fit.out_of_step = is_named;
@@ -116,8 +116,8 @@ impl Calibration {
         };
         let cameras = it.views.map(|view| scene.views[view].name.clone());
         tracing::warn!(
-            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, with the footage of the two \
-             exchanged by {:.1}{}",
+            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, but only by {:.1} if the footage of \
+             the two is exchanged{}",
             cameras[0],
             cameras[1],
             it.degrees,
@@ -125,7 +125,7 @@ impl Calibration {
             if it.is_sure {
                 ""
             } else {
-                "; it may be other two"
+                "; it may also be two other cameras"
             },
         );
         self.exchanged = Some(Exchanged {

@@ -42,7 +42,7 @@ impl Folder {
     /// Fails with [`FolderError`] if the folder cannot be used.
     pub fn open(dir: &Path, resume: bool) -> Result<Self, FolderError> {
         let dir = files::Folder::create(dir).map_err(|source| FolderError {
-            doing: "make the folder",
+            doing: "create the folder",
             path: dir.to_owned(),
             source,
         })?;
@@ -95,7 +95,7 @@ impl Folder {
             }
             self.dir.begin(&part)?.write_all(&vec![b' '; bytes])
         });
-        taken.map_err(|source| self.failed("make room for", name, source))?;
+        taken.map_err(|source| self.failed("reserve space for", name, source))?;
         self.parts.push(name.to_owned());
         Ok(())
     }
@@ -144,7 +144,7 @@ impl Folder {
             let mut mark = inner.begin(MARK)?;
             mark.write_all(b"pictures of a run of parallax\n")
         });
-        marked.map_err(|source| self.failed("make the folder", name, source))?;
+        marked.map_err(|source| self.failed("create the folder", name, source))?;
         self.parts.push(name.to_owned());
         Ok(path)
     }
@@ -241,10 +241,7 @@ pub fn remove_pictures(path: &Path) -> Result<(), FolderError> {
     if !path.join(MARK).is_file()
         && let Some(other) = other_than_pictures(path, 2).map_err(failed)?
     {
-        let text = format!(
-            "{} is not a picture of a run; move it away",
-            other.display()
-        );
+        let text = format!("{} was not written by a run; move it away", other.display());
         return Err(failed(io::Error::other(text)));
     }
     fs::remove_dir_all(path).map_err(failed)
@@ -311,7 +308,7 @@ mod tests {
         let errors = folder.finish();
         let text = format!("{} {}", errors[0], errors[0].source);
         assert!(
-            text.contains("holiday.png is not a picture of a run"),
+            text.contains("holiday.png was not written by a run"),
             "{text}"
         );
         assert!(own.exists() && pictures.join("left/000001.png").exists());

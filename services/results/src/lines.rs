@@ -51,7 +51,7 @@ impl Lines {
         }
         self.lacks_some = true;
         if let Err(error) = self.file.set_len(self.len) {
-            tracing::debug!(%error, "cannot take back half a line");
+            tracing::debug!(%error, "cannot remove an incomplete line");
         }
         written
     }

@@ -49,7 +49,7 @@ pub enum OutputError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     /// The histograms cannot be created.
-    #[error("cannot make the latency histograms")]
+    #[error("cannot create the latency histograms")]
     Latency(#[from] hdrhistogram::CreationError),
     /// The first line cannot be written.
     #[error("cannot write to the output folder")]
@@ -248,7 +248,7 @@ impl Output {
         self.folder.remove_smoothed();
         for error in self.folder.finish() {
             let is_first = self.tally.failed(&error);
-            tracing::error!(%error, is_first, "a file keeps its name of an unfinished file");
+            tracing::error!(%error, is_first, "a file keeps its temporary name");
         }
         self.tally.summary()
     }
@@ -294,7 +294,7 @@ impl Output {
         });
         let axes = match scene.up_in_world {
             Some(_) => "y up",
-            None => "the world's: the rig does not say which way is up",
+            None => "those of the world, because the rig does not give the upward direction",
         };
         RunSummary {
             frame_rate_hz: scene.frame_rate_hz,
@@ -313,7 +313,7 @@ impl Output {
         if let Err(error) = outcome
             && self.tally.failed(&error)
         {
-            tracing::error!(%error, "cannot write results; the pipeline goes on, failures are counted");
+            tracing::error!(%error, "cannot write results; the pipeline continues, and failures are counted");
         }
     }
 }

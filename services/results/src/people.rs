@@ -143,7 +143,7 @@ impl Counted {
         if frame.n_seen > 1 {
             self.n_with_others += 1;
             if self.n_with_others == MANY {
-                tracing::warn!("others are in view: {}", self.people().text());
+                tracing::warn!("other people are in view: {}", self.people().text());
             }
         }
     }

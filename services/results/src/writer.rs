@@ -98,7 +98,7 @@ impl Writer {
     pub(crate) fn rest(&self, absent: Vec<Absent>) {
         let record = None;
         if let Err(error) = self.queue.send(Batch { absent, record }) {
-            tracing::debug!(%error, "the writing thread is gone");
+            tracing::debug!(%error, "the writing thread has ended");
         }
     }
 

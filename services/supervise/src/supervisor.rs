@@ -23,8 +23,8 @@ const ASLEEP: Duration = Duration::from_secs(2);
 const LONGEST_STALL: Duration = Duration::from_mins(1);
 /// Message after such a stall.
 const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  \
-    hint: something else has filled, cut off or changed files in /dev/shm while they were in use: make room there; \
-    `parallax clean` removes what is left\n";
+    hint: another program has filled /dev/shm, or truncated or changed files there: free some space there; \
+    `parallax clean` removes the leftovers\n";
 
 /// Error of a failed run.
 #[derive(Debug, thiserror::Error)]
@@ -359,7 +359,7 @@ impl Supervisor<'_> {
             Sequel::GiveUp => {
                 let process = watch.spec.name.as_str();
                 if let Err(error) = Losses::of(&self.plan.namespace).note(process) {
-                    tracing::warn!(process, %error, "senders will wait for it for long");
+                    tracing::warn!(process, %error, "senders will wait a long time for it");
                 }
                 (self.on_event)(Event::GivenUp {
                     process: &watch.spec.name,

@@ -141,7 +141,7 @@ impl Arrivals {
         if nth >= self.next {
             return Place::Frame(nth);
         }
-        // If the clocks have different rates, the previous frame was either given up or already has its message.
+        // The previous frame was given up, or it already has its message because the clocks have different rates.
         if self.given_up() > 0 {
             self.tally.n_came_late += 1;
             Place::Late

@@ -39,7 +39,7 @@ pub enum ExchangeError {
     #[error("the answer is dated before its question")]
     Backwards,
     /// The other host claims to have taken longer than the whole exchange.
-    #[error("the answer took {inside} ns, the whole exchange only {outside} ns")]
+    #[error("the answer took {inside} ns, but the whole exchange only {outside} ns")]
     Inside {
         /// Time from question to answer on the other host, in nanoseconds.
         inside: u64,
@@ -89,8 +89,8 @@ impl Estimate {
         let share = self.bound_nanos as f64 / period_nanos.max(1) as f64;
         (share > max_share).then(|| {
             format!(
-                "its clock is known to {:.3} ms only, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %): \
-                 the network's round trips take {:.3} ms at best; a quieter network helps; if cameras stamp their \
+                "its clock is only known to {:.3} ms, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %), \
+                 because round trips on the network take {:.3} ms at best; use a network with less traffic; if cameras stamp their \
                  pictures themselves, run `chrony` or `linuxptp` on all hosts",
                 self.bound_nanos as f64 * 1e-6,
                 100.0 * share,

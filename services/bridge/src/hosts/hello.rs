@@ -44,7 +44,7 @@ pub struct Welcome {
 #[derive(Debug, thiserror::Error)]
 pub enum HelloError {
     /// There are too many bytes.
-    #[error("{0} bytes, at most {MOST_BYTES} are read")]
+    #[error("{0} bytes, but at most {MOST_BYTES} are allowed")]
     Long(usize),
     /// The content is not an introduction or answer.
     #[error("not an introduction")]

@@ -55,7 +55,7 @@ pub enum MapsError {
         expected: usize,
     },
     /// There are more Gaussians than any host sends.
-    #[error("{got} Gaussians, at most {MOST_GAUSSIANS}")]
+    #[error("{got} Gaussians, but at most {MOST_GAUSSIANS} are allowed")]
     Many {
         /// Number of Gaussians.
         got: usize,
@@ -224,7 +224,7 @@ mod tests {
         assert!(refused(&[&whole[..], b"x"].concat()).contains("149 bytes, expected 148"));
         let mut many = whole;
         many[44..48].copy_from_slice(&1200_u32.to_le_bytes());
-        assert!(refused(&many).contains("1200 Gaussians, at most 1024"));
+        assert!(refused(&many).contains("1200 Gaussians, but at most 1024 are allowed"));
     }
 
     proptest! {

@@ -113,7 +113,7 @@ pub enum PacketError {
     Magic([u8; 4]),
     /// The other host has another version.
     #[error(
-        "version {got} of the link, here is version {VERSION}; use the same Parallax on all hosts"
+        "version {got} of the link, but this host has version {VERSION}; use the same version of Parallax on all hosts"
     )]
     Version {
         /// Version of the other host.

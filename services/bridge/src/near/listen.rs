@@ -146,7 +146,8 @@ impl Gate {
             Content::ViewPose | Content::ViewQuality => self.carry == Carry::Poses,
         };
         if !crosses {
-            return remote.malformed(&"a message that does not cross: link.carry is another there");
+            return remote
+                .malformed(&"a message that must not be sent: link.carry differs on that host");
         }
         let mut state = remote.state();
         if state.welcomed != Some(packet.head.origin) {
@@ -217,14 +218,14 @@ impl Decoder {
             Content::Frame if it.head.status == Status::OK => {
                 let pixels = jpeg::decode(&it.body, self.size);
                 if pixels.is_none() {
-                    remote.malformed(&"a JPEG that is damaged, or of another size");
+                    remote.malformed(&"a JPEG that is damaged, or has another size");
                 }
                 pixels?
             }
             Content::Frame => Vec::new(),
             Content::ViewPose => {
                 let Some((poses, maps)) = maps::split(&it.body) else {
-                    remote.malformed(&"poses that are cut off");
+                    remote.malformed(&"truncated poses");
                     return None;
                 };
                 let maps = self.check(maps);
@@ -256,7 +257,7 @@ impl Decoder {
             _ if bytes.is_empty() => Ok(None),
             Some(maps) => maps.unpack(bytes).map(Some).map_err(|error| error.to_string()),
             None => Err(format!(
-                "{} bytes after poses, where no maps cross",
+                "{} bytes after poses, although no maps are sent",
                 bytes.len()
             )),
         }

@@ -101,7 +101,7 @@ impl Publisher {
                 view = self.view,
                 n,
                 expected,
-                "beginning without all receivers"
+                "starting before all receivers are connected"
             );
         }
     }

@@ -101,7 +101,10 @@ impl Remote {
         let mut state = self.state();
         if state.refused.as_deref() != Some(why) {
             let why = listed(why);
-            tracing::warn!(host = self.name, "refused, as the host sees it: {why}");
+            tracing::warn!(
+                host = self.name,
+                "refused, from the point of view of that host: {why}"
+            );
         }
         state.refused = Some(why.to_vec());
         state.welcomed = None;
@@ -114,7 +117,7 @@ impl Remote {
         state.last_malformed = why.to_string();
         if state.n_malformed.is_power_of_two() {
             let n = state.n_malformed;
-            tracing::warn!(host = self.name, %why, n, "what came from this host is refused");
+            tracing::warn!(host = self.name, %why, n, "messages of this host are refused");
         }
     }
 

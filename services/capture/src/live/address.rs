@@ -36,27 +36,28 @@ pub enum LiveError {
     #[error(transparent)]
     Device(#[from] VideoError),
     /// The format is not supported.
-    #[error("the format {format:?} is not read; these are: {}", known())]
+    #[error(
+        "the format {format:?} is not supported; supported formats: {}",
+        known()
+    )]
     Format {
         /// Format that was requested, or to which the device is set.
         format: String,
     },
     /// The stream does not give its rate.
-    #[error(
-        "{address} does not say how many pictures it has per second: set `frame_rate_hz` of the camera"
-    )]
+    #[error("{address} does not state its frame rate: set `frame_rate_hz` of the camera")]
     NoRate {
         /// Address without a password.
         address: String,
     },
     /// No picture came for some time.
-    #[error("{address} is silent")]
+    #[error("{address} sends no pictures")]
     Silent {
         /// Address without a password.
         address: String,
     },
     /// Another camera has the address of this one.
-    #[error("{address} is another camera now: {found}, expected {expected}")]
+    #[error("{address} is a different camera now: {found}, expected {expected}")]
     Another {
         /// Address of the camera.
         address: String,

@@ -293,14 +293,14 @@ fn say_of_clock(clock: &OwnClock, camera: &str) {
         tracing::info!(
             camera,
             delay_ms,
-            "this camera tells when its pictures were taken"
+            "this camera states when its pictures were taken"
         );
     } else {
         tracing::warn!(
             camera,
             delay_ms,
-            "by its own clock the pictures of this camera come before they were taken, or too late to be waited for: they count as \
-             taken when they came; set its clock and that of this machine by one time server"
+            "by its own clock, the pictures of this camera arrive before they were taken, or too late to be used: they count as \
+             taken when they arrived; set the camera's clock and that of this machine from the same time server"
         );
     }
 }

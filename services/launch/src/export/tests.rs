@@ -257,7 +257,7 @@ fn runs_that_are_not_whole_say_so_and_those_without_a_joint_are_refused() {
     assert_eq!(origin.trials[0].slots.len(), 2);
     let flaws = origin.flaws.join("\n");
     assert!(
-        flaws.contains("has not ended") && flaws.contains("line 3 is cut off"),
+        flaws.contains("has not ended") && flaws.contains("line 3 is truncated"),
         "{flaws}"
     );
     for text in ["", LINE, &format!("{LINE}\n{LINE}\n")] {

@@ -147,7 +147,7 @@ const LINES: &[Mistake] = &[
         made: |fixture| fixture.write("out", ""),
         command: "run deployment.toml",
         code: 4,
-        says: &["cannot make the folder", "out is a file"],
+        says: &["cannot create the folder", "out is a file"],
         tries: &["--out"],
     },
     Mistake {

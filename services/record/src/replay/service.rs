@@ -63,7 +63,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         }
         playback.send(*output, &message, &envelope)?;
         if let Err(error) = place.note([nth + 1]) {
-            tracing::debug!(%error, "cannot note the place in the recording");
+            tracing::debug!(%error, "cannot save the position in the recording");
         }
     }
     let end = end.unwrap_or_else(|| end_after(&order, &tracks, &mut file, job, recorded_session));
@@ -79,7 +79,7 @@ fn received(job: &Job) -> impl Iterator<Item = &Output> {
 fn tracks<'a>(job: &Job, recording: &'a Recording) -> Result<Vec<&'a Track>, Failure> {
     let tracks = received(job).map(|output| {
         recording.tracks.get(&output.topic).ok_or_else(|| {
-            let message = format!("{} holds nothing of {}", job.file.display(), output.topic);
+            let message = format!("{} has no messages of {}", job.file.display(), output.topic);
             Failure::new(ExitKind::Input, message)
         })
     });
@@ -201,7 +201,7 @@ impl<'a> Playback<'a> {
                     topic = output.topic,
                     n,
                     expected,
-                    "beginning without all receivers"
+                    "starting before all receivers are connected"
                 );
             }
         }
