@@ -1,4 +1,4 @@
-//! Facts that the files of cameras hold about themselves, in whole runs: numbers with gaps, tags of orientation.
+//! Tests of whole runs that use facts from the files of cameras: numbers with gaps, orientation tags.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Mistakes in deployment files, on command lines, and in the files that go with footage.
+//! Tests with mistakes in deployment files, on command lines, and in files that accompany footage.
 
 use std::fs;
 
@@ -205,13 +205,13 @@ const fn rig(
     }
 }
 
-/// Names a network that predicts errors.
+/// Sets a network that predicts errors.
 fn errors(case: &Case, file: &str) {
     let named = format!("workers = 2\nerrors = {file:?}");
     case.edit("deployment.toml", "workers = 2", &named);
 }
 
-/// Names a file of joints.
+/// Sets a file of joints.
 fn joints(case: &Case, file: &str) {
     let named = format!("bodies = false\njoint_map = {file:?}");
     case.edit("deployment.toml", "bodies = false", &named);
