@@ -92,7 +92,7 @@ impl SearchSize {
             n => format!("{n} cameras share the space in which a person of {PERSON_METRES:.2} m stands"),
         };
         format!(
-            "capture.scale is chosen: {}; {why} (capture.scale or capture.size sets it)",
+            "capture.scale is set automatically: {}; {why} (capture.scale or capture.size overrides this)",
             chosen.join("; ")
         )
     }
@@ -191,7 +191,7 @@ mod tests {
         let alike = size(&[(0.25, Some(690.0), false), (0.25, Some(710.0), false)], 2);
         assert_eq!(
             alike.text(),
-            "capture.scale is chosen: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; 2 cameras \
+            "capture.scale is set automatically: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; 2 cameras \
              share the space in which a person of 1.70 m stands (capture.scale or capture.size sets it)"
         );
         assert_eq!(alike.warning(), None);

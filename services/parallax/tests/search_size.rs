@@ -70,7 +70,7 @@ fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
     deployment(&case, &[[1088, 1920]; 4], 1800.0, 1.0);
     let text = said(&case);
     for words in [
-        "is chosen: 0.25, a person is 7",
+        "is set automatically: 0.25, a person is 7",
         "px in 272x480; 4 cameras share the space in which a person of 1.70 m stands",
         "capture.scale or capture.size sets it",
     ] {

@@ -40,8 +40,8 @@ pub fn table(snapshot: &Snapshot) -> String {
 const CAMERAS: [&str; 13] = [
     "<CAMERA",
     "OPENED",
-    "MADE",
-    "LOST BY IT",
+    "TAKEN",
+    "LOST",
     "USED",
     "SURPLUS",
     "OVERTAKEN",

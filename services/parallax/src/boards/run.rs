@@ -307,7 +307,7 @@ fn known(
             Err(Failure::new(
                 ExitKind::Usage,
                 format!(
-                    "--known has the cameras {}, none of {}",
+                    "--known has the cameras {}, but none of {}",
                     there.join(", "),
                     names.join(", ")
                 ),
@@ -429,7 +429,7 @@ impl Calibrated {
             source += "; intrinsics only, without poses";
         }
         if !self.outcome.doubts.is_empty() {
-            source += "; not to be trusted: ";
+            source += "; doubtful: ";
             source += &self.doubts().join("; ");
         }
         Rig::new(cameras, None, source).or_fail(ExitKind::Calibration)

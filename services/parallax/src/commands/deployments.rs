@@ -15,7 +15,7 @@ const UNMARKED: &str = "not a deployment: ignored";
 /// Options of `parallax status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-With a DEPLOYMENT, prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages.
+With a DEPLOYMENT, prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages. \
 `parallax top --help` explains the table. With --json, times are in milliseconds, and memory is in bytes.")]
 pub(crate) struct StatusArguments {
     /// Name or file of a running deployment whose processes and times are shown.

@@ -49,8 +49,8 @@ pub(crate) struct StatusArguments {
 /// Options of `parallax hosts keys`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Writes ca.pem, ca.key, and HOST.pem and HOST.key for every host into the folder `link.keys` of the deployment. In that folder, every
-host needs ca.pem and its own two files. ca.key is only needed to add hosts later; do not copy it to any host. Existing files are not
+Writes ca.pem, ca.key, and HOST.pem and HOST.key for every host into the folder `link.keys` of the deployment. In that folder, every \
+host needs ca.pem and its own two files. ca.key is only needed to add hosts later; do not copy it to any host. Existing files are not \
 replaced.
 
 Example:

@@ -16,16 +16,19 @@ use crate::commands::calibrate::height;
 /// Options of `parallax new`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Each step is a command, which is printed before it runs. Files of finished steps are kept. If `new` is run
-again, it continues after these steps; delete a file to repeat its step. If a step fails, `new` ends with the
+Each step is a command, which is printed before it runs. Files of finished steps are kept. If `new` is run \
+again, it continues after these steps; delete a file to repeat its step. If a step fails, `new` ends with the \
 exit code of the step. It also ends after a doubtful result (exit code 7), unless --go-on is given.
 
     1  Get the rig: --rig converts a calibration, --board with --show finds one (`parallax calibrate board`).
     2  Move the origin of the rig to the floor: --floor (`parallax calibrate origin`).
-    3  Write ROOM/deployment.toml. You may edit this file: `new` does not replace it (`parallax config check`).
-    4  With --people, find the poses of the cameras and the floor from a person who walks about in their footage
-       (`parallax calibrate people`). Only the lenses of --rig or of the board are used. No board on the floor is needed.
-    5  With --sync, find the clock offsets of recorded cameras from people (`parallax sync estimate --write`).
+    3  Write ROOM/deployment.toml. You may edit this file: `new` does not replace it
+       (`parallax config check`).
+    4  With --people, find the poses of the cameras, and the floor, from a person who walks about
+       in their footage (`parallax calibrate people`). Only the lenses of --rig or of the board are
+       used. No board on the floor is needed.
+    5  With --sync, find the clock offsets of recorded cameras from people
+       (`parallax sync estimate --write`).
     6  With --run, start a first run (`parallax run`).
 
 Examples:

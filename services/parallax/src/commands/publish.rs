@@ -11,8 +11,8 @@ use terminal::{Globals, output};
 /// Options of `parallax publish`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-No process of the deployment waits for this command, so it may be started and stopped at any time. Each person of
-a frame is sent in a datagram of at most 1400 bytes, as JSON on one line or as OSC bundles. A joint without a position is sent with the
+No process of the deployment waits for this command, so it may be started and stopped at any time. Each person of \
+a frame is sent in a datagram of at most 1400 bytes, as JSON on one line or as OSC bundles. A joint without a position is sent with the \
 reason, never as zeros. Datagrams that no program receives are lost. docs/guide/programs.md describes both formats.
 
 Examples:

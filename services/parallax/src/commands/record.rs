@@ -21,25 +21,25 @@ const MAX_EPOCHS: u32 = 64;
 /// Options of `parallax record`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The file is MCAP: chunked, indexed and not compressed. Messages are CDR with ROS 2 schemas. The metadata contains
+The file is MCAP: chunked, indexed and not compressed. Messages are CDR with ROS 2 schemas. The metadata contains \
 the settings of the run, and fingerprints of the files that it read. The run also writes its results, like `run`.
 
-With lossless delivery (capture.mode = \"lossless\"), a slow disk slows down the run. With realtime delivery it does
-not: messages that do not fit into the queue are left out. They are counted by topic in the file, and reported at the end.
-A file whose end is missing, because of a full disk or a crash, is valid up to that point. A restarted recording
+With lossless delivery (capture.mode = \"lossless\"), a slow disk slows down the run. With realtime delivery it does \
+not: messages that do not fit into the queue are left out. They are counted by topic in the file, and reported at the end. \
+A file whose end is missing, because of a full disk or a crash, is valid up to that point. A restarted recording \
 process continues in FILE.1.mcap. If anything was lost, the exit code is 7.
 
-For live cameras, the file also contains the original pictures at the full rate of the camera: JPEG files, raw pixels,
-or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches
+For live cameras, the file also contains the original pictures at the full rate of the camera: JPEG files, raw pixels, \
+or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches \
 these pictures later. No camera waits for the disk. Results go to the deployment's `output`; `--set output=DIR` sets another folder.
 
-Foxglove opens the file directly, and shows skeletons with their uncertainty, cameras and pictures. Besides Parallax's topics, the file
+Foxglove opens the file directly, and shows skeletons with their uncertainty, cameras and pictures. Besides Parallax's topics, the file \
 contains `foxglove.SceneUpdate`, `foxglove.FrameTransforms`, `foxglove.CameraCalibration` and `foxglove.CompressedImage`.
 
-With several hosts (`[[host]]`), the fusing host records all messages that arrive. Frames that other hosts do not send are missing. A
+With several hosts (`[[host]]`), the fusing host records all messages that arrive. Frames that other hosts do not send are missing. A \
 host with cameras records the output of its own cameras and processes. A deployment can use such a file as `source = \"FILE#NAME\"`.
 
-Before the run, the command prints the maximum size of one frame and of one second, and the free space. It does not start
+Before the run, the command prints the maximum size of one frame and of one second, and the free space. It does not start \
 without space for ten frames, or for all frames if there are fewer.
 
 Examples:

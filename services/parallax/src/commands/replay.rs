@@ -22,12 +22,12 @@ use crate::stage;
 /// Options of `parallax replay`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The stages before --from are not run. Instead, processes with their names send the recorded messages. The other
-stages run with the settings of the recorded run, except settings that --set replaces. With lossless delivery, and with
+The stages before --from are not run. Instead, processes with their names send the recorded messages. The other \
+stages run with the settings of the recorded run, except settings that --set replaces. With lossless delivery, and with \
 the same settings and files, the results are equal to the recorded ones, bit for bit.
 
-A truncated file is replayed up to its end. Every chunk (a frame or 4 MiB) has a checksum. The messages of a damaged
-chunk are listed, counted and left out. In both cases the exit code is 7. End-to-end latency is only meaningful at --speed 1. The times
+A truncated file is replayed up to its end. Every chunk (a frame or 4 MiB) has a checksum. The messages of a damaged \
+chunk are listed, counted and left out. In both cases the exit code is 7. End-to-end latency is only meaningful at --speed 1. The times \
 of the stages that are run are always meaningful.
 
 Examples:

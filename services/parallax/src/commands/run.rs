@@ -17,13 +17,13 @@ use super::{hosts, publish, view};
 #[command(after_help = "\
 Ctrl-C stops the run. A second Ctrl-C, at least half a second after the first, ends it at once.
 
-The output folder contains pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json,
-deployment.json and overlays/. Only the user who started the run can read these files. They are called *.part until they are
-complete. With --force, the results of an earlier run are replaced when the new ones are complete. A file that no run has
+The output folder contains pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, \
+deployment.json and overlays/. Only the user who started the run can read these files. They are called *.part until they are \
+complete. With --force, the results of an earlier run are replaced when the new ones are complete. A file that no run has \
 written is never replaced. Only one run at a time can use the folder.
 
-pose3d.jsonl has one line per frame, in order: the result, or the status \"no result\" with the reason. pose3d.trc has a row of NaN
-for a frame without a result. It is written only if the frame rate is known. A run without any result is degraded, and the
+pose3d.jsonl has one line per frame, in order: the result, or the status \"no result\" with the reason. pose3d.trc has a row of NaN \
+for a frame without a result. It is written only if the frame rate is known. A run without any result is degraded, and the \
 summary says why.
 
 Examples:
@@ -34,8 +34,8 @@ Examples:
     parallax run my.toml --dry-run
     parallax run my.toml --host left        run the part of one of several machines
 
-During the run, `parallax top` and `parallax status NAME --json` show every process and its times. With a
-latency budget, the run ends with exit code 6 if the 99th percentile from capture to result exceeds the budget. It also does so
+During the run, `parallax top` and `parallax status NAME --json` show every process and its times. With a \
+latency budget, the run ends with exit code 6 if the 99th percentile from capture to result exceeds the budget. It also does so \
 if no frame was measured, unless Ctrl-C stopped the run before the first measurement.")]
 #[expect(
     clippy::struct_excessive_bools,

@@ -17,17 +17,18 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions{left} {prefix}
 #[derive(Debug, Args)]
 #[command(after_help = "\
 FOLDER contains the results of a run. They are not changed. The command adds the files
-    pose3d-smooth.jsonl   like pose3d.jsonl; `states` says whether a joint is measured, exchanged, filled or rejected
-    angles.csv            hips, knees, ankles, shoulders, elbows and trunk, in degrees, with standard deviations
-    smooth.json           the method, its parameters, and how many measurements were used, exchanged, filled or rejected
+    pose3d-smooth.jsonl   like pose3d.jsonl, with the state of each joint in `states`
+    angles.csv            angles of hips, knees, ankles, shoulders, elbows and trunk, in degrees
+    smooth.json           the method, its parameters, and the number of measurements by state
 
-No options are needed: the process noise and the scale of the covariances of each joint are estimated from the measurements.
+A joint is measured, exchanged, filled or rejected. Angles have standard deviations. \
+No options are needed: the process noise and the scale of the covariances of each joint are estimated from the measurements. \
 See docs/guide/smooth.md.
 
 If you have ground truth, `parallax-lab smooth` compares the result with it.
 
-Exit codes: 0 done; 7 done, but with doubts (`doubts`: the file is truncated, nothing was measured, or many
-measurements contradict each other); 2 an option is wrong, or the cutoff is too high for the rate; 4 the folder cannot be read, a line
+Exit codes: 0 done; 7 done, but with doubts (`doubts`: the file is truncated, nothing was measured, or many \
+measurements contradict each other); 2 an option is wrong, or the cutoff is too high for the rate; 4 the folder cannot be read, a line \
 is wrong, or times do not ascend.
 
 With --json, prints one object:

@@ -15,21 +15,21 @@ use launch::live::{self, Live};
 /// Options of `parallax top`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Keys: space, j or page down shows the next page, k or page up shows the previous page, and the arrows move by one line. q, Escape
+Keys: space, j or page down shows the next page, k or page up shows the previous page, and the arrows move by one line. q, Escape \
 or Ctrl-C quits. `top` ends when the deployment ends.
 
 States:
     runs     the process works
     done     the process has sent the end of its footage, and waits for the stop request
     begins   the process has not sent a message yet
-    silent   the process is alive, but has sent no message for five seconds: stopped, or without processor time
+    silent   the process is alive, but has sent no message for five seconds (it may be stopped)
     dead     there is no process; the supervisor may start it again
 The last values of a dead process stay in the table.
 
 Stages:
-    waiting         from sending a message until work on it begins (transport, a busy receiver, other views)
+    waiting         until work on a message begins: transport, a busy receiver, other views
     computing       from the beginning of the work to its end
-    publishing      until the result is sent (with lossless delivery, this includes slow receivers)
+    publishing      until the result is sent; with lossless delivery, includes slow receivers
     since capture   from the capture of the frame to the message of this process
     end to end      from the capture to the result
 Percentiles are over the lifetime of the process. Rates are over the last five seconds.")]

@@ -36,8 +36,8 @@ cameras at a time must see the board. A table says which pictures were taken tog
 It has the format of Caliscope: the n-th row of a camera is its n-th picture. Without a table, pictures with the same number \
 belong together; if frame rates differ, pictures with the same time.
 
-The world has the axes and origin of the first camera. `parallax calibrate origin` moves its origin to the floor. If the result is doubtful,
-the files are written, the report and the rig state the doubts, and the exit code is 7. Without a result, the exit code is 5,
+The world has the axes and origin of the first camera. `parallax calibrate origin` moves its origin to the floor. If the result is doubtful, \
+the files are written, the report and the rig state the doubts, and the exit code is 7. Without a result, the exit code is 5, \
 or 4 if no picture shows the board.
 
 With --json, prints one object:

@@ -53,7 +53,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("expected 0 to 1000000 seconds, got {text:?}"))
 }
 
-/// What all cameras saw of people.
+/// People in the footage of all cameras.
 pub(super) struct Walk {
     pub(super) deployment: Deployment,
     pub(super) found: Films,
