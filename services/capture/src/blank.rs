@@ -182,11 +182,11 @@ mod tests {
     #[test]
     fn addresses_that_cannot_be_are_refused_with_what_is_wrong() {
         for (address, words) in [
-            ("blank.mp4", "begins otherwise"),
+            ("blank.mp4", "starts with something else"),
             ("blank://?frames=1&rate=1", "width and height are missing"),
             ("blank://64x48?rate=1", "no `frames`"),
             ("blank://64x48?frames=1", "no `rate`"),
-            ("blank://64x48?frames=1&rate=1&x=2", "`x=2` is neither"),
+            ("blank://64x48?frames=1&rate=1&x=2", "`x=2` is not"),
             ("blank://0x48?frames=1&rate=1", "`width` is \"0\""),
             (
                 "blank://64x99999?frames=1&rate=1",

@@ -192,7 +192,7 @@ mod tests {
         assert_eq!(
             alike.text(),
             "capture.scale is set automatically: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; 2 cameras \
-             share the space in which a person of 1.70 m stands (capture.scale or capture.size sets it)"
+             share the space in which a person of 1.70 m stands (capture.scale or capture.size overrides this)"
         );
         assert_eq!(alike.warning(), None);
         let text = size(&[(0.25, Some(690.0), false), (0.5, None, false)], 2).text();
@@ -212,7 +212,7 @@ mod tests {
         let limited = size(&[(0.25, Some(300.0), true), (0.25, Some(700.0), false)], 2);
         let warning = limited.warning().unwrap();
         assert!(
-            warning.contains("75 px high in the frames of a, where 150 to 250"),
+            warning.contains("75 px high in the frames of a, but 150 to 250"),
             "{warning}"
         );
         assert!(

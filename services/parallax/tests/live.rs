@@ -179,7 +179,7 @@ fn a_run_that_misses_its_latency_budget_fails_and_reports_the_times_of_its_stage
     let ended = budgeted(&case, "0.001");
     assert_eq!(ended.status.code(), Some(6), "{}", ended.stderr);
     for said in [
-        "latency budget of 0.001 ms missed",
+        "latency budget of 0.001 ms exceeded",
         "p99.9",
         "triangulate",
         "end to end",

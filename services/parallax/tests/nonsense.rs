@@ -116,7 +116,11 @@ const CALIBRATIONS: &[Row] = &[
         |case| move_cameras(case, |_| 0.0),
         RUN,
         5,
-        &["3 cameras are at one place", "0.0 mm apart", "stand apart"],
+        &[
+            "3 cameras are at one place",
+            "0.0 mm apart",
+            "must be apart",
+        ],
     ),
 ];
 

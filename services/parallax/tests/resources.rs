@@ -296,9 +296,7 @@ mod long {
         assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
-        // The killed process frees memory, so the next one does not always fail at the same place: the queues, a topic or its wake-up may
-        // be
-        // refused first.
+        // The killed process frees memory, so the next one may fail at different places: the queues, a topic or its wake-up is refused.
         for words in [
             "of shared memory",
             "free in /dev/shm",

@@ -72,7 +72,7 @@ fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
     for words in [
         "is set automatically: 0.25, a person is 7",
         "px in 272x480; 4 cameras share the space in which a person of 1.70 m stands",
-        "capture.scale or capture.size sets it",
+        "capture.scale or capture.size overrides this",
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
@@ -83,7 +83,7 @@ fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
         let ended = case.start(&[DRY, &["--set", set]].concat()).wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         assert!(
-            !ended.stdout.contains("scale is chosen"),
+            !ended.stdout.contains("scale is set automatically"),
             "{}",
             ended.stdout
         );

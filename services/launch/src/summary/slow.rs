@@ -41,7 +41,7 @@ mod tests {
     #[test]
     fn a_machine_that_had_time_for_few_frames_is_told() {
         let told = text(&summary(6), 60, 8.0, false).unwrap();
-        assert!(told.contains("6 of 60 frames, 0.8 a second"), "{told}");
+        assert!(told.contains("6 of 60 frames, 0.8 per second"), "{told}");
         assert_eq!(text(&summary(50), 60, 8.0, false), None);
         assert_eq!(text(&summary(6), 60, 8.0, true), None);
         assert_eq!(
