@@ -73,7 +73,7 @@ mod long {
 
     #[test]
     fn in_a_realtime_run_a_hung_process_is_detected_by_its_missing_progress() {
-        // By the time limit alone, the loop would only be noticed after ten minutes.
+        // The time limit alone would only detect the hang after ten minutes.
         let live = PACED.replace("\"paced\"", "\"realtime\"");
         let patient = format!("{live}[supervise]\nhang_limit_s = 600\n");
         let case = Case::new("chaos-spin", &[240; 3], &patient);

@@ -195,7 +195,7 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
 
 #[test]
 fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
-    // By the time limit alone, the loop would only be noticed after ten minutes.
+    // The time limit alone would only detect the hang after ten minutes.
     let more = "[capture]\nupright = false\nmode = \"realtime\"\n\
                 frame_rate_hz = 20\n[results]\noverlay_every = 0\n\
                 [paper]\nerrors = \"q.onnx\"\n[supervise]\nhang_limit_s = 600\n";

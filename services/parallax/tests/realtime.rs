@@ -121,7 +121,7 @@ fn a_slow_receiver_does_not_slow_its_sender() {
 
 #[test]
 fn a_process_in_an_endless_computation_is_detected_by_its_missing_progress() {
-    // By the time limit alone, the loop would only be noticed after ten minutes.
+    // The time limit alone would only detect the hang after ten minutes.
     let patient = "[supervise]\nhang_limit_s = 600\n";
     let case = Case::new("spins", &[160; 2], &format!("{LIVE}{PACED}{patient}"));
     let spins = "name = \"b\"\nfault = \"spin@60+1\"";

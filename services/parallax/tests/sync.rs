@@ -209,7 +209,7 @@ fn clocks_are_found_by_the_sounds_of_the_videos() {
     let text = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
     assert_eq!(text.matches("offset_ms = ").count(), 3, "{text}");
 
-    // One camera has silent sound, the other has no microphone.
+    // One camera recorded only silence, the other has no microphone.
     video(&case, "quiet", &[], 11.0);
     case.edit("deployment.toml", "c2.mp4", "quiet.mp4");
     let ended = estimate(&case, &["--by", "sound"]);

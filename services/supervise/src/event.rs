@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use messages::Health;
 
-/// How a process ended.
+/// Cause of the end of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Death {
     /// The process ended on its own: with an exit status other than 0, or with 0 before it had finished.
