@@ -1,8 +1,8 @@
-//! For both executables: tells the command its version, the commit that it is built from, and the features that not every build has.
+//! Build script of both executables: passes the version, the commit of the build, and the enabled optional features to the command.
 
 use std::process::Command;
 
-/// Features that a user notices.
+/// Cargo features that make a difference to the user.
 const FEATURES: [&str; 5] = ["gpu", "hosts", "libtorch", "ort", "parquet"];
 
 fn main() {

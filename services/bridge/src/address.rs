@@ -1,46 +1,46 @@
-//! Where a link begins and ends, and why there is none.
+//! Addresses of links, and errors of links.
 
 use crate::keys::KeyFiles;
 
-/// Where to connect to, or to listen, and as whom.
+/// Address to connect to or to listen on, with the names and keys of the hosts.
 #[derive(Debug, Clone)]
 pub struct Address {
-    /// The deployment.
+    /// Name of the deployment.
     pub deployment: String,
-    /// This host.
+    /// Name of this host.
     pub host: String,
-    /// All hosts.
+    /// Names of all hosts.
     pub hosts: Vec<String>,
-    /// The address of the host that fuses: name or number, and port.
+    /// Address of the host that fuses: name or number, and port.
     pub address: String,
     /// True if this host is the one that fuses.
     pub listens: bool,
-    /// The keys; none if the deployment is insecure.
+    /// The keys; `None` if the deployment is insecure.
     pub keys: Option<KeyFiles>,
 }
 
-/// The link cannot be used.
+/// Error if the link cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// It cannot be opened.
+    /// The link cannot be opened.
     #[error("cannot {what} {address}: {message}")]
     Open {
-        /// Connect or listen.
+        /// Attempted action: connect or listen.
         what: &'static str,
-        /// Where.
+        /// Address of the link.
         address: String,
-        /// Why.
+        /// Reason of the failure.
         message: String,
     },
     /// A name cannot be used.
     #[error("cannot use {key:?} on the link: {message}")]
     Use {
-        /// The name.
+        /// Name that cannot be used.
         key: String,
-        /// Why.
+        /// Reason of the failure.
         message: String,
     },
-    /// This build has none.
-    #[error("this build has no hosts: build with `--features hosts`")]
+    /// This build has no link between hosts.
+    #[error("this build does not support hosts: build with `--features hosts`")]
     NotBuilt,
 }

@@ -1,4 +1,4 @@
-//! The bridge of a host with cameras: takes messages of its views from shared memory, and sends the newest.
+//! The bridge of a host with cameras: takes messages of its views from shared memory, and sends the newest ones.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,15 +19,15 @@ use crate::link::Link;
 use crate::maps::{self, ViewMaps};
 use crate::topics::Topics;
 
-/// How often the host introduces itself: the other may have been started again.
+/// Interval at which the host introduces itself, because the other host may have been restarted.
 const HELLO_EVERY: Duration = Duration::from_millis(500);
-/// How often the end of a stream is sent until it is acknowledged, and for how long.
+/// Interval at which the end of a stream is sent until it is acknowledged, and longest time for which it is sent.
 const END_EVERY: Duration = Duration::from_millis(300);
 const END_PATIENCE: Duration = Duration::from_secs(15);
-/// Longest sleep: while something waits for an acknowledgement, and else.
+/// Longest sleep: first while a message waits for an acknowledgement, then otherwise.
 const SHORT: Duration = Duration::from_millis(2);
 const LONG: Duration = Duration::from_millis(20);
-/// Acknowledgements that wait to be read.
+/// Maximum number of acknowledgements that wait to be read.
 const MOST_ACKS: usize = 1024;
 
 /// A message that waits to be sent.
@@ -41,26 +41,26 @@ enum Item {
         content: Content,
         envelope: Envelope,
         data: Vec<u8>,
-        /// The maps of poses, where they cross.
+        /// Maps of the poses, if maps are sent.
         maps: Vec<u8>,
     },
 }
 
-/// Where the messages of a lane come from.
+/// Source of the messages of a lane.
 enum Port {
     Frame(SliceSubscriber<u8, FrameHeader>),
     Message(Content, Receiver),
 }
 
-/// The evidence of a view, which crosses as Gaussians with its poses.
+/// Evidence of a view, which is sent as Gaussians together with the poses.
 struct Evidence {
     port: SliceSubscriber<f32, EvidenceHeader>,
-    /// The frame of the newest, and its bytes.
+    /// Frame of the newest evidence, and its bytes.
     newest: Option<(u64, Vec<u8>)>,
 }
 
 impl Evidence {
-    /// Adds the maps of its frame to the poses of a view. The maps were published before the poses.
+    /// Adds the maps of the same frame to the poses of a view. The maps were published before the poses.
     fn add_to(&mut self, item: &mut Item, session: u64) -> Result<(), Failure> {
         while let Some(sample) = self.port.receive()? {
             let header = sample.header();
@@ -69,7 +69,7 @@ impl Evidence {
             }
             match ViewMaps::pack(header, sample.payload()) {
                 Ok(bytes) => self.newest = Some((header.stamp.frame, bytes)),
-                Err(error) => tracing::warn!(%error, "evidence that does not cross"),
+                Err(error) => tracing::warn!(%error, "evidence that is not sent"),
             }
         }
         if let Item::Message { envelope, maps, .. } = item
@@ -83,15 +83,15 @@ impl Evidence {
     }
 }
 
-/// A topic of a view.
+/// A lane: one topic of a view.
 struct Lane {
     view: usize,
     port: Port,
-    /// Maps that are sent with its messages.
+    /// Maps that are sent with the messages.
     evidence: Option<Evidence>,
-    /// The end of its stream, once it came.
+    /// End of the stream, once it was received.
     end: Option<Item>,
-    /// The sequence from which on an acknowledgement means that the end has arrived.
+    /// Sequence from which an acknowledgement means that the end has arrived.
     end_sequence: Option<u64>,
     has_ended: bool,
     end_sent: Option<Instant>,
@@ -100,7 +100,7 @@ struct Lane {
 /// An acknowledgement: view, content, sequence.
 type Ack = (u32, Content, u64);
 
-/// Sends what the views of this host publish, until they end or a stop is requested.
+/// Sends the messages of this host's views, until they end or a stop is requested.
 pub(crate) fn run(service: &Service, job: &Job, role: &Far) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let lanes = lanes(service, job, role, &mut waiter)?;
@@ -213,7 +213,7 @@ fn lanes(
 
 type Listening = (ChannelReceiver<Ack>, Arc<Mutex<Option<Answer>>>);
 
-/// Answers questions about the time at once, and keeps acknowledgements and the last answer.
+/// Answers questions about the time at once. Stores acknowledgements and the last answer.
 fn listen(link: &Arc<Link>, job: &Job, origin: u64) -> Result<Listening, Failure> {
     let topics = Topics::of(&job.address.deployment);
     let host = &job.address.host;
@@ -240,7 +240,7 @@ fn listen(link: &Arc<Link>, job: &Job, origin: u64) -> Result<Listening, Failure
                 content,
                 sequence,
             }) if of == origin => {
-                // What finds no room counts as lost after a while.
+                // Acknowledgements for which there is no space count as lost after a while.
                 let _is_kept = sender.try_send((view, content, sequence)).is_ok();
             }
             Ok(_) => {}
@@ -273,7 +273,7 @@ struct Sending<'a> {
 }
 
 impl Sending<'_> {
-    /// Takes everything that waits in shared memory.
+    /// Receives all waiting messages from shared memory.
     fn receive(&mut self) -> Result<(), Failure> {
         let session = self.service.session();
         let health = self.service.health();
@@ -309,14 +309,14 @@ impl Sending<'_> {
         }
     }
 
-    /// Sends the ends of streams, again and again until they are acknowledged.
+    /// Sends the ends of streams repeatedly until they are acknowledged.
     fn repeat_ends(&mut self) {
         for (index, lane) in self.lanes.iter_mut().enumerate() {
             let is_due = lane.end_sent.is_none_or(|at| at.elapsed() > END_EVERY);
             let Some(end) = lane.end.as_ref().filter(|_| is_due && !lane.has_ended) else {
                 continue;
             };
-            // Not before the last frame has gone: it would be overtaken.
+            // The end must not be sent before the last frame, because it would overtake it.
             if lane.end_sent.is_some()
                 || self.outbox.sent(index).n_offered == 0
                 || self.outbox.n_waiting() == 0
@@ -413,7 +413,7 @@ fn parts(item: &Item) -> (Envelope, Content) {
     }
 }
 
-/// The next message of a topic: its session, its status, and itself.
+/// Returns the next message of a topic, with its session and status.
 fn next(port: &Port) -> Result<Option<(u64, Status, Item)>, Failure> {
     match port {
         Port::Frame(port) => Ok(port.receive()?.map(|sample| {

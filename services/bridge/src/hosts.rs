@@ -1,16 +1,16 @@
-//! Messages between the hosts of a deployment, and their meaning there: framing, clocks, order, counts. Pure.
+//! The messages between the hosts of a deployment and their interpretation: framing, clocks, order, counts. The module has no side effects.
 //!
 //! | what | where |
 //! |---|---|
 //! | a message of a view as bytes, checked | [`Packet`] |
 //! | questions and answers between two hosts | [`Signal`], [`Hello`], [`Answer`] |
-//! | how far another host's clock is from ours, with a bound | [`Clock`] |
+//! | offset of another host's clock from this one, with a bound | [`Clock`] |
 //! | the maps of a view as Gaussians, after its poses | [`Maps`] |
-//! | what waits to be sent: the newest of every lane, and no more than a few on their way | [`Outbox`] |
-//! | which frame of the run a message is for, and what became of the others | [`Arrivals`] |
-//! | whether two hosts have the same files | [`Fingerprint`] |
+//! | messages that wait to be sent: the newest of every lane, with a limit on those under way | [`Outbox`] |
+//! | the frame of the run to which a message belongs, and the fate of frames without a message | [`Arrivals`] |
+//! | check that two hosts have the same files | [`Fingerprint`] |
 //!
-//! No socket, no clock and no file: `services/bridge` has those.
+//! This module uses no socket, clock or file. The other modules of `services/bridge` use these.
 
 mod arrivals;
 mod clock;
@@ -30,5 +30,5 @@ pub use outbox::{Outbox, Parcel, Sent};
 pub use packet::{Content, Expected, HEAD_BYTES, Head, Packet, PacketError};
 pub use signal::{Signal, SignalError};
 
-/// The version of everything here: two hosts with different ones do not talk.
+/// Version of the messages in this module. Two hosts with different versions do not work together.
 pub const VERSION: u16 = 2;

@@ -1,4 +1,4 @@
-//! Task of the process.
+//! The job of the process.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -9,46 +9,46 @@ use deployment::hosts::Carry;
 use crate::address::Address;
 use crate::maps::ViewMaps;
 
-/// Task of the process.
+/// The job of the process.
 #[derive(Debug)]
 pub struct Job {
-    /// Where it connects to, or listens, and as whom.
+    /// Address to connect to or to listen on, with the names and keys of the hosts.
     pub address: Address,
     /// Fingerprint of the files and settings that must be the same on all hosts.
     pub fingerprint: Fingerprint,
-    /// Kind of messages sent between the hosts.
+    /// Kind of messages that are sent between the hosts.
     pub carry: Carry,
     /// True if expected errors are sent with poses.
     pub has_quality: bool,
-    /// By view, where the maps of the views cross with their poses; else empty.
+    /// Properties of the maps, by view, if maps are sent with the poses; otherwise empty.
     pub maps: Vec<ViewMaps>,
-    /// Width and height of the frames of every view of the deployment, pixels.
+    /// Width and height of the frames of every view of the deployment, in pixels.
     pub sizes: Vec<[u32; 2]>,
-    /// From the session to the first instant, nanoseconds.
+    /// Time from the session to the first instant, in nanoseconds.
     pub lead_nanos: u64,
-    /// From one instant to the next, nanoseconds.
+    /// Time from one instant to the next, in nanoseconds.
     pub period_nanos: f64,
     /// The first frame of the footage.
     pub start_frame: u64,
-    /// From one frame to the next.
+    /// Distance from one frame to the next.
     pub frame_step: u64,
-    /// The part of this host.
+    /// Role of this host.
     pub role: Role,
 }
 
-/// The part of a host.
+/// Role of a host.
 #[derive(Debug)]
 pub enum Role {
-    /// It has cameras, and sends.
+    /// The host has cameras, and sends messages.
     Far(Far),
-    /// It fuses, and receives.
+    /// The host fuses, and receives messages.
     Near(Near),
 }
 
 /// A host with cameras.
 #[derive(Debug)]
 pub struct Far {
-    /// Its views.
+    /// Views of the host.
     pub views: Vec<usize>,
     /// Quality of the JPEG, 1 to 100.
     pub jpeg_quality: u8,
@@ -57,31 +57,31 @@ pub struct Far {
 /// The host that fuses.
 #[derive(Debug)]
 pub struct Near {
-    /// The others.
+    /// The other hosts.
     pub hosts: Vec<NearHost>,
-    /// Frames of the run.
+    /// Number of frames of the run.
     pub n_frames: u64,
-    /// Processes that receive what is published about a view, by view.
+    /// Number of processes that receive the messages of each view.
     pub n_receivers: Vec<usize>,
-    /// How long the process waits for them.
+    /// Time that the process waits for its receivers.
     pub patience: Duration,
     /// Largest uncertainty of another host's clock without a warning, as a share of the period.
     pub max_clock_share: f64,
-    /// Where the state of the hosts is written: `hosts.json`.
+    /// File to which the state of the hosts is written: `hosts.json`.
     pub file: PathBuf,
 }
 
-/// A host with cameras, as the one that fuses knows it.
+/// A host with cameras, as known to the host that fuses.
 #[derive(Debug, Clone)]
 pub struct NearHost {
-    /// Its name.
+    /// Name of the host.
     pub name: String,
-    /// Its views.
+    /// Views of the host.
     pub views: Vec<usize>,
 }
 
 impl Job {
-    /// The instants of the run of this host.
+    /// Returns the instants of this host's run.
     pub(crate) fn grid(&self, session: u64) -> Grid {
         Grid {
             start_nanos: session.saturating_add(self.lead_nanos),
@@ -89,12 +89,12 @@ impl Job {
         }
     }
 
-    /// The number of a frame of the footage among the instants.
+    /// Returns the index of the instant of a frame of the footage.
     pub(crate) fn nth(&self, frame: u64) -> u64 {
         frame.saturating_sub(self.start_frame) / self.frame_step.max(1)
     }
 
-    /// The frame of the footage at an instant.
+    /// Returns the frame of the footage at an instant.
     pub(crate) fn frame(&self, nth: u64) -> u64 {
         self.start_frame.saturating_add(nth.saturating_mul(self.frame_step))
     }

@@ -1,4 +1,4 @@
-//! Before a run: whether the host that fuses takes part, with the same files, and when its run began by our clock.
+//! Joins a run: checks that the host that fuses has the same files, and determines when its run began by this host's clock.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,24 +13,24 @@ use crate::address::{Address, LinkError};
 use crate::link::Link;
 use crate::topics::Topics;
 
-/// Exchanges of times before a run.
+/// Number of time exchanges before a run.
 const N_EXCHANGES: usize = 12;
 const ASK_EVERY: Duration = Duration::from_millis(50);
-/// How often it is said that nobody answers.
+/// Interval of messages that the other host does not answer.
 const SAY_EVERY: Duration = Duration::from_secs(10);
 
-/// A host cannot take part.
+/// Error if a host cannot join the run.
 #[derive(Debug, thiserror::Error)]
 pub enum JoinError {
     /// The link cannot be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// It has other files than the host that fuses.
+    /// This host has other files than the host that fuses.
     #[error("the host that fuses refuses this one: {}", listed(.0))]
     Refused(Vec<Difference>),
 }
 
-/// The differences, in the words of the host that reads them: the one that fuses wrote them.
+/// Lists the differences from the point of view of this host. The host that fuses wrote them from its own point of view.
 pub(crate) fn listed(all: &[Difference]) -> String {
     let each = all.iter().map(|difference| {
         let (there, here) = (&difference.here, &difference.there);
@@ -46,13 +46,13 @@ struct Heard {
     answer: Option<Answer>,
 }
 
-/// Waits for the host that fuses, and returns when its run began by our clock, nanoseconds; none on a stop request.
+/// Waits for the host that fuses. Returns the time at which its run began by this host's clock, in nanoseconds; `None` on a stop request.
 ///
-/// * `say`: is called with what the user should know while nobody answers.
+/// * `say`: called with messages for the user while the other host does not answer.
 ///
 /// # Errors
 ///
-/// [`JoinError`].
+/// Fails with [`JoinError`] if the host cannot join.
 pub fn join(
     address: &Address,
     fingerprint: &Fingerprint,
@@ -85,7 +85,7 @@ pub fn join(
         if said.is_none_or(|said| said.elapsed() > SAY_EVERY) {
             if said.is_some() {
                 let what = if address.keys.is_some() {
-                    " (does it run, is it reachable, are its keys of the same authority, and is the common name of our certificate that of this host?)"
+                    " (is it running and reachable, are its keys from the same authority, and does our certificate have the name of this host?)"
                 } else {
                     ""
                 };
@@ -106,7 +106,7 @@ pub fn join(
     Ok(Some(begin(&clock, welcome)))
 }
 
-/// When a run began, by our clock.
+/// Returns the time at which a run began, by this host's clock.
 fn begin(clock: &Clock, welcome: Welcome) -> u64 {
     let now = now_nanos();
     clock.estimate(now).map_or(now, |estimate| estimate.ours(welcome.session))
@@ -147,11 +147,11 @@ fn listen(
     })
 }
 
-/// The state of all hosts, as the fusing host reports it; `None` if it does not answer within `limit`.
+/// Returns the state of all hosts, as reported by the fusing host; `None` if it does not answer within `limit`.
 ///
 /// # Errors
 ///
-/// The link cannot be opened.
+/// Fails if the link cannot be opened.
 pub fn status(address: &Address, limit: Duration) -> Result<Option<String>, LinkError> {
     let link = Link::open(address)?;
     let key = Topics::of(&address.deployment).status();

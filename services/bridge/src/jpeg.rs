@@ -1,9 +1,9 @@
-//! Frames to JPEG and back.
+//! Encodes frames as JPEG, and decodes them.
 
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
 use image::{ExtendedColorType, ImageDecoder as _, ImageError};
 
-/// A JPEG of a frame.
+/// Encodes a frame as JPEG.
 ///
 /// * `rgb`: `width * height * 3` bytes.
 /// * `quality`: 1 to 100.
@@ -14,9 +14,9 @@ pub(crate) fn encode(rgb: &[u8], size: [u32; 2], quality: u8) -> Result<Vec<u8>,
     Ok(out)
 }
 
-/// The frame in a JPEG; none if it is not one of that size in colour.
+/// Decodes the frame in a JPEG. Returns `None` if it does not have this size, or is not in colour.
 ///
-/// The size is checked before anything is decoded: a few bytes can claim to be a very large picture.
+/// The size is checked before anything is decoded, because a few bytes can claim to be a very large picture.
 pub(crate) fn decode(jpeg: &[u8], size: [u32; 2]) -> Option<Vec<u8>> {
     let decoder = JpegDecoder::new(std::io::Cursor::new(jpeg)).ok()?;
     let (width, height) = decoder.dimensions();

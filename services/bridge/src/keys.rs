@@ -1,55 +1,55 @@
-//! The keys of the hosts: one authority, and a certificate with its key for each.
+//! The keys of the hosts: one certificate authority, and a certificate with its key for each host.
 
 use std::path::{Path, PathBuf};
 
 /// The files that a host needs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyFiles {
-    /// The certificate of the authority.
+    /// Certificate of the authority.
     pub authority: PathBuf,
-    /// The certificate of this host.
+    /// Certificate of this host.
     pub certificate: PathBuf,
-    /// Its key.
+    /// Key of this host's certificate.
     pub key: PathBuf,
 }
 
-/// Keys cannot be made or used.
+/// Error if keys cannot be created or used.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// A file is missing.
     #[error("there is no {0}")]
     Missing(PathBuf),
-    /// There are keys already.
-    #[error("{0} exists and is not replaced, because hosts that have it would be refused")]
+    /// A key file already exists.
+    #[error("{0} exists and is not replaced, because hosts with the old keys would be refused")]
     Exists(PathBuf),
     /// A file cannot be written.
     #[error("cannot write {file}")]
     Write {
-        /// Which one.
+        /// Path of the file.
         file: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         #[source]
         source: std::io::Error,
     },
-    /// A certificate cannot be made.
-    #[error("cannot make the certificate of {host}: {message}")]
+    /// A certificate cannot be created.
+    #[error("cannot create the certificate of {host}: {message}")]
     Make {
-        /// For whom.
+        /// Name of the host.
         host: String,
-        /// Why.
+        /// Reason of the failure.
         message: String,
     },
-    /// This build cannot.
-    #[error("this build has no hosts: build with `--features hosts`")]
+    /// This build cannot create keys.
+    #[error("this build does not support hosts: build with `--features hosts`")]
     NotBuilt,
 }
 
 impl KeyFiles {
-    /// The files of a host in a folder, as [`make_keys`] writes them.
+    /// Returns the files of a host in a folder, as [`make_keys`] writes them.
     ///
     /// # Errors
     ///
-    /// [`KeyError::Missing`].
+    /// Fails with [`KeyError::Missing`] if a file does not exist.
     pub fn find(folder: &Path, host: &str) -> Result<Self, KeyError> {
         let files = Self {
             authority: folder.join("ca.pem"),
@@ -65,14 +65,14 @@ impl KeyFiles {
     }
 }
 
-/// Makes an authority, and a certificate with its key for every host, in a folder: `ca.pem`, `ca.key`, `HOST.pem`, `HOST.key`. Keys are for
-/// their user alone. Nothing is replaced.
+/// Creates an authority, and a certificate with its key for every host, in a folder: `ca.pem`, `ca.key`, `HOST.pem`, `HOST.key`. Only the
+/// user can read the keys. Existing files are not replaced.
 ///
-/// * `hosts`: their names, with the names or numbers that others reach them by.
+/// * `hosts`: names of the hosts, each with the names or addresses at which other hosts reach it.
 ///
 /// # Errors
 ///
-/// [`KeyError`].
+/// Fails with [`KeyError`] if a file exists or cannot be written.
 #[cfg(feature = "zenoh")]
 pub fn make_keys(folder: &Path, hosts: &[(String, Vec<String>)]) -> Result<Vec<PathBuf>, KeyError> {
     use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair};
@@ -118,11 +118,11 @@ pub fn make_keys(folder: &Path, hosts: &[(String, Vec<String>)]) -> Result<Vec<P
     Ok(files.into_iter().map(|file| file.0).collect())
 }
 
-/// Without the feature there are none.
+/// Fails, because keys need the feature.
 ///
 /// # Errors
 ///
-/// [`KeyError::NotBuilt`].
+/// Always fails with [`KeyError::NotBuilt`].
 #[cfg(not(feature = "zenoh"))]
 pub fn make_keys(
     _folder: &Path,
@@ -131,7 +131,7 @@ pub fn make_keys(
     Err(KeyError::NotBuilt)
 }
 
-/// Writes a file that its user alone may read.
+/// Writes a file that only the user can read.
 #[cfg(feature = "zenoh")]
 fn write_private(file: &Path, text: &str) -> Result<(), KeyError> {
     use std::io::Write as _;

@@ -1,12 +1,12 @@
-//! Carries messages of views between the hosts of a deployment: takes them from shared memory on one host, and writes them into loaned
-//! shared memory on another, so that every other process is as it is on one machine.
+//! Transfers messages of views between the hosts of a deployment. The bridge takes messages from shared memory on one host, and writes them
+//! into loaned shared memory on another. All other processes work as on a single machine.
 //!
 //! | host | what its bridge does | where |
 //! |---|---|---|
-//! | with cameras | sends frames as JPEG, or poses with the maps they are from as Gaussians; the newest wins | `far` |
-//! | that fuses | publishes them for the frames of its run, and says why where one is missing | `near` |
+//! | with cameras | sends frames as JPEG, or poses with their maps as Gaussians; the newest message wins | `far` |
+//! | that fuses | publishes them for the frames of its run, and reports why a message is missing | `near` |
 //!
-//! The engine is Zenoh, behind the feature `zenoh`; what crosses, and the rules for it, are in [`hosts`], which is pure.
+//! The link uses Zenoh, behind the feature `zenoh`. The messages and the rules for them are in [`hosts`], which has no side effects.
 #![forbid(unsafe_code)]
 
 mod address;
@@ -38,18 +38,18 @@ pub use one_thread::{ONE_THREAD, has_one_thread};
 use failure::Failure;
 use runtime::Service;
 
-/// True if this build can carry messages between hosts.
+/// True if this build can transfer messages between hosts.
 pub const HAS_LINK: bool = cfg!(feature = "zenoh");
 
-/// Carries messages until the run ends or a stop is requested.
+/// Transfers messages until the run ends or a stop is requested.
 ///
 /// # Errors
 ///
-/// The link cannot be opened, another host has other files, and what the transport reports.
+/// Fails if the link cannot be opened, or another host has other files. Also fails with errors of the transport.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     if job.address.keys.is_none() {
         tracing::warn!(
-            "link.insecure = true: anybody on the network can read the pictures of this deployment, and send others"
+            "link.insecure = true: anyone on the network can read the pictures of this deployment, and send false ones"
         );
     }
     match &job.role {

@@ -11,7 +11,7 @@ use crate::address::{Address, LinkError};
 use crate::one_thread::has_one_thread;
 use crate::topics::Topics;
 
-/// How long a link without any sign of life lasts.
+/// Time without any message after which a link counts as broken.
 const LEASE: Duration = Duration::from_secs(2);
 
 /// An open link.
@@ -19,7 +19,7 @@ const LEASE: Duration = Duration::from_secs(2);
 pub(crate) struct Link(zenoh::Session);
 
 impl Link {
-    /// Opens the link. A host that connects does not wait for the other: it tries for ever.
+    /// Opens the link. A host that connects does not wait for the other host: it keeps trying.
     pub(crate) fn open(address: &Address) -> Result<Self, LinkError> {
         let failed = |message: String| LinkError::Open {
             what: if address.listens {
@@ -31,9 +31,7 @@ impl Link {
             message,
         };
         if address.keys.is_some() && !has_one_thread() {
-            tracing::warn!(
-                "the link has several threads: a host that dies can take this process along"
-            );
+            tracing::warn!("the link has several threads: if a host dies, this process may crash");
         }
         let config = zenoh::Config::from_json5(&config(address).to_string());
         let config = config.map_err(|error| failed(error.to_string()))?;
@@ -41,7 +39,7 @@ impl Link {
         Ok(Self(session.map_err(|error| failed(error.to_string()))?))
     }
 
-    /// Sends a message, or drops it if there is no room; messages that must not be lost are acknowledged.
+    /// Sends a message, or drops it if there is no space. Messages that must not be lost are acknowledged.
     pub(crate) fn send(&self, key: &str, bytes: Vec<u8>, is_urgent: bool) {
         let priority = if is_urgent {
             Priority::RealTime
@@ -55,7 +53,7 @@ impl Link {
         }
     }
 
-    /// Calls `on` with everything that comes under a name, until the link is closed.
+    /// Calls `on` with every message under a name, until the link is closed.
     pub(crate) fn subscribe(
         &self,
         key: &str,
@@ -90,7 +88,7 @@ impl Link {
         })
     }
 
-    /// Asks under a name; the first answer within a time.
+    /// Asks a question under a name, and returns the first answer within a time.
     pub(crate) fn ask(&self, key: &str, limit: Duration) -> Option<Vec<u8>> {
         let answers = self.0.get(key).timeout(limit).wait().ok()?;
         let answer = answers.recv_timeout(limit).ok().flatten()?;
@@ -101,12 +99,12 @@ impl Link {
     /// Closes the link.
     pub(crate) fn close(self) {
         if let Err(error) = self.0.close().wait() {
-            tracing::debug!(%error, "the link does not close");
+            tracing::debug!(%error, "the link cannot be closed");
         }
     }
 }
 
-/// The settings of Zenoh. Nothing searches the network for other hosts or announces them, and only the host that fuses
+/// Returns the settings of Zenoh. No host searches the network for other hosts or announces itself, and only the host that fuses
 /// listens.
 fn config(address: &Address) -> Value {
     let text = |path: &Path| Value::from(path.display().to_string());
@@ -153,8 +151,8 @@ fn config(address: &Address) -> Value {
     config
 }
 
-/// Returns the access rules of the host that fuses: every host may send only its own messages, by the common name of its
-/// certificate. The keys of one host do not let anybody speak for another.
+/// Returns the access rules of the host that fuses. Every host may only send its own messages, according to the common name of its
+/// certificate. With the keys of one host, nobody can send messages for another host.
 fn access(address: &Address) -> Value {
     let topics = Topics::of(&address.deployment);
     let everything = [
@@ -249,7 +247,7 @@ mod tests {
         }
     }
 
-    /// A free port of this machine.
+    /// Returns a free port of this machine.
     fn port() -> u16 {
         let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
         listener.local_addr().unwrap().port()
@@ -264,7 +262,7 @@ mod tests {
             names.iter().map(|name| ((*name).to_owned(), of_desk.clone())).collect();
         crate::keys::make_keys(folder.path(), &made).unwrap();
         let at = format!("127.0.0.1:{}", port());
-        // `who` has the certificate of `keys`.
+        // Opens a link for the host `who` with the certificate of `keys`.
         let open = |who: &str, keys: &str| {
             let address = Address {
                 deployment: "a".to_owned(),
@@ -289,7 +287,7 @@ mod tests {
             let on = move |key: &str, _: &[u8]| told.send(key.to_owned()).unwrap();
             rack.subscribe(&topics.down(host), on).unwrap();
         }
-        // A host needs a moment to be heard; what is said in another's name is never heard.
+        // It takes a moment until messages of a host arrive. Messages sent in another host's name never arrive.
         let limit = Duration::from_secs(20);
         let began = std::time::Instant::now();
         while arrived.is_empty() || orders.is_empty() {

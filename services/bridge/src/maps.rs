@@ -1,4 +1,4 @@
-//! The maps of a view to Gaussians and back: what of the evidence crosses with the poses.
+//! Converts the maps of a view to Gaussians and back. The Gaussians are sent with the poses.
 
 use crate::hosts::{Gaussian, MOST_GAUSSIANS, Maps, MapsError, PersonGaussians};
 use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES};
@@ -12,25 +12,25 @@ const _: () = assert!(
     "all that a view can have"
 );
 
-/// The maps of a view.
+/// Properties of a view's maps.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewMaps {
-    /// Width and height of the frames.
+    /// Width and height of the frames, in pixels.
     pub size: [usize; 2],
-    /// Most values of its evidence.
+    /// Maximum number of values in the evidence.
     pub longest: usize,
 }
 
-/// Maps from another host that were checked.
+/// Checked maps from another host.
 #[derive(Debug, Clone)]
 pub(crate) struct Checked {
     header: EvidenceHeader,
     grids: Vec<MapGrid>,
-    /// By person.
+    /// Gaussians, by person.
     bumps: Vec<Vec<Bump>>,
 }
 
-/// Why maps from another host are refused.
+/// Reason why maps from another host are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum Refused {
     #[error(transparent)]
@@ -46,11 +46,11 @@ pub(crate) enum Refused {
 }
 
 impl ViewMaps {
-    /// The evidence of a view as bytes.
+    /// Returns the evidence of a view as bytes.
     ///
     /// # Errors
     ///
-    /// It is not that of a view.
+    /// Fails if the evidence does not have the form of a view's evidence.
     pub(crate) fn pack(header: &EvidenceHeader, values: &[f32]) -> Result<Vec<u8>, WireError> {
         let gaussian = |bump: Bump| Gaussian {
             joint: bump.joint as u32,
@@ -71,7 +71,7 @@ impl ViewMaps {
         Ok(maps.to_bytes())
     }
 
-    /// Reads and checks what another host made of its evidence.
+    /// Reads and checks the Gaussians that another host computed from its evidence.
     pub(crate) fn unpack(&self, bytes: &[u8]) -> Result<Checked, Refused> {
         let maps = Maps::parse(bytes)?;
         if maps.people.len() > MAX_CANDIDATES {
@@ -120,14 +120,14 @@ fn bump(gaussian: &Gaussian) -> Bump {
 }
 
 impl Checked {
-    /// Number of values of the evidence.
+    /// Returns the number of values in the evidence.
     pub(crate) fn n_values(&self) -> usize {
         wire::n_values(&self.grids)
     }
 
     /// Writes the evidence, and returns its header without stamp and times.
     ///
-    /// * `values`: as many as [`Self::n_values`].
+    /// * `values`: buffer of [`Self::n_values`] values.
     pub(crate) fn fill(&self, values: &mut [f32]) -> EvidenceHeader {
         let mut left = values;
         for (grid, bumps) in self.grids.iter().zip(&self.bumps) {
@@ -139,8 +139,9 @@ impl Checked {
     }
 }
 
-/// A body of poses and maps: the length of the poses (`u32`, little endian), the poses as in a recording without the zeros at their end,
-/// which are most of them, and the maps.
+/// Returns a body with poses and maps: the length of the poses (`u32`, little endian), the poses as in a recording, and the maps. Zeros at
+/// the
+/// end of the poses, which are most of them, are left out.
 pub(crate) fn join(poses: &[u8], maps: &[u8]) -> Vec<u8> {
     let end = poses.iter().rposition(|pose| *pose != 0).map_or(0, |index| index + 1);
     let mut body = Vec::with_capacity(4 + end + maps.len());
@@ -150,7 +151,7 @@ pub(crate) fn join(poses: &[u8], maps: &[u8]) -> Vec<u8> {
     body
 }
 
-/// The poses of a body, whole again, and its maps. None if it is cut off, or longer than poses can be.
+/// Splits a body into complete poses and maps. Returns `None` if the body is truncated, or the poses are too long.
 pub(crate) fn split(body: &[u8]) -> Option<(Vec<u8>, &[u8])> {
     let (length, rest) = body.split_first_chunk()?;
     let (poses, maps) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;

@@ -1,4 +1,4 @@
-//! The bridge of the host that fuses: publishes what the other hosts send for the frames of its run, and says why where something is
+//! The bridge of the host that fuses: publishes the messages of the other hosts for the frames of its run, and reports why a message is
 //! missing.
 
 mod listen;
@@ -25,25 +25,25 @@ use publish::{Publisher, Times};
 use remote::Remote;
 use report::Report;
 
-/// How often the clocks of the others are asked: at first, and later.
+/// Interval at which the clocks of the other hosts are queried: first at the beginning, then later.
 const PING_SOON: Duration = Duration::from_millis(100);
 const PING_EVERY: Duration = Duration::from_millis(500);
 const SOON: Duration = Duration::from_secs(10);
-/// How often the state is written.
+/// Interval at which the state is written.
 const REPORT_EVERY: Duration = Duration::from_millis(250);
-/// How far after now an instant may be, beside a period, nanoseconds.
+/// Time by which an instant may be in the future, in addition to a period, in nanoseconds.
 const FUTURE: u64 = 100_000_000;
 /// Longest sleep.
 const LONGEST: Duration = Duration::from_millis(20);
 
 /// A view of another host.
 struct View {
-    /// Its number.
+    /// Index of the view.
     index: usize,
     remote: usize,
     publisher: Publisher,
     arrivals: Arrivals,
-    /// The frame at which its stream ends, once that is known.
+    /// Frame at which the stream ends, once it is known.
     end: Option<u64>,
     has_ended: bool,
 }
@@ -60,7 +60,7 @@ struct Receiving<'a> {
     origin: u64,
 }
 
-/// Publishes what the other hosts send, until all views have ended or a stop is requested.
+/// Publishes the messages of the other hosts, until all views have ended or a stop is requested.
 pub(crate) fn run(service: &Service, job: &Job, role: &Near) -> Result<(), Failure> {
     let stage: Stage<'_, ()> = Stage::new(service, role.patience);
     service.health().set_total(role.n_frames);
@@ -140,7 +140,7 @@ fn views(service: &Service, job: &Job, role: &Near) -> Result<Vec<View>, Failure
 }
 
 impl Receiving<'_> {
-    /// Asks the clocks of all hosts.
+    /// Queries the clocks of all hosts.
     fn ping(&mut self, since: Duration) {
         let every = if since < SOON { PING_SOON } else { PING_EVERY };
         if self.pinged.is_some_and(|at| at.elapsed() < every) {
@@ -166,7 +166,7 @@ impl Receiving<'_> {
                 Ok(it) => self.publish(&it)?,
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
                 Err(RecvTimeoutError::Disconnected) => {
-                    let message = "nothing receives from the link any more";
+                    let message = "no thread receives from the link any more";
                     return Err(Failure::new(ExitKind::Run, message));
                 }
             }
@@ -174,7 +174,7 @@ impl Receiving<'_> {
         }
     }
 
-    /// Until the next frame of a view is given up.
+    /// Returns the time until the next frame of a view is given up.
     fn until_due(&self) -> Duration {
         let now = now_nanos();
         let open = self.views.iter().filter(|view| !view.has_ended);
@@ -194,14 +194,14 @@ impl Receiving<'_> {
         };
         let remote = &self.remotes[self.views[index].remote];
         let Some(clock) = remote.estimate(now_nanos()) else {
-            // Nothing is known of its clock yet: where would it belong?
+            // The clock of the host is not known yet, so the message cannot be assigned to a frame.
             remote.count_without_clock();
             return Ok(());
         };
         let (service, job) = (self.service, self.job);
         let it = &mut self.views[index];
         let instant = clock.ours(arrived.head.instant_nanos);
-        // A clock that is not known yet, or a host that is wrong: frames that have not begun are not given up for it.
+        // The clock is not known yet, or the host is wrong. Frames that have not begun are not given up because of this message.
         let soon = now_nanos().saturating_add(job.period_nanos as u64 + FUTURE);
         if instant > soon && arrived.head.status != Status::END {
             remote.malformed(&"an instant in the future");
@@ -236,7 +236,7 @@ impl Receiving<'_> {
         self.end_if_over(index)
     }
 
-    /// Sends the reason for frames whose time is over without a message.
+    /// Gives up frames whose message is overdue, and sends the reason.
     fn give_up_overdue(&mut self) -> Result<(), Failure> {
         let now = now_nanos();
         for index in 0..self.views.len() {
@@ -255,7 +255,7 @@ impl Receiving<'_> {
         Ok(())
     }
 
-    /// Ends the stream of a view once all of its frames are published.
+    /// Ends the stream of a view once all its frames are published.
     fn end_if_over(&mut self, index: usize) -> Result<(), Failure> {
         let it = &mut self.views[index];
         let is_over = it.arrivals.is_over() || it.end.is_some_and(|end| it.arrivals.next() >= end);
@@ -272,7 +272,7 @@ impl Receiving<'_> {
         view.publisher.send_nothing(self.service, frame, Status::END)
     }
 
-    /// Logs hosts that come and go, and clocks that are not known well enough.
+    /// Logs hosts that appear or disappear, and clocks that are not known well enough.
     fn watch(&self) {
         for remote in self.remotes.iter() {
             remote.watch(

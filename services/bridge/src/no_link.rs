@@ -1,11 +1,11 @@
-//! Stand-in for the link in a build without it: everything says so.
+//! Replacement for the link in a build without it: every function fails with this reason.
 
 use core::convert::Infallible;
 use core::time::Duration;
 
 use crate::address::{Address, LinkError};
 
-/// There is none.
+/// A link that cannot be opened.
 #[derive(Debug)]
 pub(crate) struct Link(Infallible);
 

@@ -1,4 +1,4 @@
-//! How long messages took, of the newest some thousand.
+//! Durations of the newest few thousand messages.
 
 use std::collections::VecDeque;
 
@@ -6,11 +6,11 @@ use serde::Serialize;
 
 const MOST: usize = 4096;
 
-/// Durations, nanoseconds; the newest are kept.
+/// Durations in nanoseconds. Only the newest are kept.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Timing(VecDeque<u64>);
 
-/// Percentiles, milliseconds.
+/// Percentiles of durations, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Percentiles {
     n: usize,
@@ -26,7 +26,7 @@ impl Timing {
         self.0.push_back(nanos);
     }
 
-    /// None if there are no durations.
+    /// Returns the percentiles; `None` if there are no durations.
     pub(crate) fn percentiles(&self) -> Option<Percentiles> {
         let mut sorted: Vec<u64> = self.0.iter().copied().collect();
         sorted.sort_unstable();

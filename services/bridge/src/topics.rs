@@ -1,6 +1,6 @@
-//! The names that hosts talk under.
+//! Names under which hosts exchange messages.
 
-/// The names of a deployment.
+/// Names for one deployment.
 #[derive(Debug, Clone)]
 pub(crate) struct Topics(String);
 
@@ -9,38 +9,38 @@ impl Topics {
         Self(format!("parallax/{deployment}"))
     }
 
-    /// Frames and results of the views of a host with cameras.
+    /// Returns the name for frames and results of the views of a host with cameras.
     pub(crate) fn data(&self, host: &str) -> String {
         format!("{}/data/{host}", self.0)
     }
 
-    /// Signals to the host that fuses.
+    /// Returns the name for signals to the host that fuses.
     pub(crate) fn up(&self, host: &str) -> String {
         format!("{}/up/{host}", self.0)
     }
 
-    /// Signals from the host that fuses.
+    /// Returns the name for signals from the host that fuses.
     pub(crate) fn down(&self, host: &str) -> String {
         format!("{}/down/{host}", self.0)
     }
 
-    /// Introductions.
+    /// Returns the name for introductions.
     pub(crate) fn hello(&self, host: &str) -> String {
         format!("{}/hello/{host}", self.0)
     }
 
-    /// Their answers.
+    /// Returns the name for answers to introductions.
     pub(crate) fn answer(&self, host: &str) -> String {
         format!("{}/answer/{host}", self.0)
     }
 
-    /// The state of all hosts.
+    /// Returns the name for the state of all hosts.
     pub(crate) fn status(&self) -> String {
         format!("{}/status", self.0)
     }
 }
 
-/// The host at the end of a name.
+/// Returns the host at the end of a name.
 pub(crate) fn host_of(key: &str) -> &str {
     key.rsplit('/').next().unwrap_or_default()
 }

@@ -6,16 +6,17 @@ use footage::{FootageError, FrameView, Size, SourceSpec};
 
 use crate::info::FeedInfo;
 
-/// Scheme of an address.
+/// Scheme of the addresses.
 const SCHEME: &str = "blank://";
 /// Brightness of all pixels.
 const GREY: u8 = 128;
-/// Longest side, pixels; most frames; slowest and fastest, frames per second: as `[capture]` of a deployment has them.
+/// Limits: longest side in pixels, number of frames, and lowest and highest frame rate per second. They are those of `[capture]` in a
+/// deployment.
 const MAX_SIDE: usize = 16_384;
 const MOST_FRAMES: u64 = 1_000_000_000_000;
 const RATES_HZ: [f64; 2] = [0.001, 1e5];
 
-/// Grey footage: `blank://1920x1080?frames=70&rate=60`.
+/// Grey footage, such as `blank://1920x1080?frames=70&rate=60`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blank {
     /// Size of every frame.
@@ -26,23 +27,23 @@ pub struct Blank {
     pub rate_hz: f64,
 }
 
-/// Why an address is not one of grey footage.
+/// Error for an invalid address of grey footage.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BlankError {
-    /// Something is missing, or strange.
+    /// A part of the address is missing or unknown.
     #[error("expected an address such as `blank://1920x1080?frames=70&rate=60`: {what}")]
     Layout {
-        /// The mistake.
+        /// Description of the mistake.
         what: String,
     },
     /// A number is out of range.
     #[error("`{key}` is {got}, expected {expected}")]
     Value {
-        /// Which number.
+        /// Name of the number.
         key: &'static str,
-        /// Its value.
+        /// Value in the address.
         got: String,
-        /// Accepted values.
+        /// Range of accepted values.
         expected: String,
     },
 }
@@ -53,26 +54,26 @@ impl Blank {
         source.starts_with(SCHEME)
     }
 
-    /// Reads an address.
+    /// Parses an address.
     ///
     /// # Errors
     ///
-    /// [`BlankError`], naming what is wrong.
+    /// Fails with [`BlankError`], which describes the mistake.
     pub fn parse(address: &str) -> Result<Self, BlankError> {
         let layout = |what: &str| BlankError::Layout {
             what: what.to_owned(),
         };
         let rest = address.strip_prefix(SCHEME);
-        let rest = rest.ok_or_else(|| layout("it begins otherwise"))?;
+        let rest = rest.ok_or_else(|| layout("it starts with something else"))?;
         let (size, options) = rest.split_once('?').unwrap_or((rest, ""));
         let sides = size.split_once('x');
-        let (width, height) = sides.ok_or_else(|| layout("no width and height"))?;
+        let (width, height) = sides.ok_or_else(|| layout("width and height are missing"))?;
         let [mut n_frames, mut rate_hz] = [None, None];
         for option in options.split('&').filter(|part| !part.is_empty()) {
             match option.split_once('=') {
                 Some(("frames", value)) => n_frames = Some(value),
                 Some(("rate", value)) => rate_hz = Some(value),
-                _ => return Err(layout(&format!("`{option}` is neither frames nor rate"))),
+                _ => return Err(layout(&format!("`{option}` is not `frames` or `rate`"))),
             }
         }
         let n_frames = n_frames.ok_or_else(|| layout("no `frames`"))?;
@@ -113,12 +114,12 @@ fn within<T: core::str::FromStr + PartialOrd + fmt::Display>(
     })
 }
 
-/// Grey frames, one after the other.
+/// The grey frames, one after the other.
 #[derive(Debug)]
 pub struct BlankFeed {
     pub(crate) info: FeedInfo,
     rate_hz: f64,
-    /// Index of the next frame, and frames left.
+    /// Index of the next frame, and number of frames left.
     index: u64,
     step: u64,
     n_left: u64,
@@ -126,7 +127,7 @@ pub struct BlankFeed {
 }
 
 impl BlankFeed {
-    /// The properties of the frames that `spec` chooses.
+    /// Returns the properties of the frames that `spec` selects.
     pub(crate) fn look(blank: &Blank, spec: &SourceSpec) -> Result<FeedInfo, FootageError> {
         let n_frames = spec.n_delivered(blank.n_frames)?;
         let rate_hz = blank.rate_hz / spec.step as f64;
@@ -181,11 +182,11 @@ mod tests {
     #[test]
     fn addresses_that_cannot_be_are_refused_with_what_is_wrong() {
         for (address, words) in [
-            ("blank.mp4", "begins otherwise"),
-            ("blank://?frames=1&rate=1", "no width and height"),
+            ("blank.mp4", "starts with something else"),
+            ("blank://?frames=1&rate=1", "width and height are missing"),
             ("blank://64x48?rate=1", "no `frames`"),
             ("blank://64x48?frames=1", "no `rate`"),
-            ("blank://64x48?frames=1&rate=1&x=2", "`x=2` is neither"),
+            ("blank://64x48?frames=1&rate=1&x=2", "`x=2` is not"),
             ("blank://0x48?frames=1&rate=1", "`width` is \"0\""),
             (
                 "blank://64x99999?frames=1&rate=1",

@@ -1,4 +1,4 @@
-//! Waits until a frame is due, warps it into shared memory, sends it.
+//! Waits until a frame is due, warps it into shared memory, and sends it.
 
 use core::time::Duration;
 use std::rc::Rc;
@@ -15,22 +15,22 @@ use crate::job::Job;
 use crate::supply::{Step, Supply};
 use deployment::capture::{Mode, Pace};
 
-/// When a picture was taken, and when it was asked for or arrived; nanoseconds.
+/// Time at which a picture was taken, and time at which it was requested or arrived, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Shot {
     pub(crate) captured_at: u64,
     pub(crate) asked_at: u64,
-    /// How long after the instant of its frame it was taken.
+    /// Time from the instant of the frame until the picture was taken.
     pub(crate) skew: i64,
 }
 
-/// The map from the output to pictures that were shrunk, of that to pictures as they were.
+/// Converts a mapping from the output to full-size pictures into a mapping to shrunk pictures.
 fn shrunk(source_from_output: Affine, by: usize) -> Affine {
     let by = by as f64;
     source_from_output.map(|[x, y, shift]| [x / by, y / by, (shift + 0.5) / by - 0.5])
 }
 
-/// One camera, and the topic of its frames.
+/// One camera, with the topic of its frames.
 pub(crate) struct Camera<'a> {
     service: &'a Service,
     job: &'a Job,
@@ -40,14 +40,14 @@ pub(crate) struct Camera<'a> {
     pacer: Pacer,
     place: Place,
     n_dropped: u64,
-    /// Receivers that the camera waits for: fewer than the job's once some did not connect in time.
+    /// Number of receivers that the camera waits for. It is lower than in the job if some did not connect in time.
     n_expected: usize,
-    /// Why the last frame had no picture, if it had none.
+    /// Reason why the last frame had no picture, if it had none.
     trouble: Option<Status>,
 }
 
 impl<'a> Camera<'a> {
-    /// A camera of footage.
+    /// Opens the footage of a camera.
     pub(crate) fn open(
         service: &'a Service,
         job: &'a Job,
@@ -63,14 +63,16 @@ impl<'a> Camera<'a> {
         Self::new(service, job, (size, shrink), pacer)
     }
 
-    /// A live camera, which has a pace of its own.
+    /// Opens a live camera, which sets its own pace.
     ///
-    /// * `size`: of its pictures.
+    /// * `size`: size of its pictures.
     pub(crate) fn live(service: &'a Service, job: &'a Job, size: Size) -> Result<Self, Failure> {
         Self::new(service, job, (size, 1), Pacer::as_fast_as_possible())
     }
 
-    /// * `size`: of the pictures, and by how much they were shrunk.
+    /// Creates a camera.
+    ///
+    /// * `size`: size of the pictures, and factor by which they were shrunk.
     fn new(
         service: &'a Service,
         job: &'a Job,
@@ -80,7 +82,7 @@ impl<'a> Camera<'a> {
         let mut stage = Stage::new(service, job.patience);
         let publisher = stage.bulk_output(&topic::frame(job.view), job.n_consumers)?;
         let [width, height] = job.framing.out_size().map(|side| side as usize);
-        // The area outside a rotated picture is black; otherwise the border is repeated, as in the reference program.
+        // The area outside a rotated picture is black. Otherwise the border is repeated, as in the reference program.
         let fill = if job.framing.roll() == 0.0 {
             Fill::Replicate
         } else {
@@ -103,12 +105,12 @@ impl<'a> Camera<'a> {
         })
     }
 
-    /// Waits for the receivers, then skips the frames that earlier epochs of this process have sent. Returns how many.
+    /// Waits for the receivers, then skips the frames that earlier epochs of this process have sent. Returns their number.
     pub(crate) fn resume(&mut self, supply: &mut Supply) -> u64 {
         self.wait_for_receivers().map_or(0, |sent| supply.skip(sent))
     }
 
-    /// Waits for the receivers. Returns how many frames earlier epochs of this process have sent, if there were some.
+    /// Waits for the receivers. Returns the number of frames that earlier epochs of this process have sent, if there were any.
     pub(crate) fn wait_for_receivers(&mut self) -> Option<u64> {
         let patience = self.service.patience_at_start(self.job.patience);
         let n = self.publisher.wait_for_subscribers(self.n_expected, patience);
@@ -116,7 +118,7 @@ impl<'a> Camera<'a> {
             tracing::warn!(
                 n,
                 expected = self.n_expected,
-                "beginning without all receivers"
+                "starting before all receivers are connected"
             );
             self.n_expected = n;
         }
@@ -127,23 +129,23 @@ impl<'a> Camera<'a> {
         Some(sent)
     }
 
-    /// Returns true if the run is to end; a turn of the main loop.
+    /// Starts an iteration of the main loop. Returns true if the run is to end.
     pub(crate) fn is_stopped(&self) -> Result<bool, Failure> {
         Ok(self.stage.wait(Duration::ZERO)? == Woken::Stop)
     }
 
-    /// Counts frames that were not sent, because this process was behind its clock.
+    /// Counts frames that were not sent because this process was behind its clock.
     pub(crate) fn drop_frames(&mut self, n: u64) {
         self.n_dropped += n;
         self.service.health().dropped(Cause::BehindClock, n);
     }
 
-    /// Notes what became of the pictures of a live camera.
+    /// Updates the counts of a live camera's pictures.
     pub(crate) fn report(&self, counts: CameraCounts) {
         self.service.health().camera(counts);
     }
 
-    /// Logs once when the camera stops giving pictures, and once when it gives them again.
+    /// Logs once when the camera stops delivering pictures, and once when it delivers them again.
     pub(crate) fn log_trouble(&mut self, frame: u64, step: Step) {
         let trouble = match step {
             Step::Nothing(status) => Some(status),
@@ -161,9 +163,9 @@ impl<'a> Camera<'a> {
         self.trouble = trouble;
     }
 
-    /// Waits until frame `at` is due; where frames may be dropped, skips those that are overdue.
+    /// Waits until frame `at` is due. If frames may be dropped, skips overdue frames.
     ///
-    /// Returns how many were skipped.
+    /// Returns the number of skipped frames.
     pub(crate) fn wait_until_due(&mut self, supply: &mut Supply, at: u64) -> Result<u64, Failure> {
         while self.pacer.wait_nanos(at, now_nanos()) > 0 {
             let nanos = self.pacer.wait_nanos(at, now_nanos());
@@ -180,7 +182,7 @@ impl<'a> Camera<'a> {
         Ok(n)
     }
 
-    /// Sends a frame; with lossless delivery, sends it again if a receiver was restarted.
+    /// Sends a frame. With lossless delivery, sends it again if a receiver was restarted.
     pub(crate) fn send_frame(&mut self, index: u64, rgb: &[u8], shot: Shot) -> Result<(), Failure> {
         let asked_at = shot.asked_at;
         let is_live = self.job.live.is_some();
@@ -208,7 +210,7 @@ impl<'a> Camera<'a> {
                 tracing::warn!(
                     n,
                     expected = self.n_expected,
-                    "going on without all receivers"
+                    "continuing without some receivers"
                 );
                 self.n_expected = n;
                 break;
@@ -227,7 +229,7 @@ impl<'a> Camera<'a> {
         Ok(())
     }
 
-    /// Sends a frame without a picture, with the cause; or the end of the stream.
+    /// Sends a frame without a picture and the reason, or the end of the stream.
     pub(crate) fn send_empty(&self, frame: u64, status: Status) -> Result<(), Failure> {
         let mut loan = self.publisher.loan(1)?;
         loan.payload_mut().fill(0);
@@ -269,14 +271,14 @@ impl<'a> Camera<'a> {
         }
     }
 
-    /// Notes where a restarted process continues.
+    /// Saves the position at which a restarted process continues.
     pub(crate) fn note(&mut self, n_sent: u64) {
         if let Err(error) = self.place.note([n_sent]) {
-            tracing::debug!(%error, "cannot note the place in the footage");
+            tracing::debug!(%error, "cannot save the position in the footage");
         }
     }
 
-    /// Sends the end of the stream, which carries the number of frames.
+    /// Sends the end of the stream, which contains the number of frames.
     pub(crate) fn end(&self, n_frames: u64) -> Result<(), Failure> {
         let beyond = self.job.source.start + n_frames * self.job.source.step;
         let n_connected = || self.publisher.n_connected();

@@ -9,7 +9,7 @@ use crate::blank::{Blank, BlankError, BlankFeed};
 use crate::info::FeedInfo;
 use crate::recorded::{Recorded, RecordedError, RecordedFeed};
 
-/// Why there are no pictures.
+/// Error if there are no pictures.
 #[derive(Debug, thiserror::Error)]
 pub enum FeedError {
     /// The footage cannot be used.
@@ -18,48 +18,48 @@ pub enum FeedError {
     /// The address of a scene is invalid.
     #[error("{address}")]
     Address {
-        /// As the user wrote it.
+        /// Address as the user wrote it.
         address: String,
-        /// The mistake in it.
+        /// Mistake in the address.
         source: AddressError,
     },
     /// The address of grey footage is invalid.
     #[error("{address}: {source}")]
     Blank {
-        /// As the user wrote it.
+        /// Address as the user wrote it.
         address: String,
-        /// The mistake in it.
+        /// Mistake in the address.
         source: BlankError,
     },
     /// The pictures of a recording cannot be used.
     #[error("{address}")]
     Recorded {
-        /// As the user wrote it.
+        /// Address as the user wrote it.
         address: String,
-        /// The cause.
+        /// Cause of the error.
         source: RecordedError,
     },
-    /// The scene of an address cannot be made.
+    /// The scene of an address cannot be created.
     #[error("{address}")]
     Scene {
-        /// As the user wrote it.
+        /// Address as the user wrote it.
         address: String,
-        /// The cause.
+        /// Cause of the error.
         source: SceneError,
     },
 }
 
-/// The pictures of a camera, in order: footage, `synth://` (see [`Address`]), `blank://` (see [`Blank`]), or `run.mcap#left` (see
-/// [`Recorded`]).
+/// The pictures of a camera, in order. The source is footage, `synth://` (see [`Address`]), `blank://` (see [`Blank`]), or `run.mcap#left`
+/// (see [`Recorded`]).
 #[derive(Debug)]
 pub enum Feed {
-    /// Files.
+    /// Footage in files.
     Footage(Box<Source>),
-    /// A scene.
+    /// A rendered scene.
     Scene(Box<Stage>),
-    /// Grey frames, of a camera whose pictures nobody needs.
+    /// Grey frames, for a camera whose pictures are not used.
     Blank(Box<BlankFeed>),
-    /// Those of a live camera, recorded as they came.
+    /// Recorded original pictures of a live camera.
     Recorded(Box<RecordedFeed>),
 }
 
@@ -69,7 +69,7 @@ pub struct Stage {
     info: FeedInfo,
     view: View,
     rate_hz: f64,
-    /// Index of the next frame, and frames left.
+    /// Index of the next frame, and number of frames left.
     index: u64,
     step: u64,
     n_left: u64,
@@ -77,11 +77,11 @@ pub struct Stage {
 }
 
 impl Feed {
-    /// The properties of a camera's pictures, without making a scene.
+    /// Returns the properties of a camera's pictures, without creating a scene.
     ///
     /// # Errors
     ///
-    /// [`FeedError`].
+    /// Fails with [`FeedError`] if the source cannot be used.
     pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
         if let Some(blank) = blank(spec)? {
             return Ok(BlankFeed::look(&blank, spec)?);
@@ -102,11 +102,11 @@ impl Feed {
         info(spec, &address, Size::new(width, height))
     }
 
-    /// Opens the source. Making a scene takes about a second.
+    /// Opens the source. Creating a scene takes about a second.
     ///
     /// # Errors
     ///
-    /// [`FeedError`].
+    /// Fails with [`FeedError`] if the source cannot be used.
     pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
         if let Some(blank) = blank(spec)? {
             return Ok(Self::Blank(Box::new(BlankFeed::open(&blank, spec)?)));
@@ -137,7 +137,7 @@ impl Feed {
         })))
     }
 
-    /// The properties of the pictures.
+    /// Returns the properties of the pictures.
     pub fn info(&self) -> FeedInfo {
         match self {
             Self::Footage(source) => FeedInfo {
@@ -155,11 +155,11 @@ impl Feed {
         }
     }
 
-    /// The next frame, in a buffer of the feed; `None` at the end.
+    /// Returns the next frame, in a buffer of the feed; `None` at the end.
     ///
     /// # Errors
     ///
-    /// [`FootageError`]; a scene has none.
+    /// Fails with [`FootageError`] if the frame cannot be read. A scene does not fail.
     pub fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
         match self {
             Self::Footage(source) => source.next_frame(),
@@ -169,7 +169,7 @@ impl Feed {
         }
     }
 
-    /// The pixels of the last frame; see [`Source::pixels`].
+    /// Returns the pixels of the last frame; see [`Source::pixels`].
     pub fn pixels(&self) -> &[u8] {
         match self {
             Self::Footage(source) => source.pixels(),
@@ -179,7 +179,7 @@ impl Feed {
         }
     }
 
-    /// Returns true if the pictures are all the same by nature (a single image, or grey), which does not count as frozen.
+    /// Returns true if all pictures are the same by design: a single image, or grey frames. Such pictures do not count as frozen.
     pub fn is_still(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Still,
@@ -188,7 +188,7 @@ impl Feed {
         }
     }
 
-    /// Returns true if the source is a video: a decoder leaves out frames that it cannot decode.
+    /// Returns true if the source is a video. A decoder leaves out frames that it cannot decode.
     pub fn is_video(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
@@ -196,7 +196,7 @@ impl Feed {
         }
     }
 
-    /// Returns the complaints of the decoder of a video so far.
+    /// Returns the complaints of a video's decoder so far.
     pub fn complaints(&self) -> Complaints {
         match self {
             Self::Footage(source) => source.complaints(),
@@ -204,11 +204,11 @@ impl Feed {
         }
     }
 
-    /// Skips the next `n` frames; returns how many there were.
+    /// Skips the next `n` frames. Returns how many there were.
     ///
     /// # Errors
     ///
-    /// [`FootageError`]; a scene has none.
+    /// Fails with [`FootageError`] if the footage cannot be read. A scene does not fail.
     pub fn skip(&mut self, n: u64) -> Result<u64, FootageError> {
         match self {
             Self::Footage(source) => source.skip(n),
@@ -250,7 +250,7 @@ impl Stage {
     }
 }
 
-/// Grey footage, where the source is meant to be that.
+/// Parses the address of grey footage. Returns `None` if the source is something else.
 fn blank(spec: &SourceSpec) -> Result<Option<Blank>, FeedError> {
     if !Blank::is_blank(&spec.path) {
         return Ok(None);

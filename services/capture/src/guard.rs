@@ -1,15 +1,15 @@
-//! Checks the frames of a camera: does the picture change, does the clock run?
+//! Checks the frames of a camera: the picture must change, and the clock must run.
 
 use messages::Status;
 
-/// Largest difference between a frame's time and the one expected from the previous frame. Recordings have gaps, and a
-/// camera may be slow for a moment: neither is a clock jump.
+/// Largest difference between a frame's time and the time expected from the previous frame. Recordings have gaps, and a
+/// camera may be slow for a moment: neither counts as a clock jump.
 const JUMP_S: f64 = 2.0;
 
-/// Keeps what it needs of a camera's last frame to check the next one. Reads no clock.
+/// Keeps the state of a camera's last frame, to check the next one. Does not read a clock.
 #[derive(Debug)]
 pub(crate) struct Guard {
-    /// Repetitions from which on a picture is frozen; 0 for never.
+    /// Number of repetitions from which a picture counts as frozen; 0 to disable the check.
     frozen_after: u32,
     /// Frames of the footage per second.
     rate_hz: Option<f64>,
@@ -20,8 +20,10 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    /// * `frozen_after`: repetitions from which on a picture counts as frozen; 0 for never.
-    /// * `rate_hz`: frames of the footage (not only of those used) per second.
+    /// Creates a guard that has not seen a frame.
+    ///
+    /// * `frozen_after`: number of repetitions from which a picture counts as frozen; 0 to disable the check.
+    /// * `rate_hz`: frame rate of the footage per second, counting all frames, not only used ones.
     pub(crate) fn new(frozen_after: u32, rate_hz: Option<f64>) -> Self {
         Self {
             frozen_after,
@@ -34,9 +36,9 @@ impl Guard {
 
     /// Returns the fault of a frame, if it has one.
     ///
-    /// * `index`: in the footage.
-    /// * `time_s`: timestamp of the camera, seconds.
-    /// * `pixels`: of any size.
+    /// * `index`: index of the frame in the footage.
+    /// * `time_s`: timestamp of the camera, in seconds.
+    /// * `pixels`: pixels of the picture, which may have any size.
     pub(crate) fn check(
         &mut self,
         index: u64,
@@ -80,7 +82,7 @@ impl Guard {
     }
 }
 
-/// A hash of all bytes, to tell pictures apart: four independent lanes, so that it costs less than a copy.
+/// Returns a hash of all bytes, to distinguish pictures. It has four independent lanes, so it is faster than a copy.
 fn fingerprint(bytes: &[u8]) -> u64 {
     const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
     let mut lanes = [1, 2, 3, 4].map(|i: u64| i.wrapping_mul(PRIME));
@@ -105,7 +107,7 @@ mod tests {
 
     use super::*;
 
-    /// The results for pictures of one colour each, at 10 Hz.
+    /// Returns the results for single-coloured pictures at 10 Hz.
     fn of_pictures(frozen_after: u32, colours: &[u8]) -> Vec<Option<Status>> {
         let mut guard = Guard::new(frozen_after, Some(10.0));
         let frames = colours.iter().enumerate();
@@ -115,7 +117,7 @@ mod tests {
         frames.map(check).collect()
     }
 
-    /// The results for timestamps at 10 Hz with changing pictures.
+    /// Returns the results for timestamps at 10 Hz with changing pictures.
     fn of_times(times_s: &[f64]) -> Vec<Option<Status>> {
         let mut guard = Guard::new(2, Some(10.0));
         let frames = times_s.iter().enumerate();
@@ -149,7 +151,7 @@ mod tests {
             of_times(&[0.0, 0.1, 0.05, 0.0, 0.4]),
             [None, None, back, back, None]
         );
-        // After a jump the clock counts as good again.
+        // After a jump, the clock counts as good again.
         assert_eq!(
             of_times(&[0.0, 0.1, 3600.0, 3600.1, 0.4, 0.5]),
             [None, None, jump, None, back, None]

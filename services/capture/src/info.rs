@@ -5,19 +5,19 @@ use footage::{Depth, Size, Turn};
 /// The properties of a camera's pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedInfo {
-    /// Size of every picture, as it is handed out.
+    /// Size of every picture as delivered.
     pub size: Size,
-    /// Factor by which it was shrunk ([`footage::SourceSpec::most_shrink`]).
+    /// Factor by which the pictures were shrunk ([`footage::SourceSpec::most_shrink`]).
     pub shrink: usize,
     /// Number of frames.
     pub n_frames: u64,
-    /// Frames per second of the scene, where it is known.
+    /// Frames per second of the scene, if known.
     pub frame_rate_hz: Option<f64>,
-    /// Turn that the tag of the first image or of the video asks for, done or not.
+    /// Rotation that the tag of the first image or of the video asks for, whether or not it is applied.
     pub tag: Turn,
-    /// How many bits images with 16 use, where these are fewer.
+    /// Number of bits that 16-bit images use, if fewer than 16.
     pub depth: Option<Depth>,
-    /// True if every picture is two, of different moments, line by line.
+    /// True if the pictures are interlaced: every picture consists of two pictures from different moments, line by line.
     pub is_interlaced: bool,
 }
 

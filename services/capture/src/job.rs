@@ -1,4 +1,4 @@
-//! Task of the process.
+//! The job of the process.
 
 use core::time::Duration;
 
@@ -9,34 +9,34 @@ use crate::live::LiveJob;
 use deployment::Timeline;
 use deployment::capture::{Faults, Mode, Pace};
 
-/// Task of the process of one camera.
+/// The job of the process of one camera.
 #[derive(Debug)]
 pub struct Job {
-    /// The view.
+    /// Index of the view.
     pub view: usize,
-    /// The footage.
+    /// Footage of the camera.
     pub source: SourceSpec,
-    /// Which frame belongs to each common instant, where cameras have clocks of their own; `source` counts instants then.
+    /// For cameras with clocks of their own: the frame that belongs to each common instant. `source` then counts instants.
     pub timeline: Option<Timeline>,
-    /// The live camera, if it is one; of `source` only the choice of frames counts then.
+    /// The live camera, if it is one. Of `source`, only the choice of frames is then used.
     pub live: Option<LiveJob>,
-    /// From the beginning of the run to the first frame in real time, nanoseconds, so that every process has started.
+    /// Time from the beginning of the run to the first frame in real time, in nanoseconds. By then every process has started.
     pub lead_nanos: u64,
-    /// Faults that are simulated.
+    /// Faults to simulate.
     pub faults: Faults,
-    /// Repetitions from which on a picture counts as frozen; 0 for never.
+    /// Number of repetitions from which a picture counts as frozen; 0 to disable the check.
     pub frozen_after: u32,
-    /// How long after the instants of their frames the pictures of footage were taken, nanoseconds; that of a live camera is
+    /// Time from the instant of a frame until the picture of the footage was taken, in nanoseconds. For a live camera, it is
     /// measured.
     pub skew_nanos: i64,
-    /// From the footage to the frames of the pipeline.
+    /// Mapping from the footage to the frames of the pipeline.
     pub framing: Framing,
-    /// Mode: decides whether frames may be dropped.
+    /// Mode, which decides whether frames may be dropped.
     pub mode: Mode,
-    /// How fast frames are sent.
+    /// Speed at which frames are sent.
     pub pace: Pace,
-    /// Processes that receive the frames.
+    /// Number of processes that receive the frames.
     pub n_consumers: usize,
-    /// How long the process waits for them.
+    /// Time that the process waits for its receivers.
     pub patience: Duration,
 }

@@ -1,4 +1,4 @@
-//! Sends the pictures of a live camera as they came, to the recording.
+//! Sends the original pictures of a live camera to the recording.
 
 use std::sync::Arc;
 
@@ -9,10 +9,10 @@ use runtime::{SendError, Service, SlicePublisher};
 use crate::job::Job;
 use crate::live::{Grid, LiveJob, Original, Originals};
 
-/// Pictures that are sent in one turn of the main loop, so that its own work is not held up.
+/// Number of pictures that are sent per iteration of the main loop, so that its own work is not delayed.
 const MOST_IN_TURN: usize = 16;
 
-/// The pictures on their way to the topic.
+/// Sends original pictures to their topic.
 pub(crate) struct Kept {
     publisher: SlicePublisher<u8, PictureHeader>,
     originals: Arc<Originals>,
@@ -22,7 +22,7 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
-    /// None if nothing is to be kept.
+    /// Opens the topic. Returns `None` if nothing is to be kept.
     pub(crate) fn open(
         service: &Service,
         job: &Job,
@@ -56,12 +56,12 @@ impl Kept {
         }))
     }
 
-    /// Where the camera puts its pictures.
+    /// Returns the queue into which the camera puts its pictures.
     pub(crate) fn originals(&self) -> Arc<Originals> {
         Arc::clone(&self.originals)
     }
 
-    /// Sends what waits. A picture that cannot be sent is lost: the recording counts it by its number.
+    /// Sends all waiting pictures. A picture that cannot be sent is lost. The recording notices this from the picture numbers.
     pub(crate) fn send_all(&mut self) -> Result<(), Failure> {
         for _ in 0..MOST_IN_TURN {
             let Some((number, original)) = self.originals.take() else {
@@ -113,7 +113,7 @@ impl Kept {
         Ok(())
     }
 
-    /// Sends what still waits, and how many there were.
+    /// Sends the pictures that still wait, and the number of all pictures.
     pub(crate) fn end(&mut self) -> Result<(), Failure> {
         while let Some((number, original)) = self.originals.take() {
             self.send(number, &original)?;

@@ -1,8 +1,8 @@
-//! A live camera: its pictures are brought to the instants that all cameras of a run have in common.
+//! A live camera, whose pictures are assigned to the common instants of all cameras in a run.
 //!
-//! Reading order: [`LiveCamera`] (what to open), `input` (a device or a stream that is open), `originals` (its
-//! pictures as they came, for a recording), `source` (the thread that keeps
-//! it open, and the newest pictures), `grid` (which instant a picture belongs to), `phase` (how far
+//! Reading order: [`LiveCamera`] (the camera to open), `input` (an open device or stream), `originals` (its
+//! original pictures, for a recording), `source` (the thread that keeps
+//! it open, and the newest pictures), `grid` (the instant that a picture belongs to), `phase` (how far
 //! pictures are from their instants).
 
 mod address;
@@ -26,16 +26,16 @@ pub(crate) use source::{Picture, Source};
 pub struct LiveJob {
     /// The camera.
     pub camera: LiveCamera,
-    /// Size of its pictures, pixels.
+    /// Size of the pictures, in pixels.
     pub size: footage::Size,
-    /// Common instants per second, before `frame_step`.
+    /// Number of common instants per second, before `frame_step`.
     pub rate_hz: f64,
-    /// True if its pictures are recorded as they come.
+    /// True if the original pictures are recorded.
     pub is_kept: bool,
-    /// Its name.
+    /// Name of the camera.
     pub name: String,
-    /// How far its pictures may be from the instants before a warning, nanoseconds.
+    /// Largest distance of pictures from the instants without a warning, in nanoseconds.
     pub max_skew_nanos: u64,
-    /// From the beginning of the run to the first instant, nanoseconds: every camera of the run has the same.
+    /// Time from the beginning of the run to the first instant, in nanoseconds. It is the same for all cameras of the run.
     pub lead_nanos: u64,
 }

@@ -12,15 +12,15 @@ use crate::job::Job;
 use crate::kept::Kept;
 use crate::live::{Grid, LiveJob, Phase, Picture, Source};
 
-/// How long after its instant a picture is still waited for: this long and two periods.
+/// Time after its instant for which a late picture is awaited. Two periods are added to it.
 const PATIENCE_NANOS: u64 = 250_000_000;
-/// Longest wait for a picture, so that a stop is noticed.
+/// Longest wait for a picture, so that a stop request is noticed.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Pictures from which on the rate of a camera is compared with that of the instants, and how far they may be apart.
+/// Number of pictures after which the rate of a camera is compared with that of the instants, and largest accepted difference.
 const N_FOR_RATE: u64 = 100;
 const RATE_TOLERANCE: f64 = 0.02;
 
-/// The pictures of a live camera on their way to the topic.
+/// Sends the pictures of a live camera to their topic.
 struct Live<'a, 'b> {
     camera: Camera<'a>,
     job: &'b Job,
@@ -30,11 +30,11 @@ struct Live<'a, 'b> {
     phase: Phase,
     guard: Guard,
     counts: CameraCounts,
-    /// The next instant.
+    /// Index of the next instant.
     at: u64,
-    /// Why pictures were refused since the last that was used.
+    /// Reason why pictures were refused since the last used one.
     refused: Option<Status>,
-    /// Why the last instant has no picture, if it has none; how often that began, by cause; and whether it was logged.
+    /// Reason why the last instant has no picture, if it has none; number of such interruptions by cause; and whether this one was logged.
     trouble: Option<Status>,
     said: Vec<(Status, u64)>,
     has_said: bool,
@@ -42,11 +42,11 @@ struct Live<'a, 'b> {
     has_warned_of_skew: bool,
 }
 
-/// Sends the pictures of a live camera until the run is stopped, or has its frames.
+/// Sends the pictures of a live camera until the run is stopped, or has all its frames.
 ///
 /// # Errors
 ///
-/// Errors of the transport. A camera that cannot be opened is opened again and again.
+/// Fails with errors of the transport. If the camera cannot be opened, this is tried again and again.
 pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Failure> {
     let mut camera = Camera::live(service, job, live.size)?;
     let step = job.source.step as f64;
@@ -87,7 +87,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
     if let Some(kept) = &mut kept {
         kept.end()?;
     }
-    // What still waits has no place any more.
+    // Pictures that still wait have no instant any more.
     while let Some(picture) = it.source.next(Duration::ZERO) {
         it.counts.n_surplus += 1;
         it.source.give_back(picture);
@@ -105,7 +105,7 @@ impl Live<'_, '_> {
         self.job.source.start + nth.saturating_mul(self.job.source.step)
     }
 
-    /// Sends a picture at its instant, and says of those before it that they were left out.
+    /// Sends a picture at its instant. Earlier instants without a picture are reported as left out.
     fn take(&mut self, picture: &Picture, n_frames: u64) -> Result<(), Failure> {
         if let Some(why) = self.grid.wrong_clock(picture.at_nanos, picture.arrived_at_nanos) {
             (self.refused, self.counts.n_refused) = (Some(why), self.counts.n_refused + 1);
@@ -116,7 +116,7 @@ impl Live<'_, '_> {
             self.counts.n_surplus += 1;
             return Ok(());
         };
-        // What was overtaken is dropped, as footage that is behind its clock is.
+        // Overtaken pictures count as dropped, like footage that is behind its clock.
         let n_dropped = picture.n_overtaken.min(nth.saturating_sub(self.at));
         if n_dropped > 0 {
             self.camera.drop_frames(n_dropped);
@@ -139,7 +139,7 @@ impl Live<'_, '_> {
         }
         self.say_that_it_is_back(index);
         let shot = Shot {
-            // Some drivers say when the picture will have been complete.
+            // Some drivers give the time at which the picture will be complete.
             captured_at: picture.at_nanos.min(picture.arrived_at_nanos),
             asked_at: picture.arrived_at_nanos,
             skew: self.counts.off_grid_nanos,
@@ -151,7 +151,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Sends that there is no picture for the next instant.
+    /// Sends that the next instant has no picture.
     fn send_nothing(&mut self, status: Status) -> Result<(), Failure> {
         let index = self.index(self.at);
         self.say_why(index, status);
@@ -160,7 +160,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Logs the first time that there is no picture for a reason, and then each time their number has doubled.
+    /// Logs a reason for missing pictures the first time, and then each time the number of missing pictures has doubled.
     fn say_why(&mut self, index: u64, status: Status) {
         let is_new = self.trouble.replace(status) != Some(status);
         if !is_new {
@@ -181,7 +181,7 @@ impl Live<'_, '_> {
         }
     }
 
-    /// Logs that there are pictures again, if it was logged that there were none.
+    /// Logs that there are pictures again, if it was logged that they were missing.
     fn say_that_it_is_back(&mut self, index: u64) {
         if self.trouble.take().is_some() && core::mem::take(&mut self.has_said) {
             tracing::info!(view = self.job.view, frame = index, "pictures again");
@@ -193,7 +193,7 @@ impl Live<'_, '_> {
         self.camera.note(self.at);
     }
 
-    /// Gives up the instants whose picture should have been here: at once if the camera is known to be gone.
+    /// Gives up instants whose picture is overdue. If the camera is known to be gone, gives them up at once.
     fn give_up_overdue(&mut self, n_frames: u64) -> Result<(), Failure> {
         let trouble = self.source.trouble();
         let patience = match trouble {
@@ -207,7 +207,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Logs once that pictures are further from the instants than they may be.
+    /// Logs once if pictures are too far from their instants.
     fn warn_of_skew(&mut self) {
         let Some(skew) = self.phase.skew_nanos() else {
             return;
@@ -225,7 +225,7 @@ impl Live<'_, '_> {
         );
     }
 
-    /// Puts the counts together for those who watch.
+    /// Updates the counts for programs that observe the run.
     fn count(&mut self) {
         let tally = self.source.tally();
         let counts = CameraCounts {
@@ -251,7 +251,7 @@ impl Live<'_, '_> {
                 view = self.job.view,
                 rate_hz,
                 wanted_hz = self.wanted.rate_hz,
-                "this camera has another rate than the run"
+                "the rate of this camera differs from that of the run"
             );
         }
     }

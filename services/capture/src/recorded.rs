@@ -1,6 +1,6 @@
-//! The pictures of a live camera that were recorded as they came, as footage: `run.mcap#left`.
+//! Recorded original pictures of a live camera, used as footage: `run.mcap#left`.
 //!
-//! Reading order: [`Recorded`] (the address), `table` (which picture belongs to which instant), `pieces` (a stream, to be decoded
+//! Reading order: [`Recorded`] (the address), `table` (the instant of each picture), `pieces` (a stream, to be decoded
 //! again), [`RecordedFeed`] (the pictures).
 
 mod pieces;
@@ -21,51 +21,50 @@ const MARK: &str = ".mcap#";
 /// A camera of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Recorded {
-    /// The recording.
+    /// Path of the recording.
     pub file: PathBuf,
     /// Name of the camera.
     pub camera: String,
 }
 
-/// Why a recording has no pictures of a camera.
+/// Error if a recording has no pictures of a camera.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedError {
-    /// The address names no camera.
-    #[error("no camera is named: write run.mcap#NAME")]
+    /// The address does not name a camera.
+    #[error("no camera is named: use run.mcap#NAME")]
     NoName,
     /// The file cannot be opened.
     #[error("cannot open the recording")]
     Open(#[from] std::io::Error),
-    /// It is not a recording, or cannot be read.
+    /// The file is not a recording, or cannot be read.
     #[error("cannot read the recording")]
     Read(#[from] ReadError),
-    /// It has no pictures of this camera.
-    #[error("it holds no original pictures of camera {camera:?}; {}", others(.known))]
+    /// The recording has no pictures of this camera.
+    #[error("it has no original pictures of camera {camera:?}; {}", others(.known))]
     NoCamera {
-        /// As asked for.
+        /// Name of the camera.
         camera: String,
-        /// The cameras of which it has some.
+        /// Cameras whose pictures the recording has.
         known: Vec<String>,
     },
-    /// Its record of the camera's pictures contradicts itself.
+    /// The recorded facts about the camera's pictures contradict each other.
     #[error("its pictures of {camera:?} cannot be used: {what}")]
     Malformed {
-        /// Which.
+        /// Name of the camera.
         camera: String,
-        /// The mistake.
+        /// Description of the mistake.
         what: &'static str,
     },
-    /// The choice of frames.
+    /// The choice of frames is invalid.
     #[error(transparent)]
     Choice(#[from] FootageError),
 }
 
 fn others(known: &[String]) -> String {
     if known.is_empty() {
-        "it holds pictures of no camera: only `parallax record` of live cameras keeps them"
-            .to_owned()
+        "it has no original pictures: only `parallax record` of live cameras keeps them".to_owned()
     } else {
-        format!("it holds those of {}", known.join(", "))
+        format!("it has those of {}", known.join(", "))
     }
 }
 
@@ -76,11 +75,11 @@ impl Recorded {
         source.contains(MARK) || is_file
     }
 
-    /// Reads an address.
+    /// Parses an address.
     ///
     /// # Errors
     ///
-    /// [`RecordedError::NoName`].
+    /// Fails with [`RecordedError::NoName`] if no camera is named.
     pub fn parse(source: &str) -> Result<Self, RecordedError> {
         let at = source.find(MARK).ok_or(RecordedError::NoName)?;
         let (file, camera) = source.split_at(at + MARK.len());
@@ -93,13 +92,13 @@ impl Recorded {
         })
     }
 
-    /// The address of a camera of a recording.
+    /// Returns the address of a camera in a recording.
     pub fn address(file: &Path, camera: &str) -> String {
         format!("{}#{camera}", file.display())
     }
 }
 
-/// The pictures of a camera of a recording, at the instants of its run or of another rate.
+/// The pictures of a camera in a recording, at the instants of the recorded run or at another rate.
 #[derive(Debug)]
 pub struct RecordedFeed {
     pub(crate) info: FeedInfo,
@@ -109,7 +108,7 @@ pub struct RecordedFeed {
     path: PathBuf,
     file: File,
     buffer: Buffer,
-    /// The next picture of the table, and the frames that are wanted.
+    /// Index of the next picture in the table, and the frames to use.
     at: usize,
     next: u64,
     step: u64,
@@ -125,7 +124,7 @@ struct Open {
 }
 
 impl RecordedFeed {
-    /// The properties of the frames that `spec` chooses.
+    /// Returns the properties of the frames that `spec` selects.
     pub(crate) fn look(recorded: &Recorded, spec: &SourceSpec) -> Result<FeedInfo, RecordedError> {
         Ok(Self::open(recorded, spec)?.info)
     }
@@ -151,7 +150,7 @@ impl RecordedFeed {
         })
     }
 
-    /// The next frame that has a picture; `None` at the end. A damaged picture is left out.
+    /// Returns the next frame that has a picture; `None` at the end. Damaged pictures are left out.
     pub(crate) fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
         while self.n_left > 0 {
             let Some(picture) = self.table.pictures.get(self.at).copied() else {
@@ -184,7 +183,7 @@ impl RecordedFeed {
         instant >= self.next && (instant - self.next).is_multiple_of(self.step)
     }
 
-    /// Skips the next `n` frames; returns how many there were.
+    /// Skips the next `n` frames. Returns how many there were.
     pub(crate) fn skip(&mut self, n: u64) -> u64 {
         let n = n.min(self.n_left);
         self.n_left -= n;
@@ -192,7 +191,7 @@ impl RecordedFeed {
         n
     }
 
-    /// Decodes a picture that needs no other; `false` if it is damaged.
+    /// Decodes a picture that does not depend on another picture. Returns `false` if it is damaged.
     fn decode(&mut self, picture: &Picture) -> Result<bool, FootageError> {
         let (file, buffer) = (&mut self.file, &mut self.buffer);
         let message = match recording::read(file, Kind::Picture, &picture.entry, buffer) {
@@ -209,9 +208,9 @@ impl RecordedFeed {
             .is_some_and(|format| format.to_rgb(message.elements, stride, size, &mut self.rgb)))
     }
 
-    /// The next picture of a stream that is wanted; none if the next one is of another connection.
+    /// Returns the next wanted picture of a stream; `None` if the next one belongs to another connection.
     ///
-    /// * `first`: the next of the table.
+    /// * `first`: the next picture of the table.
     fn next_of_stream(&mut self, first: Picture) -> Result<Option<Picture>, FootageError> {
         let is_open = |open: &Open| open.connection == first.connection;
         if !self.stream.as_ref().is_some_and(is_open) {
@@ -233,7 +232,7 @@ impl RecordedFeed {
         };
         let label = match open.decoder.next_into(&mut self.rgb) {
             Ok(label) => label,
-            // The camera was set to another size: what follows is of no use until it was opened again.
+            // The camera was set to another size. The following pictures cannot be used until the camera was opened again.
             Err(FootageError::SizeChanged { .. }) => None,
             Err(error) => return Err(error),
         };

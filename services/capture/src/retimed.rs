@@ -1,4 +1,4 @@
-//! Footage brought to common instants: of every instant the frame that is nearest to it.
+//! Footage resampled at common instants: each instant gets the nearest frame.
 
 use deployment::Timeline;
 use footage::{Complaints, FootageError, FrameView, SourceSpec};
@@ -6,28 +6,28 @@ use footage::{Complaints, FootageError, FrameView, SourceSpec};
 use crate::feed::{Feed, FeedError};
 use crate::info::FeedInfo;
 
-/// The frames of a camera: at common instants if it has a timeline, else as the footage has them.
+/// The frames of a camera: at common instants if it has a timeline, otherwise as in the footage.
 #[derive(Debug)]
 pub struct Retimed {
     feed: Feed,
     times: Option<Times>,
 }
 
-/// Which instants are used, and where the footage is.
+/// The instants to use, and the position in the footage.
 #[derive(Debug)]
 struct Times {
     timeline: Timeline,
     start: u64,
     step: u64,
     n_instants: u64,
-    /// Position of the next instant among those that are used.
+    /// Position of the next instant among the used ones.
     at: u64,
-    /// The next frame that the footage gives, and the last that it gave.
+    /// Index of the next frame from the footage, and of the last one.
     next: u64,
     shown: Option<u64>,
 }
 
-/// The footage with all its frames, from one on.
+/// Returns the whole footage, from a frame on.
 fn whole(spec: &SourceSpec, from: u64) -> SourceSpec {
     SourceSpec {
         start: from,
@@ -38,13 +38,13 @@ fn whole(spec: &SourceSpec, from: u64) -> SourceSpec {
 }
 
 impl Retimed {
-    /// The properties of the pictures.
+    /// Returns the properties of the pictures.
     ///
-    /// * `spec`: with a timeline it counts instants.
+    /// * `spec`: counts instants if there is a timeline.
     ///
     /// # Errors
     ///
-    /// As for [`Feed::look`].
+    /// Fails like [`Feed::look`].
     pub fn look(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<FeedInfo, FeedError> {
         let Some(timeline) = timeline else {
             return Feed::look(spec);
@@ -60,11 +60,11 @@ impl Retimed {
 
     /// Opens the footage.
     ///
-    /// * `spec`: with a timeline it counts instants.
+    /// * `spec`: counts instants if there is a timeline.
     ///
     /// # Errors
     ///
-    /// As for [`Feed::open`].
+    /// Fails like [`Feed::open`].
     pub fn open(spec: &SourceSpec, timeline: Option<&Timeline>) -> Result<Self, FeedError> {
         let Some(timeline) = timeline else {
             let feed = Feed::open(spec)?;
@@ -86,7 +86,7 @@ impl Retimed {
         })
     }
 
-    /// The properties of the pictures.
+    /// Returns the properties of the pictures.
     pub fn info(&self) -> FeedInfo {
         let info = self.feed.info();
         self.times.as_ref().map_or(info, |times| FeedInfo {
@@ -96,31 +96,31 @@ impl Retimed {
         })
     }
 
-    /// The pixels of the last frame; see [`Feed::pixels`].
+    /// Returns the pixels of the last frame; see [`Feed::pixels`].
     pub fn pixels(&self) -> &[u8] {
         self.feed.pixels()
     }
 
-    /// As [`Feed::is_still`].
+    /// Returns the same as [`Feed::is_still`].
     pub fn is_still(&self) -> bool {
         self.feed.is_still()
     }
 
-    /// As [`Feed::is_video`].
+    /// Returns the same as [`Feed::is_video`].
     pub fn is_video(&self) -> bool {
         self.feed.is_video()
     }
 
-    /// As [`Feed::complaints`].
+    /// Returns the same as [`Feed::complaints`].
     pub fn complaints(&self) -> Complaints {
         self.feed.complaints()
     }
 
-    /// Skips frames or instants; returns how many there were.
+    /// Skips frames or instants. Returns how many there were.
     ///
     /// # Errors
     ///
-    /// As for [`Feed::skip`].
+    /// Fails like [`Feed::skip`].
     pub fn skip(&mut self, n: u64) -> Result<u64, FootageError> {
         let Some(times) = &mut self.times else {
             return self.feed.skip(n);
@@ -130,11 +130,11 @@ impl Retimed {
         Ok(n)
     }
 
-    /// The next picture; of a later instant where the footage lacks frames. `None` at the end.
+    /// Returns the next picture. If the footage lacks frames, it belongs to a later instant. Returns `None` at the end.
     ///
     /// # Errors
     ///
-    /// As for [`Feed::next_frame`].
+    /// Fails like [`Feed::next_frame`].
     pub fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
         let Some(times) = &mut self.times else {
             return self.feed.next_frame();
@@ -172,12 +172,12 @@ impl Retimed {
 }
 
 impl Times {
-    /// The next instant.
+    /// Returns the next instant.
     fn instant(&self) -> u64 {
         self.start.saturating_add(self.at.saturating_mul(self.step))
     }
 
-    /// The frame that is nearest to it.
+    /// Returns the frame nearest to the next instant.
     fn wanted(&self) -> u64 {
         self.timeline.frame(self.instant())
     }

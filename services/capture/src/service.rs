@@ -11,12 +11,12 @@ use deployment::capture::Pace;
 
 /// Sends the footage of one view, then the end of the stream.
 ///
-/// A frame without a picture, or with a faulty one, is sent without pixels; its status gives the cause
+/// A frame without a picture, or with a faulty one, is sent without pixels. Its status gives the cause
 /// ([`messages::Status::CAMERA_FAULTS`]).
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the footage cannot be opened, and what the transport reports.
+/// Fails with [`ExitKind::Input`] if the footage cannot be opened, and with errors of the transport.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     if let Some(live) = &job.live {
         return live_service::run(service, job, live);

@@ -1,4 +1,4 @@
-//! The pictures of a camera that may fail: it is reopened when it is back, and every frame is checked.
+//! The pictures of a camera that may fail. The camera is reopened after a failure, and every frame is checked.
 
 #[cfg(test)]
 mod tests;
@@ -13,41 +13,41 @@ use crate::retimed::Retimed;
 use deployment::Timeline;
 use deployment::capture::{Fault, FaultKind, Faults};
 
-/// Time between attempts to reopen a camera, nanoseconds.
+/// Time between attempts to reopen a camera, in nanoseconds.
 const PAUSE_NANOS: u64 = 500_000_000;
-/// Footage without a clock cannot recover: it is abandoned after this many consecutive failures.
+/// Number of consecutive failures after which footage without a clock is abandoned, because it cannot recover.
 const MAX_FAILURES: u32 = 3;
 
-/// The outcome of one frame.
+/// Outcome of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Step {
-    /// Its picture: [`Supply::pixels`].
+    /// The frame has a picture: [`Supply::pixels`].
     Picture,
-    /// No picture, and why.
+    /// The frame has no picture, for this reason.
     Nothing(Status),
     /// There are no more frames.
     End,
 }
 
-/// The frames of a camera in order; every one has an outcome.
+/// The frames of a camera in order. Every frame has an outcome.
 #[derive(Debug)]
 pub(crate) struct Supply {
     spec: SourceSpec,
-    /// Where the camera has a clock of its own: `spec` counts instants then.
+    /// Timeline of a camera with a clock of its own. `spec` then counts instants.
     timeline: Option<Timeline>,
     faults: Faults,
     info: FeedInfo,
     /// True if frames follow a clock, so that a camera may come back.
     is_live: bool,
     feed: Option<Retimed>,
-    /// Position of the next frame among those that are used.
+    /// Position of the next frame among the used ones.
     at: u64,
-    /// Index of a frame that has been read before its turn, and its time.
+    /// Index and time of a frame that was read too early.
     early: Option<(u64, Option<f64>)>,
     /// The picture that is repeated while the camera is frozen.
     held: Option<Vec<u8>>,
     guard: Guard,
-    /// Why there is no picture, after a failure.
+    /// Reason why there is no picture, after a failure.
     cause: Status,
     n_failures: u32,
     retry_at: u64,
@@ -55,14 +55,14 @@ pub(crate) struct Supply {
 }
 
 impl Supply {
-    /// Opens the footage or makes the scene.
+    /// Opens the footage, or creates the scene.
     ///
-    /// * `is_live`: frames follow a clock, and a camera that is gone may come back.
+    /// * `is_live`: true if frames follow a clock, and a lost camera may come back.
     /// * `frozen_after`: see [`deployment::capture::Config::frozen_after`].
     ///
     /// # Errors
     ///
-    /// [`FeedError`]: a camera that cannot be opened at the start is an error of the deployment.
+    /// Fails with [`FeedError`] if the camera cannot be opened at the start, which is an error of the deployment.
     pub(crate) fn open(
         (spec, timeline): (&SourceSpec, Option<&Timeline>),
         faults: &Faults,
@@ -91,12 +91,12 @@ impl Supply {
         })
     }
 
-    /// The properties of the pictures.
+    /// Returns the properties of the pictures.
     pub(crate) fn info(&self) -> FeedInfo {
         self.info
     }
 
-    /// Index in the footage of the next frame.
+    /// Returns the index in the footage of the next frame.
     pub(crate) fn index(&self) -> u64 {
         self.index_of(self.at)
     }
@@ -106,18 +106,19 @@ impl Supply {
         self.spec.start.saturating_add(offset)
     }
 
-    /// How long after its instant the picture of a frame was taken, nanoseconds; 0 for cameras without a clock of their own.
+    /// Returns the time from the instant of a frame until its picture was taken, in nanoseconds; 0 for cameras without a clock of their
+    /// own.
     pub(crate) fn rest_nanos(&self, index: u64) -> i64 {
         self.timeline.map_or(0, |timeline| timeline.rest_nanos(index))
     }
 
-    /// The picture of the last [`Self::step`], RGB, row major.
+    /// Returns the picture of the last [`Self::step`]: RGB, row major.
     pub(crate) fn pixels(&self) -> &[u8] {
         let fresh = || self.feed.as_ref().map_or(&[][..], Retimed::pixels);
         self.held.as_deref().unwrap_or_else(fresh)
     }
 
-    /// Skips the next `n` frames; returns how many there were.
+    /// Skips the next `n` frames. Returns how many there were.
     pub(crate) fn skip(&mut self, n: u64) -> u64 {
         let n = n.min(self.info.n_frames.saturating_sub(self.at));
         for _ in 0..n {
@@ -129,9 +130,9 @@ impl Supply {
         n
     }
 
-    /// Goes on to the next frame.
+    /// Advances to the next frame.
     ///
-    /// * `now`: nanoseconds; decides when a camera is reopened.
+    /// * `now`: time in nanoseconds, which decides when a camera is reopened.
     pub(crate) fn step(&mut self, now: u64) -> Step {
         if self.at >= self.info.n_frames {
             self.complain();
@@ -164,7 +165,7 @@ impl Supply {
                 messages = complaints.messages,
                 undecoded = complaints.undecoded,
                 last = complaints.last,
-                "the decoder complained about this camera's film; pictures that were not whole are left out"
+                "the decoder complained about this camera's video; incomplete pictures are left out"
             );
         }
     }
@@ -179,7 +180,7 @@ impl Supply {
                 wrong.map_or(Step::Picture, Step::Nothing)
             }
             Read::LeftOut => {
-                // A camera leaves out frames when it is slow, a video decoder when it cannot decode them.
+                // A slow camera leaves out frames, and so does a video decoder that cannot decode them.
                 let is_video = self.feed.as_ref().is_some_and(Retimed::is_video);
                 let cause = if is_video {
                     Status::DAMAGED
@@ -237,7 +238,7 @@ impl Supply {
         Ok(feed.next_frame()?.map(|frame| (frame.index, frame.time_s)))
     }
 
-    /// The source has ended early; with a live camera this is a failure.
+    /// Handles the early end of a source. For a live camera, this is a failure.
     fn at_end(&self) -> Result<Read, FootageError> {
         if !self.is_live {
             return Ok(Read::Over);
@@ -247,14 +248,14 @@ impl Supply {
         })
     }
 
-    /// The error that a simulated fault causes, if it causes one.
+    /// Returns the error that a simulated fault causes, if any.
     fn failure(&self, fault: Fault) -> Option<FootageError> {
         let path = || self.spec.path.clone();
         match fault.kind {
             FaultKind::Unplug => Some(FootageError::NotFound { path: path() }),
             FaultKind::Damage => Some(FootageError::Video {
                 path: path().into(),
-                message: "a fault on purpose".to_owned(),
+                message: "a simulated fault".to_owned(),
             }),
             FaultKind::Size => {
                 let Size { width, height } = self.info.size;
@@ -301,7 +302,7 @@ impl Supply {
         Ok(())
     }
 
-    /// The timestamp of a frame, with a simulated fault of the clock.
+    /// Returns the timestamp of a frame, with a simulated fault of the clock.
     fn timestamp(&self, fault: Option<Fault>, index: u64, time_s: Option<f64>) -> Option<f64> {
         let rate_hz = self.info.frame_rate_hz? * self.spec.step as f64;
         let at = |index: u64| index as f64 / rate_hz;
@@ -317,7 +318,7 @@ impl Supply {
         }
     }
 
-    /// Reopens the source at the next frame; `false` if it is not yet time for that.
+    /// Reopens the source at the next frame. Returns `false` if it is too early for that.
     fn reopen(&mut self, now: u64) -> Result<bool, FootageError> {
         if self.is_abandoned || (self.is_live && now < self.retry_at) {
             return Ok(false);
@@ -330,7 +331,7 @@ impl Supply {
         let feed = match Retimed::open(&spec, self.timeline.as_ref()) {
             Ok(feed) => feed,
             Err(FeedError::Footage(error)) => return Err(error),
-            // A scene that was made once can be made again, unless its files are gone.
+            // A scene that was created once can be created again, unless its files are gone.
             Err(
                 FeedError::Address { address, .. }
                 | FeedError::Blank { address, .. }
@@ -348,7 +349,7 @@ impl Supply {
         Ok(true)
     }
 
-    /// Notes a failure and closes the source: its next frame is unknown.
+    /// Records a failure, and closes the source. Its next frame is then unknown.
     fn lose(&mut self, error: &FootageError, now: u64) {
         let cause = cause_of(error);
         if self.feed.is_some() || self.cause != cause {
@@ -376,12 +377,12 @@ fn spin() -> ! {
     }
 }
 
-/// Result of a reading from a camera.
+/// Result of reading from a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Read {
-    /// A picture, and its timestamp, seconds.
+    /// A picture, with its timestamp in seconds.
     Picture(Option<f64>),
-    /// The frame is missing: the camera is at a later one already.
+    /// The frame is missing, because the camera is already at a later one.
     LeftOut,
     /// The end of the footage.
     Over,

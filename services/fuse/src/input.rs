@@ -17,13 +17,13 @@ pub(crate) enum Input {
 pub(crate) struct Candidates {
     /// Distinct poses, best first.
     pub(crate) poses: Vec<Pose>,
-    /// Evidence of the picture for the front of each.
+    /// For each pose, the evidence of the picture for the person's front.
     pub(crate) front: Vec<FrontEvidence>,
-    /// How long after the instant of the frame it was taken, seconds.
+    /// Time from the instant of the frame until the picture was taken, in seconds.
     pub(crate) skew_s: f64,
 }
 
-/// The expected errors of the parts, and the thresholds that came with them.
+/// The expected errors of the parts, with their thresholds.
 #[derive(Debug, Clone)]
 pub(crate) struct Errors {
     pub(crate) sigma_px: Option<Vec<f32>>,

@@ -1,4 +1,4 @@
-//! Task of the process.
+//! The job of the process.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -6,16 +6,16 @@ use std::sync::Arc;
 use multiview::ViewPlan;
 use pipeline::{Follow, FuseStep, Views};
 
-/// Task of the process of one worker.
+/// The job of the process of one worker.
 #[derive(Debug)]
 pub struct Job {
-    /// The worker.
+    /// Index of the worker.
     pub worker: usize,
-    /// Grouping of the views: solved in pairs or all at once.
+    /// Grouping of the views: solved in pairs, or all at once.
     pub views: Views,
-    /// Which of several people is followed.
+    /// Choice of the followed person.
     pub follow: Follow,
-    /// Its pairs: index in the deployment, and views. If all views are solved at once: the views of these pairs.
+    /// Pairs of this worker: index in the deployment, and the two views. If all views are solved at once, these are the views of the pairs.
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.
     pub step: Arc<FuseStep>,
@@ -23,14 +23,14 @@ pub struct Job {
     pub plans: Vec<Arc<ViewPlan>>,
     /// True if there are processes that send expected errors.
     pub has_quality: bool,
-    /// How long a frame waits for expected errors where the latest frame wins.
+    /// With realtime delivery, the time that a frame waits for expected errors.
     pub quality_deadline: Duration,
-    /// Largest age of the last expected errors of a view that may be used instead.
+    /// Maximum age of a view's last expected errors that may be used instead.
     pub quality_max_age: Duration,
-    /// Distance between the frames used, at least 1.
+    /// Distance between used frames, at least 1.
     pub frame_step: u64,
-    /// Processes that receive the poses of pairs.
+    /// Number of processes that receive the poses of pairs.
     pub n_consumers: usize,
-    /// How long a view may be silent.
+    /// Time that a view may be silent.
     pub patience: Duration,
 }

@@ -1,4 +1,6 @@
-//! Candidates of all views in; out, by the method of networks who is who, by the paper's the answers of camera pairs on the evidence.
+//! Fuses the candidates of all views. For people found by networks, sends the identities of people; by the paper's method, the poses of
+//! camera
+//! pairs.
 #![forbid(unsafe_code)]
 
 mod input;

@@ -1,4 +1,4 @@
-//! Joins the poses of views, solves this worker's pairs or all views on their evidence, sends.
+//! Joins the poses of views, solves this worker's pairs or all views on their evidence, and sends the poses.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use stage::Stage;
 ///
 /// # Errors
 ///
-/// Errors of the transport.
+/// Fails with errors of the transport.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let n_views = job.plans.len();
     let mut stage = Stage::new(service, job.patience);

@@ -1,4 +1,4 @@
-//! From the section `[paper]` of a deployment to the settings of the optimiser.
+//! Converts the section `[paper]` of a deployment to the settings of the optimiser.
 
 use deployment::Views;
 use deployment::paper::{Config, Energy, Switch, Tau, TauName};
@@ -7,11 +7,10 @@ use multiview::learned::Learned;
 use multiview::{EnergyKind, Settings, SwitchBy};
 use viewquality::TrainingErrors;
 
-/// The settings of the optimiser.
+/// Returns the settings of the optimiser.
 ///
-/// * `frame_scale`: pixels of the frame per pixel of the footage, in which `tau` is given.
-/// * `learned`: the content of the file `consistency`; its weights are those of the paper's energy where this
-///   says nothing else.
+/// * `frame_scale`: pixels of the frame per pixel of the footage. `tau` is given in pixels of the footage.
+/// * `learned`: the content of the file `consistency`. Its weights are used for the paper's energy, unless `config` sets them.
 pub fn settings(config: &Config, frame_scale: f32, learned: Option<&Learned>) -> Settings {
     let scaled = |px: Vec<f32>| px.into_iter().map(|px| px * frame_scale).collect();
     let (energy, defaults) = match config.energy {
@@ -49,7 +48,7 @@ pub fn settings(config: &Config, frame_scale: f32, learned: Option<&Learned>) ->
     }
 }
 
-/// Returns the grouping in which the views of a frame are solved.
+/// Returns how the views of a frame are grouped for the solution.
 pub fn views(from: Views) -> pipeline::Views {
     match from {
         Views::Pairs => pipeline::Views::Pairs,
@@ -68,8 +67,8 @@ fn training(tau: &Tau) -> Option<TrainingErrors> {
     }
 }
 
-/// The thresholds, pixels of the footage; empty if there are none, or if a file has them that is
-/// still to be read.
+/// Returns the thresholds in pixels of the footage. The list is empty if there are none, or if they are in a file that has not been
+/// read yet.
 pub fn tau_px(tau: &Tau) -> Vec<f32> {
     let Some(errors) = training(tau) else {
         return match tau {
@@ -89,13 +88,13 @@ pub fn tau_px(tau: &Tau) -> Vec<f32> {
     thresholds.px().to_vec()
 }
 
-/// The median training errors, by which the released energy takes one of two switched-off views
-/// back; empty if they are not known.
+/// Returns the median training errors. If two views are switched off, the released energy uses these errors to switch one of them on
+/// again. The list is empty if the errors are not known.
 fn rescue_px(tau: &Tau) -> Vec<f32> {
     training(tau).map_or_else(Vec::new, |errors| errors.median_px.to_vec())
 }
 
-/// Which of several people is followed.
+/// Returns the choice of the followed person.
 pub fn follow(from: Follow) -> pipeline::Follow {
     match from {
         Follow::Last => pipeline::Follow::Last,

@@ -1,4 +1,4 @@
-//! Joins what the views found, says who is who, sends.
+//! Joins the poses of the views, determines the identities of people, and sends them.
 
 use core::time::Duration;
 
@@ -9,34 +9,34 @@ use pipeline::{Sightings, WhoSettings, WhoStep, time_s};
 use runtime::{Place, Service};
 use stage::{Frame, Stage};
 
-/// The process's work by the method of networks.
+/// The job of the process, for people found by networks.
 #[derive(Debug)]
 pub struct WhoJob {
     /// Cameras of the views, in the rig's order.
     pub cameras: Vec<Camera>,
-    /// Who is who.
+    /// Settings for the identities of people.
     pub settings: WhoSettings,
-    /// Frames of the footage per second, if that is known.
+    /// Frames of the footage per second, if known.
     pub frame_rate_hz: Option<f64>,
-    /// Distance between the frames used, at least 1.
+    /// Distance between used frames, at least 1.
     pub frame_step: u64,
-    /// Processes that receive the people.
+    /// Number of processes that receive the people.
     pub n_consumers: usize,
-    /// How long a view may be silent.
+    /// Time that a view may be silent.
     pub patience: Duration,
 }
 
-/// Determines who is who in every frame, until the footage of all views ends or a stop is requested.
+/// Determines the identities of people in every frame, until the footage of all views ends or a stop is requested.
 ///
 /// # Errors
 ///
-/// Errors of the transport.
+/// Fails with errors of the transport.
 pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
     let n_views = job.cameras.len();
     let mut stage = Stage::new(service, job.patience);
     stage.skip_when_behind(job.frame_step);
     for view in 0..n_views {
-        // Who is who does not depend on extra keypoints.
+        // Identities do not depend on extra keypoints.
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
             let n_extras = pose.n_keypoints as usize;
             wire::sightings_from_message(pose, n_extras)
@@ -59,10 +59,10 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
         frame.turn().restart(now_nanos());
         let found = step.run(time_s(frame.number(), job.frame_rate_hz), &answers);
-        // Before they are sent: an identity that others know is never forgotten.
+        // The identities are saved before they are sent, so that no identity that was sent is ever lost.
         let noted = place.note_bytes(bytemuck::cast_slice(&step.memory()));
         if let Err(error) = noted.as_ref() && is_noted {
-            tracing::warn!(%error, "cannot note who is there: after a death of this process people have new identities");
+            tracing::warn!(%error, "cannot save the identities of people: if this process dies, people get new identities");
         }
         is_noted = noted.is_ok();
         let message = wire::people_to_message(&found, present).or_fail(ExitKind::Run)?;
@@ -70,7 +70,7 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
     })
 }
 
-/// The step; after a restart with the people and identities of the process before.
+/// Returns the step. After a restart, it continues with the people and identities of the previous process.
 fn begin(service: &Service, job: &WhoJob, settings: WhoSettings, place: &mut Place) -> WhoStep {
     let memory = place.last().filter(|_| service.epoch() > 0);
     let resumed = memory.and_then(|bytes| {
@@ -80,7 +80,7 @@ fn begin(service: &Service, job: &WhoJob, settings: WhoSettings, place: &mut Pla
     resumed.unwrap_or_else(|| WhoStep::new(job.cameras.clone(), settings))
 }
 
-/// The candidates of a view; `None` if it has none.
+/// Returns the candidates of a view; `None` if it has none.
 fn answer(
     service: &Service,
     frame: &mut Frame<'_, Option<Sightings>>,

@@ -17,15 +17,15 @@ use crate::job::Job;
 struct FrameViews<'a> {
     turn: &'a Turn,
     answers: Vec<Option<ViewResult>>,
-    /// The candidates that are other people.
+    /// Candidates that are not the followed person.
     others: Others,
-    /// How many frames old the expected errors of every view are.
+    /// Age of the expected errors of every view, in frames.
     sigma_ages: Vec<u64>,
     evidence: Vec<Option<EvidenceView<'a>>>,
 }
 
 impl FrameViews<'_> {
-    /// Bit `v` is set if the poses of view `v` were received in time.
+    /// Returns a bit mask: bit `v` is set if the poses of view `v` were received in time.
     fn present(&self) -> u32 {
         let answers = self.answers.iter().enumerate();
         let present = answers.filter(|(_, answer)| answer.is_some());
@@ -36,7 +36,7 @@ impl FrameViews<'_> {
 pub(crate) struct Worker<'a> {
     pub(crate) service: &'a Service,
     pub(crate) job: &'a Job,
-    /// By view; only those that a pair of this worker needs.
+    /// Evidence by view. Only views in a pair of this worker have it.
     pub(crate) evidence: Vec<Option<Held<f32, EvidenceHeader>>>,
     pub(crate) output: Output<'a, PairPose>,
 }
@@ -44,7 +44,7 @@ pub(crate) struct Worker<'a> {
 impl Worker<'_> {
     /// Solves one frame.
     ///
-    /// * `following`: who was followed in the frames before.
+    /// * `following`: the person followed in previous frames.
     pub(crate) fn fuse(
         &self,
         frame: &mut Frame<'_, Input>,
@@ -70,7 +70,7 @@ impl Worker<'_> {
         }
     }
 
-    /// The poses of every view with their expected errors, and how many frames old these are.
+    /// Returns the poses of every view with their expected errors, and the age of these errors in frames.
     fn answers(&self, frame: &mut Frame<'_, Input>) -> (Vec<Option<ViewResult>>, Vec<u64>) {
         let n_views = self.job.plans.len();
         let mut ages = vec![0; n_views];
@@ -110,7 +110,7 @@ impl Worker<'_> {
         (answers, ages)
     }
 
-    /// The evidence of a view; refused if the poses of the view do not lie within it.
+    /// Returns the evidence of a view. It is refused if a pose of the view is outside of the evidence.
     fn evidence_of<'a>(
         &'a self,
         view: usize,
@@ -183,7 +183,7 @@ impl Worker<'_> {
         Ok(())
     }
 
-    /// Messages of a solution. Responses that are not numbers give an energy that is not a number: the evidence is refused,
+    /// Returns the messages of a solution. If responses are not numbers, the energy is not a number either. The evidence is then refused,
     /// and the messages say that there is no solution.
     fn or_bad_input<M: AsMut<[PairPose]>>(
         &self,
@@ -200,7 +200,7 @@ impl Worker<'_> {
         })
     }
 
-    /// Sends a message with the expected errors of its two views; returns the send time, nanoseconds.
+    /// Sends a message with the expected errors of its two views. Returns the send time in nanoseconds.
     fn send(
         &self,
         frame: &FrameViews<'_>,

@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 /// A latency budget and the measured latency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// The budget, milliseconds.
+    /// The budget, in milliseconds.
     limit_ms: f64,
     /// Number of measured frames.
     n_frames: u64,
-    /// The measured 99th percentile, milliseconds; none if no frame was measured.
+    /// The measured 99th percentile, in milliseconds; `None` if no frame was measured.
     p99_ms: Option<f64>,
     /// The latency table of all stages, as text; empty if nothing was measured.
     table: String,
@@ -21,8 +21,8 @@ pub struct Budget {
 impl Budget {
     /// Compares the latency of a run with its budget.
     ///
-    /// * `limit_ms`: the budget, milliseconds.
-    /// * `latency`: the latency report of the run; none if there is none.
+    /// * `limit_ms`: the budget, in milliseconds.
+    /// * `latency`: the latency report of the run, if there is one.
     pub fn new(limit_ms: f64, latency: Option<&LatencyReport>) -> Self {
         let measured = latency.map(|latency| latency.end_to_end);
         let measured = measured.filter(|measured| measured.count > 0);
@@ -44,23 +44,27 @@ impl Budget {
         self.p99_ms.is_some() && !self.is_held()
     }
 
-    /// The verdict in one line.
+    /// Returns the verdict in one line.
     pub fn verdict(&self) -> String {
         let Self {
             limit_ms, n_frames, ..
         } = self;
         match self.p99_ms {
-            None => format!("{limit_ms} ms could not be judged: no frame has an end-to-end time"),
+            None => format!("{limit_ms} ms could not be checked: no frame has an end-to-end time"),
             Some(p99) if self.is_held() => {
-                format!("{limit_ms} ms held: p99 end to end is {p99:.1} ms of {n_frames} frames")
+                format!(
+                    "{limit_ms} ms met: the 99th percentile end to end is {p99:.1} ms ({n_frames} frames)"
+                )
             }
             Some(p99) => {
-                format!("{limit_ms} ms missed: p99 end to end is {p99:.1} ms of {n_frames} frames")
+                format!(
+                    "{limit_ms} ms exceeded: the 99th percentile end to end is {p99:.1} ms ({n_frames} frames)"
+                )
             }
         }
     }
 
-    /// The verdict and the latency table, as the error message of a run that exceeds its budget.
+    /// Returns the verdict and the latency table, as the error message of a run that exceeds its budget.
     pub fn error_text(&self) -> String {
         let text = format!("latency budget of {}", self.verdict());
         if self.table.is_empty() {
@@ -70,7 +74,7 @@ impl Budget {
         }
     }
 
-    /// The verdict as JSON.
+    /// Returns the verdict as JSON.
     pub fn json(&self) -> Value {
         json!({
             "budget_ms": self.limit_ms,
@@ -81,7 +85,7 @@ impl Budget {
     }
 }
 
-/// The latency table, milliseconds: a header, a row per stage and one end to end; empty if nothing was measured.
+/// Returns the latency table, in milliseconds: a header, a row per stage, and a row for the end-to-end time. Empty if nothing was measured.
 pub fn table(latency: &LatencyReport) -> String {
     let mut text = String::new();
     for (name, percentiles) in rows(latency).filter(|(_, percentiles)| percentiles.count > 0) {
@@ -101,7 +105,7 @@ pub fn table(latency: &LatencyReport) -> String {
     text
 }
 
-/// The latency percentiles of the measured stages, in pipeline order, then those end to end.
+/// Returns the latency percentiles of the measured stages, in pipeline order, then those of the end-to-end time.
 pub fn rows(latency: &LatencyReport) -> impl Iterator<Item = (&'static str, Percentiles)> {
     let names = ["capture", "pose", "quality", "fuse", "triangulate"].into_iter();
     let stages = names.filter_map(|name| Some((name, *latency.stages.get(name)?)));
@@ -139,7 +143,7 @@ mod tests {
         assert!(budget.is_held() && !budget.is_exceeded());
         assert_eq!(
             budget.verdict(),
-            "50 ms held: p99 end to end is 50.0 ms of 100 frames"
+            "50 ms met: the 99th percentile end to end is 50.0 ms (100 frames)"
         );
     }
 
@@ -148,7 +152,7 @@ mod tests {
         let budget = Budget::new(49.9, Some(&latency(100)));
         assert!(budget.is_exceeded());
         let expected = "\
-latency budget of 49.9 ms missed: p99 end to end is 50.0 ms of 100 frames
+latency budget of 49.9 ms exceeded: the 99th percentile end to end is 50.0 ms (100 frames)
   latency, ms         p50       p99     p99.9       max
     pose             20.0      50.0      60.0     123.0
     end to end       20.0      50.0      60.0     123.0";
@@ -161,7 +165,7 @@ latency budget of 49.9 ms missed: p99 end to end is 50.0 ms of 100 frames
         for latency in [None, Some(LatencyReport::default()), Some(latency(0))] {
             let budget = Budget::new(1e9, latency.as_ref());
             assert!(!budget.is_held() && !budget.is_exceeded(), "{latency:?}");
-            assert!(budget.error_text().contains("could not be judged"));
+            assert!(budget.error_text().contains("could not be checked"));
             assert_eq!(budget.json()["p99_ms"], Value::Null);
         }
     }

@@ -1,4 +1,4 @@
-//! The footage of the cameras of a deployment, looked at before any process is started.
+//! The footage of a deployment's cameras, inspected before any process is started.
 
 mod advice;
 mod live;
@@ -16,17 +16,17 @@ pub use pictures::{rotation, settled};
 /// Metadata of a camera's footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Footage {
-    /// Width and height, pixels.
+    /// Width and height, in pixels.
     pub size: [u32; 2],
     /// Number of frames to use.
     pub n_frames: u64,
-    /// Used frames per second of the scene, if known.
+    /// Rate of the used frames, per second of the scene, if known.
     pub frame_rate_hz: Option<f64>,
-    /// Which frame belongs to each common instant, where cameras have clocks of their own; frames are instants then.
+    /// For cameras with clocks of their own: the frame that belongs to each common instant. The frames of the run are then instants.
     pub timeline: Option<Timeline>,
 }
 
-/// The footage of a camera, with the range of frames to use.
+/// Returns the footage of a camera, with the range of frames to use.
 pub fn source(camera: &Camera, config: &Config) -> SourceSpec {
     SourceSpec {
         start: config.start_frame,

@@ -1,4 +1,4 @@
-//! The device that frames are searched on: the choice of a run, and the GPU of a process.
+//! The device that searches frames: the choice for a run, and the GPU of a process.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -7,14 +7,14 @@ use failure::{ExitKind, Failure, OrFail as _};
 use gpu::{Choice, Kind, OpenError};
 use pipeline::ViewStep;
 
-/// The GPU of this process; none before the first view asks for it.
+/// The GPU of this process; `None` until the first view requests it.
 static OPENED: Mutex<Option<Arc<gpu::Device>>> = Mutex::new(None);
 
-/// Returns a line about the device of a run and the reason; `None` if there is no choice.
+/// Returns a line about the device of a run and the reason for the choice. Returns `None` if there is no choice.
 ///
 /// # Errors
 ///
-/// A GPU is asked for, and none can be used.
+/// Fails if the deployment requires a GPU, but none can be used.
 pub fn device(deployment: &Deployment) -> Result<Option<String>, Failure> {
     let asked = deployment.device;
     if !gpu::IS_BUILT && matches!(asked, Device::Auto | Device::Cpu) {
@@ -25,7 +25,7 @@ pub fn device(deployment: &Deployment) -> Result<Option<String>, Failure> {
     }
     let best = gpu::adapters().into_iter().next();
     let usable = match (asked, best) {
-        (Device::Cpu, _) => return Ok(Some("device: cpu, as the deployment says".to_owned())),
+        (Device::Cpu, _) => return Ok(Some("device: cpu, as set in the deployment".to_owned())),
         _ if !gpu::IS_BUILT => Err(OpenError::NotBuilt),
         (_, None) => Err(OpenError::NoAdapter),
         (Device::Auto | Device::Gpu, Some(adapter)) if adapter.kind == Kind::Software => {
@@ -35,25 +35,25 @@ pub fn device(deployment: &Deployment) -> Result<Option<String>, Failure> {
     };
     match usable {
         Ok(adapter) => Ok(Some(format!("device: gpu for the filters, {adapter}"))),
-        Err(error) if asked == Device::Auto => Ok(Some(format!("device: cpu, since {error}"))),
+        Err(error) if asked == Device::Auto => Ok(Some(format!("device: cpu, because {error}"))),
         Err(error) => Err(error).or_fail(ExitKind::Config),
     }
 }
 
-/// The same where networks search frames.
+/// Like [`device`], for a deployment whose frames are searched by networks.
 fn by_networks(deployment: &Deployment) -> Result<Option<String>, Failure> {
     if deployment.network.onnx_runtime.is_none() && deployment.device == Device::Gpu {
-        let message = "device = \"gpu\": networks run on a GPU by ONNX Runtime only: set `network.onnx_runtime`, or `device = \"auto\"`";
+        let message = "device = \"gpu\": networks need ONNX Runtime to run on a GPU: set `network.onnx_runtime`, or `device = \"auto\"`";
         return Err(Failure::new(ExitKind::Config, message));
     }
     Ok(None)
 }
 
-/// The step on the device of its deployment.
+/// Returns the step, set up for the device of its deployment.
 ///
 /// # Errors
 ///
-/// A GPU is asked for, and none can do it.
+/// Fails if the deployment requires a GPU, but no GPU can run the step.
 pub(crate) fn on_device(step: ViewStep, asked: Device) -> Result<ViewStep, Failure> {
     let choice = match asked {
         Device::Cpu => return Ok(step),
@@ -80,7 +80,7 @@ pub(crate) fn on_device(step: ViewStep, asked: Device) -> Result<ViewStep, Failu
     }
 }
 
-/// The GPU of this process.
+/// Returns the GPU of this process, and opens it if necessary.
 fn opened(choice: Choice) -> Result<Arc<gpu::Device>, OpenError> {
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(device) = &*opened {

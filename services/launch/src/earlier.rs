@@ -1,4 +1,4 @@
-//! Results that lie in an output folder before a run begins.
+//! Results that are already in an output folder before a run begins.
 
 use std::fs;
 use std::io;
@@ -23,18 +23,18 @@ const RESULTS: [&str; 10] = [
     "overlays",
     crate::summary::PAGE,
 ];
-/// Folder that `parallax export` writes by default.
+/// Folder to which `parallax export` writes by default.
 const EXPORT: &str = "export";
-/// End of the name of the file that lists what was exported.
+/// Ending of the file that lists the exported files.
 const MANIFEST: &str = ".export.json";
 
-/// Refuses a deployment whose name another one that runs has, before anything is looked at that takes time.
+/// Refuses a deployment if another one with the same name is running. This check comes before checks that take long.
 ///
-/// Deployments of several hosts have a name for each host, known later: they are refused as their processes start.
+/// Deployments of several hosts get a name per host later. They are refused when their processes start.
 ///
 /// # Errors
 ///
-/// It runs already; its files in shared memory cannot be made.
+/// Fails if such a deployment is running, or its files in shared memory cannot be created.
 pub fn check_name(deployment: &Deployment) -> Result<(), Failure> {
     if deployment.hosts.is_empty() {
         drop(Namespace::new(&deployment.name)?.acquire()?);
@@ -44,12 +44,12 @@ pub fn check_name(deployment: &Deployment) -> Result<(), Failure> {
 
 /// Refuses a folder with results of an earlier run, or with files of the same names that no run has written.
 ///
-/// * `force`: the results of an earlier run may be replaced. What was exported from them is removed; they themselves stay until
-///   the new ones are whole.
+/// * `force`: true to allow that the results of an earlier run are replaced. Files that were exported from them are removed. The results
+///   themselves are kept until the new ones are complete.
 ///
 /// # Errors
 ///
-/// As above; another run writes into the folder; the folder cannot be read.
+/// Fails if the folder is refused, another run writes to it, or it cannot be read.
 pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
     failure::check_claim(folder)?;
     let lies_there = |name: &&str| fs::symlink_metadata(folder.join(name)).is_ok();
@@ -61,11 +61,11 @@ pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
     };
     let Some(name) = deployment_of(folder) else {
         let message = format!(
-            "{}: {first} lies there, and no run of parallax has written it",
+            "{} contains {first}, which no run of parallax has written",
             folder.display()
         );
         let failure = Failure::new(ExitKind::Config, message);
-        return Err(failure.with_hint("move it away, or name another folder with --out"));
+        return Err(failure.with_hint("move it away, or choose another folder with --out"));
     };
     if !force {
         let message = format!(
@@ -74,13 +74,13 @@ pub fn make_way(folder: &Path, force: bool) -> Result<(), Failure> {
         );
         let failure = Failure::new(ExitKind::Config, message);
         return Err(
-            failure.with_hint("replace them with --force, or choose another folder with --out")
+            failure.with_hint("pass --force to replace them, or choose another folder with --out")
         );
     }
     remove_exports(&folder.join(EXPORT)).map_err(|error| in_file(&folder.join(EXPORT), &error))
 }
 
-/// Name of the deployment whose results lie in a folder; none if no run has written there.
+/// Returns the name of the deployment whose results are in a folder, or `None` if no run has written there.
 fn deployment_of(folder: &Path) -> Option<String> {
     let text = files::read_text(&folder.join("deployment.json"), files::SETTINGS).ok()?;
     let value: Value = serde_json::from_str(&text).ok()?;
@@ -88,7 +88,7 @@ fn deployment_of(folder: &Path) -> Option<String> {
     Some(name.to_owned())
 }
 
-/// Removes what `parallax export` has written, by its own list; other files stay.
+/// Removes the files that `parallax export` has written, according to its list. Other files are kept.
 fn remove_exports(folder: &Path) -> io::Result<()> {
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -105,7 +105,7 @@ fn remove_exports(folder: &Path) -> io::Result<()> {
         let listed = value.get("files").and_then(Value::as_array);
         for file in listed.into_iter().flatten() {
             let path = file.get("path").and_then(Value::as_str).map(Path::new);
-            // Beneath the folder, wherever the list says that it was.
+            // Only files in the folder are removed, even if the list has paths elsewhere.
             let Some(name) = path.and_then(Path::file_name) else {
                 continue;
             };
@@ -136,7 +136,10 @@ mod tests {
         fs::write(folder.join("pose3d.csv"), "mine").unwrap();
         for force in [false, true] {
             let text = refused(folder, force);
-            assert!(text.contains("no run of parallax has written it"), "{text}");
+            assert!(
+                text.contains("which no run of parallax has written"),
+                "{text}"
+            );
         }
         let about = "{\"deployment\": {\"name\": \"room\"}}";
         fs::write(folder.join("deployment.json"), about).unwrap();

@@ -1,6 +1,6 @@
-//! A finished run in the files of other tools: what is read, what is written where, and what is said about it.
+//! Export of a finished run to the files of other tools: reads the run, writes the files, and describes them.
 //!
-//! The crate `exports` defines the content of each format; here are the files, the cameras and their pictures.
+//! The crate `exports` defines the content of each format. This module handles the files, the cameras and their pictures.
 
 mod origin;
 mod per_view;
@@ -17,25 +17,25 @@ use serde_json::{Value, json};
 pub use origin::{Given, Lines, Origin};
 use pictures::Pictures;
 
-/// A format that the user can ask for.
+/// A format that the user can choose.
 #[derive(Debug, Clone, Copy)]
 pub enum Format {
-    /// A format of one file.
+    /// A format with one file for all views.
     File(&'static FileFormat),
-    /// Keypoints of the reprojected pose, a file for every view and frame.
+    /// Keypoints of the reprojected pose, with a file for every view and frame.
     OpenPose,
-    /// A video of every view with the pose drawn on it.
+    /// A video of every view, with the pose drawn on it.
     Mp4,
 }
 
 impl Format {
-    /// All of them.
+    /// Returns all formats.
     pub fn all() -> Vec<Self> {
         let files = FILES.iter().map(Self::File);
         files.chain([Self::OpenPose, Self::Mp4]).collect()
     }
 
-    /// Its name.
+    /// Returns the name of the format.
     pub fn name(self) -> &'static str {
         match self {
             Self::File(format) => format.name,
@@ -61,34 +61,34 @@ impl Format {
     }
 }
 
-/// Task of an export: formats, folder and name.
+/// An export job: formats, folder and name.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Which formats.
+    /// Formats to write.
     pub formats: Vec<Format>,
-    /// The folder, made if it is not there.
+    /// Folder for the files, created if it does not exist.
     pub out: PathBuf,
-    /// Name of the files, without the part that tells formats apart.
+    /// Base name of the files, without the endings of the formats.
     pub name: String,
     /// True if existing files are replaced.
     pub force: bool,
 }
 
-/// Something that was written.
+/// A file or folder that was written.
 #[derive(Debug, Clone)]
 pub struct Written {
-    /// The name of its format.
+    /// Name of the format.
     pub format: &'static str,
-    /// The file, or the folder of one format.
+    /// The file, or the folder of the format.
     pub path: PathBuf,
-    /// Its unit, its axes, what a gap is, and how uncertainty is held.
+    /// Unit of the file, its axes, its representation of a gap, and its representation of uncertainty.
     pub about: [&'static str; 4],
-    /// Facts that the format cannot say in itself.
+    /// Facts that the format cannot express.
     pub notes: Notes,
 }
 
 impl Written {
-    /// As JSON.
+    /// Returns the description as JSON.
     fn json(&self) -> Value {
         let [unit, axes, gaps, uncertainty] = self.about;
         json!({
@@ -98,17 +98,17 @@ impl Written {
     }
 }
 
-/// Name of the file that describes what was exported: `pose3d.export.json`.
+/// Ending of the file that describes the exported files, such as `pose3d.export.json`.
 const MANIFEST: &str = ".export.json";
 
-/// Writes all formats of a run.
+/// Writes a run in all formats of a job.
 ///
-/// Everything that can be refused is refused before anything is written. Files take their names when they are whole.
+/// All checks come before anything is written. Each file gets its final name when it is complete.
 ///
 /// # Errors
 ///
-/// A format needs what the run does not have; a file exists and is not to be replaced; the disk. `Interrupted` when a stop is
-/// requested; files that were whole by then stay.
+/// Fails if a format needs data that the run lacks, a file exists and must not be replaced, or the disk fails. Fails with `Interrupted`
+/// on a stop request. Files that are complete by then are kept.
 pub fn export(
     origin: &Origin,
     job: &Job,
@@ -205,7 +205,7 @@ pub fn as_json(origin: &Origin, written: &[Written]) -> Value {
     })
 }
 
-/// Refuses formats for which the run lacks data.
+/// Fails if the run lacks data that a format needs.
 fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     let lacks = |needs: fn(Format) -> bool| {
         let all = job.formats.iter().copied().filter(|format| needs(*format));
@@ -215,20 +215,22 @@ fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     if origin.trials[0].rate_hz.is_none()
         && let Some(formats) = lacks(Format::needs_rate)
     {
-        let message = format!(
-            "the run does not say how many frames per second it has, which {formats} must contain"
-        );
-        return Err(Failure::new(ExitKind::Usage, message).with_hint("give it: --rate 30"));
+        let message = format!("the run has no frame rate, which {formats} must contain");
+        return Err(Failure::new(ExitKind::Usage, message)
+            .with_hint("give the frame rate, for example --rate 30"));
     }
     if let (Some(why), Some(formats)) = (&origin.up_unknown, lacks(Format::needs_up)) {
-        let message = format!("which way is up is not known, and {formats} must say it: {why}");
+        let message =
+            format!("the upward direction is not known, and {formats} must contain it: {why}");
         let failure = Failure::new(ExitKind::Input, message);
-        return Err(failure.with_hint("give it in the world of the rig: --up 0,0,1"));
+        return Err(
+            failure.with_hint("give the direction in the world of the rig, for example --up 0,0,1")
+        );
     }
     Ok(())
 }
 
-/// Where a format is written; one of a file for each person of several has the number of the person in the names.
+/// Returns the paths of a format. If there are several people, a format with one file per person has the person's number in the names.
 fn paths(format: Format, job: &Job, trials: &[Trial], pictures: &[Pictures]) -> Vec<PathBuf> {
     let name = |suffix: &str| job.out.join(format!("{}{suffix}", job.name));
     match format {
@@ -253,7 +255,7 @@ fn refuse_existing(format: Format, path: &Path, force: bool) -> Result<(), Failu
     if !force {
         let failure = Failure::new(ExitKind::Usage, format!("{name} exists"));
         return Err(
-            failure.with_hint("choose another folder with --out, or replace it with --force")
+            failure.with_hint("choose another folder with --out, or pass --force to replace it")
         );
     }
     let is_folder = matches!(format, Format::OpenPose);
@@ -272,7 +274,7 @@ fn file(trial: &Trial, format: &'static FileFormat, path: &Path) -> Result<Writt
         path: path.to_owned(),
         about: [format.unit, format.axes, format.gaps, format.uncertainty],
         notes: notes.map_err(|error| match error.kind() {
-            // What the format has no room for is no matter of the disk.
+            // The format cannot hold the data, so the disk is not at fault.
             io::ErrorKind::InvalidInput => Failure::new(ExitKind::Degraded, error),
             _ => cannot_write(path, &error),
         })?,
@@ -290,7 +292,7 @@ pub(crate) fn interrupted() -> Failure {
     Failure::new(ExitKind::Interrupted, "interrupted")
 }
 
-/// A camera as its footage shows it.
+/// Returns a camera as its footage shows it.
 pub(crate) fn of_footage(view: &str, framing: &geometry::Framing, size: [u32; 2]) -> ViewCamera {
     ViewCamera {
         name: view.to_owned(),

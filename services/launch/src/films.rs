@@ -1,5 +1,5 @@
-//! Joints of people in every camera of a deployment, as films whose clocks can be compared: from files of keypoints, or found by
-//! a network in the footage.
+//! Joints of people in every camera of a deployment, as films whose clocks can be compared. The joints are read from keypoint files, or
+//! found by a network in the footage.
 
 mod eyes;
 mod upright;
@@ -20,23 +20,23 @@ use crate::keypoints as keypoint_files;
 use eyes::Eyes;
 use upright::Upright;
 
-/// Which pictures are looked at.
+/// The part of the footage to use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
-    /// Every n-th frame.
+    /// Use every n-th frame.
     pub every: u64,
-    /// Where to begin, seconds of each camera's footage.
+    /// Start in each camera's footage, in seconds.
     pub from_s: f64,
-    /// For how long, seconds; to the end without it.
+    /// Duration in seconds; `None` up to the end.
     pub seconds: Option<f64>,
 }
 
-/// Known poses of the cameras.
+/// Knowledge about the poses of the cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Poses {
-    /// The poses of the rig: people are looked for in pictures that are turned upright, as in a run.
+    /// The poses of the rig are right. As in a run, pictures are turned upright before people are searched in them.
     OfRig,
-    /// Nothing.
+    /// Poses are unknown.
     Unknown,
 }
 
@@ -45,29 +45,29 @@ pub enum Poses {
 pub struct Films {
     /// The cameras, in the order of the deployment.
     pub cameras: Vec<Camera>,
-    /// Film of each camera, by its own clock.
+    /// Film of each camera, with times of the camera's own clock.
     pub films: Vec<Film>,
     /// Number of joints of a person.
     pub n_joints: usize,
-    /// Joint on the other side of each joint, where sides follow the picture in some camera.
+    /// For each joint, the joint on the other side of the body. Set if left and right follow the picture in some camera.
     pub mirror: Option<Vec<usize>>,
-    /// Joint on the other side of each joint.
+    /// For each joint, the joint on the other side of the body.
     pub sides: Vec<usize>,
-    /// Who found the joints of each camera.
+    /// Source of the joints of each camera, for the user.
     pub finders: Vec<String>,
 }
 
-/// Who finds the joints of a camera.
+/// Source of the joints of a camera.
 enum Finder {
     Keypoints(KeypointSource),
     Eyes(Box<Eyes>),
 }
 
-/// Reads or finds the people of all cameras.
+/// Reads or finds the people in all cameras.
 ///
 /// # Errors
 ///
-/// A camera is live or not in the rig; an input cannot be read; it was stopped.
+/// Fails if a camera is live or not in the rig, an input cannot be read, or a stop is requested.
 pub fn films(
     deployment: &Deployment,
     part: Part,
@@ -116,27 +116,27 @@ pub fn films(
     })
 }
 
-/// The cameras of a deployment of footage, in its order.
+/// Returns the cameras of a deployment, in its order.
 ///
 /// # Errors
 ///
-/// A camera is live, or not in the rig.
+/// Fails if a camera is live or not in the rig.
 pub fn cameras(deployment: &Deployment, rig: &Rig) -> Result<Vec<Camera>, Failure> {
     let of_entry = |camera: &deployment::capture::Camera| {
         if crate::cameras::is_live(&camera.source) {
             let message = format!(
-                "camera {:?} is live: it has no footage to compare with that of others",
+                "camera {:?} is live, so it has no footage to compare with that of other cameras",
                 camera.name
             );
             let failure = Failure::new(ExitKind::Config, message);
-            return Err(failure.with_hint("name footage that was recorded with it"));
+            return Err(failure.with_hint("use footage that was recorded with this camera"));
         }
         inputs::camera_of(rig, &camera.name, deployment).cloned()
     };
     deployment.cameras.iter().map(of_entry).collect()
 }
 
-/// Returns the angle that turns the pictures of a camera upright, radians; 0 where it is not known, or not wanted.
+/// Returns the angle that turns the pictures of a camera upright, in radians. Returns 0 if the angle is not known or not wanted.
 fn roll(deployment: &Deployment, rig: &Rig, (camera, poses): (&Camera, Poses)) -> f64 {
     if poses == Poses::Unknown || !deployment.capture.upright {
         return 0.0;
@@ -165,13 +165,13 @@ impl Finder {
 
     fn text(&self) -> String {
         match self {
-            Self::Keypoints(_) => "keypoints of files".to_owned(),
+            Self::Keypoints(_) => "keypoint files".to_owned(),
             Self::Eyes(eyes) => eyes.text(),
         }
     }
 }
 
-/// Keypoints beside the joints that at least two cameras have.
+/// Returns the keypoints, other than the joints, that at least two cameras have.
 fn extra(names: &[Vec<String>]) -> Vec<String> {
     let mut extra: Vec<String> = Vec::new();
     for name in names.iter().flatten() {
@@ -211,7 +211,7 @@ fn mirror(extra: &[String]) -> Vec<usize> {
     mirror
 }
 
-/// Frames per second of what keypoints were found in.
+/// Returns the frame rate of the footage in which the keypoints were found, in frames per second.
 fn keypoint_rate(deployment: &Deployment, camera: usize) -> Result<f64, Failure> {
     let entry = &deployment.cameras[camera];
     let of_footage = || {
@@ -223,9 +223,9 @@ fn keypoint_rate(deployment: &Deployment, camera: usize) -> Result<f64, Failure>
 }
 
 fn no_rate(name: &str) -> Failure {
-    let message = format!("nothing says how many frames per second camera {name:?} has");
+    let message = format!("the frame rate of camera {name:?} is not known");
     Failure::new(ExitKind::Config, message)
-        .with_hint("give `capture.frame_rate_hz` in the deployment")
+        .with_hint("set `capture.frame_rate_hz` in the deployment")
 }
 
 fn whole(deployment: &Deployment, camera: usize, start: u64, step: u64) -> SourceSpec {
@@ -237,13 +237,13 @@ fn whole(deployment: &Deployment, camera: usize, start: u64, step: u64) -> Sourc
     }
 }
 
-/// Reads one camera.
+/// Reads the film of one camera.
 struct Reader<'a> {
     rows: Rows,
-    /// From pixels of the footage to those of the calibrated picture.
+    /// Offset from pixels of the footage to pixels of the calibrated picture.
     offset: [f64; 2],
     name: &'a str,
-    /// By which pictures are turned, radians, clockwise as seen.
+    /// Angle by which pictures are turned, in radians, clockwise as seen.
     roll: f64,
     stop: &'a Stop,
     console: &'a dyn Console,
@@ -355,7 +355,7 @@ impl Reader<'_> {
 }
 
 impl Part {
-    /// The range of frames, of `n_frames`.
+    /// Returns the range of frames to use, of `n_frames`.
     fn frames(self, n_frames: u64, rate_hz: f64) -> Range<u64> {
         let start = ((self.from_s * rate_hz).round() as u64).min(n_frames);
         let most = self.seconds.map(|second| (second * rate_hz).round() as u64);

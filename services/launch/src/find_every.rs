@@ -1,27 +1,31 @@
-//! How often boxes around people are looked for.
+//! Intervals at which boxes around people are searched.
 
 use deployment::network::Config;
 
-/// Frames that are farther apart are not of a person whom a box could follow, seconds: boxes are looked for in every one.
+/// Largest time between two frames in which a box can follow a person, in seconds. If frames are further apart, boxes are searched in
+/// every frame.
 pub const FOLLOWED_S: f64 = 0.4;
 
-/// In every n-th frame of a view boxes are looked for: as the deployment says, else by the rate.
+/// Intervals in frames: boxes are searched in every n-th frame of a view. The deployment sets the interval; otherwise it depends on the
+/// rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FindEvery {
-    /// While one person is seen.
+    /// Interval while one person is seen.
     pub(crate) alone: u64,
-    /// While several are: one who is hidden for a moment is found again soon.
+    /// Interval while several people are seen. It is short, so that a person who is hidden for a moment is soon found again.
     pub(crate) several: u64,
 }
 
 impl FindEvery {
-    /// * `rate_hz`: of the frames that are looked at; not known of pictures in a folder, which may be of any time: nobody is followed
-    ///   in these.
+    /// Chooses the intervals.
+    ///
+    /// * `rate_hz`: rate of the frames that are searched. It is not known for pictures in a folder, which may be of any time. In such
+    ///   pictures nobody is followed.
     pub(crate) fn new(config: &Config, rate_hz: Option<f64>) -> Self {
-        /// People come and go by time.
+        /// How fast people come and go depends on time, not on frames.
         const SECONDS: f64 = 0.5;
         const SECONDS_OF_SEVERAL: f64 = 0.125;
-        /// Never more often: the network follows who it sees.
+        /// Not more often than this, because the network follows the people that it sees.
         const OFTEN: f64 = 10.0;
         let each = match (config.find_every, rate_hz) {
             (Some(every), _) => [every; 2],

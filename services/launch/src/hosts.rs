@@ -1,4 +1,5 @@
-//! Deployments of several hosts: which of them this machine is, what must be the same on all, and the job of the bridge.
+//! Deployments of several hosts: chooses the host of this machine, computes the fingerprint that all hosts must share, and prepares the
+//! job of the bridge.
 
 use std::path::{Path, PathBuf};
 
@@ -16,14 +17,14 @@ use crate::resolved::Resolved;
 /// Largest uncertainty of another host's clock without a warning, as a share of the time between two frames.
 const MAX_CLOCK_SHARE: f64 = 0.1;
 
-/// The host that this machine is: the one that is named, or the one with the name of the machine. None for a deployment without
-/// hosts.
+/// Returns the host that runs on this machine: the host named by the user, or the host with the name of the machine. Returns `None` for a
+/// deployment without hosts.
 ///
 /// * `machine`: the name of the machine.
 ///
 /// # Errors
 ///
-/// There is no such host, or this build has none.
+/// Fails if there is no such host, or this build does not support hosts.
 pub fn choose<'a>(
     deployment: &'a Deployment,
     named: Option<&str>,
@@ -47,35 +48,35 @@ pub fn choose<'a>(
             known.join(", ")
         );
         let failure = Failure::new(ExitKind::Usage, message);
-        return Err(failure.with_hint("say which one this machine is: --host NAME"));
+        return Err(failure.with_hint("pass --host NAME to say which host this machine is"));
     };
     let has_keypoints = deployment.cameras.iter().find(|camera| camera.keypoints.is_some());
     if let Some(camera) = has_keypoints {
         let message = format!(
-            "camera {:?} has `keypoints`, and the deployment has hosts: files of keypoints are for one machine",
+            "camera {:?} has `keypoints`, which a deployment with hosts cannot use: keypoint files only work on one machine",
             camera.name
         );
         return Err(Failure::new(ExitKind::Config, message));
     }
     if !bridge::HAS_LINK {
-        let failure = Failure::new(ExitKind::Usage, "this build has no hosts");
+        let failure = Failure::new(ExitKind::Usage, "this build does not support hosts");
         return Err(failure.with_hint("build it with `cargo build --release --features hosts`"));
     }
     Ok(Some(host))
 }
 
-/// Where a host connects to, or listens, and as whom.
+/// Returns the address to which a host connects, or on which it listens, with the host's key.
 ///
 /// # Errors
 ///
-/// A key is missing.
+/// Fails if a key is missing.
 pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure> {
     let fusing = deployment.fusing_host().and_then(|fusing_host| fusing_host.address.clone());
     let keys = match &deployment.link.keys {
         Some(folder) if !deployment.link.insecure => {
             Some(KeyFiles::find(folder, &host.name).map_err(|error| {
                 let failure = Failure::new(ExitKind::Input, error);
-                failure.with_hint("`parallax hosts keys FILE` makes them; every host needs ca.pem and its own two files")
+                failure.with_hint("`parallax hosts keys FILE` creates the keys; every host needs ca.pem and its own two files")
             })?)
         }
         _ => None,
@@ -90,11 +91,11 @@ pub fn address(deployment: &Deployment, host: &Host) -> Result<Address, Failure>
     })
 }
 
-/// Returns the fingerprint that must be the same on all hosts: the files that results depend on, and the settings.
+/// Returns the fingerprint that must be the same on all hosts. It covers the files and settings on which results depend.
 ///
 /// # Errors
 ///
-/// A file cannot be read.
+/// Fails if a file cannot be read.
 pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     let mut all = Fingerprint::default();
     all.add_text("version of Parallax", env!("CARGO_PKG_VERSION"));
@@ -143,7 +144,7 @@ pub fn fingerprint(deployment: &Deployment) -> Result<Fingerprint, Failure> {
     Ok(all)
 }
 
-/// The settings that the joints of a view depend on, without the names of files, which may lie elsewhere on every host.
+/// Returns the settings on which the joints of a view depend, without file names, which may differ between hosts.
 fn without_files(config: &network::Config) -> network::Config {
     network::Config {
         file: PathBuf::new(),
@@ -157,8 +158,8 @@ fn read(file: &Path) -> Result<Vec<u8>, Failure> {
     files::read(file, files::SETTINGS).map_err(|error| failure::in_file(file, &error))
 }
 
-/// The part of a deployment that a host runs: one with cameras has a name and a folder of its own, so that it can run beside the others
-/// on one machine.
+/// Returns the part of a deployment that a host runs. A host with cameras gets its own name and output folder, so that it can run beside
+/// other hosts on one machine.
 pub fn part(deployment: &Deployment, host: &Host) -> Deployment {
     let mut part = deployment.clone();
     if !host.fuses {
@@ -167,7 +168,7 @@ pub fn part(deployment: &Deployment, host: &Host) -> Deployment {
     part
 }
 
-/// The name under which the processes of a host share memory.
+/// Returns the name under which the processes of a host share memory.
 pub(crate) fn namespace(resolved: &Resolved) -> String {
     let deployment = &resolved.deployment;
     match resolved.own_host().filter(|own_host| !own_host.fuses) {
@@ -176,12 +177,12 @@ pub(crate) fn namespace(resolved: &Resolved) -> String {
     }
 }
 
-/// The job of the bridge.
+/// Returns the job of the bridge.
 pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
     let deployment = &resolved.deployment;
     let host = resolved
         .own_host()
-        .ok_or("the deployment has no host of that name")
+        .ok_or("the deployment has no host with this name")
         .or_fail(ExitKind::Config)?;
     let prepared = Prepared::new(resolved)?;
     let capture = &deployment.capture;

@@ -1,4 +1,5 @@
-//! The pipeline of a deployment in one process, by the method of networks: the same steps as its processes, the same bits.
+//! The pipeline of a deployment in one process, for people found by networks. It has the same steps as the separate processes, and
+//! gives the same bits.
 
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
@@ -14,9 +15,9 @@ use crate::resolved::Resolved;
 /// A frame of a view.
 #[derive(Debug, Clone, Copy)]
 pub struct SentFrame<'a> {
-    /// Its picture.
+    /// Picture of the frame.
     pub image: Rgb8View<'a>,
-    /// How long after the instant of the frame it was taken, nanoseconds.
+    /// Time from the instant of the frame until the picture was taken, in nanoseconds.
     pub skew_nanos: i64,
 }
 
@@ -24,7 +25,7 @@ pub struct SentFrame<'a> {
 #[derive(Debug)]
 pub struct InProcess {
     estimator: NetworkEstimator,
-    /// By view; `None` where a network looks at pictures.
+    /// Keypoints of each view; `None` for a view in which a network searches the pictures.
     keypoints: Vec<Option<pose::Source>>,
     start_frame: u64,
     frame_step: u64,
@@ -32,11 +33,11 @@ pub struct InProcess {
 }
 
 impl InProcess {
-    /// Prepares the pipeline of a deployment whose people are found by networks or keypoints.
+    /// Prepares the pipeline of a deployment whose people are found by networks or given as keypoints.
     ///
     /// # Errors
     ///
-    /// An input cannot be read, or the filters find people in the deployment.
+    /// Fails if an input cannot be read, or the filters find people in the deployment.
     pub fn new(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
         let prepared = Prepared::new(resolved)?;
@@ -54,7 +55,7 @@ impl InProcess {
                     keypoints.push(Some(source));
                 }
                 pose::Step::Filters(_) => {
-                    let message = "the filters find people in this deployment, not a network";
+                    let message = "in this deployment the filters find people, not a network";
                     return Err(Failure::new(ExitKind::Config, message));
                 }
             }
@@ -76,11 +77,11 @@ impl InProcess {
 
     /// Estimates the next frame.
     ///
-    /// * `frames`: of the views, as their capture processes send them; `None` for a view that is missing.
+    /// * `frames`: frames of the views, as the capture processes send them; `None` for a missing view.
     ///
     /// # Errors
     ///
-    /// A network fails.
+    /// Fails if a network fails.
     pub fn estimate(
         &mut self,
         frames: &[Option<SentFrame<'_>>],

@@ -1,4 +1,4 @@
-//! The keypoints that another program found in the footage of cameras, and grey footage for cameras that have them alone.
+//! Keypoints that another program found in the footage of cameras, and grey footage for cameras that have only keypoints.
 
 use capture::Blank;
 use deployment::Deployment;
@@ -12,11 +12,11 @@ use messages::MAX_KEYPOINTS;
 
 use crate::resolved::Resolved;
 
-/// Opens the keypoints of a camera; none for a camera that names none.
+/// Opens the keypoints of a camera. Returns `None` if the camera has none.
 ///
 /// # Errors
 ///
-/// They cannot be read; the message names the file.
+/// Fails if the keypoints cannot be read. The message names the file.
 pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
     let Some(path) = &camera.keypoints else {
         return Ok(None);
@@ -25,8 +25,8 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
     let names = names.transpose().or_fail(ExitKind::Config)?;
     let source = KeypointSource::open(path, names).map_err(|error| {
         let hint = format!(
-            "these are the `keypoints` of camera {:?}: a folder with a JSON file for every frame, in the layout of OpenPose, or one JSON \
-             file in that of COCO; `keypoint_names` says what they are called",
+            "these are the `keypoints` of camera {:?}: use a folder with a JSON file for every frame, in the layout of OpenPose, or one JSON \
+             file in the layout of COCO; `keypoint_names` gives their names",
             camera.name
         );
         Failure::new(ExitKind::Input, error).with_hint(hint)
@@ -37,17 +37,17 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
 /// Properties of the keypoints that the networks and keypoint files of the cameras find.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
-    /// Names of those beside the joints, each once, in the order of the cameras.
+    /// Names of the keypoints other than the joints, each once, in the order of the cameras.
     pub(crate) extra: Vec<String>,
     /// True if left and right of a network follow the picture.
     pub(crate) as_seen: bool,
 }
 
-/// Reads the cards and the names of the keypoints of a deployment.
+/// Reads the cards of the networks and the names of the keypoints of a deployment.
 ///
 /// # Errors
 ///
-/// They cannot be read, or are more than a message has room for.
+/// Fails if these cannot be read, or there are more keypoints than fit into a message.
 pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
     let Found {
         mut extra,
@@ -76,8 +76,8 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
     }
     if extra.len() > MAX_KEYPOINTS {
         let message = format!(
-            "the networks and keypoint files of the cameras have {} different keypoints beside the joints, and there is room for \
-             {MAX_KEYPOINTS}",
+            "the networks and keypoint files of the cameras have {} different keypoints besides the joints, but at most \
+             {MAX_KEYPOINTS} are possible",
             extra.len()
         );
         let hint = "use the same set of keypoints for all cameras";
@@ -86,7 +86,8 @@ pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
     Ok(Found { extra, as_seen })
 }
 
-/// Number of frames of the keypoints of every camera, from the first frame of the footage on; none for a camera without them.
+/// Returns the number of frames in the keypoints of every camera, counted from the first frame of the footage; `None` for a camera without
+/// keypoints.
 pub(crate) fn lengths(deployment: &Deployment) -> Result<Vec<Option<u64>>, Failure> {
     let cameras = deployment.cameras.iter();
     cameras
@@ -94,11 +95,12 @@ pub(crate) fn lengths(deployment: &Deployment) -> Result<Vec<Option<u64>>, Failu
         .collect()
 }
 
-/// The deployment with grey footage for every camera without a source: of the size that the rig says, as long as its keypoints.
+/// Returns the deployment with grey footage for every camera without a source. The footage has the image size of the rig, and is as long as
+/// the keypoints.
 ///
 /// # Errors
 ///
-/// The frame rate is not given, or the rig lacks the camera.
+/// Fails if the frame rate is not given, or the rig lacks the camera.
 pub(crate) fn with_pictures(
     mut deployment: Deployment,
     lengths: &[Option<u64>],
@@ -123,9 +125,9 @@ pub(crate) fn with_pictures(
 fn grey(name: &str, size: Size, n_frames: u64, rate_hz: Option<f64>) -> Result<Blank, Failure> {
     let rate_hz = rate_hz.ok_or_else(|| {
         let message = format!(
-            "camera {name:?} has keypoints and no `source`, and nothing says how many frames they have per second"
+            "camera {name:?} has keypoints without a `source`, and their frame rate is not known"
         );
-        let hint = "give `capture.frame_rate_hz` in the deployment: frames per second of the footage that they were found in";
+        let hint = "set `capture.frame_rate_hz` in the deployment to the frame rate of the footage in which they were found";
         Failure::new(ExitKind::Config, message).with_hint(hint)
     })?;
     Ok(Blank {
@@ -137,7 +139,7 @@ fn grey(name: &str, size: Size, n_frames: u64, rate_hz: Option<f64>) -> Result<B
 
 /// Warns of footage that is longer or shorter than its keypoints.
 ///
-/// * `lengths`: as [`lengths`] gives them.
+/// * `lengths`: result of [`lengths`].
 pub(crate) fn check_lengths(resolved: &Resolved, lengths: &[Option<u64>]) -> Vec<String> {
     let capture = &resolved.deployment.capture;
     let cameras = resolved.deployment.cameras.iter();
@@ -152,15 +154,15 @@ pub(crate) fn check_lengths(resolved: &Resolved, lengths: &[Option<u64>]) -> Vec
             core::cmp::Ordering::Less => "the last keypoints have no frames",
         };
         Some(format!(
-            "camera {:?}: {used} frames of footage and keypoints of {known} frames are to be used: {what}; both are counted from the \
-             first one, so do they begin together?",
+            "camera {:?}: {used} frames of footage and keypoints of {known} frames are used: {what}; both are counted from the \
+             first frame: do they begin at the same time?",
             camera.name
         ))
     });
     odd.collect()
 }
 
-/// How many of `n_frames` are used.
+/// Returns how many of `n_frames` frames are used.
 fn used_of(n_frames: u64, capture: &Config) -> u64 {
     let left = n_frames.saturating_sub(capture.start_frame);
     let used = left.div_ceil(capture.frame_step.max(1));

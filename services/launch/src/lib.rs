@@ -3,17 +3,17 @@
 //! | step | where |
 //! |---|---|
 //! | read the deployment file and check it against this machine | [`load`] |
-//! | read its input files, and look at its footage | [`inputs`], [`cameras`] |
-//! | resolve it: the deployment with the metadata of its footage, the input of every process | [`plan::resolve`], [`Resolved`] |
-//! | prepare model, views and settings of the stages | [`Prepared`] |
+//! | read its input files, and inspect its footage | [`inputs`], [`cameras`] |
+//! | resolve it: add the metadata of its footage, which every process needs | [`plan::resolve`], [`Resolved`] |
+//! | prepare the model, the views and the settings of the stages | [`Prepared`] |
 //! | plan processes and topics, and run them | [`Planned`] |
 //! | run one of its processes | [`process`] |
 //! | show progress, and report on the run | [`Watcher`], [`Report`] |
-//! | what the cameras see, so that their clocks can be compared | [`films`] |
-//! | the part of one of several hosts | [`hosts`] |
+//! | get the joints that the cameras see, to compare their clocks | [`films`] |
+//! | select the part of one of several hosts | [`hosts`] |
 //! | observe a running deployment from another process | [`live`] |
 //! | read the settings in a recording, and report its flaws | [`recorded`] |
-//! | write a finished run into the files of other tools | [`export`] |
+//! | export a finished run to the files of other tools | [`export`] |
 //!
 //! Data goes to standard output and messages to standard error, both through [`terminal::output`].
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! A running deployment, observed from another process: its processes and their metrics.
+//! Observes the processes of a running deployment, and their metrics, from another process.
 
 mod describe;
 mod snapshot;
@@ -18,13 +18,13 @@ pub use table::table;
 use crate::load;
 use crate::resolved::Resolved;
 
-/// How long a deployment may take to begin: until it says what it is, its topics are not all there.
+/// Time that a deployment may take to start. Its topics are complete when it publishes its description.
 const STARTING: Duration = Duration::from_secs(10);
-/// How long to wait for the first metrics of all processes.
+/// Time to wait for the first metrics of all processes.
 const PATIENCE: Duration = Duration::from_secs(2);
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Observes a deployment while it runs.
+/// An observer of a running deployment.
 #[derive(Debug)]
 pub struct Live {
     name: String,
@@ -32,12 +32,11 @@ pub struct Live {
 }
 
 impl Live {
-    /// Connects to a running deployment. One that is starting is waited for, at most ten seconds: before, it would be seen with a part
-    /// of its processes.
+    /// Connects to a running deployment. If the deployment is starting, waits until its processes are complete, at most ten seconds.
     ///
     /// # Errors
     ///
-    /// The deployment does not run, or its topics cannot be opened.
+    /// Fails if the deployment does not run, or its topics cannot be opened.
     pub fn open(namespace: &Namespace) -> Result<Self, Failure> {
         if !wait_for_description(namespace, STARTING) {
             let name = namespace.name().to_owned();
@@ -49,11 +48,11 @@ impl Live {
         })
     }
 
-    /// The current state of all processes.
+    /// Returns the current state of all processes.
     ///
     /// # Errors
     ///
-    /// The metrics cannot be received.
+    /// Fails if the metrics cannot be received.
     pub fn snapshot(&mut self) -> Result<Snapshot, Failure> {
         let supervisor = self.observer.supervisor();
         let observed = self.observer.observe()?;
@@ -65,11 +64,11 @@ impl Live {
         ))
     }
 
-    /// As [`Self::snapshot`], but first waits until every live process has sent metrics, at most two seconds.
+    /// Returns the state like [`Self::snapshot`], but first waits until every live process has sent metrics, at most two seconds.
     ///
     /// # Errors
     ///
-    /// As for [`Self::snapshot`].
+    /// Fails like [`Self::snapshot`].
     pub fn first_snapshot(&mut self) -> Result<Snapshot, Failure> {
         let begin = Instant::now();
         loop {
@@ -81,19 +80,19 @@ impl Live {
         }
     }
 
-    /// Returns true if the deployment is ending; the observer must then be dropped.
+    /// Returns true if the deployment is ending. The observer must then be dropped.
     pub fn is_over(&self) -> bool {
         self.observer.is_over()
     }
 }
 
-/// The namespace of a running deployment.
+/// Returns the namespace of a running deployment.
 ///
-/// * `named`: its name or its file; none for the only running one.
+/// * `named`: name or file of the deployment; `None` for the only running deployment.
 ///
 /// # Errors
 ///
-/// The file cannot be read, the name is not valid, or not exactly one deployment runs.
+/// Fails if the file cannot be read, or the name is not valid. Without a name, also fails if no deployment or several are running.
 pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     if let Some(named) = named {
         let is_file = Path::new(named).extension().is_some_and(|extension| extension == "toml");
@@ -109,21 +108,23 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     if running.len() > 1 {
         let names: Vec<&str> = running.iter().map(|running| running.namespace.name()).collect();
         let message = format!("{} deployments run: {}", names.len(), names.join(", "));
-        return Err(Failure::new(ExitKind::Usage, message).with_hint("name one of them"));
+        return Err(
+            Failure::new(ExitKind::Usage, message).with_hint("give the name of one of them")
+        );
     }
-    let none = || Failure::new(ExitKind::Usage, "no deployment runs");
+    let none = || Failure::new(ExitKind::Usage, "no deployment is running");
     running.pop().map(|running| running.namespace).ok_or_else(none)
 }
 
-/// Returns the description that a running deployment gives of itself: its settings, without passwords of cameras.
+/// Returns the description that a running deployment publishes: its settings, without passwords of cameras.
 ///
 /// # Errors
 ///
-/// It does not run, or is of another version.
+/// Fails if the deployment does not run, or has another version.
 pub fn description(namespace: &Namespace) -> Result<Resolved, Failure> {
     let name = namespace.name();
     let text = namespace.description().map_err(|error| {
-        let text = format!("deployment {name:?} does not say what it is: {error}");
+        let text = format!("deployment {name:?} has no description: {error}");
         Failure::new(ExitKind::Usage, text)
     })?;
     serde_json::from_str(&text).map_err(|error| {

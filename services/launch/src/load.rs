@@ -8,17 +8,17 @@ use deployment::{ConfigError, Deployment, Loaded, Machine};
 use failure::{ExitKind, Fault};
 use scene::Address;
 
-/// Why a deployment could not be loaded.
+/// Reason why a deployment could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file could not be read.
     #[error("cannot read the deployment file {}{why}", file.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         file: PathBuf,
-        /// Kind of the file, where it is of another one; empty if the error of the system suffices.
+        /// Explanation if this is not a deployment file; empty if the system's error is sufficient.
         why: &'static str,
-        /// The error of the system.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// The content of the file is invalid.
@@ -37,13 +37,13 @@ impl Fault for LoadError {
 
 /// Reads a deployment file.
 ///
-/// Relative paths, also those in `set`, are relative to the folder of the file.
+/// Relative paths in the file and in `set` are relative to the folder of the file.
 ///
 /// * `set`: `key=value` pairs that replace values of the file.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or a value is invalid.
+/// Fails if the file cannot be read, or a value is invalid.
 pub fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
     let text = files::read_text(file, files::SETTINGS).map_err(|source| LoadError::Read {
         file: file.to_owned(),
@@ -53,14 +53,14 @@ pub fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
     Ok(Loaded::parse(&text, file, set, &ThisMachine)?)
 }
 
-/// A loaded deployment with some values replaced; see [`Loaded::again`].
+/// Returns a loaded deployment with some values replaced; see [`Loaded::again`].
 ///
 /// * `set`: `key=value` pairs that replace values.
-/// * `refused`: why a key may not be replaced; none if it may.
+/// * `refused`: returns the reason why a key may not be replaced, or `None` if it may.
 ///
 /// # Errors
 ///
-/// A key may not be replaced, or a value is invalid.
+/// Fails if a key may not be replaced, or a value is invalid.
 pub fn with_overrides(
     deployment: &Deployment,
     set: &[String],
@@ -69,18 +69,18 @@ pub fn with_overrides(
     Ok(Loaded::again(deployment, set, refused, &ThisMachine)?)
 }
 
-/// The default values, without a deployment file.
+/// Returns the default values, without a deployment file.
 ///
 /// * `set`: `key=value` pairs that replace values.
 ///
 /// # Errors
 ///
-/// A value is invalid.
+/// Fails if a value is invalid.
 pub fn defaults(set: &[String]) -> Result<Loaded, LoadError> {
     Ok(Loaded::defaults(set)?)
 }
 
-/// The machine that this process runs on.
+/// The machine on which this process runs.
 struct ThisMachine;
 
 impl Machine for ThisMachine {
@@ -113,12 +113,12 @@ impl Machine for ThisMachine {
     }
 }
 
-/// Returns the kind of the file, where it is of another one; empty if the error of the system suffices.
+/// Explains why a file is not a deployment file. Returns an empty text if the system's error is sufficient.
 fn why_not(file: &Path, error: &std::io::Error) -> &'static str {
     if error.kind() == ErrorKind::InvalidData {
-        ": it is no text (not UTF-8)"
+        ": it is not a text file (not UTF-8)"
     } else if file.is_dir() {
-        ": it is a folder; name the .toml file in it"
+        ": it is a folder; pass the .toml file in it"
     } else {
         ""
     }

@@ -4,7 +4,7 @@ use runfiles::Summary;
 
 use crate::views::ViewReport;
 
-/// Why a run has no joints in space. None if it has some, or if its only view shows a person.
+/// Returns the reason why a run has no joints in space. Returns `None` if it has some, or if its only view shows a person.
 ///
 /// * `summary`: the summary that the process `results` wrote.
 /// * `views`: the reports of all views.
@@ -15,7 +15,7 @@ pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     if summary.frames == 0 {
         let views: Vec<String> = views.iter().map(ToString::to_string).collect();
         return Some(format!(
-            "no frame got a result ({}); this machine may be too slow for so many views: fewer or smaller \
+            "no frame has a result ({}); this machine may be too slow for so many views: use fewer or smaller \
              pictures, a lower capture.frame_rate_hz, or capture.mode = \"lossless\"",
             views.join("; ")
         ));
@@ -25,16 +25,16 @@ pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     }
     if views.iter().all(|view| view.used == 0) {
         return Some(format!(
-            "nobody was found in any of {} frames of any view: is somebody there, upright and large enough? `parallax detect` shows what is \
+            "nobody was found in any of {} frames of any view: is there a person, upright and large enough? `parallax detect` shows what is \
              found in a picture",
             summary.frames
         ));
     }
     if views.len() > 1 {
         return Some(format!(
-            "views show a person, but none of {} results has a joint in space that a person can have: nobody may be \
-             there; else see `calib check`, whether the unit of the calibration is right (`unit`: m, mm, ft, or 30mm for squares of \
-             the board), whether the footage is of one moment, and whether people are large enough",
+            "views show a person, but none of {} results has a plausible joint in space: maybe there was nobody. \
+             Otherwise run `calib check`, and check that the unit of the calibration is right (`unit`: m, mm, ft, or 30mm for squares of \
+             the board), that all footage was recorded at the same time, and that people are large enough",
             summary.frames
         ));
     }
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn a_run_without_any_result_has_a_reason() {
         let dropped = reason_of(0, 0, &[view(30, 0), view(30, 0)]);
-        assert!(dropped.contains("no frame got a result"), "{dropped}");
+        assert!(dropped.contains("no frame has a result"), "{dropped}");
         assert!(dropped.contains("a: 0 of 30 frames"), "{dropped}");
         let none = reason_of(0, 0, &[view(0, 0)]);
         assert!(none.contains("no frame"), "{none}");

@@ -1,11 +1,11 @@
-//! Warns about frames that are largely padding because their aspect ratio differs from that of the camera's image.
+//! Warns of frames that are largely padding, because their aspect ratio differs from that of the camera's image.
 
-/// The smallest share of padding that is reported.
+/// Minimum share of padding that is reported.
 const MIN_SHARE: f64 = 0.1;
 
-/// A warning about the cameras whose frames are largely padding; none if there are none.
+/// Returns a warning about the cameras whose frames are largely padding, if there are any.
 ///
-/// * `frame`: width and height of the frames, pixels.
+/// * `frame`: width and height of the frames, in pixels.
 /// * `cameras`: name, and width and height of the image in pixels, of every camera.
 pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option<String> {
     let padded = cameras.iter().filter(|camera| share(camera.1, frame) > MIN_SHARE);
@@ -18,8 +18,8 @@ pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option
         .collect();
     let [width, height] = fitting(image, frame);
     Some(format!(
-        "{:.0} % of every {}x{} frame of {} is padding, for the camera's image is {}x{}: the padding is searched in \
-         vain, and the person is small. Try capture.size = [{width}, {height}], or capture.scale = {:.3} in place of it",
+        "{:.0} % of every {}x{} frame of {} is padding, because the camera's image has {}x{} pixels: searching the padding wastes \
+         time, and the person is small. Try capture.size = [{width}, {height}], or replace it by capture.scale = {:.3}",
         100.0 * share(image, frame),
         frame[0],
         frame[1],
@@ -30,20 +30,20 @@ pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option
     ))
 }
 
-/// The factor by which an image is scaled to fit into a frame.
+/// Returns the factor by which an image is scaled to fit into a frame.
 fn scale(image: [u32; 2], frame: [usize; 2]) -> f64 {
     let of_axis = |axis: usize| frame[axis] as f64 / f64::from(image[axis].max(1));
     of_axis(0).min(of_axis(1))
 }
 
-/// The share of a frame that remains empty when an image is scaled to fit into it.
+/// Returns the share of a frame that remains empty when an image is scaled to fit into it.
 fn share(image: [u32; 2], frame: [usize; 2]) -> f64 {
     let scale = scale(image, frame);
     let area = f64::from(image[0]) * f64::from(image[1]) * scale * scale;
     1.0 - area / (frame[0] as f64 * frame[1] as f64)
 }
 
-/// The size of the image scaled to fit into the frame, pixels.
+/// Returns the size of the image when it is scaled to fit into the frame, in pixels.
 fn fitting(image: [u32; 2], frame: [usize; 2]) -> [u32; 2] {
     let scale = scale(image, frame);
     image.map(|image| (f64::from(image) * scale).round().max(1.0) as u32)

@@ -25,27 +25,27 @@ use crate::scheduling;
 use crate::search_size::SearchSize;
 use crate::vertical;
 
-/// Where the iterations of a main loop are comparable (a frame, or a level of a pair): how many times the processor time
-/// of the longest iteration so far an iteration may take.
+/// Limit on the processor time of an iteration, relative to the longest iteration so far. It applies to main loops with comparable
+/// iterations (a frame, or a level of a pair).
 const MAX_WORK_FACTOR: u32 = 3;
-/// The window in which restarts of a process are counted.
+/// Length of the window in which restarts of a process are counted.
 const RESTART_WINDOW: Duration = Duration::from_mins(1);
 
-/// Resolves a deployment: gives cameras that have keypoints alone grey footage, reads the metadata of its footage, checks footage and calibration against each other, finds the
-/// vertical if it is not given, and logs warnings.
+/// Resolves a deployment. Adds grey footage to cameras that have only keypoints, reads the metadata of the footage, and checks footage and
+/// calibration against each other. Finds the vertical if it is not given, and logs warnings.
 ///
 /// # Errors
 ///
-/// Footage or calibration cannot be read, or no joints can be located in space with them.
+/// Fails if footage or calibration cannot be read, or no joints can be located in space with them.
 pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
     resolve_on(deployment, None)
 }
 
-/// Resolves the part of a deployment that one of its hosts runs: of cameras of other hosts nothing is read.
+/// Resolves the part of a deployment that one of its hosts runs. Nothing is read for the cameras of other hosts.
 ///
 /// # Errors
 ///
-/// As for [`resolve`]; or no vertical is given, which hosts must have in common.
+/// Fails like [`resolve`]. Also fails if the vertical is not given, because all hosts must use the same one.
 pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolved, Failure> {
     let lengths = keypoints::lengths(deployment)?;
     let deployment = &keypoints::with_pictures(deployment.clone(), &lengths)?;
@@ -68,13 +68,13 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     };
     sanity::warn(&resolved, &lengths)?;
     check_names_and_sizes(&resolved, &is_here)?;
-    // Stored in the deployment, so that every process and a replay use the same vertical.
+    // The vertical is stored in the deployment, so that every process and a replay use the same one.
     if let Some(found) = vertical::find(deployment)? {
         if host.is_some() {
-            let message = "neither the calibration nor the deployment says where up is";
+            let message = "neither the calibration nor the deployment gives the upward direction";
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint(format!(
-                "hosts must agree on it: `up = {:?}` in the deployment, which is what this one found",
+                "all hosts must use the same direction: set `up` in the deployment; this host found `up = {:?}`",
                 found.up
             )));
         }
@@ -86,7 +86,8 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     Ok(resolved)
 }
 
-/// Refuses cameras that the calibration lacks, and pictures of other sizes than it says, before anything that takes long.
+/// Refuses cameras that the calibration lacks, and pictures whose size differs from the calibration. This check comes before checks
+/// that take long.
 fn check_names_and_sizes(
     resolved: &Resolved,
     is_here: &dyn Fn(usize) -> bool,
@@ -102,7 +103,7 @@ fn check_names_and_sizes(
 ///
 /// # Errors
 ///
-/// An input cannot be read or used.
+/// Fails if an input cannot be read or used.
 pub fn check(deployment: &Deployment) -> Result<String, Failure> {
     let resolved = resolve(deployment)?;
     let prepared = Prepared::new(&resolved)?;
@@ -114,7 +115,7 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
         tracing::warn!("{small}");
     }
     let n_frames = if resolved.is_endless() {
-        "frames until it is stopped".to_owned()
+        "frames until the run is stopped".to_owned()
     } else {
         format!("{} frames", resolved.n_frames())
     };
@@ -162,7 +163,7 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     let topology = resolved.topology();
     let mut rooms = topology.rooms(mode, &sizes, held_frames);
     if resolved.is_far() {
-        // The others' views, and what is fused, are elsewhere.
+        // On a host with cameras, topics of other views and of fusion are on other hosts.
         let uses = |process: &Process, topic: &String| {
             process.inputs.contains(topic) || process.outputs.contains(topic)
         };
@@ -173,8 +174,8 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     between.chain(of_processes).collect()
 }
 
-/// The largest picture of a live camera as it comes, bytes, if it is recorded: no format is larger than RGB, and a small picture
-/// may carry tables.
+/// Returns the maximum size of a live camera's original picture, in bytes, if it is recorded. No format is larger than RGB, but a small
+/// picture may also contain tables.
 fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
     const TABLES: usize = 1 << 16;
     let recording = resolved.recording.as_ref();
@@ -186,10 +187,10 @@ fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
     })
 }
 
-/// The plan of a topic with the given limits and message sizes.
+/// Returns the plan of a topic with the given limits and message sizes.
 fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(room.receivers, room.queued, room.borrowed);
-    // Where there are onlookers, programs of the user are among them.
+    // If a topic allows onlookers, these include programs of the user.
     let guests = if room.onlookers > 0 { MOST_GUESTS } else { 0 };
     let limits = limits.with_onlookers(room.onlookers + guests);
     let (topic, longest) = (room.topic, room.longest);
@@ -257,7 +258,8 @@ fn process(
             process.service,
             &process.name,
         ),
-        // Not for stages that write files, whose work varies, and not with lossless delivery, which has no deadlines.
+        // There is no limit for stages that write files, whose work varies. There is also none with lossless delivery, which has no
+        // deadlines.
         most_work: (is_realtime && is_comparable).then_some(MAX_WORK_FACTOR),
     }
 }
@@ -296,7 +298,7 @@ pub(crate) fn plan(
     })
 }
 
-/// The path of this executable, which runs every service.
+/// Returns the path of this executable, which runs every service.
 fn executable() -> Result<PathBuf, Failure> {
     std::env::current_exe().or_fail(ExitKind::Run)
 }

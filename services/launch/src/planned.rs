@@ -19,20 +19,20 @@ use crate::summary::{Report, Watcher};
 /// A deployment with the plan of its run.
 #[derive(Debug)]
 pub struct Planned {
-    /// The resolved deployment, the input of every process.
+    /// The resolved deployment, which every process gets as input.
     resolved: Resolved,
-    /// Its processes and topics.
+    /// Processes and topics of the run.
     plan: Plan,
 }
 
 impl Planned {
-    /// Resolves a deployment and plans its processes and topics.
+    /// Resolves a deployment, and plans its processes and topics.
     ///
     /// * `log`: the log level of its processes.
     ///
     /// # Errors
     ///
-    /// An input cannot be read or used; see [`plan::resolve`] and [`Self::of`].
+    /// Fails if an input cannot be read or used; see [`plan::resolve`] and [`Self::of`].
     pub fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
         Self::of(plan::resolve(deployment)?, log)
     }
@@ -43,7 +43,7 @@ impl Planned {
     ///
     /// # Errors
     ///
-    /// Model, calibration, network or table of expected errors cannot be read or used.
+    /// Fails if the model, calibration, network or table of expected errors cannot be read or used.
     pub fn of(resolved: Resolved, log: Level) -> Result<Self, Failure> {
         let prepared = Prepared::new(&resolved)?;
         prepared.check_predictions(&resolved)?;
@@ -61,36 +61,36 @@ impl Planned {
         Ok(Self { resolved, plan })
     }
 
-    /// The resolved deployment, the input of every process.
+    /// Returns the resolved deployment, which every process gets as input.
     pub fn resolved(&self) -> &Resolved {
         &self.resolved
     }
 
-    /// Its processes and topics.
+    /// Returns the plan of processes and topics.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// The session, which is the time of planning (`failure::now_nanos`).
+    /// Returns the session, which is the time of planning (`failure::now_nanos`).
     pub fn session(&self) -> u64 {
         self.plan.session
     }
 
-    /// The names of its processes.
+    /// Returns the names of the processes.
     pub fn processes(&self) -> impl Iterator<Item = &str> {
         self.plan.processes.iter().map(|process| process.name.as_str())
     }
 
-    /// The same run, which has begun elsewhere.
+    /// Returns the same run with the beginning that another host has set.
     ///
-    /// * `session`: when it began, as the host that fuses says; none if it begins here.
+    /// * `session`: beginning of the run according to the host that fuses; `None` if the run begins here.
     #[must_use]
     pub fn begun(mut self, session: Option<u64>) -> Self {
         self.plan.session = session.unwrap_or(self.plan.session);
         self
     }
 
-    /// Makes a process enter an endless loop in epoch 0, once it has sent a message about a frame after `after_frame`.
+    /// Makes a process enter an endless loop in epoch 0, after it has sent a message about a frame later than `after_frame`.
     pub fn spin(&mut self, process: &str, after_frame: u64) {
         let spec = self.plan.processes.iter_mut().find(|spec| spec.name == process);
         if let Some(spec) = spec {
@@ -101,13 +101,13 @@ impl Planned {
 
     /// Runs the deployment, shows its progress, and reports on it.
     ///
-    /// * `quiet`: shows no progress and no messages of `on_event`.
+    /// * `quiet`: true to hide the progress and the messages of `on_event`.
     /// * `stop`: ends the run early.
-    /// * `on_event`: called for every event of the run; a message that it returns is shown.
+    /// * `on_event`: called for every event of the run. If it returns a message, the message is shown.
     ///
     /// # Errors
     ///
-    /// The output folder cannot be created or another run uses it; the processes cannot be started or supervised.
+    /// Fails if the output folder cannot be created, another run uses it, or the processes cannot be started or supervised.
     pub fn run(
         &self,
         quiet: bool,
@@ -131,13 +131,14 @@ impl Planned {
         let elapsed = begin.elapsed();
         let report = Report::new(&self.resolved, self.plan.session, &outcome?, elapsed);
         if let Err(failure) = report.write_page(&self.resolved) {
-            tracing::warn!(%failure, "the page of the run is not written");
+            tracing::warn!(%failure, "the page of the run could not be written");
         }
         Ok(report)
     }
 }
 
-/// The file of the resolved deployment, for the user; the processes get the same content in their standard input.
+/// Returns the path of the resolved deployment in the output folder. The file is for the user; processes get the same content on
+/// standard input.
 fn resolved_file(deployment: &Deployment) -> PathBuf {
     deployment.output.join("deployment.json")
 }

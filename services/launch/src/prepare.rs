@@ -1,4 +1,4 @@
-//! Prepares model, views and settings of a resolved deployment for its stages.
+//! Prepares the model, the views and the settings of a resolved deployment for its stages.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,11 +23,11 @@ use crate::resolved::Resolved;
 /// A prepared view.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// The camera's name.
+    /// Name of the camera.
     pub name: String,
-    /// The mapping from its footage to the frames of the pipeline.
+    /// Mapping from the camera's footage to the frames of the pipeline.
     pub framing: Framing,
-    /// Camera, pyramid layout and cells of those frames.
+    /// Camera, pyramid layout and cells of the frames.
     pub plan: Arc<ViewPlan>,
 }
 
@@ -38,14 +38,14 @@ pub struct Prepared {
     pub model: Arc<Model>,
     /// The views, in the order of their numbers.
     pub views: Vec<View>,
-    /// The pairs of views that are fused, ascending. If all views are solved at once: every view but the first with
-    /// the view before it, so that there is one pair per message and every view is in a pair.
+    /// The pairs of views that are fused, in ascending order. If all views are solved at once, each view after the first is paired with
+    /// the view before it. Then every view is in a pair, and there is one pair per message.
     pub pairs: Vec<[usize; 2]>,
-    /// The direction against gravity, if the rig gives it.
+    /// Upward direction, if the rig gives it.
     pub up_in_world: Option<UnitVector3<f64>>,
     /// The settings of all stages.
     pub settings: EstimatorSettings,
-    /// The warning about padding, if the frames are largely padding.
+    /// Warning about padding, if the frames are largely padding.
     pub padding: Option<String>,
 }
 
@@ -54,7 +54,7 @@ impl Prepared {
     ///
     /// # Errors
     ///
-    /// An input cannot be read, does not match the other inputs, or contradicts the deployment.
+    /// Fails if an input cannot be read, does not match the other inputs, or contradicts the deployment.
     pub fn new(resolved: &Resolved) -> Result<Self, Failure> {
         let with_origin = |failure| inputs::of_deployment(failure, &resolved.deployment);
         Self::read(resolved).map_err(with_origin)
@@ -93,11 +93,11 @@ impl Prepared {
         })
     }
 
-    /// The predictor of the expected errors of a view from a table, if the deployment names one.
+    /// Returns the predictor that reads the expected errors of a view from a table, if the deployment has a table.
     ///
     /// # Errors
     ///
-    /// The table cannot be read, or does not contain the view.
+    /// Fails if the table cannot be read, or does not contain the view.
     pub fn predictor(
         &self,
         resolved: &Resolved,
@@ -115,12 +115,12 @@ impl Prepared {
         Ok(Some(predictor))
     }
 
-    /// Checks that the networks, if there are some, can be loaded, and that the table of expected errors, if there is
-    /// one, contains every view. Warns of views without a row for any frame.
+    /// Checks that the networks can be loaded, and that the table of expected errors contains every view. Warns of views without a row for
+    /// any frame.
     ///
     /// # Errors
     ///
-    /// Network or table cannot be read, or do not match the model.
+    /// Fails if a network or the table cannot be read, or does not match the model.
     pub fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
         let with_origin = |failure| inputs::of_deployment(failure, &resolved.deployment);
         self.check_quality(resolved).map_err(with_origin)
@@ -136,8 +136,8 @@ impl Prepared {
         let has_other_model = paper.model.is_some() && !is_shipped(paper.model.as_ref());
         if has_other_model && is_shipped(errors.and_then(Errors::network)) {
             tracing::warn!(
-                "paper.errors is the network that ships, which was trained on poses of the model that ships; it knows \
-                 nothing about those of another model"
+                "paper.errors is the shipped network, which was trained on poses of the shipped model; it cannot predict the \
+                 errors of another model"
             );
         }
         inputs::quality_network(errors, self.model.n_parts())?;
@@ -150,27 +150,27 @@ impl Prepared {
             if !(0..footage.n_frames).any(|nth| predictor.sigma_px(frame(nth)).is_some()) {
                 tracing::warn!(
                     view = self.views[view].name,
-                    "the table of paper.errors has no row for any frame of this view: see its frame_offset \
-                     and frame_step; every part counts as usable"
+                    "the table of paper.errors has no row for any frame of this view: check its frame_offset \
+                     and frame_step; all parts are treated as usable"
                 );
             }
         }
         Ok(())
     }
 
-    /// The plans of all views.
+    /// Returns the plans of all views.
     pub fn plans(&self) -> Vec<Arc<ViewPlan>> {
         self.views.iter().map(|view| Arc::clone(&view.plan)).collect()
     }
 }
 
-/// The mapping from the footage of a camera to its frames.
+/// Returns the mapping from the footage of a camera to its frames.
 ///
-/// * `index`: the camera's place in the deployment.
+/// * `index`: index of the camera in the deployment.
 ///
 /// # Errors
 ///
-/// The calibration does not contain the camera, or does not match the size of the footage.
+/// Fails if the calibration does not contain the camera, or does not match the size of the footage.
 pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
     let deployment = &resolved.deployment;
     let entry = &deployment.cameras[index];
@@ -197,13 +197,13 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
         let [width, height] = camera.intrinsics.size;
         if size == [height, width] {
             return failure.with_hint(
-                "the size agrees once the pictures are turned: set `rotate = 90` or `rotate = 270` (degrees to the right) in its [[camera]], or \
-                 `rotate = \"tag\"` to turn them as the file asks",
+                "the sizes agree if the pictures are rotated: set `rotate = 90` or `rotate = 270` (degrees to the right) in its [[camera]], or \
+                 `rotate = \"tag\"` to rotate them as the file's tag says",
             );
         }
         failure.with_hint(
-            "calibrate at the size of the footage; if the footage lacks rows or columns of the \
-             calibrated image, say where it begins: source_offset_px = [x, y] in its [[camera]], [0, 0] if they are missing on the right or below",
+            "calibrate at the size of the footage; if the footage is a part of the \
+             calibrated image, set its position: source_offset_px = [x, y] in its [[camera]], [0, 0] if only columns on the right or rows below are missing",
         )
     })
 }
@@ -226,7 +226,7 @@ fn settings(
     let n_thresholds = fuse::tau_px(&config.tau).len();
     if ![0, model.n_parts()].contains(&n_thresholds) {
         let message = format!(
-            "`paper.tau` has {n_thresholds} thresholds, the model has {} parts",
+            "`paper.tau` has {n_thresholds} thresholds, but the model has {} parts",
             model.n_parts()
         );
         return Err(Failure::new(ExitKind::Config, message));
@@ -256,7 +256,7 @@ fn skeleton_settings(
     let config = &deployment.paper;
     let joints = JointSet::by_name(&deployment.person.joints).unwrap_or(defaults.joints);
     let joint_map = if deployment.has_maps() {
-        // The joints themselves are parts.
+        // No mapping is needed, because the parts are the joints.
         None
     } else {
         inputs::Joints::of(&config.joint_map, config.model.as_deref())?.map(learned, joints)
@@ -275,7 +275,7 @@ fn skeleton_settings(
     })
 }
 
-/// Settings of who is who.
+/// Returns the settings for matching people between views and frames.
 pub(crate) fn who_settings(resolved: &Resolved, prepared: &Prepared) -> WhoSettings {
     WhoSettings {
         follow: prepared.settings.follow,
@@ -286,7 +286,7 @@ pub(crate) fn who_settings(resolved: &Resolved, prepared: &Prepared) -> WhoSetti
     }
 }
 
-/// The settings of the step in space.
+/// Returns the settings of the step in space.
 pub(crate) fn space_settings(resolved: &Resolved, prepared: &Prepared) -> SpaceStepSettings {
     let skeleton = &prepared.settings.skeleton;
     let least_heat = resolved.deployment.network.least_heat;
@@ -297,13 +297,13 @@ pub(crate) fn space_settings(resolved: &Resolved, prepared: &Prepared) -> SpaceS
     }
 }
 
-/// The scale of the frames: pixels of the frame per pixel of the footage.
+/// Returns the scale of the frames: pixels of the frame per pixel of the footage.
 pub(crate) fn frame_scale(framing: &Framing) -> f64 {
     let [[a, b, _], [c, d, _]] = framing.source_from_output();
     1.0 / (a * d - b * c).abs().sqrt()
 }
 
-/// Heat that half of the joints of a person whom a view sees well have, 0 to 1.
+/// Returns the heat, from 0 to 1, that at least half of the joints have if a view sees the person well.
 pub(crate) fn least_heat(deployment: &Deployment) -> f64 {
     2.0 * deployment.network.least_heat
 }

@@ -1,4 +1,4 @@
-//! Runs one process of a deployment: builds the job of its service from the resolved deployment.
+//! Runs one process of a deployment: creates the job of its service from the resolved deployment.
 
 mod live;
 pub(crate) mod view_step;
@@ -27,23 +27,23 @@ pub use view_step::network_step;
 /// The processes of a deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Name {
-    /// One per view: footage to frames.
+    /// One per view: turns footage into frames.
     Capture,
-    /// One per view: frames to candidates and evidence.
+    /// One per view: finds candidates and evidence in frames.
     Pose,
-    /// One per view: expected errors.
+    /// One per view: predicts expected errors.
     Quality,
-    /// One per worker: pairs of views.
+    /// One per worker: fuses pairs of views.
     Fuse,
-    /// Triangulation: joints in the world.
+    /// Triangulates joints in the world.
     Triangulate,
-    /// Results: the files in the output folder.
+    /// Writes the files in the output folder.
     Results,
-    /// The recording of every message in one file.
+    /// Records every message in one file.
     Record,
-    /// The recorded messages of another process.
+    /// Sends the recorded messages of another process.
     Replay,
-    /// Messages between hosts.
+    /// Transfers messages between hosts.
     Bridge,
 }
 
@@ -61,7 +61,7 @@ impl Name {
         Self::Replay,
     ];
 
-    /// Its name on the command line: the service of [`deployment::Process`], or `replay`.
+    /// Returns the name on the command line: the service of [`deployment::Process`], or `replay`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Capture => Stage::Capture.name(),
@@ -76,37 +76,37 @@ impl Name {
         }
     }
 
-    /// The process with the given name.
+    /// Returns the process with the given name.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|process| process.name() == name)
     }
 
-    /// Its description in the help of the command line.
+    /// Returns the description for the help of the command line.
     pub fn help(self) -> &'static str {
         match self {
-            Self::Capture => "One per view: footage to frames",
-            Self::Pose => "One per view: frames to candidates and evidence",
-            Self::Quality => "One per view: expected errors",
-            Self::Fuse => "One per worker: pairs of views",
-            Self::Triangulate => "Joints in the world",
-            Self::Results => "The output folder",
-            Self::Record => "Every message into one file",
-            Self::Replay => "The recorded messages of another process",
-            Self::Bridge => "Messages between hosts",
+            Self::Capture => "One per view: turns footage into frames",
+            Self::Pose => "One per view: finds candidates and evidence in frames",
+            Self::Quality => "One per view: predicts expected errors",
+            Self::Fuse => "One per worker: fuses pairs of views",
+            Self::Triangulate => "Triangulates joints in the world",
+            Self::Results => "Writes the output folder",
+            Self::Record => "Records every message in one file",
+            Self::Replay => "Sends the recorded messages of another process",
+            Self::Bridge => "Transfers messages between hosts",
         }
     }
 }
 
-/// The arguments of a process; the deployment itself is in its standard input.
+/// Arguments of a process. The deployment itself is read from standard input.
 #[derive(Debug, Clone)]
 pub struct ProcessArguments {
-    /// The file of the resolved deployment, read if standard input is empty.
+    /// File of the resolved deployment, read if standard input is empty.
     pub plan: PathBuf,
-    /// The number of its view or worker, from 0.
+    /// Index of the view or worker, counted from 0.
     pub index: usize,
     /// The stage that a replay process replaces.
     pub stage: Option<Stage>,
-    /// Enter an endless loop in epoch 0, once a message about a later frame has been sent; for tests.
+    /// For tests: enter an endless loop in epoch 0, after a message about a frame later than this has been sent.
     pub spin_after: Option<u64>,
 }
 
@@ -114,13 +114,13 @@ pub struct ProcessArguments {
 ///
 /// # Errors
 ///
-/// The resolved deployment cannot be read or used, it has no such process, or the service fails.
+/// Fails if the resolved deployment cannot be read or used, it has no such process, or the service fails.
 pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Result<(), Failure> {
     let resolved = Resolved::read(&arguments.plan)?;
     let n_views = resolved.deployment.cameras.len();
     let per_view = matches!(name, Name::Capture | Name::Pose | Name::Quality);
     if per_view && arguments.index >= n_views {
-        let message = format!("there is no view {}, only {n_views}", arguments.index);
+        let message = format!("there is no view {}, only {n_views} views", arguments.index);
         return Err(Failure::new(ExitKind::Usage, message));
     }
     if per_view {
@@ -149,8 +149,8 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
     }
 }
 
-/// The thread pool of a process. If it has several threads, the calling thread is one of them: work that is started
-/// outside a pool would not be spread over its threads.
+/// Returns a builder for the thread pool of a process. If the pool has several threads, the calling thread is one of them. Work that is
+/// started outside the pool would not use its threads.
 fn pool(n_threads: usize) -> ThreadPoolBuilder {
     let pool = ThreadPoolBuilder::new().num_threads(n_threads);
     if n_threads > 1 {
@@ -185,7 +185,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     capture::run(service, &job)
 }
 
-/// Factor by which a decoder may shrink pictures of which smaller frames are made.
+/// Returns the factor by which a decoder may shrink pictures that are scaled down to smaller frames.
 fn most_shrink(framing: &Framing) -> usize {
     let [[a, _, _], [c, _, _]] = framing.source_from_output();
     (a.hypot(c) + 1e-9) as usize
@@ -209,8 +209,8 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     pose::run(service, &job)
 }
 
-/// Most frames from one in which people are seen to the next one in which they can be followed. Nobody is lost from one frame to the
-/// next, however rarely the deployment has people looked for.
+/// Returns the largest number of frames between two frames in which the same person can be followed. With any `frame_step`, it
+/// is large enough that nobody is lost from one frame to the next.
 pub(crate) fn most_apart(resolved: &Resolved) -> Option<f64> {
     let step = resolved.deployment.capture.frame_step as f64;
     let rate_hz = resolved.frame_rate_hz()?;
@@ -232,7 +232,7 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         None => quality::Source::Table(
             prepared
                 .predictor(resolved, view)?
-                .ok_or("there is no paper.errors")
+                .ok_or("paper.errors is not set")
                 .or_fail(ExitKind::Config)?,
         ),
     };
@@ -288,7 +288,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let plans = prepared.plans();
-    // Twice the patience of the process before, which waits for late views itself.
+    // The process before waits for late views itself, so this one waits twice as long.
     let patience = 2 * resolved.patience();
     let n_consumers = topology.receivers_of(&topic::skeletons());
     if topology.has_maps() {

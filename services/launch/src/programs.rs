@@ -7,8 +7,8 @@ use runtime::Delivery;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 
-/// The text of the file `deployment.json` beside the sockets of a deployment: the resolved deployment without passwords, and
-/// what other programs need to read its messages.
+/// Returns the text of the file `deployment.json` beside the sockets of a deployment. It contains the resolved deployment without
+/// passwords, and the facts that other programs need to read its messages.
 pub(crate) fn description(
     resolved: &Resolved,
     prepared: &Prepared,

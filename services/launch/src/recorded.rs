@@ -17,23 +17,23 @@ use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 use inputs::Shipped;
 
-/// The maximal number of damaged messages, and of damaged places, that are listed as text.
+/// Maximum number of damaged messages, and of damaged places, that are listed as text.
 const MAX_LISTED: usize = 10;
 
 /// The settings of a run that its recording contains.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Settings {
-    /// The resolved deployment, the input of every process.
+    /// The resolved deployment, which every process gets as input.
     pub resolved: Resolved,
-    /// Fingerprints (FNV-1a) of the input files, by path; shipped files by their name.
+    /// Fingerprints (FNV-1a) of the input files, by path. Shipped files are listed by their name.
     pub files: BTreeMap<PathBuf, u64>,
 }
 
-/// The metadata of a recording. The session is 0: the recording process sets it.
+/// Returns the metadata of a recording. The session is 0, because the recording process sets it later.
 ///
 /// # Errors
 ///
-/// An input file cannot be read.
+/// Fails if an input file cannot be read.
 pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure> {
     let settings = Settings {
         files: fingerprints(&resolved.deployment)?,
@@ -57,7 +57,7 @@ pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure
     })
 }
 
-/// The cameras and joints of what a recording holds for Foxglove.
+/// Returns the cameras and joints that a recording shows in Foxglove.
 pub fn stage(prepared: &Prepared) -> record::Stage {
     let views = prepared.views.iter();
     record::Stage {
@@ -66,7 +66,7 @@ pub fn stage(prepared: &Prepared) -> record::Stage {
     }
 }
 
-/// Fingerprints (FNV-1a) of the input files of a deployment, without its footage.
+/// Returns fingerprints (FNV-1a) of the input files of a deployment, without its footage.
 pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, u64>, Failure> {
     let mut files = BTreeMap::new();
     let paper = &deployment.paper;
@@ -93,7 +93,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
     let named = named.filter(|(_, file)| !deployment::is_none(file));
     let networks = deployment.pose_networks().into_iter();
     for (kind, file) in named.chain(networks.map(|file| (Shipped::PoseNetwork, file))) {
-        // The deployment calls all shipped files "shipped".
+        // The deployment calls every shipped file "shipped".
         let name = if deployment::is_shipped(file) {
             kind.name()
         } else {
@@ -108,7 +108,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
 ///
 /// # Errors
 ///
-/// The file cannot be read or is not a recording.
+/// Fails if the file cannot be read, or is not a recording.
 pub fn open(file: &Path) -> Result<Recording, Failure> {
     let mut input = files::open(file).map_err(|error| failure::in_file(file, &error))?;
     recording::scan(&mut input).map_err(|error| failure::in_file(file, &error))
@@ -118,7 +118,7 @@ pub fn open(file: &Path) -> Result<Recording, Failure> {
 ///
 /// # Errors
 ///
-/// The recording has none, or those of another version.
+/// Fails if the recording has no settings, or settings of another version.
 pub fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
     let about = recording.about.as_ref();
     let about = about.map_err(|error| failure::in_file(file, error))?;
@@ -126,17 +126,17 @@ pub fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure>
         let failure = failure::in_file(file, &error);
         let (theirs, ours) = (&about.version, env!("CARGO_PKG_VERSION"));
         failure.with_hint(format!(
-            "recorded by version {theirs}, this is version {ours}"
+            "recorded by version {theirs}, but this is version {ours}"
         ))
     })
 }
 
-/// Returns true if the file is undamaged and contains every message that was sent, as far as the file tells.
+/// Returns true if the file is undamaged and contains every message that was sent, as far as the file shows.
 pub fn is_whole(recording: &Recording) -> bool {
     is_undamaged(recording) && recording.n_lost() == 0
 }
 
-/// Returns true if the file is complete and undamaged, as far as a scan tells; the content of the messages is not checked.
+/// Returns true if the file is complete and undamaged, as far as a scan shows. The content of the messages is not checked.
 pub fn is_undamaged(recording: &Recording) -> bool {
     let extent = &recording.extent;
     extent.is_complete
@@ -151,7 +151,7 @@ pub fn is_undamaged(recording: &Recording) -> bool {
 ///
 /// # Errors
 ///
-/// The file cannot be read.
+/// Fails if the file cannot be read.
 pub fn damaged(
     file: &Path,
     recording: &Recording,
@@ -167,7 +167,7 @@ pub fn damaged(
         Some(Kind::Evidence) => from > Stage::Pose && has_evidence,
         Some(Kind::ViewQuality) => from > Stage::Quality,
         Some(Kind::PairPose | Kind::People) => from > Stage::Fuse,
-        // Pictures of cameras are checked as they are read.
+        // Pictures of cameras are checked when they are read.
         Some(Kind::Skeletons | Kind::Health | Kind::Picture) | None => false,
     };
     let mut input = files::open(file).map_err(|error| failure::in_file(file, &error))?;
@@ -175,11 +175,11 @@ pub fn damaged(
         .map_err(|error| failure::in_file(file, &error))
 }
 
-/// Describes the damaged messages as text, and lists the first of them; none if there are none.
+/// Describes the damaged messages as text, and lists the first of them. Returns `None` if there are none.
 pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     let chunks: BTreeSet<u64> = damaged.iter().map(|message| message.chunk).collect();
     let mut text = format!(
-        "  {} messages of {} damaged chunks are left out: the chunks are not what their checksums say",
+        "  {} messages of {} damaged chunks are left out: the chunks do not match their checksums",
         damaged.len(),
         chunks.len()
     );
@@ -196,12 +196,12 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     text.extend(named);
     if damaged.len() > MAX_LISTED {
         let more = damaged.len() - MAX_LISTED;
-        text.extend([format!("\n    and {more} more; --json names all")]);
+        text.extend([format!("\n    and {more} more; --json lists all")]);
     }
     (!damaged.is_empty()).then_some(text)
 }
 
-/// The damaged messages as JSON.
+/// Returns the damaged messages as JSON.
 pub fn damaged_json(damaged: &[Damaged]) -> Value {
     let damaged = damaged
         .iter()
@@ -209,11 +209,11 @@ pub fn damaged_json(damaged: &[Damaged]) -> Value {
     damaged.collect()
 }
 
-/// Describes a recording as text: one line on its content, and one per flaw.
+/// Describes a recording as text: one line about its content, and one line per flaw.
 pub fn text(file: &Path, recording: &Recording) -> String {
     let extent = &recording.extent;
     let mut text = format!(
-        "{}: {} messages of {} topics in {:.1} MB",
+        "{}: {} messages of {} topics, {:.1} MB",
         file.display(),
         recording.n_messages(),
         recording.tracks.len(),
@@ -246,7 +246,10 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
         write!(text, "\n  and at {more} more places")?;
     }
     for (topic, n) in &extent.missing {
-        write!(text, "\n  {topic}: {n} messages are damaged and not found")?;
+        write!(
+            text,
+            "\n  {topic}: {n} messages are damaged and cannot be found"
+        )?;
     }
     if extent.n_malformed > 0 {
         let n = extent.n_malformed;

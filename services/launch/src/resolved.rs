@@ -1,4 +1,4 @@
-//! A resolved deployment: a deployment with the metadata of its footage, the input of every process.
+//! A resolved deployment: a deployment with the metadata of its footage. Every process gets it as input.
 
 use core::time::Duration;
 use std::io::{IsTerminal as _, Read as _};
@@ -14,7 +14,7 @@ use serde_json::Value;
 use crate::cameras::Footage;
 use crate::search_size::SearchSize;
 
-/// A deployment with the metadata of its footage, the input of every process.
+/// A deployment with the metadata of its footage. Every process gets it as input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Resolved {
     /// The deployment, with absolute paths.
@@ -23,11 +23,11 @@ pub struct Resolved {
     pub footage: Vec<Footage>,
     /// The sizes of the frames, if the deployment sets none.
     pub search_size: Option<SearchSize>,
-    /// Names of the keypoints that the networks and keypoint files of the cameras have beside the joints, each once.
+    /// Names of the keypoints, other than the joints, that the networks and keypoint files of the cameras have. Each name occurs once.
     pub extra_keypoints: Vec<String>,
-    /// True if left and right of a network follow the picture: all views together decide which are those of the person.
+    /// True if left and right of a network follow the picture. All views together then decide which side is the person's left.
     pub sides_as_seen: bool,
-    /// The host that runs, of a deployment of several.
+    /// The host that runs here, in a deployment of several hosts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub host: Option<String>,
     /// The recording to write, if there is one.
@@ -36,7 +36,7 @@ pub struct Resolved {
     pub replay: Option<Replay>,
 }
 
-/// Key of what `ffprobe` answered, beside those of [`Resolved`].
+/// Key for the answers of `ffprobe`, beside the keys of [`Resolved`].
 const ANSWERS: &str = "ffprobe";
 
 /// The services, in pipeline order.
@@ -50,12 +50,12 @@ pub const SERVICES: [&str; 6] = [
 ];
 
 impl Resolved {
-    /// Number of frames to use: that of the longest footage.
+    /// Returns the number of frames to use, which is that of the longest footage.
     pub fn n_frames(&self) -> u64 {
         self.footage.iter().map(|footage| footage.n_frames).max().unwrap_or(0)
     }
 
-    /// Returns true if the deployment runs until it is stopped: it has a live camera, and no number of frames.
+    /// Returns true if the deployment runs until it is stopped: it has a live camera, and no number of frames is set.
     pub fn is_endless(&self) -> bool {
         self.deployment.capture.n_frames.is_none() && self.has_live()
     }
@@ -66,15 +66,16 @@ impl Resolved {
         cameras.any(|camera| crate::cameras::is_live(&camera.source))
     }
 
-    /// Views with a live camera.
+    /// Returns the views with a live camera.
     pub fn live_views(&self) -> Vec<usize> {
         let cameras = self.deployment.cameras.iter().enumerate();
         let live = cameras.filter(|camera| crate::cameras::is_live(&camera.1.source));
         live.map(|view| view.0).collect()
     }
 
-    /// Instants per second that live cameras are brought together at, before `frame_step`: as the deployment says, else the
-    /// rate of the slowest.
+    /// Returns the rate of the common instants of live cameras, per second, before `frame_step`. The deployment sets it; otherwise it is
+    /// the
+    /// rate of the slowest camera.
     pub fn instants_hz(&self) -> f64 {
         let step = self.deployment.capture.frame_step as f64;
         let own = self.footage.iter().filter_map(|footage| footage.frame_rate_hz);
@@ -82,7 +83,7 @@ impl Resolved {
         self.deployment.capture.frame_rate_hz.unwrap_or(slowest)
     }
 
-    /// Frames per second of the footage, before `frame_step`, if it is known.
+    /// Returns the frame rate of the footage, per second, before `frame_step`, if it is known.
     pub fn frame_rate_hz(&self) -> Option<f64> {
         let capture = &self.deployment.capture;
         let step = capture.frame_step as f64;
@@ -91,13 +92,13 @@ impl Resolved {
         }
         let known = self.footage.iter().filter_map(|footage| footage.frame_rate_hz);
         let all: Vec<f64> = known.map(|value| value * step).collect();
-        // If the files contradict each other, the setting of the deployment counts.
+        // If the files contradict each other, the setting of the deployment is used.
         let agree = all.iter().all(|value| (value / all[0] - 1.0).abs() < 1e-3);
         let given = capture.frame_rate_hz.filter(|_| !agree);
         given.or_else(|| all.first().copied())
     }
 
-    /// Writes it to a file, for the user, without passwords of cameras.
+    /// Writes the deployment to a file for the user, without passwords of cameras.
     pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
         files::replace(
             file,
@@ -106,22 +107,23 @@ impl Resolved {
         .map_err(|error| failure::in_file(file, &error))
     }
 
-    /// The text that every process gets as standard input: also what is known of the footage, which need not be asked again.
+    /// Returns the text that every process gets on standard input. It includes the known properties of the footage, which need not be
+    /// determined again.
     pub(crate) fn to_text(&self) -> Result<String, Failure> {
         let mut value = serde_json::to_value(self).or_fail(ExitKind::Run)?;
         value[ANSWERS] = footage::answers_so_far();
         serde_json::to_string_pretty(&value).or_fail(ExitKind::Run)
     }
 
-    /// Reads the resolved deployment from standard input, where the supervisor writes it. The file in the output
+    /// Reads the resolved deployment from standard input, to which the supervisor writes it. The file in the output
     /// folder could have been removed, or replaced by another run, before a restart.
     ///
-    /// * `file`: a file with the same content, which is read if standard input is empty or a terminal, as for a
+    /// * `file`: a file with the same content. It is read if standard input is empty or a terminal, as for a
     ///   process that is started by hand.
     ///
     /// # Errors
     ///
-    /// Neither standard input nor the file can be read, or the text is not a resolved deployment.
+    /// Fails if neither standard input nor the file can be read, or the text is not a resolved deployment.
     pub fn read(file: &Path) -> Result<Self, Failure> {
         let wrong = |error: &dyn core::error::Error| failure::in_file(file, error);
         let mut text = String::new();
@@ -137,7 +139,7 @@ impl Resolved {
         serde_json::from_value(value).map_err(|error| wrong(&error))
     }
 
-    /// The delivery of messages to receivers that are slower than their senders.
+    /// Returns how messages are delivered to receivers that are slower than their senders.
     pub fn delivery(&self) -> Delivery {
         if self.deployment.capture.mode.is_lossless() {
             Delivery::Lossless
@@ -146,12 +148,12 @@ impl Resolved {
         }
     }
 
-    /// How long a stage waits for a late view.
+    /// Returns how long a stage waits for a late view.
     pub fn patience(&self) -> Duration {
         Duration::from_millis(self.deployment.deadline_ms())
     }
 
-    /// The processes of the deployment and the topics between them.
+    /// Returns the processes of the deployment and the topics between them.
     pub fn topology(&self) -> Topology {
         let (recording, replay) = (self.recording.as_ref(), self.replay.as_ref());
         let whole = Topology::new(&self.deployment, recording, replay);
@@ -161,12 +163,12 @@ impl Resolved {
         }
     }
 
-    /// The host that runs, of a deployment of several.
+    /// Returns the host that runs here, in a deployment of several hosts.
     pub fn own_host(&self) -> Option<&Host> {
         self.deployment.host(self.host.as_deref()?)
     }
 
-    /// Returns true if this is a host with cameras that leaves the results to another.
+    /// Returns true if this is a host with cameras, and another host has the results.
     pub fn is_far(&self) -> bool {
         self.own_host().is_some_and(|own_host| !own_host.fuses)
     }

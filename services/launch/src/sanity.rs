@@ -1,4 +1,4 @@
-//! Checks of footage and calibration of a deployment, before any process is started.
+//! Checks footage and calibration of a deployment before any process is started.
 
 use std::path::PathBuf;
 
@@ -16,30 +16,32 @@ use crate::resolved::Resolved;
 
 /// The largest ratio of two frame rates at which frames can be paired by number.
 const MAX_RATE_RATIO: f64 = 1.02;
-/// The least range of brightness, of 255, over the cells of an image at which it is compared with others.
+/// Minimum range of brightness over the cells of an image, of 255. Images with less contrast are not compared.
 const MIN_CONTRAST: f64 = 16.0;
-/// Warning about footage without a rate.
-const NO_RATE: &str = "nothing says how many frames per second the footage has: times, speeds and pose3d.trc are left out; \
-    `capture.frame_rate_hz` says it";
-/// A picture whose brightest value is less, of 255, uses a small part of its range.
+/// Warning about footage without a frame rate.
+const NO_RATE: &str = "the frame rate of the footage is not known: times, speeds and pose3d.trc are left out; \
+    set `capture.frame_rate_hz`";
+/// If the brightest value of a picture is below this, of 255, the picture uses a small part of its range.
 const LEAST_BRIGHTEST: u8 = 64;
-/// Images whose mean difference of brightness over the cells is less than this, of 255, look the same.
+/// Two images look the same if their mean difference of brightness over the cells is below this, of 255.
 const MIN_DIFFERENCE: f64 = 1.0;
-/// Cells of the grid of brightness, in each direction.
+/// Number of cells of the brightness grid, in each direction.
 const CELLS: usize = 32;
 
-/// Checks footage and calibration; returns warnings.
+/// Checks footage and calibration, and returns warnings.
 ///
 /// # Errors
 ///
-/// No joints can be located in space: a single camera, cameras in one place, a wrong unit, one source for two
-/// cameras, or different frame rates.
+/// Fails if no joints can be located in space: there is a single camera, cameras are in one place, the unit is wrong, two cameras have
+/// the same source, or frame rates differ.
 fn check(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
     let mut warnings = deployment.doubts(n_cores());
     check_number(deployment)?;
     if resolved.host.is_some() {
-        // Devices of two machines have the same names, and footage of another cannot be read.
+        // With several hosts, sources are not compared: devices of two machines may have the same name, and footage of another machine
+        // cannot
+        // be read.
         warnings.extend(check_cameras(deployment)?);
         return Ok(warnings);
     }
@@ -58,12 +60,12 @@ fn check_number(deployment: &Deployment) -> Result<(), Failure> {
         return Ok(());
     };
     let message = format!(
-        "the deployment has one camera, {:?}: nothing can be located in space by one alone",
+        "the deployment has only one camera, {:?}: a single camera cannot locate anything in space",
         camera.name
     );
     let failure = Failure::new(ExitKind::Config, message);
     Err(failure.with_hint(
-        "add a [[camera]] that sees the same people from elsewhere; `parallax detect` finds people in single images",
+        "add a [[camera]] that sees the same people from another position; `parallax detect` finds people in single images",
     ))
 }
 
@@ -88,7 +90,7 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         };
         let [a, b] = [first, nth].map(|i| &deployment.cameras[i].name);
         let message = format!(
-            "cameras {a:?} and {b:?} have one source, {}",
+            "cameras {a:?} and {b:?} have the same source, {}",
             footage::without_passwords(&source.to_string_lossy())
         );
         let failure = Failure::new(ExitKind::Config, message);
@@ -102,7 +104,7 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     let named = deployment.cameras.iter().filter_map(|camera| rig.camera(&camera.name));
     let used = Rig::new(named.cloned().collect(), rig.up_in_world(), rig.source());
-    // A camera that the rig does not contain is reported elsewhere, by name.
+    // If the rig lacks a camera, this is reported elsewhere, with its name.
     let Ok(used) = used else {
         return Ok(Vec::new());
     };
@@ -129,21 +131,21 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
         .collect())
 }
 
-/// The hint for a finding.
+/// Returns the hint for a finding.
 fn hint(finding: &Finding) -> String {
     match finding {
         Finding::Distance { metres, .. } => format!(
-            "say in the deployment what the numbers of the file are: `unit = \"mm\"` makes this {:.3} m, `unit = \"cm\"` {:.3} m, \
-             `unit = \"m\"` says that it is right",
+            "set the unit of the file in the deployment: with `unit = \"mm\"` this is {:.3} m, with `unit = \"cm\"` {:.3} m; \
+             use `unit = \"m\"` if the distance is right",
             metres / 1000.0,
             metres / 100.0
         ),
         Finding::OnePlace { .. } => {
-            "joints in space need cameras that stand apart, best a metre or more; `unit` in the deployment says what \
-             the numbers of the file are"
+            "to locate joints in space, cameras must be apart, best by a metre or more; `unit` in the deployment sets the unit of \
+             the file"
                 .to_owned()
         }
-        _ => "`parallax calib check` says more; calibrate again, or leave the camera out".to_owned(),
+        _ => "`parallax calib check` shows details; calibrate again, or leave the camera out".to_owned(),
     }
 }
 
@@ -166,44 +168,45 @@ fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     }
     let drift = resolved.n_frames() as f64 * step * (high / low - 1.0);
     let text = format!(
-        "{rates}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
+        "{rates}: frames are paired by their numbers, so at the end they are {drift:.1} frames apart"
     );
     if high / low <= MAX_RATE_RATIO || deployment.capture.frame_rate_hz.is_some() {
         return Ok((drift >= 0.5).then_some(text).or_else(|| without_rate(resolved)));
     }
     let failure = Failure::new(ExitKind::Input, text);
     Err(failure.with_hint(
-        "if the cameras have clocks of their own, set `offset_ms` in each [[camera]], as `parallax sync estimate` finds it (0 if they \
-         began together): a run then brings cameras of any rates to common instants; if a file is wrong about its rate, give the \
-         true one as `capture.frame_rate_hz`",
+        "if the cameras have separate clocks, set `offset_ms` in each [[camera]]: use the values from `parallax sync estimate`, or 0 if the cameras \
+         began at the same time. A run then brings cameras of any rates to common instants. If a file states a wrong rate, set the \
+         right one as `capture.frame_rate_hz`",
     ))
 }
 
-/// Names the cameras whose frame rate nothing says, while it is known for others; none if there are none.
+/// Returns a warning about the cameras whose frame rate is unknown, if the rate of other cameras is known.
 fn without_rate(resolved: &Resolved) -> Option<String> {
     let views = resolved.deployment.cameras.iter().zip(&resolved.footage);
     let unknown = views.filter(|view| view.1.frame_rate_hz.is_none());
     let names: Vec<&str> = unknown.map(|unknown| unknown.0.name.as_str()).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "nothing says how many frames per second {} has: the rate of the other cameras is used; `capture.frame_rate_hz` sets it",
+            "the frame rate of {} is not known: the rate of the other cameras is used; `capture.frame_rate_hz` sets another rate",
             names.join(", ")
         )
     })
 }
 
-/// The pictures of live cameras are paired by their times: another rate only means that some have none for an instant.
+/// Warns of live cameras with different rates. Their pictures are paired by time, so a slower camera only has no picture for some
+/// instants.
 fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<String>, Failure> {
     if ratio <= MAX_RATE_RATIO || resolved.deployment.capture.frame_rate_hz.is_some() {
         return Ok(None);
     }
     let failure = Failure::new(ExitKind::Config, rates.to_owned());
     Err(failure.with_hint(
-        "set the same `frame_rate_hz` in each [[camera]], or the rate of the common instants as `capture.frame_rate_hz`: a slower camera then has no picture at some of them",
+        "set the same `frame_rate_hz` in each [[camera]], or set `capture.frame_rate_hz` to the rate of the common instants: a slower camera then has no picture at some instants",
     ))
 }
 
-/// Warns of cameras whose footage is much shorter than that of another.
+/// Warns of cameras whose footage is much shorter than that of another camera.
 fn check_lengths(resolved: &Resolved) -> Option<String> {
     if resolved.has_live() {
         return None;
@@ -213,7 +216,7 @@ fn check_lengths(resolved: &Resolved) -> Option<String> {
     shorter(&names.zip(lengths).collect::<Vec<_>>())
 }
 
-/// The cameras that are much shorter than the longest, and by how much; none if there are none.
+/// Describes the cameras whose footage is much shorter than the longest, and by how much. Returns `None` if there are none.
 fn shorter(all: &[(&str, u64)]) -> Option<String> {
     const LEAST_FRAMES: u64 = 5;
     const LEAST_SHARE: f64 = 0.05;
@@ -234,7 +237,7 @@ fn shorter(all: &[(&str, u64)]) -> Option<String> {
         .collect();
     (!short.is_empty()).then(|| {
         format!(
-            "{} than {long} with {many}: frames are paired by their numbers; do they begin together, at one rate?",
+            "{} than {long} with {many}: frames are paired by their numbers; do all cameras begin at the same time, with the same rate?",
             short.join(", ")
         )
     })
@@ -272,7 +275,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
             let [a, b] = [other, nth].map(|i| &deployment.cameras[i].name);
             if own.rgb == theirs.rgb {
                 let message = format!(
-                    "the first {} pictures of cameras {a:?} and {b:?} are equal, bit for bit, which two cameras never see",
+                    "the first {} pictures of cameras {a:?} and {b:?} are equal, bit for bit, so they come from one camera",
                     own.rgb.len()
                 );
                 let failure = Failure::new(ExitKind::Input, message);
@@ -283,7 +286,7 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
             let difference = own.difference(theirs);
             if difference < MIN_DIFFERENCE {
                 warnings.push(format!(
-                    "the first pictures of {a} and {b} differ by {difference:.1} of 255 on average: is it one video, given for two cameras?"
+                    "the first pictures of {a} and {b} differ by only {difference:.1} of 255 on average: was one video given for two cameras?"
                 ));
             }
         }
@@ -294,14 +297,14 @@ fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
 /// The first images of a camera.
 struct FirstImages {
     rgb: Vec<Vec<u8>>,
-    /// True if the first image has contrast.
+    /// True if the first image has enough contrast.
     has_contrast: bool,
     /// Mean brightness of the cells of the first image, row by row.
     grid: Vec<f64>,
 }
 
 impl FirstImages {
-    /// None for a live or a synthetic camera, for one without pictures, and for unreadable footage.
+    /// Reads the first images. Returns `None` for a live or synthetic camera, a camera without pictures, and unreadable footage.
     fn read(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
@@ -316,7 +319,7 @@ impl FirstImages {
             most_shrink: 4,
             ..crate::cameras::source(camera, capture)
         };
-        // Unreadable footage is reported where it is read.
+        // Unreadable footage is reported when it is read.
         let mut feed = Feed::open(&spec).ok()?;
         let mut rgb = Vec::new();
         while let Ok(Some(frame)) = feed.next_frame() {
@@ -337,7 +340,7 @@ impl FirstImages {
         self.rgb.iter().flatten().copied().max().unwrap_or(0)
     }
 
-    /// Mean absolute difference of brightness over the cells.
+    /// Returns the mean absolute difference of brightness over the cells.
     fn difference(&self, other: &Self) -> f64 {
         let pairs = self.grid.iter().zip(&other.grid);
         let sum: f64 = pairs.map(|(a, b)| (a - b).abs()).sum();
@@ -345,7 +348,7 @@ impl FirstImages {
     }
 }
 
-/// Mean brightness of the cells of an image, row by row.
+/// Returns the mean brightness of the cells of an image, row by row.
 ///
 /// * `rgb`: the pixels, three bytes each.
 fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
@@ -363,11 +366,11 @@ fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
 
 /// Runs the checks and logs the warnings.
 ///
-/// * `lengths`: number of frames of the keypoints of every camera, where it has some.
+/// * `lengths`: number of frames in the keypoints of each camera, if it has keypoints.
 ///
 /// # Errors
 ///
-/// As for [`check`].
+/// Fails like [`check`].
 pub(crate) fn warn(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<(), Failure> {
     for warning in check(resolved, lengths)? {
         tracing::warn!("{warning}");
@@ -375,7 +378,7 @@ pub(crate) fn warn(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<(), F
     Ok(())
 }
 
-/// Number of cores that this process may use, if it is known.
+/// Returns the number of cores that this process may use, if it is known.
 fn n_cores() -> Option<usize> {
     let known = std::thread::available_parallelism();
     known.ok().map(usize::from)

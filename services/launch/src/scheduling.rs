@@ -1,14 +1,14 @@
-//! The scheduling that processes of a deployment request, without what the system denies.
+//! The scheduling that processes of a deployment request, without requests that the system denies.
 
 use deployment::Runtime;
 use runtime::{Denied, RealTime, Scheduling};
 use supervise::ProcessSpec;
 
-/// The services that may poll: they wait for messages, and other stages wait for their results. `capture` waits for its
-/// clock, and no stage waits for `results`.
+/// The services that may poll: other stages wait for their results. `capture` is left out because it waits for its clock, and `results`
+/// because no stage waits for it.
 const POLLING: [&str; 4] = ["pose", "quality", "fuse", "triangulate"];
 
-/// The scheduling that a process requests. Settings of the process take precedence over those of its service.
+/// Returns the scheduling that a process requests. Settings of the process take precedence over those of its service.
 pub(crate) fn requested(settings: &Runtime, service: &str, process: &str) -> Scheduling {
     let policy = runtime::Policy::Fifo;
     let cores = settings.cores.get(process).or(settings.cores.get(service));
@@ -22,10 +22,9 @@ pub(crate) fn requested(settings: &Runtime, service: &str, process: &str) -> Sch
     }
 }
 
-/// Removes from the processes the requests that the system would deny. Returns a warning for each denial: the
-/// processes, the reason, and what to try.
+/// Removes requests that the system would deny. Returns a warning for each denial, with the processes, the reason, and what to try.
 ///
-/// * `rehearse`: the requests that the system would deny, [`Scheduling::rehearse`].
+/// * `rehearse`: returns the requests that the system would deny, as [`Scheduling::rehearse`] does.
 pub(crate) fn remove_denied(
     processes: &mut [ProcessSpec],
     rehearse: impl Fn(&Scheduling) -> Vec<Denied>,
@@ -50,7 +49,7 @@ pub(crate) fn remove_denied(
     let warning = |(denied, names): &(Denied, Vec<String>)| {
         let reason = core::error::Error::source(denied).map(|source| format!(" ({source})"));
         format!(
-            "{}: {denied}{}; going on without. Try: {}",
+            "{}: {denied}{}; continuing without it. Try: {}",
             names.join(", "),
             reason.unwrap_or_default(),
             denied.hint()
@@ -79,7 +78,7 @@ mod tests {
         }
     }
 
-    /// A system with cores 0 and 1 that denies real-time priorities.
+    /// Simulates a system with cores 0 and 1 that denies real-time priorities.
     fn rehearse(requested: &Scheduling) -> Vec<Denied> {
         let allowed = vec![0, 1];
         let too_many = requested.cores.iter().any(|core| !allowed.contains(core));
@@ -114,7 +113,9 @@ mod tests {
         assert!(priority.contains("permission denied"), "{priority}");
         assert!(priority.contains("ulimit -r"), "{priority}");
         assert!(
-            cores.starts_with("pose-1: cannot run on cores 1,7: 0,1 may be used; going on without"),
+            cores.starts_with(
+                "pose-1: cannot run on cores 1,7: 0,1 may be used; continuing without it"
+            ),
             "{cores}"
         );
         let got = processes.map(|process| process.scheduling.to_string());

@@ -1,4 +1,4 @@
-//! The size in which frames are searched if the deployment sets none: the choice from the calibration, and its description.
+//! The size of frames if the deployment sets none: chooses it from the calibration, and describes the choice.
 
 use core::fmt::Write as _;
 
@@ -14,33 +14,33 @@ use serde::{Deserialize, Serialize};
 pub struct SearchSize {
     /// The size of every camera's frames, in the order of the deployment.
     pub cameras: Vec<CameraSize>,
-    /// The most cameras that share a space in which a person can stand; 0 if no two do.
+    /// Largest number of cameras that share a space in which a person can stand; 0 if no two cameras share one.
     pub n_sharing: usize,
 }
 
 /// The size of one camera's frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraSize {
-    /// The camera.
+    /// Name of the camera.
     pub name: String,
-    /// As a share of its image.
+    /// Scale of the frames, as a share of the camera's image.
     pub scale: f64,
-    /// Width and height, pixels.
+    /// Width and height of the frames, in pixels.
     pub frame_size: [u32; 2],
-    /// Height of a person in its image, in the space that it shares with others, pixels.
+    /// Height of a person in the camera's image, in pixels. The person is in the space that the camera shares with others.
     pub person_px: Option<f64>,
-    /// The same in its frames.
+    /// Height of the same person in the frames, in pixels.
     pub person_in_frame_px: Option<f64>,
-    /// True if the person is smaller than is good because the number of pixels is limited.
+    /// True if the person is too small in the frames because the number of pixels is limited.
     pub is_limited: bool,
 }
 
 impl SearchSize {
-    /// Chooses the size of every camera, unless the deployment says it.
+    /// Chooses the size of every camera's frames, unless the deployment sets it.
     ///
-    /// * `rig`: as [`inputs::rig_of`] reads it.
+    /// * `rig`: the rig, as [`inputs::rig_of`] reads it.
     ///
-    /// Also `None` if the rig lacks a camera: that error is reported where the frames are planned.
+    /// Also returns `None` if the rig lacks a camera. This error is reported when the frames are planned.
     pub fn of(deployment: &Deployment, rig: &Rig) -> Option<Self> {
         let capture = &deployment.capture;
         if capture.size.is_some() || capture.scale.is_some() {
@@ -64,13 +64,13 @@ impl SearchSize {
         })
     }
 
-    /// The scale of a camera's frames.
+    /// Returns the scale of a camera's frames.
     pub(crate) fn scale(&self, camera: &str) -> f64 {
         let found = self.cameras.iter().find(|entry| entry.name == camera);
         found.map_or(1.0, |entry| entry.scale)
     }
 
-    /// The choice and its reason, on one line.
+    /// Returns the choice and its reason, on one line.
     pub fn text(&self) -> String {
         let mut groups: Vec<Vec<&CameraSize>> = Vec::new();
         for it in &self.cameras {
@@ -87,17 +87,17 @@ impl SearchSize {
         let chosen: Vec<String> =
             groups.iter().map(|group| describe(group, groups.len() > 1)).collect();
         let why = match self.n_sharing {
-            0 => "no two cameras share a space in which a person can stand, so the frames are as large as time permits"
+            0 => "no two cameras share a space in which a person can stand, so the frames are as large as possible in the available time"
                 .to_owned(),
             n => format!("{n} cameras share the space in which a person of {PERSON_METRES:.2} m stands"),
         };
         format!(
-            "capture.scale is chosen: {}; {why} (capture.scale or capture.size sets it)",
+            "capture.scale is set automatically: {}; {why} (capture.scale or capture.size overrides this)",
             chosen.join("; ")
         )
     }
 
-    /// A warning if a person is too small in some frames, with what to set.
+    /// Returns a warning with a suggested setting, if a person is too small in some frames.
     pub fn warning(&self) -> Option<String> {
         let px = |camera_size: &CameraSize| camera_size.person_in_frame_px.unwrap_or(f64::INFINITY);
         let small = self.cameras.iter();
@@ -108,7 +108,7 @@ impl SearchSize {
         let scale = better_scale(&seen)?;
         let names: Vec<&str> = small.iter().map(|small| small.name.as_str()).collect();
         let mut text = format!(
-            "a person is about {:.0} px high in the frames of {}, where {} to {} are good: ",
+            "a person is about {:.0} px high in the frames of {}, but {} to {} px are best: ",
             px(first),
             names.join(", "),
             GOOD_PX[0],
@@ -118,23 +118,23 @@ impl SearchSize {
         let _infallible = if first.is_limited {
             write!(
                 text,
-                "frames have {MOST_PIXELS} pixels at most unless it is set, to limit the time; for larger ones \
+                "to limit the time, frames have at most {MOST_PIXELS} pixels by default; for larger frames, \
                  set capture.scale = {scale} ({:.0} times the pixels)",
                 (scale / first.scale).powi(2)
             )
         } else {
             write!(
                 text,
-                "the image has no more; set capture.scale = {scale} to search it enlarged"
+                "the image has no more pixels; set capture.scale = {scale} to enlarge it for the search"
             )
         };
         Some(text)
     }
 }
 
-/// Describes the size of cameras that have the same one.
+/// Describes the size of cameras whose frames have the same size.
 ///
-/// * `is_named`: whether to name them.
+/// * `is_named`: true to name the cameras.
 fn describe(cameras: &[&CameraSize], is_named: bool) -> String {
     let first = cameras[0];
     let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
@@ -155,7 +155,7 @@ fn describe(cameras: &[&CameraSize], is_named: bool) -> String {
     }
 }
 
-/// The range of numbers, rounded, as text; `None` without numbers.
+/// Returns the range of numbers, rounded, as text; `None` without numbers.
 fn range(numbers: impl Iterator<Item = f64> + Clone) -> Option<String> {
     let least = numbers.clone().reduce(f64::min)?.round();
     let most = numbers.reduce(f64::max)?.round();
@@ -191,8 +191,8 @@ mod tests {
         let alike = size(&[(0.25, Some(690.0), false), (0.25, Some(710.0), false)], 2);
         assert_eq!(
             alike.text(),
-            "capture.scale is chosen: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; 2 cameras \
-             share the space in which a person of 1.70 m stands (capture.scale or capture.size sets it)"
+            "capture.scale is set automatically: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; 2 cameras \
+             share the space in which a person of 1.70 m stands (capture.scale or capture.size overrides this)"
         );
         assert_eq!(alike.warning(), None);
         let text = size(&[(0.25, Some(690.0), false), (0.5, None, false)], 2).text();
@@ -212,7 +212,7 @@ mod tests {
         let limited = size(&[(0.25, Some(300.0), true), (0.25, Some(700.0), false)], 2);
         let warning = limited.warning().unwrap();
         assert!(
-            warning.contains("75 px high in the frames of a, where 150 to 250"),
+            warning.contains("75 px high in the frames of a, but 150 to 250"),
             "{warning}"
         );
         assert!(
@@ -221,7 +221,7 @@ mod tests {
         );
         let small = size(&[(1.0, Some(100.0), false)], 1).warning().unwrap();
         assert!(
-            small.ends_with("set capture.scale = 2 to search it enlarged"),
+            small.ends_with("set capture.scale = 2 to enlarge it for the search"),
             "{small}"
         );
     }

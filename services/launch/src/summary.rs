@@ -45,36 +45,36 @@ pub struct Report {
     interrupted: bool,
     given_up: Vec<String>,
     restarts: Vec<(String, u32)>,
-    /// Peak memory of every process, including shared memory, bytes.
+    /// Peak memory of every process, including shared memory, in bytes.
     peaks: Vec<(String, u64)>,
     n_dropped: u64,
-    /// Processor time of every process in its last life, seconds.
+    /// Processor time of every process since its last start, in seconds.
     processor_s: BTreeMap<String, f64>,
     /// Messages that each process refused, by cause.
     refused: Vec<(String, [u64; Refusal::N])>,
-    /// Frames that the processor computed because the GPU was lost, by process.
+    /// Number of frames that the processor computed because the GPU was lost, by process.
     without_gpu: BTreeMap<String, u64>,
     is_lossless: bool,
     views: Vec<ViewReport>,
     budget: Option<Budget>,
     /// The sizes of the frames, if the deployment sets none.
     search_size: Option<SearchSize>,
-    /// Where people were too small or too large.
+    /// Views in which people were too small or too large.
     outside: Option<Outside>,
     /// The last metrics of every process.
     measured: BTreeMap<String, Value>,
-    /// The summary of the process `results`: `summary.json`.
+    /// Summary that the process `results` wrote to `summary.json`.
     recorded: Recorded,
-    /// Counts of the pictures of live cameras, a line each.
+    /// Counts of the pictures of live cameras, one line per camera.
     live: String,
-    /// True if another host fuses, and has the results.
+    /// True if another host fuses and has the results.
     is_far: bool,
 }
 
 impl Report {
     /// Combines the outcome of the supervisor with the summary of the process `results`.
     ///
-    /// * `session`: the session of the run; the summary of another session is ignored.
+    /// * `session`: the session of the run. The summary of another session is ignored.
     /// * `elapsed`: the duration of the run.
     pub fn new(resolved: &Resolved, session: u64, outcome: &Outcome, elapsed: Duration) -> Self {
         let folder = &resolved.deployment.output;
@@ -125,7 +125,7 @@ impl Report {
                 .latency_budget_ms
                 .map(|latency_budget_ms| Budget::new(latency_budget_ms, recorded.latency())),
             search_size: resolved.search_size.clone(),
-            // A network sees everybody in a window of its own size.
+            // A network sees every person in a window of its own size, so the size in the picture does not matter.
             outside: recorded
                 .outside(resolved.deployment.capture.size.is_some())
                 .filter(|_| !resolved.deployment.has_maps()),
@@ -136,14 +136,15 @@ impl Report {
         }
     }
 
-    /// The frame counts of every view.
+    /// Returns the frame counts of every view.
     pub fn views(&self) -> &[ViewReport] {
         &self.views
     }
 
-    /// The processes that were restarted more often than faults were injected into them, or were given up; sorted.
+    /// Returns the processes that were restarted more often than faults were injected into them, and those that were given up. The list is
+    /// sorted.
     ///
-    /// * `n_faults`: the number of faults injected into a process.
+    /// * `n_faults`: returns the number of faults injected into a process.
     pub fn unexpected_failures(&self, n_faults: impl Fn(&str) -> u32) -> Vec<String> {
         let restarted = self.restarts.iter();
         let unexpected =
@@ -154,18 +155,18 @@ impl Report {
         failed
     }
 
-    /// The verdict on the latency budget, if the deployment has one.
+    /// Returns the verdict on the latency budget, if the deployment has a budget.
     pub fn budget(&self) -> Option<&Budget> {
         self.budget.as_ref()
     }
 
-    /// The cameras whose calibration is suspected to be wrong.
+    /// Returns the cameras whose calibration is probably wrong.
     pub fn misplaced(&self) -> Vec<String> {
         let suspected = self.suspected();
         suspected.map(|(camera, _)| camera.clone()).collect()
     }
 
-    /// The cameras whose pictures were taken at other times than they say.
+    /// Returns the cameras whose pictures were taken at other times than they state.
     pub fn out_of_step(&self) -> impl Iterator<Item = (&String, &CameraFit)> {
         let summary = self.recorded.summary().into_iter();
         let fits = summary.flat_map(|summary| &summary.calibration);
@@ -178,16 +179,16 @@ impl Report {
         fits.filter(|(_, fit)| fit.suspected)
     }
 
-    /// The summary that the process `results` wrote.
+    /// Returns the summary that the process `results` wrote.
     pub fn recorded(&self) -> &Recorded {
         &self.recorded
     }
 
-    /// The exit status of the run, if it did not succeed.
+    /// Returns the exit status of the run, if it did not succeed.
     pub fn kind(&self) -> Option<ExitKind> {
         let budget = self.budget.as_ref();
         if budget.is_some_and(Budget::is_exceeded) {
-            // Also if it was interrupted: live cameras always run until they are stopped.
+            // This also holds for an interrupted run, because live cameras always run until they are stopped.
             Some(ExitKind::Limit)
         } else if self.interrupted {
             Some(ExitKind::Interrupted)
@@ -198,7 +199,7 @@ impl Report {
         }
     }
 
-    /// Returns true if views, frames or processes were lost, or the losses are unknown. False for an interrupted run.
+    /// Returns true if views, frames or processes were lost, or the losses are unknown. Returns false for an interrupted run.
     fn is_degraded(&self) -> bool {
         if self.is_far {
             return !self.given_up.is_empty() || !self.restarts.is_empty();
@@ -212,7 +213,7 @@ impl Report {
                 || self.views.iter().any(|view| view.is_lost(self.is_lossless)))
     }
 
-    /// Why the results should not be trusted, by themselves.
+    /// Returns the reasons in the results themselves not to trust them.
     fn doubts(&self) -> Vec<Doubt> {
         let summary = self.recorded.summary();
         summary.map_or_else(Vec::new, |summary| summary.trust.doubts())
@@ -227,17 +228,17 @@ impl Report {
             || summary.writes_failed > 0
     }
 
-    /// Why the run has no joints in space; none for an interrupted run.
+    /// Returns the reason why the run has no joints in space; `None` for an interrupted run.
     fn no_results_reason(&self) -> Option<String> {
         let summary = self.recorded.summary().filter(|_| !self.interrupted)?;
         no_results::reason(summary, &self.views)
     }
 
-    /// Writes `report.html` into the folder of the run, and returns its path; none where the results are elsewhere.
+    /// Writes `report.html` to the folder of the run, and returns its path. Returns `None` if the results are on another host.
     ///
     /// # Errors
     ///
-    /// The results cannot be read, or the page cannot be written.
+    /// Fails if the results cannot be read, or the page cannot be written.
     pub fn write_page(&self, resolved: &Resolved) -> Result<Option<PathBuf>, Failure> {
         let (Some(summary), false) = (self.recorded.summary(), self.is_far) else {
             return Ok(None);
@@ -266,12 +267,12 @@ impl Report {
         text.extend(doubts.first().map(|doubt| format!(": {doubt}")));
         let is_good = self.kind().is_none();
         if !is_good && doubts.is_empty() && !trust::are_cameras_doubtful(summary) {
-            text.push_str("; the run is not whole: see below");
+            text.push_str("; the run is incomplete: see below");
         }
         Verdict { text, is_good }
     }
 
-    /// The report as JSON.
+    /// Returns the report as JSON.
     pub fn json(&self) -> Value {
         json!({
             "schema_version": 1,
@@ -298,7 +299,7 @@ impl Report {
         })
     }
 
-    /// The report as text.
+    /// Returns the report as text.
     pub fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -369,7 +370,7 @@ impl Report {
         Ok(())
     }
 
-    /// Writes what a host with cameras knows: the results are elsewhere.
+    /// Writes the report of a host with cameras, which does not have the results.
     fn write_far(&self, text: &mut String) -> core::fmt::Result {
         writeln!(text, "  results       on the host that fuses")?;
         self.write_live(text);
@@ -412,7 +413,7 @@ impl Report {
             let px = |value: Option<f64>| value.unwrap_or(f64::NAN);
             writeln!(
                 text,
-                "  calibration   {camera} does not stand where it says: cameras are {:.0} px apart with it, {:.0} px without",
+                "  calibration   {camera} is not where it says: the cameras differ by {:.0} px with this camera, and by {:.0} px without it",
                 px(fit.residual_px),
                 px(fit.without_px),
             )?;
@@ -423,7 +424,7 @@ impl Report {
         Ok(())
     }
 
-    /// Writes the refused messages by process and cause, and who lost a GPU; nothing if there are none.
+    /// Writes the refused messages by process and cause, and the processes that lost a GPU. Writes nothing if there are none.
     fn write_refused(&self, text: &mut String) -> core::fmt::Result {
         for (process, counts) in &self.refused {
             let causes = by_cause(counts);
@@ -434,13 +435,13 @@ impl Report {
         for (process, n) in &self.without_gpu {
             writeln!(
                 text,
-                "  GPU           {process} lost it: the processor computed {n} frames"
+                "  GPU           {process} lost the GPU: the processor computed {n} frames"
             )?;
         }
         Ok(())
     }
 
-    /// Writes the peak memory of the largest process of every service.
+    /// Writes, for every service, the peak memory of its largest process.
     fn write_memory(&self, text: &mut String) -> core::fmt::Result {
         let mut peaks = BTreeMap::new();
         for (process, bytes) in &self.peaks {
@@ -454,7 +455,7 @@ impl Report {
             .collect();
         writeln!(
             text,
-            "  memory        {} MB (peak of one process, with the shared memory it uses)",
+            "  memory        {} MB (peak of one process, including its shared memory)",
             peaks.join(", ")
         )
     }
@@ -466,7 +467,7 @@ fn write_latency(text: &mut String, latency: &LatencyReport) -> core::fmt::Resul
     if let (Some(waiting), Some(transport)) = (latency.share_waiting, latency.share_transport) {
         writeln!(
             text,
-            "    of the end-to-end time {} is waiting for busy processes, {} transport",
+            "    of the end-to-end time, {} is waiting for busy processes, and {} is transport",
             percent(waiting),
             percent(transport)
         )?;
@@ -474,7 +475,7 @@ fn write_latency(text: &mut String, latency: &LatencyReport) -> core::fmt::Resul
     Ok(())
 }
 
-/// The last metrics of every process as JSON; null if they are invalid.
+/// Returns the last metrics of every process as JSON; null if they are invalid.
 fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
     let measured = outcome.processes.iter().filter_map(|process| {
         let reading = Reading::from_message(process.measured.as_ref()?);
@@ -487,7 +488,7 @@ fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
     measured.collect()
 }
 
-/// The counts of refused messages by the name of the cause, without zeros.
+/// Returns the counts of refused messages by the name of the cause, without zeros.
 fn by_cause(counts: &[u64; Refusal::N]) -> BTreeMap<&'static str, u64> {
     let all = Refusal::ALL.iter().zip(counts);
     let some = all.filter(|entry| *entry.1 > 0);

@@ -1,5 +1,5 @@
-//! Finds the vertical if neither calibration nor deployment gives it: from people, whose heads are above their ankles in the keypoints
-//! of files, or who are found in pictures that are turned so.
+//! Finds the vertical if neither calibration nor deployment gives it. The vertical is found from people: from heads and ankles in keypoint
+//! files, or from people in rotated pictures.
 
 mod kept;
 mod keypoints;
@@ -15,27 +15,28 @@ use nalgebra::{Matrix3, SymmetricEigen, UnitVector3, Vector3};
 
 /// Number of images per camera that are searched.
 const N_PICTURES: u64 = 2;
-/// Frames from one of these images to the next.
+/// Interval between these images, in frames.
 const STEP: u64 = 20;
-/// The maximal number of cameras whose images are searched.
+/// Maximum number of cameras whose images are searched.
 const MAX_VIEWS: usize = 4;
-/// The maximal length of the longer side of a searched image, pixels.
+/// Maximum length of the longer side of a searched image, in pixels.
 const MAX_SIDE_PX: f64 = 480.0;
-/// Rolls that differ by less than this are searched once, degrees.
+/// If two rolls differ by less than this, in degrees, only one is searched.
 const SAME_ROLL: f64 = 12.0;
-/// A direction within this angle of a world axis is snapped to the axis, degrees.
+/// A direction within this angle of a world axis is replaced by the axis. In degrees.
 const NEAR_AXIS: f64 = 6.0;
-/// Directions within this angle of each other are tried once, degrees.
+/// If two directions differ by less than this angle, in degrees, only one is tried.
 const SAME_DIRECTION: f64 = 10.0;
-/// Scores that differ by less are equal: of these the first direction is taken, that of level cameras before the others.
+/// Scores that differ by less than this count as equal. Of directions with equal scores the first is taken; that of level cameras
+/// comes first.
 const SAME_SCORE: f64 = 0.02;
 
-/// The direction against gravity that was found, and why it was chosen.
+/// The upward direction that was found, and the reason for the choice.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Vertical {
-    /// The unit vector against gravity, in the world.
+    /// Unit vector that points up in the world.
     pub up: [f64; 3],
-    /// The reason, for the user.
+    /// Reason for the choice, for the user.
     pub why: String,
 }
 
@@ -43,18 +44,18 @@ pub(crate) struct Vertical {
 #[derive(Debug, Clone, Copy)]
 struct Hypothesis {
     up: UnitVector3<f64>,
-    /// Mean score of the best pose over views and images; none if nobody was found.
+    /// Mean score of the best pose over views and images; `None` if nobody was found.
     score: Option<f64>,
 }
 
-/// Finds the vertical of a deployment. None if the rig or the deployment gives it, or if frames are not turned upright.
+/// Finds the vertical of a deployment. Returns `None` if the rig or the deployment gives it, or if frames are not turned upright.
 ///
-/// With keypoint files the answer is immediate. A search of pictures takes a while; what it finds is kept beside the
-/// rig, and not searched again.
+/// With keypoint files, this is fast. A search of pictures takes a while, so its result is stored beside the rig and used
+/// again.
 ///
 /// # Errors
 ///
-/// Inputs cannot be read, or nothing shows which way is up: no keypoints of people, and no pictures.
+/// Fails if inputs cannot be read, or nothing shows the upward direction: there are neither keypoints of people nor pictures.
 pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     if rig.up_in_world().is_some() || !deployment.capture.upright {
@@ -74,14 +75,14 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     };
     let mut images = Images::new(deployment, &cameras)?;
     if images.views.is_empty() {
-        let message = "nothing says which way is up: neither the calibration nor the deployment does, no people with heads and ankles are \
-                       among the keypoints, and there are no pictures";
-        let hint = "give `up` in the deployment, the direction against gravity in the world of the calibration, such as [0, 0, 1]";
+        let message = "the upward direction is not known: neither the calibration nor the deployment gives it, the keypoints have no people with \
+                       heads and ankles, and there are no pictures";
+        let hint = "set `up` in the deployment: the upward direction in the world of the calibration, such as [0, 0, 1]";
         return Err(Failure::new(ExitKind::Config, message).with_hint(hint));
     }
     tracing::warn!(
-        "the calibration does not say which way is up: looking for people in the first pictures of {} cameras, which takes up to half a \
-         minute; `up` in the deployment spares this",
+        "the calibration does not give the upward direction: searching for people in the first pictures of {} cameras, which takes up to half a \
+         minute; set `up` in the deployment to avoid this",
         images.views.len()
     );
     let mut tried: Vec<Hypothesis> = Vec::new();
@@ -113,7 +114,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     Ok(Some(found))
 }
 
-/// The hypothesis with the highest score; of equal ones the first.
+/// Returns the hypothesis with the highest score; of equal hypotheses, the first.
 fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
     let score = |hypothesis: &Hypothesis| hypothesis.score.unwrap_or(f64::NEG_INFINITY);
     let best = tried.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
@@ -137,21 +138,21 @@ fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String
         next.and_then(|hypothesis| Some((hypothesis.up, hypothesis.score?))),
     ) {
         (Some(score), Some((up, other))) => format!(
-            "people are found with a score of {score:.2}; with up = {} the score is {other:.2}",
+            "people are found with a score of {score:.2}, but with up = {} the score is {other:.2}",
             text(&up)
         ),
         (Some(score), None) => format!("people are found with a score of {score:.2}"),
         (None, _) => "nobody was found in the first pictures".to_owned(),
     };
     format!(
-        "the calibration does not say which way is up; up = {} is used: cameras are held within {off:.0} degrees of level, and \
-         {people}; give `up` in the deployment if it is wrong, or to begin sooner",
+        "the calibration does not give the upward direction; up = {} is used: cameras are level to within {off:.0} degrees, and \
+         {people}; set `up` in the deployment if this is wrong, or to start faster",
         text(&best.up)
     )
 }
 
-/// The directions to try, in this order: that of level cameras, those of cameras rolled by 90 degrees either way, the world
-/// axes, and the opposite of the first.
+/// Returns the directions to try, in this order: up for level cameras, up for cameras rolled by 90 degrees to either side, the world
+/// axes, and the opposite of the first direction.
 fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let axis =
         |camera: &Camera, axis: Vector3<f64>| camera.camera_from_world.rotation.inverse() * axis;
@@ -183,15 +184,15 @@ fn world_axes() -> [UnitVector3<f64>; 6] {
     [z, -z, y, -y, x, -x]
 }
 
-/// The axis of the world that is near a direction, or the direction itself.
+/// Returns the world axis close to a direction, or the direction itself if none is close.
 fn snapped(direction: UnitVector3<f64>) -> UnitVector3<f64> {
     let is_near = |axis: &UnitVector3<f64>| axis.angle(&direction).to_degrees() < NEAR_AXIS;
     world_axes().into_iter().find(is_near).unwrap_or(direction)
 }
 
-/// The direction perpendicular to all given vectors, by least squares with less weight for outliers.
+/// Returns the direction perpendicular to all given vectors, by least squares with less weight for outliers.
 ///
-/// * `side`: the result is on this side. It is the result itself if the vectors do not determine a plane.
+/// * `side`: the result points to this side. If the vectors do not determine a plane, the result is `side` itself.
 fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3<f64>> {
     let mean = UnitVector3::try_new(side, 1e-6);
     let mut weights = vec![1.0; all.len()];
@@ -204,7 +205,7 @@ fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3
         let order = eigen.eigenvalues.iter().enumerate();
         let mut order: Vec<(usize, f64)> = order.map(|(nth, value)| (nth, *value)).collect();
         order.sort_by(|a, b| a.1.total_cmp(&b.1));
-        // The vectors are parallel, as for cameras that all look the same way or at each other.
+        // The vectors are parallel, for example because all cameras look in the same direction or at each other.
         if order[1].1 < 0.02 * order[2].1 {
             return mean;
         }
@@ -223,7 +224,7 @@ fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3
     found
 }
 
-/// The roll that turns a camera's image upright, degrees; 0 if the camera looks along the vertical.
+/// Returns the roll that turns a camera's image upright, in degrees; 0 if the camera looks along the vertical.
 fn roll_degrees(camera: &Camera, up: &UnitVector3<f64>) -> f64 {
     let rig = Rig::new(vec![camera.clone()], Some(*up), "");
     let roll = rig.ok().and_then(|rig| upright_roll(camera, &rig));
@@ -241,14 +242,14 @@ struct View<'a> {
     size: Size,
     offset: Option<[u32; 2]>,
     rgb: Vec<Vec<u8>>,
-    /// The rolls that were searched, degrees, and their mean scores.
+    /// Rolls that were searched, in degrees, and their mean scores.
     tried: Vec<(f64, Option<f64>)>,
 }
 
 impl<'a> Images<'a> {
     fn new(deployment: &Deployment, cameras: &'a [Camera]) -> Result<Self, Failure> {
         let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
-        // Nobody can be found in the grey pictures of cameras that have keypoints alone.
+        // Cameras that have only keypoints have grey pictures, in which nobody can be found.
         let views = deployment.cameras.iter();
         let views = views.filter(|view| !Blank::is_blank(&view.source)).take(MAX_VIEWS);
         let views = views.filter_map(|entry| {
@@ -261,7 +262,7 @@ impl<'a> Images<'a> {
         })
     }
 
-    /// The mean score of the people found with a direction as up; none if nobody was found.
+    /// Returns the mean score of the people found with an upward direction; `None` if nobody was found.
     fn score(&mut self, up: UnitVector3<f64>) -> Option<f64> {
         let search = &self.search;
         let scores = self.views.iter_mut().filter_map(|view| view.score(search, up));
@@ -272,7 +273,7 @@ impl<'a> Images<'a> {
 }
 
 impl<'a> View<'a> {
-    /// None if the footage cannot be read; that is reported where it is read later.
+    /// Reads the images. Returns `None` if the footage cannot be read; that is reported when it is read later.
     fn new(
         entry: &deployment::capture::Camera,
         camera: &'a Camera,
@@ -311,10 +312,10 @@ impl<'a> View<'a> {
         score
     }
 
-    /// The best score in an image turned by an angle.
+    /// Returns the best score in an image rotated by an angle.
     fn search_at(&self, search: &Search, rgb: &[u8], degrees: f64) -> Option<f64> {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
-        // A square, which fits the image at every roll.
+        // The searched image is a square into which the picture fits at every roll.
         let scale = (MAX_SIDE_PX / width.max(height)).min(1.0);
         let side = (scale * width.max(height)).round() as u32;
         let source = [self.size.width, self.size.height].map(|value| value as u32);
@@ -344,7 +345,7 @@ impl<'a> View<'a> {
 mod tests {
     use super::*;
 
-    /// Cameras of a ring, rolled about their axes by some degrees, in a world whose up is `up`.
+    /// Returns cameras in a ring, rolled about their axes by some degrees, in a world in which `up` points up.
     pub(super) fn ring(rolls: &[f64], up: UnitVector3<f64>) -> Vec<Camera> {
         let rig = scene::RigChoice::parse(&format!("ring:{}", rolls.len()));
         let rig = rig.unwrap().rig().unwrap();

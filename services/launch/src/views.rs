@@ -13,9 +13,9 @@ use crate::resolved::Resolved;
 /// The frame counts of one view. `frames` is the sum of the counts from `used` to `unanswered`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ViewReport {
-    /// The camera.
+    /// Name of the camera.
     pub name: String,
-    /// Frames of the footage.
+    /// Number of frames of the footage.
     pub frames: u64,
     /// Frames that were used in a result.
     pub used: u64,
@@ -25,11 +25,11 @@ pub struct ViewReport {
     pub late: u64,
     /// Frames that were dropped for lack of time.
     pub dropped: u64,
-    /// Frames that were lost because a process was dead, or died while it held them.
+    /// Frames that were lost because a process was dead, or died while processing them.
     pub lost: u64,
-    /// All other frames: those that were not reached before the run was stopped.
+    /// All other frames, which were not reached before the run was stopped.
     pub unanswered: u64,
-    /// Number of results with a camera fault, by cause; included in `empty`.
+    /// Number of results with a camera fault, by cause. These are included in `empty`.
     pub faults: BTreeMap<String, u64>,
     /// Number of results without this view, by reason.
     #[serde(skip)]
@@ -59,22 +59,24 @@ impl ViewReport {
         views.collect()
     }
 
-    /// * `frames`: frames of the footage.
-    /// * the counts of its capture and its pose process.
+    /// Combines the counts of one view.
+    ///
+    /// * `frames`: number of frames of the footage.
+    /// * `[camera, pose]`: counts of the capture process and the pose process of the view.
     fn new(
         name: &str,
         frames: u64,
         [camera, pose]: [Counts; 2],
         summary: Option<&Summary>,
     ) -> Self {
-        // Without a summary no frame is known to be used.
+        // Without a summary, no frame is known to be used.
         let reasons = summary.and_then(|summary| summary.views_missing.get(name));
         let missing: Vec<(Missing, u64)> = reasons.cloned().into_iter().flatten().collect();
         let used = summary.and_then(|summary| summary.views_present.get(name));
         let used = used.copied().unwrap_or(0);
         let empty = missing.iter().filter(|missing| missing.0.is_answer());
         let empty: u64 = empty.map(|empty| empty.1).sum();
-        // The last count of a killed process may be missing.
+        // The last count of a killed process may not have arrived.
         let answered = pose.n_sent.max(used + empty);
         let not_processed =
             (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
@@ -107,7 +109,7 @@ impl ViewReport {
     }
 }
 
-/// Frames of a run: of live cameras that ran until they were stopped, those that were sent.
+/// Returns the number of frames of a run. For live cameras without an end, these are the frames that were sent.
 pub(crate) fn n_reached(resolved: &Resolved, outcome: &Outcome) -> u64 {
     if !resolved.is_endless() {
         return resolved.n_frames();

@@ -1,4 +1,4 @@
-//! Boards in footage: looked for in every camera's pictures, or read from a table of corners; cameras calibrated from them.
+//! Calibration of cameras from footage of a board. The corners of the board are found in the pictures, or read from a table.
 
 mod corners;
 mod frames;
@@ -20,12 +20,12 @@ use calibration::boards::{Board, Layout, Nothing};
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::{FootageError, Source, SourceSpec};
 
-/// The pictures of a camera.
+/// The footage of one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraFootage {
-    /// Its name.
+    /// Name of the camera.
     pub name: String,
-    /// A video, a folder, a pattern; or several pictures.
+    /// A video, a folder or a pattern; or several single pictures.
     pub paths: Vec<String>,
 }
 
@@ -45,11 +45,11 @@ impl CameraFootage {
         }
     }
 
-    /// Width and height of its pictures.
+    /// Returns the width and height of the camera's pictures.
     ///
     /// # Errors
     ///
-    /// Footage that cannot be opened, or has no frames.
+    /// Fails if the footage cannot be opened, or has no frames.
     pub fn size(&self) -> Result<[u32; 2], Failure> {
         let first = self.paths.first().ok_or("no pictures").or_fail(ExitKind::Input)?;
         let source = Source::open(&SourceSpec::upright(first)).map_err(footage_failure)?;
@@ -58,7 +58,7 @@ impl CameraFootage {
     }
 }
 
-/// A name for a camera from the name of its file: what may stand in one.
+/// Returns a name for a camera: the name of its file, without characters that are not allowed in a name.
 fn stem(path: &str) -> String {
     let path = PathBuf::from(path);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -81,45 +81,45 @@ pub(crate) fn footage_failure(error: FootageError) -> Failure {
     Failure::new(ExitKind::Input, error)
 }
 
-/// Sights of the board by one camera.
+/// The sights of the board by one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
-    /// Width and height of its pictures.
+    /// Width and height of the camera's pictures.
     pub size: [u32; 2],
-    /// Pictures that were looked at.
+    /// Number of pictures that were searched.
     pub n_pictures: usize,
-    /// Frames with the board, whatever way it was read.
+    /// All frames in which the board was found, including inverted and mirrored ones.
     pub sights: Vec<Sight>,
-    /// Pictures whose black is white.
+    /// Number of pictures in which black and white are exchanged.
     pub n_inverted: usize,
-    /// Pictures in a mirror.
+    /// Number of mirrored pictures.
     pub n_mirrored: usize,
-    /// Why pictures have no board, with their counts, most first.
+    /// Reasons why the board was not found, each with its number of pictures, most frequent first.
     pub nothing: Vec<(Nothing, usize)>,
-    /// Where the picture of a frame is: the path, and the picture of it.
+    /// Source of the picture of each frame: index of the path, and index of the picture in that path.
     pub pictures: BTreeMap<usize, [usize; 2]>,
 }
 
-/// Sights of the board by all cameras.
+/// The sights of the board by all cameras.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Looked {
-    /// The board as it is.
+    /// The board that was found in the pictures.
     pub board: Board,
-    /// How it differs from what was said.
+    /// Difference between this board and the one that the user named, if any.
     pub note: Option<String>,
-    /// Its points, metres.
+    /// Corner points of the board, in metres.
     pub layout: Layout,
     /// Sights of each camera.
     pub cameras: Vec<Seen>,
 }
 
 impl Looked {
-    /// All sights.
+    /// Returns the sights of all cameras.
     pub fn sights(&self) -> Vec<Sight> {
         self.cameras.iter().flat_map(|camera| camera.sights.clone()).collect()
     }
 
-    /// The cameras whose pictures are mirrored.
+    /// Returns the indices of the cameras whose pictures are mirrored.
     pub fn mirrored(&self) -> Vec<usize> {
         let is_mirrored = |camera: &&Seen| 2 * camera.n_mirrored > camera.sights.len();
         let each = self.cameras.iter().enumerate();

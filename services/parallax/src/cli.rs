@@ -11,8 +11,8 @@ use terminal::{EXIT_CODES, Globals, completions};
 const LONG_ABOUT: &str = "\
 Calibrated, synchronised cameras in, 3D human skeletons out.
 
-A deployment file (ten lines: the cameras, their calibration, an output folder) describes a run.
-A run has one process per stage and camera; `parallax run` starts and watches all of them:
+A deployment file describes a run in about ten lines: the cameras, their calibration, an output folder.
+A run has one process per stage and camera. `parallax run` starts and watches all of them:
 
     capture -> pose -> (quality) -> fuse -> triangulate -> results
 
@@ -23,27 +23,27 @@ Examples:
     parallax doctor                                     check this machine
     parallax demo                                       run four synthetic cameras, and write a report
     parallax run my.toml                                run a deployment: from its cameras to 3D
-    parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
-    parallax run my.toml --dry-run                      show the processes and their memory, and start nothing
-    parallax run my.toml --latency-budget-ms 150        fail if 1 frame in 100 takes longer
-    parallax demo --view                                the demo, watched in the browser
-    parallax view my.toml                               a page about a deployment, while it runs
-    parallax publish my.toml udp://127.0.0.1:9000       its skeletons as datagrams, for programs of any language
-    parallax top                                        the times of a running deployment
-    parallax record my.toml --out run.mcap              run, and record every message
+    parallax run my.toml --set capture.n_frames=20      run it with one value replaced
+    parallax run my.toml --dry-run                      show the processes and their memory, but start nothing
+    parallax run my.toml --latency-budget-ms 150        fail if more than 1 frame in 100 takes longer
+    parallax demo --view                                run the demo, and watch it in the browser
+    parallax view my.toml                               watch a running deployment in the browser
+    parallax publish my.toml udp://127.0.0.1:9000       send its skeletons as datagrams to another program
+    parallax top                                        watch the times of a running deployment
+    parallax record my.toml --out run.mcap              run a deployment, and record every message
     parallax replay run.mcap --from fuse --set paper.alpha=2     run the later stages again, with another value
-    parallax export out/my --to c3d,glb,bvh             write the run in formats of other tools
+    parallax export out/my --to c3d,glb,bvh             export a run to the formats of other tools
     parallax chaos                                      inject faults into a deployment, and check limits
     parallax bench transport                            measure the time of a message between processes
-    parallax config show my.toml                        every value and its origin
-    parallax config schema > parallax.schema.json       completion and checks in an editor
-    parallax detect photo.jpg --model parse.mat --json  people in single images
-    parallax smooth out/run                             smoothed trajectories and joint angles of a run
-    parallax cameras view /dev/video0 --out shot.png    a picture of a live camera
+    parallax config show my.toml                        print every setting and its origin
+    parallax config schema > parallax.schema.json       get completion and checks in an editor
+    parallax detect photo.jpg --model parse.mat --json  find people in single images
+    parallax smooth out/run                             smooth the trajectories of a run, and compute joint angles
+    parallax cameras view /dev/video0 --out shot.png    take a picture with a live camera
     parallax sync estimate my.toml --write              find the clock offsets of recorded cameras
-    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   a rig from a person who walks about
-    parallax calibrate board --board charuco:7x5:40mm a.mp4 b.mp4 --out rig.toml    a rig from a board
-    parallax calib show Calib.toml                      the content of a calibration file
+    parallax calibrate people my.toml --height-m 1.78 --out rig.toml   make a rig from a person walking about
+    parallax calibrate board --board charuco:7x5:40mm a.mp4 b.mp4 --out rig.toml    make a rig from a board
+    parallax calib show Calib.toml                      print the content of a calibration file
 ";
 
 /// Calibrated cameras in, 3D human skeletons out.
@@ -59,7 +59,7 @@ Examples:
     max_term_width = 100
 )]
 pub(crate) struct Cli {
-    /// Options of all commands.
+    /// Global options, accepted by all commands.
     #[command(flatten)]
     pub globals: Globals,
     /// The command.
@@ -70,36 +70,36 @@ pub(crate) struct Cli {
 /// The command.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run a whole deployment of four synthetic cameras, kill one of its processes, and report.
+    /// Run a demo with four synthetic cameras, kill one of its processes, and write a report.
     Demo(demo::Arguments),
-    /// Run a deployment: all its processes, from footage to 3D.
+    /// Run a deployment: start all its processes, from footage to 3D.
     Run(run::Arguments),
     /// Run a deployment, and record every message in one file.
     Record(record::Arguments),
     /// Run the later stages of a recorded run again.
     Replay(replay::Arguments),
-    /// Write a finished run, or a recording, in the formats of other tools.
+    /// Export a finished run or a recording to the formats of other tools.
     Export(export::Arguments),
-    /// Inject faults into a deployment (kill and stop processes, disturb cameras), and check limits.
+    /// Inject faults into a deployment (kill and stop processes, disturb cameras), and check that it stays within limits.
     Chaos(chaos::Arguments),
-    /// Measure how fast messages travel, and how fast whole deployments are.
+    /// Measure the speed of messages between processes, and of whole deployments.
     #[command(subcommand)]
     Bench(bench::Command),
     /// Find people in single images.
     Detect(detect::Arguments),
-    /// Make a deployment from footage, step by step.
+    /// Create a deployment from footage, step by step.
     New(Box<new::Arguments>),
     /// Read, show, check and convert calibrations.
     #[command(subcommand)]
     Calib(calib::Command),
-    /// Find the places of cameras from their footage.
+    /// Find the positions and orientations of cameras from their footage.
     #[command(subcommand)]
     Calibrate(calibrate::Command),
-    /// List the video devices of this machine, and take pictures of live cameras.
+    /// List the video devices of this machine, or take a picture with a live camera.
     Cameras(cameras::Arguments),
     /// Smooth the trajectories of a finished run, and compute joint angles.
     Smooth(Box<smooth::Arguments>),
-    /// Find the clock offsets of the cameras of recorded footage.
+    /// Find the clock offsets between the cameras of recorded footage.
     #[command(subcommand)]
     Sync(sync::Command),
     /// Show and check deployment files.
@@ -109,24 +109,24 @@ pub(crate) enum Command {
     Publish(publish::Arguments),
     /// Print the layout of messages, for programs in other languages.
     Messages(messages::Arguments),
-    /// Show the state of a deployment on several machines, or make its keys.
+    /// Show the state of a deployment that runs on several machines, or create its keys.
     #[command(subcommand)]
     Hosts(hosts::Command),
-    /// List running deployments and the leftovers of dead ones in shared memory, or show the processes of one.
+    /// List running deployments and the shared memory left by dead ones, or show the processes of one deployment.
     Status(deployments::StatusArguments),
-    /// Watch the processes of a running deployment: rates, times, losses, memory.
+    /// Watch the processes of a running deployment: rates, times, lost messages, memory.
     Top(top::Arguments),
     /// Watch a running deployment, a finished run or a recording in the browser: skeleton, pictures, processes.
     View(view::Arguments),
-    /// Remove the leftovers of dead deployments from shared memory.
+    /// Remove the shared memory that dead deployments left behind.
     Clean(deployments::CleanArguments),
-    /// Check this machine for everything that Parallax needs, and say what to do about each problem.
+    /// Check that this machine has everything that Parallax needs, and explain how to fix each problem.
     Doctor(doctor::Arguments),
-    /// Print the completion script of a shell.
+    /// Print the completion script for a shell.
     Completions(completions::Arguments),
-    /// Write manual pages, one for each command.
+    /// Write the manual pages, one per command.
     Man(completions::ManArguments),
-    /// Run one process of a deployment; started by `run`.
+    /// Run one process of a deployment. `run` starts these processes.
     #[command(hide = true)]
     Service(service::Arguments),
 }

@@ -32,7 +32,7 @@ use terminal::completions;
 
 use crate::cli::{Cli, Command};
 
-/// Runs the command of the command line.
+/// Runs the command that the command line names.
 pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
     let has_own_logging = matches!(
         cli.command,

@@ -1,4 +1,4 @@
-//! Poses as JSON for the user: pixels count from 0, types and levels from 1.
+//! Describes poses as JSON. Pixels are counted from 0, types and levels from 1.
 
 use std::sync::Arc;
 
@@ -6,27 +6,27 @@ use fmp::{Layout, Model, Pose};
 use serde_json::{Map, Value, json};
 use skeleton::{JointMap, JointSet};
 
-/// The joints that are reported.
+/// The joints to report.
 #[derive(Debug, Clone)]
 pub(crate) struct NamedJoints {
-    /// Their names.
+    /// The joint set, which has the names.
     pub(crate) set: &'static JointSet,
-    /// From parts to them; a choice of parts without it.
+    /// Mapping from parts to joints. Without a mapping, each joint is one of the parts.
     pub(crate) map: Option<Arc<JointMap>>,
 }
 
-/// A pose with the layout of its pyramid, and the mapping to the pixels that are reported.
+/// A pose with the layout of its pyramid, and the scale from searched to reported pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placed<'a> {
     pose: &'a Pose,
     model: &'a Model,
     layout: &'a Layout,
-    /// Reported pixels per pixel of the searched image, across and down.
+    /// Reported pixels per pixel of the searched image, horizontally and vertically.
     scaled: [f64; 2],
 }
 
 impl<'a> Placed<'a> {
-    /// A pose in pixels of the searched image.
+    /// Creates the description of a pose, in pixels of the searched image.
     pub(crate) fn new(pose: &'a Pose, model: &'a Model, layout: &'a Layout) -> Self {
         Self {
             pose,
@@ -36,9 +36,9 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// Reports pixels of the picture of which the searched image is a scaled copy.
+    /// Reports positions in pixels of the original picture, of which the searched image is a scaled copy.
     ///
-    /// * `per_pixel`: pixels of the picture per pixel of the image, across and down.
+    /// * `per_pixel`: pixels of the picture per pixel of the searched image, horizontally and vertically.
     pub(crate) fn scaled(self, per_pixel: [f64; 2]) -> Self {
         Self {
             scaled: per_pixel,
@@ -46,7 +46,8 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// Score, level, scale and parts as JSON; also the joints of the set, null if the model lacks parts for them.
+    /// Returns score, level, scale and parts as JSON. With `joints`, also returns the joints of the set: null if the model lacks
+    /// parts that they need.
     pub(crate) fn json(&self, joints: Option<&NamedJoints>) -> Value {
         let centres: Vec<[f64; 2]> = self
             .pose
@@ -90,7 +91,7 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// The joints of a pose by name; null if the model lacks parts that the set needs.
+/// Returns the joints of a pose by name: null if the model lacks parts that the set needs.
 fn joints_of(centres: &[[f64; 2]], joints: &NamedJoints) -> Value {
     let set = joints.set;
     let needed = set.joints.iter().flat_map(|joint| joint.parts).max().map_or(0, |part| part + 1);

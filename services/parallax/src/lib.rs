@@ -1,4 +1,4 @@
-//! Work from files to files behind the commands for rigs and finished runs.
+//! The file-to-file work behind the commands for rigs and finished runs.
 #![forbid(unsafe_code)]
 
 pub mod boards;

@@ -1,8 +1,8 @@
-//! Parallax: calibrated, synchronised cameras in, 3D human skeletons out. This is the start page of the API.
+//! Parallax turns the pictures of calibrated, synchronised cameras into 3D human skeletons. This is the start page of the API.
 //!
-//! The executable parses the command line, and runs a command or a process of a deployment (`parallax service <name>`).
-//! `docs/` is the book: guide, reference, the method, and `docs/architecture.md`, which explains where to make changes.
-//! The crates, by layer (dependencies go downwards):
+//! The executable parses the command line, then runs a command or one process of a deployment (`parallax service <name>`).
+//! The book in `docs/` has the guide, the reference and the method. Its page `docs/architecture.md` explains where to make changes.
+//! The table lists the crates by layer; each layer depends only on layers below it:
 //!
 //! | wing | crates |
 //! |---|---|
@@ -14,10 +14,10 @@
 //! | ground | [`skeleton`](../skeleton/index.html), [`kernels`](../kernels/index.html), [`formats`](../formats/index.html), [`files`](../files/index.html), [`statistics`](../statistics/index.html) |
 //! | laboratory | [`lab`](../lab/index.html), [`training`](../training/index.html) |
 //!
-//! For tests only: `testkit`, in `tests/harness`.
+//! The crate `testkit`, in `tests/harness`, is for tests only.
 //!
 //! Start with [`pipeline`](../pipeline/index.html) for the path of a frame, [`multiview`](../multiview/index.html) for the
-//! energy, [`messages`](../parallax_messages/index.html) for the messages between processes.
+//! energy, or [`messages`](../parallax_messages/index.html) for the messages between processes.
 #![forbid(unsafe_code)]
 
 mod cli;

@@ -3,7 +3,7 @@
 use clap::builder::{MapValueParser, PossibleValue, PossibleValuesParser, TypedValueParser as _};
 use deployment::Stage;
 
-/// The messages that a replay from a stage takes from the recording, in addition to those of the stage before.
+/// Describes the recorded messages that a replay from this stage sends, in addition to those of a replay from the stage before.
 fn taken(from: Stage) -> &'static str {
     match from {
         Stage::Capture => "Start from the footage, and send no recorded messages",
@@ -14,10 +14,10 @@ fn taken(from: Stage) -> &'static str {
     }
 }
 
-/// A parser of the names of stages, with their explanation in `--help`.
+/// Returns a parser for the names of stages, with their explanations for `--help`.
 pub(crate) fn parser() -> MapValueParser<PossibleValuesParser, fn(String) -> Stage> {
     let values = Stage::ALL.map(|stage| PossibleValue::new(stage.name()).help(taken(stage)));
-    // The parser has checked that this is the name of a stage.
+    // The parser accepts only names of stages, so the fallback is never used.
     let stage: fn(String) -> Stage = |name| Stage::of_name(&name).unwrap_or(Stage::Capture);
     PossibleValuesParser::new(values).map(stage)
 }

@@ -1,4 +1,4 @@
-//! Errors in inputs name the file and the field, and nothing is left behind.
+//! Tests that errors in inputs name the file and the field, and that nothing is left behind.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -17,7 +17,7 @@ const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
 const RUN: &[&str] = &["run", "deployment.toml"];
 const DETECT: &[&str] = &["detect", "it.png", "--model", "model.plx", "--json"];
 
-/// One way to break a valid deployment of two views, `a` and `b`, with two frames each.
+/// A mistake in a valid deployment of two views, `a` and `b`, with two frames each.
 struct Row {
     what: &'static str,
     broken: fn(&Case),
@@ -150,7 +150,7 @@ fn calibrations() {
                 "camera \"a\"",
                 "96x128",
                 "calibrated for 128x96",
-                "the size agrees once the pictures are turned",
+                "the sizes agree if the pictures are rotated",
             ],
         },
         Row {
@@ -317,7 +317,7 @@ fn every_pixel_format_works() {
     assert_eq!(found[4], found[0], "sixteen bits");
 }
 
-/// A planted picture of another size.
+/// Returns a planted picture with another size.
 fn picture(width: u32, height: u32) -> DynamicImage {
     let [w, h] = planted::SIZE;
     let canvas = planted::picture(&planted::rig(2).cameras()[0], 0);
@@ -325,7 +325,7 @@ fn picture(width: u32, height: u32) -> DynamicImage {
     DynamicImage::from(image).resize_exact(width, height, image::imageops::Nearest)
 }
 
-/// Replaces the first line of the rig that begins with a key.
+/// Replaces the first line of the rig that starts with a key.
 fn replace_line(case: &Case, key: &str, line: &str) {
     let text = fs::read_to_string(case.path("rig.toml")).unwrap();
     let old = text.lines().find(|line| line.starts_with(key)).unwrap();

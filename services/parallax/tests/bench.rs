@@ -1,4 +1,4 @@
-//! Benches with real processes: what they report, their exit codes, and that pixels are never copied.
+//! Tests of benchmarks with real processes: their reports, their exit codes, and that pixels are never copied.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -9,7 +9,7 @@ use common::{Case, Ended, PLAIN};
 use messages::{PairPose, ViewPose};
 use serde_json::{Value, json};
 
-/// Runs a bench in the folder of a case, under its name.
+/// Runs a benchmark in the folder of a case, under the name of the case.
 fn bench(case: &Case, words: &[&str]) -> (Ended, Value) {
     let shared = ["--name", &case.name, "--json"];
     let ended = case.start(&[&["bench"], words, &shared].concat()).wait();
@@ -18,7 +18,7 @@ fn bench(case: &Case, words: &[&str]) -> (Ended, Value) {
     (ended, report)
 }
 
-/// Short series: how fast they are is not tested.
+/// Series are short, because their speed is not tested.
 const SERIES: [&str; 6] = [
     "transport",
     "--messages",
@@ -94,7 +94,7 @@ fn measuring_more_cameras_than_exist_is_refused() {
     );
 }
 
-/// The bytes that the ports of a process have copied, from its log.
+/// Returns the number of bytes that the ports of a process have copied, from its log.
 fn copied_bytes(stderr: &str, process: &str) -> usize {
     let said = format!(" {process}: ports have done their work copied_bytes=");
     let found = stderr.lines().find_map(|line| line.split_once(&said));
@@ -112,7 +112,7 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     for view in 0..2 {
         let camera = copied_bytes(&ended.stderr, &format!("capture-{view}"));
         assert_eq!(camera, 0, "it sends nothing but pixels");
-        // The end of the stream is a message as well.
+        // The end of the stream is also a message.
         let sent = (N_FRAMES + 1) * size_of::<ViewPose>();
         let pose = copied_bytes(&ended.stderr, &format!("pose-{view}"));
         let most = sent + 4 * size_of::<ViewPose>();

@@ -1,4 +1,4 @@
-//! The book (README.md, docs/ and the other Markdown files): commands parse, marked ones run, links and names exist.
+//! Tests of the book (README.md, docs/ and the other Markdown files): commands parse, marked commands run, links and names exist.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -14,7 +14,7 @@ use std::process::{Command, Output};
 use blocks::{Block, blocks};
 use command::{Line, Program, lines};
 
-/// Keys that a part of a deployment file leaves out.
+/// Keys that an incomplete deployment file may leave out.
 const BASE: &str = r#"
 name = "book"
 rig = "rig.toml"
@@ -118,7 +118,7 @@ fn blocks_marked_to_run_succeed_in_an_empty_folder() {
     assert!(n_files > 0, "no block runs a deployment");
 }
 
-/// How many files a run has left, all of which have to be in the reference.
+/// Returns the number of files that a run has left. All of them must be described in the reference.
 fn results_are_described(folder: &Path) -> usize {
     let reference = fs::read_to_string(root().join("docs/reference/files.md")).unwrap();
     let is_result = |file: &PathBuf| file.parent().is_some_and(|folder| folder.ends_with("out"));
@@ -205,7 +205,7 @@ fn every_page_is_in_the_summary() {
     }
 }
 
-/// `mdbook build`, where it is installed: it says nothing worse than what it does, and every page is there.
+/// If `mdbook` is installed, `mdbook build` prints no warnings, and creates every page.
 #[test]
 fn the_book_renders() {
     let folder = tempfile::tempdir().unwrap();
@@ -277,13 +277,13 @@ fn the_start_page_of_the_api_leads_to_every_crate_and_to_nothing_else() {
     assert_eq!(linked, crates, "services/parallax/src/main.rs");
 }
 
-/// Accepts a part of a deployment file, or a whole one.
+/// Checks a complete or incomplete deployment file with `config show`.
 fn show(text: &str) -> Output {
     let folder = tempfile::tempdir().unwrap();
     let is_whole =
         text.lines().any(|line| line.starts_with("name = ")) && !text.trim_start().starts_with('[');
     let base = if is_whole { "" } else { BASE };
-    // Keys of no section stand before the first camera.
+    // Keys without a section come before the first camera.
     let sections = if text.starts_with('[') {
         0
     } else {
@@ -299,7 +299,7 @@ fn show(text: &str) -> Output {
     run(Program::Parallax, folder.path(), &arguments)
 }
 
-/// Gives every deployment that a command has written a name that no other test has.
+/// Renames every deployment that a command has written, so that no other test uses the name.
 fn rename_deployments(folder: &Path) {
     let mark = format!("-book-{}\"", std::process::id());
     for file in files_below(folder, "deployment.toml") {
@@ -335,7 +335,7 @@ fn shown(file: &Path) -> String {
     file.display().to_string()
 }
 
-/// All Markdown files of the repository.
+/// Returns all Markdown files of the repository.
 fn markdown_files() -> Vec<PathBuf> {
     let mut files = vec![root().join("README.md")];
     for folder in ["configs", "docs", "services", "shared", "tests"] {
@@ -358,7 +358,7 @@ fn files_below(folder: &Path, ending: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Every fenced block, with its place.
+/// Returns every fenced block, with its location.
 fn all_blocks() -> Vec<(String, Block)> {
     let of_file = |file: &PathBuf| {
         let text = fs::read_to_string(file).unwrap();
@@ -369,7 +369,7 @@ fn all_blocks() -> Vec<(String, Block)> {
     markdown_files().iter().flat_map(of_file).collect()
 }
 
-/// Every command line of every `sh` block, with its place.
+/// Returns every command line of every `sh` block, with its location.
 fn command_lines() -> Vec<(String, Line)> {
     let of_block = |(place, block): (String, Block)| {
         let found = if block.info.first().is_some_and(|info| info == "sh") {

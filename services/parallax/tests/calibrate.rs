@@ -1,4 +1,4 @@
-//! Rigs from people, from rendered pictures to the file that is written.
+//! Tests of rigs from people, from rendered pictures to the rig file.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::Path;
@@ -37,11 +37,11 @@ fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let (found, truth) = (rig(&case.path("room.toml")), rig(&case.path("rig.toml")));
     for (found, truth) in found.cameras().iter().zip(truth.cameras()) {
-        // The floor of the scene is where z is 0.
+        // In the scene, the floor is at z = 0.
         let off = found.centre_in_world().z - truth.centre_in_world().z;
         assert!(off.abs() < 0.05, "{}: {off} m", found.name);
     }
-    // The run was made before the rig was put on the floor.
+    // The run was made before the origin of the rig was moved to the floor.
     case.edit(
         "rig.toml",
         "translation_metres = [0.0, ",
@@ -71,7 +71,7 @@ fn a_room_that_is_kept_is_said_to_differ_from_new_options() {
     );
     let ended = new("somebody=a.mp4");
     assert!(
-        ended.stderr.contains("differs from what these options"),
+        ended.stderr.contains("differs from the file that these options"),
         "{}",
         ended.stderr
     );
@@ -125,10 +125,10 @@ mod long {
     use super::*;
     use crate::common::Started;
 
-    /// By how much the second camera of the wrong rig is turned, degrees.
+    /// Angle by which the second camera of the wrong rig is rotated, in degrees.
     const TURNED: f64 = 2.0;
 
-    /// Writes the rig with the second camera turned where it stands.
+    /// Writes the rig with the second camera rotated at its position.
     fn write_turned(case: &Case) {
         let truth = rig(&case.path("room/rig.toml"));
         let mut cameras: Vec<Camera> = truth.cameras().to_vec();

@@ -1,4 +1,4 @@
-//! `parallax chaos` on a short deployment: real processes, real kills, verdicts and exit codes.
+//! Tests of `parallax chaos` with a short deployment: real processes, real kills, verdicts and exit codes.
 
 use crate::common;
 
@@ -7,7 +7,7 @@ use std::fs;
 use common::{Case, Ended, PACED};
 use serde_json::Value;
 
-/// Runs scenarios on a small deployment; returns its exit, and `chaos.json`.
+/// Runs scenarios on a small deployment. Returns the exit and `chaos.json`.
 fn chaos(case: &Case, scenarios: &str, more: &[&str]) -> (Ended, Value) {
     let plain = [
         "chaos",
@@ -68,12 +68,12 @@ mod long {
 
     use super::*;
 
-    /// Two seconds of results are enough; generous limits for a loaded machine.
+    /// Limits for a loaded machine, which are sufficient for two seconds of results.
     const PATIENT: [&str; 4] = ["--max-return-ms", "60000", "--max-pause-ms", "60000"];
 
     #[test]
     fn in_a_realtime_run_a_hung_process_is_detected_by_its_missing_progress() {
-        // The time limit alone would detect it after ten minutes.
+        // The time limit alone would only detect the hang after ten minutes.
         let live = PACED.replace("\"paced\"", "\"realtime\"");
         let patient = format!("{live}[supervise]\nhang_limit_s = 600\n");
         let case = Case::new("chaos-spin", &[240; 3], &patient);
@@ -128,7 +128,7 @@ mod long {
             json!([]),
             "no process was killed"
         );
-        // With lossless delivery senders wait for a suspended results process, and nothing is lost.
+        // With lossless delivery, senders wait for a suspended results process, and nothing is lost.
         let limits = stall["limits"].as_array().unwrap().iter();
         let written = limits.clone().find(|limit| limit["what"] == "results written");
         assert_eq!(written.unwrap()["measured"], "80", "{stall:#}");

@@ -1,4 +1,4 @@
-//! The demo as a new user starts it, but shorter: real processes, a real kill, the report.
+//! Tests of the demo as a new user starts it, but shorter: real processes, a real kill, the report.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 /// Two demos at the same time would compete for cores.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// Runs a short demo in a folder of its own; returns the folder, its exit, and `report.json`.
+/// Runs a short demo in its own folder. Returns the folder, the exit and `report.json`.
 fn demo(name: &str, more: &[&str]) -> (Case, Ended, Value) {
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let case = Case::new(name, &[1, 1], "");
@@ -24,7 +24,7 @@ fn demo(name: &str, more: &[&str]) -> (Case, Ended, Value) {
     (case, ended, report)
 }
 
-/// The limits that were missed.
+/// Returns the limits that were exceeded.
 fn missed(report: &Value) -> Vec<&str> {
     let limits = report["limits"].as_array().unwrap();
     let missed = limits.iter().filter(|limit| limit["held"] == false);
@@ -33,7 +33,7 @@ fn missed(report: &Value) -> Vec<&str> {
 
 #[test]
 fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
-    // As slow as a machine with little left needs it, with limits that allow for frames that it drops.
+    // The demo is slow enough for a loaded machine, and the limits allow for dropped frames.
     let limits = "--min-results 5 --min-skeletons 10 --min-pcp3d 5";
     let at = |rate_hz: f64| {
         let [deadline_ms, return_ms, pause_ms] =
@@ -80,7 +80,7 @@ fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
     assert_eq!(report["run"]["restarts"], restarts);
     let accuracy = &report["accuracy"]["all"];
     let [pcp3d, mpjpe] = ["pcp3d_percent", "mpjpe_mm"].map(|key| number(&accuracy[key]));
-    // Only of frames with a skeleton: how many have one depends on the machine.
+    // Only frames with a skeleton count, because their number depends on the machine.
     let found = 1.0 - number(&accuracy["lost_percent"]) / 100.0;
     assert!((35.0..=100.0).contains(&(pcp3d / found)), "{accuracy:#}");
     assert!((5.0..400.0).contains(&mpjpe), "{accuracy:#}");
@@ -99,7 +99,7 @@ fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
     a_killed_camera_was_lost_and_not_late(&case, killed);
 }
 
-/// The lines of a results file of the demo.
+/// Returns the lines of a results file of the demo.
 fn lines(case: &Case, name: &str) -> Vec<Value> {
     let text = fs::read_to_string(case.path("demo/run").join(name)).unwrap();
     let lines = text.lines().map(serde_json::from_str);

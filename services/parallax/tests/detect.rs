@@ -1,4 +1,4 @@
-//! Photographs and clips as users have them: large, with an orientation tag, some damaged.
+//! Tests with photographs and clips as users have them: large, with an orientation tag, some damaged.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -15,7 +15,7 @@ use image::codecs::png::PngEncoder;
 use image::{DynamicImage, imageops};
 use serde_json::Value;
 
-/// A case with the pictures of one camera in the folder `a`.
+/// Creates a case with the pictures of one camera in the folder `a`.
 fn case(name: &str, n_frames: usize) -> (Case, DynamicImage) {
     let case = Case::new(name, &[n_frames, 1], PLAIN);
     let picture = image::open(case.path("a/0000.png")).unwrap();
@@ -45,7 +45,7 @@ fn a_damaged_file_is_named_and_the_others_are_searched() {
     for words in ["0001.jpg", "0002.bmp", "absent.png", "3 of 6 files"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
-    // If no file can be read it is an input error.
+    // If no file can be read, this is an input error.
     for files in [&["a/0001.jpg"][..], &["a/0001.jpg", "absent.png"]] {
         let (ended, lines) = detect(&case, files);
         assert_eq!(
@@ -67,7 +67,7 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
     stored
         .write_with_encoder(JpegEncoder::new_with_quality(&mut jpeg, 100))
         .unwrap();
-    // A rotation by 90 degrees to the right.
+    // The tag asks for a rotation by 90 degrees to the right.
     for (name, file) in [("turned.png", png), ("turned.jpg", jpeg)] {
         case.write(name, testkit::exif::tagged(&file, 6));
     }
@@ -91,10 +91,10 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
         assert!(ended.stdout.contains(said), "{by:?}: {}", ended.stdout);
     }
 
-    // The calibration is of the upright picture: a deployment applies the tag, and reports that.
+    // The calibration is of the upright picture, so a deployment applies the tag and reports this.
     fs::copy(case.path("turned.png"), case.path("a/0000.png")).unwrap();
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
-    for words in ["orientation tag", "camera \"a\"", "which is done"] {
+    for words in ["orientation tag", "camera \"a\"", "which is applied"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
 }

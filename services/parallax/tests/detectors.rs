@@ -1,4 +1,4 @@
-//! Detectors of people: shown with their cards, and as what finds the boxes of `detect`.
+//! Tests of detectors of people, shown with their cards, and used by `detect` to find boxes.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -16,14 +16,14 @@ input = { width = 64, height = 64 }
 output = { codec = "list", boxes = "dets" }
 "#;
 
-/// The boxes of the detector: left, top, right, bottom, pixels of its input, and score.
+/// Boxes of the detector: left, top, right and bottom in pixels of its input, and the score.
 const BOXES: [[f32; 5]; 3] = [
     [0.0, 0.0, 24.0, 32.0, 0.6],
     [24.0, 16.0, 48.0, 48.0, 0.9],
     [30.0, 30.0, 40.0, 40.0, 0.1],
 ];
 
-/// Gives the same boxes of every picture.
+/// Returns a detector that finds the same boxes in every picture.
 fn detector() -> Network {
     let mut net = Network::default();
     let picture = [1, 3, 64, 64].map(Side::Fixed).to_vec();
@@ -36,7 +36,7 @@ fn detector() -> Network {
     net
 }
 
-/// A picture of 128 by 96 pixels with one white pixel block, the networks and their cards.
+/// Creates a case with a picture of 128 by 96 pixels with one white block, the networks and their cards.
 fn case(name: &str) -> Case {
     let case = Case::new(name, &[1, 1], PLAIN);
     case.write("det.onnx", detector().file());
@@ -60,7 +60,7 @@ fn parsed(ended: &Ended) -> Value {
     serde_json::from_str(ended.stdout.trim()).unwrap()
 }
 
-/// A box of the detector in the picture, which is twice as large as its input.
+/// Returns a box of the detector in pixels of the picture, which is twice as large as its input.
 fn in_picture(nth: usize) -> Value {
     let side = |value: f32| (f64::from(value) + 0.5) * 2.0 - 0.5;
     json!(BOXES[nth][..4].iter().map(|bounds| side(*bounds)).collect::<Vec<_>>())
@@ -90,7 +90,7 @@ fn the_network_looks_into_every_box_of_the_detector() {
         let score = person["box_score"].as_f64().unwrap();
         assert!((score - f64::from(BOXES[nth][4])).abs() < 1e-6, "{person}");
     }
-    // The block lies in the first of the two, and in a corner of the other.
+    // The block is inside the first box, and in a corner of the second.
     let head = |nth: usize| found[nth]["keypoints"][0]["score"].as_f64().unwrap();
     assert!(head(0) > 0.9, "{line}");
 
@@ -228,12 +228,12 @@ fn what_does_not_fit_is_named_with_the_numbers() {
             }
         }
     }
-    // The card of a network that finds keypoints.
+    // The card belongs to a network that finds keypoints.
     let ended = run(&case, &DETECT, &["--detector-card", "net.toml"]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     let said = "`parallax-keypoint-network` version 1, expected `parallax-detector` version 1";
     assert!(ended.stderr.contains(said), "{}", ended.stderr);
-    // Options of the filters, and of nobody.
+    // Options that cannot be combined with a detector.
     for more in [
         &["--threshold", "0"][..],
         &["--box", "0,0,9,9"],
@@ -259,7 +259,7 @@ fn numbers_are_of_the_type_that_the_card_says() {
     case.write("det.toml", CARD);
     let show = ["model", "show", "det.onnx"];
     assert_eq!(run(&case, &show, &[]).status.code(), Some(0));
-    // It takes single precision: bytes are refused, and not passed as something else.
+    // The detector takes single-precision numbers, so bytes are refused.
     case.write(
         "det.toml",
         CARD.replace("height = 64", "height = 64, numbers = \"u8\""),

@@ -1,4 +1,4 @@
-//! A room that somebody enters and leaves, from rendered pictures to the skeletons of a run in which nothing is set.
+//! Test of a room that a person enters and leaves, from rendered pictures to skeletons, without any settings.
 #![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -20,7 +20,7 @@ mod long {
         case.path(&format!("room/{of}/{camera}/{frame:06}.png"))
     }
 
-    /// Returns the empty room: the background behind the person at one time is seen at another.
+    /// Returns the empty room. The background behind the person is taken from a picture at another time.
     fn empty_room(case: &Case, camera: &str) -> RgbImage {
         let open = |of: &str, frame: usize| image::open(picture(case, of, camera, frame)).unwrap();
         let mut empty = open("cameras", 0).into_rgb8();
@@ -49,7 +49,7 @@ mod long {
             let empty = empty_room(&case, camera);
             for frame in (0..N_FRAMES).filter(|i| !THERE.contains(i)) {
                 let mut noisy = empty.clone();
-                // Pictures that are the same would be those of a frozen camera.
+                // Noise is added, because identical pictures would be those of a frozen camera.
                 let mut random = fastrand::Rng::with_seed(frame as u64);
                 for value in noisy.iter_mut() {
                     *value = value.saturating_add(random.u8(..8));
@@ -60,7 +60,7 @@ mod long {
         let lossless = ["--set", "capture.mode=lossless"];
         let words = ["run", "room/deployment.toml", "--out", "out"];
         let ended = case.start(&[&words[..], &lossless].concat()).wait();
-        // Nor do the cameras contradict each other, or the results themselves, by what they see in an empty room.
+        // In an empty room, the cameras do not contradict each other, and the results do not contradict themselves.
         assert_eq!(
             ended.status.code(),
             Some(0),
@@ -78,7 +78,7 @@ mod long {
         let count = |frames: Range<usize>| found[frames].iter().filter(|seen| **seen).count();
         assert_eq!(count(0..THERE.start), 0, "{found:?}");
         assert_eq!(count(THERE.end..N_FRAMES), 0, "{found:?}");
-        // Every view looks for people once a second.
+        // Every view searches for people once per second.
         let soon = THERE.start + 10;
         assert_eq!(count(soon..THERE.end), THERE.end - soon, "{found:?}");
     }

@@ -1,4 +1,4 @@
-//! Several people in real processes: their identities, whatever is killed.
+//! Tests of several people in real processes: their identities are kept, even if processes are killed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use core::fmt::Write as _;
@@ -12,10 +12,10 @@ use crate::common::started::{processes, signal};
 use crate::maps::{N, joints_at, rig};
 
 const N_PEOPLE: usize = 3;
-/// Two with the same id at distances above this were exchanged, metres: nobody comes as near to another.
+/// If two people with the same id are further apart than this, in metres, their identities were exchanged. No two people come this close.
 const NEAR_M: f64 = 0.3;
 
-/// The joints of a person, who walks on a circle, metres.
+/// Returns the joints of a person who walks on a circle, in metres.
 fn joints(person: usize, frame: usize) -> [Point3<f64>; N] {
     let turn = core::f64::consts::TAU * person as f64 / N_PEOPLE as f64;
     let angle = turn + 0.02 * frame as f64;
@@ -23,8 +23,9 @@ fn joints(person: usize, frame: usize) -> [Point3<f64>; N] {
     joints_at(0.0).map(|joint| joint + place)
 }
 
-/// Writes the keypoints of everybody in the layout of OpenPose, in an order that differs from frame to frame and from view to view, and a
-/// deployment that reads them.
+/// Writes the keypoints of all people in the layout of OpenPose, and a deployment that reads them. The order of people differs from frame
+/// to
+/// frame and from view to view.
 fn write_keypoints(case: &Case, n_frames: usize) {
     let name = &case.name;
     let mut text = format!("name = {name:?}\nrig = \"rig.toml\"\noutput = \"out\"\n");
@@ -52,7 +53,7 @@ fn write_keypoints(case: &Case, n_frames: usize) {
     case.write("deployment.toml", text);
 }
 
-/// The mean distance of the joints of a skeleton from where they are, metres.
+/// Returns the mean distance of a skeleton's joints from the truth, in metres.
 fn off_m(person: &Value, truth: &[Point3<f64>; N]) -> f64 {
     let joints = person["joints"].as_object().unwrap();
     let (mut sum, mut n) = (0.0, 0.0);
@@ -66,7 +67,7 @@ fn off_m(person: &Value, truth: &[Point3<f64>; N]) -> f64 {
     sum / n
 }
 
-/// The id of every person in every frame: `None` where nobody was put there.
+/// Returns the id of every person in every frame; `None` if no person was found at this position.
 fn ids(lines: &[Value]) -> Vec<[Option<u64>; N_PEOPLE]> {
     let of_frame = |line: &Value| {
         let frame = line["frame"].as_u64().unwrap() as usize;

@@ -1,4 +1,4 @@
-//! Runs in the files of other tools: from the folder and from the recording the same, and what they lack is said.
+//! Tests of exported runs: folder and recording give the same files, and missing data is reported.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "what is skipped is told")]
 
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::common::{Case, Ended, PLAIN};
 
 const N_FRAMES: usize = 5;
-/// Formats of one file.
+/// Formats with one file.
 const FILES: [&str; 6] = [
     "pose3d.c3d",
     "pose3d.trc",
@@ -34,7 +34,7 @@ fn done(case: &Case, source: &str, more: &[&str]) -> Value {
     serde_json::from_str(&ended.stdout).unwrap()
 }
 
-/// `[frame][joint]`, metres in the world; none in a gap.
+/// Returns `[frame][joint]`, in metres in the world; `None` in a gap.
 fn found(case: &Case) -> Vec<Vec<Option<[f64; 3]>>> {
     let names = skeleton::PARSE14.joints.iter().map(|joint| joint.name);
     let of_line = |line: &Value| {
@@ -53,7 +53,7 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     let ended = case.start(&["record", "deployment.toml", "--out", "run.mcap"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
 
-    // Nothing tells the rate of pictures.
+    // The rate of the pictures is not known.
     let ended = exported(&case, "out", &["--to", ALL]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(ended.stderr.contains("--rate 30"), "{}", ended.stderr);
@@ -88,7 +88,7 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     assert!(ended.stderr.contains("cut off"), "{}", ended.stderr);
 }
 
-/// C3D in millimetres and TRC in metres are where the run says, by the readers of this workspace.
+/// Checks the positions in C3D (millimetres) and TRC (metres) against the run, with the readers of this workspace.
 fn check_positions(case: &Case) {
     let found = found(case);
     let folder = case.path("out/export");
@@ -117,7 +117,7 @@ fn check_positions(case: &Case) {
     }
 }
 
-/// Returns the content that programs of others read of a folder, by format; those that Python lacks are left out, and named.
+/// Returns the content that other programs read from a folder, by format. Formats that Python cannot read are left out, and named.
 fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value)> {
     const SCRIPT: &str = include_str!("export.py");
     let read = Command::new("python3")
@@ -132,7 +132,7 @@ fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value
     };
     let complaint = String::from_utf8_lossy(&read.stderr);
     assert!(read.status.success(), "{complaint}");
-    // Some of them print notices of their own before.
+    // Some of these programs print notices first.
     let text = String::from_utf8_lossy(&read.stdout);
     let said: Value = serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap();
     let all = formats.iter().map(|&format| (format, said[format].clone()));
@@ -143,7 +143,7 @@ fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value
     found
 }
 
-/// The same by programs of others, where Python has them.
+/// Checks the positions with other programs, if Python has them.
 fn check_with_python(case: &Case) {
     let mut formats = vec!["c3d", "trc", "bvh", "glb", "csv"];
     if cfg!(feature = "parquet") {
@@ -168,7 +168,7 @@ fn check_with_python(case: &Case) {
     }
 }
 
-/// Joints that are missing anywhere in a row, whole rows, and more frames than 16 bits count.
+/// There are missing joints anywhere in a row, missing rows, and more frames than fit into 16 bits.
 #[test]
 fn programs_of_others_open_gaps_and_long_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -188,7 +188,7 @@ fn programs_of_others_open_gaps_and_long_files() {
         n_rows: 8,
     };
     let rows = frames.iter().enumerate().map(|(nth, frame)| {
-        // y up.
+        // TRC has y up.
         let turned = frame.iter().map(|frame| frame.map(|[x, y, z]| [y, z, x]));
         formats::trc::row(nth as u64 + 1, nth as f64 / 60.0, turned)
     });
@@ -263,7 +263,7 @@ fn joints_have_the_names_of_opensim_models_where_asked_for() {
     }
 }
 
-/// `[frame][joint]` as another program reads it, and null in gaps.
+/// Checks `[frame][joint]` as read by another program, with null in gaps.
 fn check_points(format: &str, said: &Value, found: &[Vec<Option<[f64; 3]>>]) {
     let joints = skeleton::PARSE14.joints.iter().map(|joint| joint.name);
     if format == "c3d" {
@@ -291,7 +291,7 @@ fn check_points(format: &str, said: &Value, found: &[Vec<Option<[f64; 3]>>]) {
     }
 }
 
-/// The validator of those who made glTF, where Node has it.
+/// Runs the official glTF validator, if Node has it.
 fn check_with_validator(folder: &Path) {
     const SCRIPT: &str = "\
 let validator;\n\
@@ -312,7 +312,7 @@ validator.validateBytes(bytes).then((it) => console.log(JSON.stringify(it.issues
     assert!(is_sound, "{issues} {complaint}");
 }
 
-/// Videos of the footage, and of the pictures of the recording where the footage is gone.
+/// Checks videos from the footage, and from the recorded pictures when the footage is gone.
 fn check_videos(case: &Case) {
     if Command::new("ffmpeg").arg("-version").output().is_err() {
         eprintln!("skipped: videos, without ffmpeg");

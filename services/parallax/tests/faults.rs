@@ -1,4 +1,4 @@
-//! Runs of real processes in which one process is suspended, terminated or killed.
+//! Tests of runs with real processes in which one process is suspended, terminated or killed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 const N_FRAMES: u64 = 80;
 
-/// The outcome of a run of three views in which one process got a signal after ten frames.
+/// Outcome of a run of three views in which one process received a signal after ten frames.
 struct Signalled {
     lines: Vec<Value>,
     summary: Value,
@@ -21,9 +21,9 @@ struct Signalled {
 }
 
 impl Signalled {
-    /// Runs to the end; checks the exit code, the restart, and that nothing is left behind.
+    /// Runs to the end. Checks the exit code, the restart, and that nothing is left behind.
     ///
-    /// * `name`: of the signal.
+    /// * `name`: name of the signal.
     /// * `victim`: the process, as on its command line, for example `pose --index 1`.
     fn new(more: &str, name: &str, victim: &str) -> Self {
         let process = victim.replace(" --index ", "-");
@@ -68,14 +68,14 @@ impl Signalled {
         assert_eq!(counted + reasons.len() as u64, self.lines.len() as u64);
     }
 
-    /// The views present in those frames that lack a view.
+    /// Returns the views that are present in each frame without all views.
     fn incomplete(&self) -> Vec<&Value> {
         let views = self.lines.iter().map(|line| &line["views_present"]);
         views.filter(|view| **view != json!(["a", "b", "c"])).collect()
     }
 }
 
-/// A table of expected errors of the three views.
+/// Returns a table of expected errors for the three views.
 fn expected_errors() -> String {
     let model = common::planted::model();
     let parts = (0..model.n_parts()).map(|i| format!("part_{}", i + 1));
@@ -90,14 +90,14 @@ fn expected_errors() -> String {
     table
 }
 
-/// Sends a process a signal that asks it to end; it must not lose more than after a crash.
+/// Sends a process a signal that asks it to end. No more may be lost than after a crash.
 fn terminate(name: &str, victim: &str) -> Signalled {
     let run = Signalled::new(PACED, name, victim);
     let number = HashMap::from([("TERM", 15), ("INT", 2), ("HUP", 1)])[name];
     let message = format!("ended by signal {number}");
     assert!(run.stderr.contains(&message), "{}", run.stderr);
     run.assert_every_frame();
-    // It continues for two seconds, then is restarted as after a crash.
+    // The process continues for two seconds, then is restarted as after a crash.
     run.assert_reasons(&["process lost", "recorder lost"], 40);
     run
 }
@@ -161,7 +161,7 @@ fn a_folder_that_is_moved_away_does_not_end_the_run_when_a_process_is_killed() {
     let restarts =
         json!([{ "process": "fuse-0", "restarts": 1 }, { "process": "capture-1", "restarts": 1 }]);
     assert_eq!(report["restarts"], restarts, "{}", ended.stderr);
-    // The results process has its folder open, so it writes on and finishes there after the move.
+    // The results process has its folder open, so it continues to write there after the move.
     let text = fs::read_to_string(case.path("gone/pose3d.jsonl")).unwrap();
     assert_eq!(text.lines().count() as u64, N_FRAMES, "{}", ended.stderr);
 }
@@ -171,7 +171,7 @@ fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
     let run = Signalled::new(PACED, "KILL", "fuse --index 0");
     run.assert_every_frame();
     assert_eq!(run.incomplete(), Vec::<&Value>::new());
-    // The other worker has one pair of the three.
+    // The other worker has one of the three pairs.
     let pairs = run.lines.iter().map(|line| &line["people"][0]["pairs"]);
     let pairs: Vec<&Value> = pairs.collect();
     assert!(
@@ -186,7 +186,7 @@ fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
 #[test]
 fn a_killed_triangulation_process_loses_few_frames_and_they_are_counted() {
     let run = Signalled::new(PACED, "KILL", "triangulate");
-    // Exactly one line for every frame, in order: a result, or the reason why there is none.
+    // Every frame has exactly one line, in order: a result, or the reason why there is none.
     run.assert_every_frame();
     run.assert_reasons(&["process lost"], 20);
 }
@@ -212,7 +212,7 @@ fn a_suspended_pose_process_is_detected_and_no_frame_is_lost() {
     let run = Signalled::new(PACED, "STOP", "pose --index 1");
     assert!(run.stderr.contains("sent no heartbeat"), "{}", run.stderr);
     run.assert_every_frame();
-    // At most the frame that it held and the next one may lack the view.
+    // The view may be missing in at most two frames: the one that the process was processing, and the next one.
     let without = run.incomplete();
     assert!(without.len() <= 2, "{without:?}");
     assert!(
@@ -224,12 +224,12 @@ fn a_suspended_pose_process_is_detected_and_no_frame_is_lost() {
 #[test]
 fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
     let live = PACED.replace("\"paced\"", "\"realtime\"");
-    // Long enough for results without the view before the suspended process is restarted.
+    // There is time for results without the view before the suspended process is restarted.
     let more = live + "[supervise]\nmissed_beats = 12\nmax_restarts = 9\n";
     let case = Case::new("pose-1", &[240; 3], &more);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
-    // Without its model the process cannot restart before frames are lost; how long that takes depends on the machine.
+    // Without its model, the process cannot restart before frames are lost. How long this takes depends on the machine.
     fs::rename(case.path("model.plx"), case.path("away.plx")).unwrap();
     signal("STOP", started.pid_of("pose --index 1").into());
     started.until("lost frames", |_| {
@@ -248,7 +248,7 @@ fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
     assert_back_after_a_gap(&case.lines("pose3d.jsonl"));
 }
 
-/// Checks that view `b` was late, then lost with its process, and is back.
+/// Checks that view `b` was first late, then lost with its process, and came back.
 fn assert_back_after_a_gap(lines: &[Value]) {
     let n_without_b = lines.iter().filter(|line| line["views_present"] == json!(["a", "c"]));
     assert!(n_without_b.count() > 3, "{lines:?}");

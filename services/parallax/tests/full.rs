@@ -1,4 +1,4 @@
-//! Runs with too little disk space or shared memory.
+//! Tests of runs with too little disk space or shared memory.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;
@@ -24,7 +24,7 @@ fn a_full_disk_ends_no_process_and_unwritten_results_are_counted() {
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let summary = &report["recorded"]["summary"];
-    // Every frame was computed, not every one was written, and no process was restarted.
+    // Every frame was computed, but not every frame was written, and no process was restarted.
     assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
     let [n_written, n_lost] =
         ["frames", "frames_not_recorded"].map(|name| summary[name].as_u64().unwrap());
@@ -34,7 +34,7 @@ fn a_full_disk_ends_no_process_and_unwritten_results_are_counted() {
     let why = summary["first_failure"].as_str().unwrap();
     assert!(why.contains("No space left"), "{why}");
     assert!(ended.stderr.contains("No space left"), "{}", ended.stderr);
-    // Every line that was written is complete, and a file that lacks some is not called whole.
+    // Every written line is complete, and a file that lacks lines keeps its temporary name.
     for name in ["pose3d.jsonl.part", "pose2d.jsonl.part"] {
         let text = fs::read_to_string(case.path("copy").join(name)).unwrap();
         assert!(text.ends_with('\n'), "{name} ends in the middle of a line");
@@ -84,7 +84,7 @@ fn a_recording_is_refused_if_the_disk_has_too_little_room() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     for words in [
-        "there is no room for",
+        "not enough disk space for",
         "2 frames of",
         "kB are free",
         "--without evidence",

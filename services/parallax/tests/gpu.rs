@@ -1,4 +1,4 @@
-//! Where frames are searched: `device` of a deployment.
+//! Tests of the setting `device`, which chooses where frames are searched.
 
 use crate::common::{Case, PLAIN};
 
@@ -6,7 +6,7 @@ fn case(name: &str, device: &str) -> Case {
     let case = Case::new(name, &[2; 2], PLAIN);
     let both = format!("method = \"paper\"\ndevice = \"{device}\"");
     case.edit("deployment.toml", "method = \"paper\"", &both);
-    // The planted model shares filters between parts, which the GPU leaves to the processor.
+    // The planted model shares filters between parts, and the GPU does not support this.
     case.edit("deployment.toml", "model = \"model.plx\"\n", "");
     case
 }

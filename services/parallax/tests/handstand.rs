@@ -1,4 +1,4 @@
-//! Somebody who stands on the hands, somebody who lies, and somebody who runs before cameras with half a second between their frames: from
+//! Tests of a person who stands on the hands, a person who lies, and a person who runs while frames are half a second apart. They go from
 //! rendered pictures to the skeletons of a run.
 #![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -15,8 +15,8 @@ mod long {
 
     const N_FRAMES: usize = 40;
 
-    /// Turns the world upside down: its floor is two metres up, and everybody in it hangs from there. So do the cameras; their pictures are
-    /// turned, so that they see it as cameras would that stand upright.
+    /// Turns the world upside down. The floor is two metres up, and the people and cameras hang from it. The pictures are
+    /// rotated, so they look like pictures from cameras that stand upright.
     fn turn_world(case: &Case) -> Isometry3<f64> {
         let half = |axis| {
             UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
@@ -29,7 +29,7 @@ mod long {
         let path = case.path("room/rig.toml");
         let rig = files::read(&path, &files::ReadOptions::default()).unwrap();
         let picture = Isometry3::from_parts(Translation3::identity(), half(Vector3::z_axis()));
-        // The tangential distortion of these lenses is below a tenth of a pixel: it is not turned.
+        // The tangential distortion of these lenses is below a tenth of a pixel, so it is not rotated.
         let camera = |camera: &Camera| Camera {
             camera_from_world: picture * camera.camera_from_world * turned.inverse(),
             ..camera.clone()
@@ -52,7 +52,7 @@ mod long {
         (at.len() == 3).then(|| Point3::new(at[0], at[1], at[2]))
     }
 
-    /// Median distance of the joints that were found from the truth, metres, and the share that was found.
+    /// Returns the median distance of the found joints from the truth in metres, and the share of joints that were found.
     fn judged(case: &Case, turned: &Isometry3<f64>) -> (f64, f64) {
         let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
         let mut lines = truth.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
@@ -107,7 +107,7 @@ mod long {
         case
     }
 
-    /// Runs the deployment; its results are good enough, or said to be doubtful.
+    /// Runs the deployment. The results must be good enough, or reported as doubtful.
     fn run(case: &Case, more: &[&str]) -> Ended {
         let words = [
             "run",
@@ -134,7 +134,7 @@ mod long {
         let ended = run(&case, &[]);
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stdout);
         let (error, share) = judged(&case, &turned);
-        // Measured: 0.015 m and 1.
+        // Measured values: 0.015 m and 1.
         assert!(error < 0.03 && share > 0.95, "{error} m, {share}");
     }
 
@@ -143,17 +143,17 @@ mod long {
         let case = case("lying", "lying", 15);
         run(&case, &[]);
         let (error, share) = judged(&case, &Isometry3::identity());
-        // Measured: 0.055 m and 0.92; before springs were turned 0.063 and 0.82, before pictures were 0.286 m and 0.45.
+        // Measured values: 0.055 m and 0.92. Without rotated springs 0.063 m and 0.82, without rotated pictures 0.286 m and 0.45.
         assert!(error < 0.075 && share > 0.85, "{error} m, {share}");
     }
 
-    /// The case of a slow machine: frames far apart, and hardly a search.
+    /// Simulates a slow machine: frames are far apart, and few of them are searched.
     #[test]
     fn who_runs_is_followed_over_half_a_second_without_a_search() {
         let case = case("apart", "jogging", 2);
         run(&case, &["--set", "network.find_every=1000"]);
         let (error, share) = judged(&case, &Isometry3::identity());
-        // Measured: 0.016 m, all; a search of every frame gives 0.017 m.
+        // Measured values: 0.016 m, all joints. With a search in every frame 0.017 m.
         assert!(error < 0.03 && share > 0.95, "{error} m, {share}");
         let lines = case.lines("pose2d.jsonl");
         let n_searched = lines.iter().filter(|line| line["search"] == "full").count();

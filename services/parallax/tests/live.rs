@@ -1,4 +1,4 @@
-//! A running deployment in `status` and `top`, and runs with a latency budget.
+//! Tests of `status` and `top` with a running deployment, and of runs with a latency budget.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -17,7 +17,7 @@ const PROCESSES: [&str; 7] = [
     "results",
 ];
 
-/// The processes of a running case in `status`.
+/// Returns the processes of a running case from `status`.
 fn processes(case: &Case) -> Vec<Value> {
     let ended = case.start(&["status", &case.name, "--json"]);
     let ended = ended.wait_among_others();
@@ -26,7 +26,7 @@ fn processes(case: &Case) -> Vec<Value> {
     told["deployment"]["processes"].as_array().unwrap().clone()
 }
 
-/// The times of one stage of a process, of one view or of all.
+/// Returns the times of one stage of a process, for one view or for all.
 fn times<'a>(process: &'a Value, stage: &str, view: Option<u64>) -> Option<&'a Value> {
     let times = process["measured"]["times"].as_array().unwrap();
     let is_meant = |value: &&Value| value["stage"] == stage && value["view"].as_u64() == view;
@@ -44,7 +44,7 @@ fn assert_plausible(it: &Value) {
         "{it:#}"
     );
     let number = |key: &str| measured[key].as_f64().unwrap();
-    // 20 pictures per second; a loaded machine is behind, then catches up. There may have been none in the last period.
+    // There are 20 pictures per second. A loaded machine is behind and then catches up, so the last period may have none.
     assert!(number("sent") / number("seconds") > 0.01, "{it:#}");
     assert!(number("sent_per_second") < 200.0, "{it:#}");
     for it in measured["times"].as_array().unwrap() {
@@ -179,7 +179,7 @@ fn a_run_that_misses_its_latency_budget_fails_and_reports_the_times_of_its_stage
     let ended = budgeted(&case, "0.001");
     assert_eq!(ended.status.code(), Some(6), "{}", ended.stderr);
     for said in [
-        "latency budget of 0.001 ms missed",
+        "latency budget of 0.001 ms exceeded",
         "p99.9",
         "triangulate",
         "end to end",

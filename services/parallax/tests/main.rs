@@ -1,4 +1,4 @@
-//! The program, run as a user would. One test binary, because linking takes longer than most tests.
+//! Tests of the program as a user runs it. There is only one test binary, because linking takes longer than most tests.
 
 mod common;
 

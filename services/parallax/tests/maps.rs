@@ -1,5 +1,6 @@
-//! Deployments whose evidence are the maps of a network, or keypoints of another program. The person is made of fourteen dots, each of
-//! its own colour, which a network of one layer finds.
+//! Tests of deployments whose evidence comes from the maps of a network or from another program's keypoints. The person consists of
+//! fourteen
+//! dots, each in its own colour. A network with one layer finds them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -19,10 +20,10 @@ pub(crate) const SIZE: [u32; 2] = [200, 240];
 pub(crate) const N: usize = 14;
 pub(crate) const N_FRAMES: usize = 40;
 const RIGHT_WRIST: usize = 6;
-/// The box of the detector, pixels of its input.
+/// Box of the detector, in pixels of its input.
 const BOX: [f32; 4] = [8.0, 6.0, 46.0, 58.0];
 
-/// A man who stands with one arm raised, metres; joints of `skeleton::PARSE14`, z up.
+/// A person who stands with one arm raised, in metres with z up: the joints of `skeleton::PARSE14`.
 const STANDING: [[f64; 3]; N] = [
     [0.02, -0.12, 0.08],
     [0.04, -0.11, 0.49],
@@ -57,7 +58,7 @@ codec = "heat-map"
 set = "lsp-14"
 "#;
 
-/// Fourteen directions in the space of colours, as far apart as a spiral puts them.
+/// Returns fourteen directions in the space of colours, spread along a spiral.
 fn directions() -> [[f64; 3]; N] {
     core::array::from_fn(|nth| {
         let z = 1.0 - (2.0 * nth as f64 + 1.0) / N as f64;
@@ -67,7 +68,7 @@ fn directions() -> [[f64; 3]; N] {
     })
 }
 
-/// A map for every colour: 1 where it is full, 0 from three quarters of it down.
+/// Returns a network with a map for every colour: 1 at full colour, falling to 0 at three quarters of it.
 fn network(bias: f32) -> Network {
     let mut net = Network::default();
     let sides = |n: [usize; 4]| n.map(Side::Fixed).to_vec();
@@ -79,7 +80,7 @@ fn network(bias: f32) -> Network {
     net.floats("bias", &[N], vec![bias; N]);
     let one = vec![("kernel_shape", Attribute::Ints(vec![1, 1]))];
     if bias.is_nan() {
-        // Relu would make it 0.
+        // Relu would turn NaN into 0.
         net.node("Conv", &["picture", "weights", "bias"], "maps", one);
     } else {
         net.node("Conv", &["picture", "weights", "bias"], "sums", one);
@@ -88,7 +89,7 @@ fn network(bias: f32) -> Network {
     net
 }
 
-/// Four cameras around the person.
+/// Returns four cameras around the person.
 pub(crate) fn rig() -> Rig {
     let cameras = (0..4).map(|view| {
         let angle = 0.4 + 1.4 * f64::from(view);
@@ -112,25 +113,25 @@ pub(crate) fn rig() -> Rig {
     Rig::new(cameras.collect(), Some(Vector3::z_axis()), "dots").unwrap()
 }
 
-/// The joints in a frame, metres.
+/// Returns the joints in a frame, in metres.
 fn joints(frame: usize) -> [Point3<f64>; N] {
     joints_at(frame as f64)
 }
 
-/// The joints at a time in frames, metres.
+/// Returns the joints at a time given in frames, in metres.
 pub(crate) fn joints_at(frame: f64) -> [Point3<f64>; N] {
     let by = Vector3::new(0.005 * frame, 0.15 * (0.5 * frame).sin(), 0.0);
     STANDING.map(|standing| Point3::from(standing) + by)
 }
 
-/// The joint whose name a view gives to a joint; 14: it is not seen.
+/// Maps each joint to the joint whose name a view gives to it; 14 if the view does not see it.
 pub(crate) type Named = fn(usize) -> usize;
 
 pub(crate) fn as_it_is(joint: usize) -> usize {
     joint
 }
 
-/// Left is called right.
+/// Exchanges left and right.
 pub(crate) fn exchanged(joint: usize) -> usize {
     let pair = skeleton::SIDES.iter().find(|side| side.contains(&joint));
     pair.map_or(joint, |[a, b]| a + b - joint)
@@ -140,7 +141,7 @@ pub(crate) fn without_a_wrist(joint: usize) -> usize {
     if joint == RIGHT_WRIST { N } else { joint }
 }
 
-/// The picture of a camera in a frame: dots on grey; the joints of the last of which are in front.
+/// Returns the picture of a camera in a frame: dots on grey. Later joints are in front of earlier ones.
 pub(crate) fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
     let [width, height] = SIZE.map(|size| size as usize);
     let mut canvas = Canvas::new(Size::new(width, height), [128; 3]);
@@ -156,9 +157,9 @@ pub(crate) fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
     canvas
 }
 
-/// A deployment with these pictures.
+/// Creates a deployment with these pictures.
 ///
-/// * `view`: what each view calls the joints; `None` for one that sees nothing.
+/// * `view`: names that each view gives to the joints; `None` for a view that sees nothing.
 pub(crate) fn case(name: &str, views: [Option<Named>; 4]) -> Case {
     let rig = rig();
     let case = Case::with_rig(&rig, name, &[0; 4], "");
@@ -172,13 +173,13 @@ pub(crate) fn case(name: &str, views: [Option<Named>; 4]) -> Case {
             let [width, height] = SIZE.map(|size| size as usize);
             let canvas = match named {
                 Some(named) => picture(camera, frame, named),
-                // Never the same twice: the camera is not frozen.
+                // Every picture is different, so the camera does not look frozen.
                 None => Canvas::new(Size::new(width, height), [120 + frame as u8; 3]),
             };
             canvas.save_png(&file).unwrap();
         }
     }
-    // The shipped model is not needed: the detector says where to look.
+    // The shipped model is not needed, because the detector finds the boxes.
     case.set_network("file = \"net.onnx\"\ndetector = \"det.onnx\"");
     case
 }
@@ -187,7 +188,7 @@ pub(crate) fn run(case: &Case, more: &[&str]) -> Ended {
     case.start(&[&["run", "deployment.toml"], more].concat()).wait()
 }
 
-/// The status of every frame, and the mean distance of its joints from the truth, metres.
+/// Returns the status of every frame, and the mean distance of its joints from the truth, in metres.
 fn found(case: &Case) -> Vec<(String, f64)> {
     let text = std::fs::read_to_string(case.path("out/pose3d.jsonl")).unwrap();
     let frames = text.lines().map(|line| {
@@ -208,7 +209,7 @@ fn found(case: &Case) -> Vec<(String, f64)> {
     frames.collect()
 }
 
-/// A third of a cell of the maps: the bumps of this made-up network are squares, flat at the top.
+/// A third of a cell of the maps. The peaks of this artificial network are squares with a flat top.
 const NEAR_M: f64 = 0.035;
 
 #[track_caller]
@@ -230,8 +231,9 @@ fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
         let lines = std::fs::read_to_string(case.path("out/pose2d.jsonl")).unwrap();
         ["full", "tracked"].map(|name| lines.matches(&format!("\"search\":\"{name}\"")).count())
     };
-    // Pictures of a folder may be of any time: boxes are looked for in every one. At 20 a second in the first and in every tenth, by the
-    // views in turn: in frames 10, 8, 5 and 3 for the second time.
+    // Pictures in a folder may be of any time, so boxes are searched in every picture. At 20 frames per second, boxes are searched in the
+    // first
+    // frame and in every tenth. The views take turns: their second search is in frames 10, 8, 5 and 3.
     assert_eq!(searched(&[]), [160, 0]);
     assert_eq!(searched(&["--set", "capture.frame_rate_hz=20"]), [19, 141]);
 }
@@ -335,7 +337,8 @@ fn what_belongs_to_the_papers_method_is_refused_beside_a_network() {
     }
 }
 
-/// Where a keypoint is in a frame: a joint of that name, or something at its ankle, between the hips, or at the head.
+/// Returns the position of a keypoint in a frame: that of the joint with its name, or a point at the ankle, between the hips, or at the
+/// head.
 fn place(name: &str, frame: f64) -> Point3<f64> {
     let joints = joints_at(frame);
     let named = |name: &str| {
@@ -354,14 +357,14 @@ fn place(name: &str, frame: f64) -> Point3<f64> {
     }
 }
 
-/// Keypoints in the layout of OpenPose, in place of the pictures.
+/// Replaces the pictures by keypoints in the layout of OpenPose.
 ///
-/// * `names`: of a set, as the view calls them.
+/// * `names`: names of a set, as the view gives them to the keypoints.
 pub(crate) fn with_keypoints(case: &Case, set: &str, names: impl Fn(usize) -> Vec<String>) {
     with_skewed_keypoints(case, set, names, [0.0; 4]);
 }
 
-/// The same of cameras that take their pictures so many frames late.
+/// Like [`with_keypoints`], for cameras that take their pictures some frames late.
 fn with_skewed_keypoints(
     case: &Case,
     set: &str,
@@ -374,7 +377,7 @@ fn with_skewed_keypoints(
     for (view, camera) in rig.cameras().iter().enumerate() {
         let folder = case.path(&camera.name);
         for frame in 0..N_FRAMES {
-            // None is there where this is not the first time.
+            // There are no pictures if this is not the first call.
             let _gone = std::fs::remove_file(folder.join(format!("{frame:04}.png")));
             let names = names(view);
             let numbers = names.iter().map(|name| {
@@ -423,7 +426,7 @@ fn keypoints_of_another_program_need_no_video_and_a_damaged_file_costs_one_view_
 #[test]
 fn what_keypoints_have_beside_the_joints_is_written_by_name() {
     let case = case("extra", [Some(as_it_is as Named); 4]);
-    // The third view names the legs the wrong way round.
+    // The third view exchanges left and right of the legs.
     let named = |view: usize, name: &str| {
         let leg = ["hip", "knee", "ankle", "toe", "heel"];
         let is_leg = leg.iter().any(|part| name.ends_with(part));
@@ -454,7 +457,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
     assert!(trc.contains("\tleft_heel\t"), "{trc}");
 }
 
-/// Mean distance of the joints of all frames but the first from the truth, millimetres, and that of the extra keypoints.
+/// Returns the mean distance of the joints from the truth in all frames except the first, in millimetres, and that of the extra keypoints.
 fn errors_mm(case: &Case) -> [f64; 2] {
     let found = found(case);
     let joints: f64 = found[1..].iter().map(|frame| frame.1).sum();
@@ -487,8 +490,8 @@ fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
     run(&case, &[]);
     errors.push(errors_mm(&case));
     let (without, told, untold) = (errors[0], errors[1], errors[2]);
-    // Joints and extra keypoints: most that is left of what was told, and how much more is left of what was not. Joints stand by evidence
-    // whose places are rounded to cells, and so do their velocities.
+    // For joints and extra keypoints: largest error that remains if the skew is known, and factor by which it is larger otherwise.
+    // Joints and their velocities depend on evidence whose positions are rounded to cells.
     for (which, most, more) in [(0, 2.5, 1.5), (1, 2.5, 2.0)] {
         let [told, untold] = [told, untold].map(|mm| mm[which] - without[which]);
         assert!(told < most && untold > more * told, "{errors:?}");

@@ -1,4 +1,4 @@
-//! The peak memory of a pose process, with images and a model of realistic size.
+//! Test of the peak memory of a pose process, with images and a model of realistic size.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -12,10 +12,10 @@ use serde_json::{Value, json};
 
 const SIZE: [u32; 2] = [640, 480];
 const N_FRAMES: usize = 6;
-/// Types of every part; each has its own filter.
+/// Number of types of every part. Each type has its own filter.
 const N_TYPES: usize = 6;
 
-/// The small test cameras with larger pictures.
+/// Returns the small test cameras with larger pictures.
 fn rig() -> Rig {
     let mut cameras = planted::rig(2).cameras().to_vec();
     for camera in &mut cameras {
@@ -32,7 +32,7 @@ fn rig() -> Rig {
     Rig::new(cameras, Some(Vector3::z_axis()), "planted").unwrap()
 }
 
-/// The small test model with as many filters as the paper's `HumanEva` model, of the same size.
+/// Returns the small test model with as many filters as the paper's `HumanEva` model, of the same size.
 fn model() -> Model {
     let small = planted::model();
     let mut spec: ModelSpec = small.spec().clone();
@@ -57,7 +57,7 @@ fn model() -> Model {
     Model::new(spec).unwrap()
 }
 
-/// A picture of noise, in which there are poses on every level.
+/// Returns a picture of noise, in which there are poses on every level.
 fn noise(seed: u64) -> Canvas {
     let [width, height] = SIZE.map(|size| size as usize);
     let mut random = fastrand::Rng::with_seed(seed);
@@ -79,7 +79,7 @@ fn a_pose_process_stays_under_300_megabytes_at_640x480() {
         }
     }
     let ended = case.run();
-    // There is nobody in noise, which the verdict says: what is measured is memory.
+    // There is nobody in noise, and the verdict says so. Only the memory is measured.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let summary = &report["recorded"]["summary"];
@@ -90,7 +90,7 @@ fn a_pose_process_stays_under_300_megabytes_at_640x480() {
         assert!(evidence > 100_000_000, "{evidence} bytes of evidence");
         let peak = &report["peak_memory_bytes"][format!("pose-{view}")];
         let peak = peak.as_u64().unwrap();
-        // Shared memory counts: evidence is written there directly.
+        // Shared memory is included, because evidence is written there directly.
         assert!((evidence..300_000_000).contains(&peak), "{peak} bytes");
     }
 }

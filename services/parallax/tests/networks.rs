@@ -1,4 +1,4 @@
-//! Networks that find keypoints: shown, and in place of the filters' parts.
+//! Tests of networks that find keypoints: shown with their cards, and used in place of the filters.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -8,7 +8,7 @@ use common::{Case, Ended, PLAIN};
 use inference::onnx::{Attribute, Network, Side};
 use serde_json::Value;
 
-/// Columns and rows of the input.
+/// Number of columns and rows of the input.
 const SIDES: [usize; 2] = [48, 64];
 
 pub(crate) const CARD: &str = r#"
@@ -29,7 +29,9 @@ refine = "none"
 names = ["head top", "left hip", "right hip"]
 "#;
 
-/// Three maps of a quarter of the input's sides: the means of red, green and blue; `operator` makes them from these.
+/// Returns a network with three maps that have a quarter of the input's sides. `operator` computes the maps from the means of red, green
+/// and
+/// blue.
 pub(crate) fn network(operator: &str) -> Network {
     let mut net = Network::default();
     let [width, height] = SIDES;
@@ -43,7 +45,7 @@ pub(crate) fn network(operator: &str) -> Network {
     net
 }
 
-/// A case with a network, its card, and a picture of 96 by 128 pixels with three blocks of colour.
+/// Creates a case with a network, its card, and a picture of 96 by 128 pixels with three coloured blocks.
 fn case(name: &str) -> Case {
     let case = Case::new(name, &[1, 1], PLAIN);
     case.write("net.onnx", network("Relu").file());
@@ -58,7 +60,7 @@ fn case(name: &str) -> Case {
     case
 }
 
-/// The top-left corners of the blocks; each fills one cell of a map.
+/// Top-left corners of the blocks. Each block fills one cell of a map.
 const BLOCKS: [[u32; 2]; 3] = [[40, 8], [56, 64], [24, 72]];
 
 fn run(case: &Case, arguments: &[&str]) -> Ended {
@@ -121,7 +123,7 @@ fn a_network_without_a_card_gets_the_nearest_ones_named() {
     assert!(ended.stderr.contains("without a card"), "{}", ended.stderr);
     let shown = json(&run(&case, &["model", "show", "bare.onnx", "--json"]));
     assert!(shown["card"].is_null(), "{shown}");
-    // All with this input, as none has maps of three keypoints.
+    // All cards with this input are listed, because none has maps of three keypoints.
     let nearest = shown["nearest_cards"].as_array().unwrap();
     assert!(nearest.contains(&Value::from("vitpose-s")), "{shown}");
     let ended = run(&case, &["detect", "blocks.png", "--network", "bare.onnx"]);
@@ -190,7 +192,7 @@ fn keypoints_of_a_box_are_found_where_they_are_and_drawn() {
     assert_eq!(person["box_from"], "given", "{line}");
     for (keypoint, [left, top]) in BLOCKS.into_iter().enumerate() {
         let it = &person["keypoints"][keypoint];
-        // The first pixel of the cell, which is two pixels of the picture for one.
+        // The position is the first pixel of the cell. Two pixels of the picture are one pixel of the input.
         assert_eq!(it["x"], f64::from(left), "{it}");
         assert_eq!(it["y"], f64::from(top), "{it}");
         assert!(it["score"].as_f64().unwrap() > 0.6, "{it}");
@@ -210,7 +212,7 @@ fn keypoints_of_a_box_are_found_where_they_are_and_drawn() {
     ];
     let shown = json(&run(&case, &[&arguments[..], &look].concat()));
     assert_eq!(shown["keypoints"], person["keypoints"]);
-    // The joints, and a map of each of the three.
+    // The sheet shows the joints, and a map of each of the three.
     let sheet = image::open(case.path("seen.png")).unwrap();
     assert!(sheet.width() > 4 * 192, "{}", sheet.width());
 }
@@ -229,12 +231,12 @@ fn options_of_the_filters_are_refused_beside_a_network() {
             &[&detect[..], &["--card", "card.toml"], &option].concat(),
         );
         assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-        let said = format!("{} is about the filters", option[0]);
+        let said = format!("{} is an option of the filters", option[0]);
         assert!(ended.stderr.contains(&said), "{}", ended.stderr);
     }
 }
 
-/// The purpose of the network that ships: nothing is given but the picture.
+/// The main use of the shipped network: only a picture is given.
 #[test]
 fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
     let case = Case::new("net-ships", &[1, 1], PLAIN);
@@ -264,7 +266,7 @@ fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
             let at: Vec<f64> = serde_json::from_value(found[0]["joints"][joint].clone()).unwrap();
             (at[0] - truth.x).hypot(at[1] - truth.y)
         };
-        // One view may name the sides the other way round.
+        // One view may exchange left and right.
         let off = |sides: [&str; 2]| {
             let joints = ["ankle", "knee", "hip", "shoulder", "elbow", "wrist"];
             let each = joints.iter().flat_map(|joint| {
@@ -285,7 +287,8 @@ fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
 #[test]
 fn a_network_is_judged_on_marked_people() {
     let case = case("network-judge");
-    // The head and the hips where the blocks are, to the middle of a cell of the maps; what the network does not know elsewhere.
+    // The head and the hips are at the blocks, in the middle of cells of the maps. The other joints, which the network does not know, are
+    // elsewhere.
     let mut marks = [[8.0, 120.0]; 14];
     for (joint, block) in [(13, 0), (3, 1), (2, 2)] {
         marks[joint] = BLOCKS[block].map(|block| f64::from(block) + 3.5);
@@ -321,7 +324,7 @@ fn a_network_is_judged_on_marked_people() {
 #[test]
 fn judging_ends_early_when_it_is_interrupted() {
     let case = case("network-interrupted");
-    // One who is left out, so that it is known when the others begin; these last for minutes.
+    // The first person has no marks and is left out. The message about this shows that judging has begun, which takes minutes.
     let mut marks = vec![[f64::NAN; 2]; 14];
     let line = |marks: &[[f64; 2]]| {
         let person = serde_json::json!({"image": "blocks.png", "joints": marks});
@@ -353,7 +356,7 @@ fn a_network_that_is_cut_short_or_gives_no_numbers_is_refused() {
     let case = case("network-broken");
     let bytes = network("Relu").file();
     case.write("short.onnx", &bytes[..bytes.len() / 2]);
-    // The logarithm of 0, where the picture is black.
+    // If the picture is black, this is the logarithm of 0.
     case.write("log.onnx", network("Log").file());
     let with = |name: &str| {
         let card = ["--card", "card.toml"];

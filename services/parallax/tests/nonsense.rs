@@ -1,4 +1,4 @@
-//! Footage, calibrations and settings that do not fit together: refused before the start or reported, with numbers.
+//! Tests with footage, calibrations and settings that do not fit together: they are refused before the start or reported, with numbers.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -11,7 +11,7 @@ const CHECK: &[&str] = &["config", "check", "deployment.toml"];
 const RUN: &[&str] = &["run", "deployment.toml"];
 const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
 
-/// A mistake, how it is made, the arguments, the exit code, and the expected texts.
+/// Description of a mistake, function that makes it, arguments, exit code, and expected texts.
 type Row = (
     &'static str,
     fn(&Case),
@@ -74,7 +74,7 @@ const CALIBRATIONS: &[Row] = &[
         &[
             "rig.toml: a and b are 1",
             "m apart",
-            "`unit = \"mm\"` makes this 1.",
+            "with `unit = \"mm\"` this is 1.",
         ],
     ),
     (
@@ -116,7 +116,11 @@ const CALIBRATIONS: &[Row] = &[
         |case| move_cameras(case, |_| 0.0),
         RUN,
         5,
-        &["3 cameras are in one place", "0.0 mm apart", "stand apart"],
+        &[
+            "3 cameras are in one place",
+            "0.0 mm apart",
+            "must be apart",
+        ],
     ),
 ];
 
@@ -193,7 +197,7 @@ fn footage_of_another_camera_is_refused_or_reported() {
             CHECK,
             3,
             &[
-                "cameras \"a\" and \"b\" have one source",
+                "cameras \"a\" and \"b\" have the same source",
                 "footage of its own camera",
             ],
         ),
@@ -202,7 +206,7 @@ fn footage_of_another_camera_is_refused_or_reported() {
             |fixture| fixture.edit("deployment.toml", "source = \"b\"", "source = \"./c/../a\""),
             RUN,
             3,
-            &["cameras \"a\" and \"b\" have one source"],
+            &["cameras \"a\" and \"b\" have the same source"],
         ),
         (
             "copies of one footage",
@@ -218,7 +222,7 @@ fn footage_of_another_camera_is_refused_or_reported() {
     ]);
 }
 
-/// A video of a test pattern, of the size of the planted pictures.
+/// Writes a video of a test pattern with the size of the planted pictures.
 fn video(case: &Case, name: &str, rate: &str, pattern: &str) {
     let source = format!("{pattern}=s=96x128:r={rate}:d=2");
     let done = std::process::Command::new("ffmpeg")
@@ -257,12 +261,12 @@ fn different_frame_rates_are_refused_with_both_numbers() {
         };
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
-    // With the rate in the settings the same footage is accepted with a warning.
+    // If the settings give the rate, the same footage is accepted with a warning.
     let given = [CHECK, &["--set", "capture.frame_rate_hz=30"]].concat();
     let ended = case.start(&given).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     assert!(ended.stderr.contains("frames apart"), "{}", ended.stderr);
-    // A difference of 0.1 %, over two seconds, is accepted.
+    // A difference of 0.1 % over two seconds is accepted.
     case.edit(
         "deployment.toml",
         "source = \"b.mp4\"",
@@ -276,7 +280,7 @@ fn different_frame_rates_are_refused_with_both_numbers() {
 #[test]
 fn a_dry_run_fails_where_the_run_would_not_begin() {
     let case = Case::new("huge", &[2; 16], PLAIN);
-    // Larger than the memory of usual machines: a frame has 0.8 GB, and exists seven times.
+    // This is larger than the memory of usual machines: a frame has 0.8 GB, and exists seven times.
     case.edit(
         "deployment.toml",
         "upright",
@@ -304,18 +308,18 @@ fn an_unspecified_vertical_is_estimated_and_reported() {
     case.edit("deployment.toml", "upright = false", "upright = true");
     let ended = case.start(CHECK).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    // The planted figure looks like a person whichever way it is turned: what is said is what counts.
+    // The planted figure looks like a person in any direction, so only the messages are checked.
     for said in [
-        "the calibration does not say which way is up; up = [",
+        "the calibration does not give the upward direction; up = [",
         "people are found with a score of",
     ] {
         assert!(ended.stderr.contains(said), "{}", ended.stderr);
     }
-    // With the setting nothing is estimated.
+    // If the setting is given, nothing is estimated.
     add(&case, "up = [0, 0, 1]");
     let ended = case.start(CHECK).wait();
     assert!(
-        !ended.stderr.contains("which way is up"),
+        !ended.stderr.contains("the upward direction"),
         "{}",
         ended.stderr
     );

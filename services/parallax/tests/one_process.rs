@@ -1,4 +1,4 @@
-//! Processes give the bits of one process by the method of networks, from pictures and from keypoints of another program.
+//! Tests that separate processes and a single process give the same bits, for people found by networks and for another program's keypoints.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use footage::Canvas;
@@ -12,7 +12,7 @@ use crate::maps::{
     without_a_wrist,
 };
 
-/// Settings with which every picture is a frame of the pipeline, unchanged.
+/// Settings with which every picture becomes a frame of the pipeline without change.
 const AS_THEY_ARE: [&str; 2] = ["capture.mode=lossless", "capture.scale=1.0"];
 
 /// Runs a case with [`AS_THEY_ARE`].
@@ -22,9 +22,9 @@ fn run_as_they_are(case: &Case) {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
 }
 
-/// Compares the results of a run with those of its steps in one process, bit for bit.
+/// Compares the results of a run with those of the same steps in one process, bit for bit.
 ///
-/// * `pictures`: by view and frame; the frames of the pipeline, which are the pictures themselves.
+/// * `pictures`: pictures by view and frame. They are also the frames of the pipeline.
 fn assert_one_process_gives_the_same(case: &Case, pictures: &[Vec<Canvas>; 4]) {
     let file = case.path("deployment.toml");
     let text = std::fs::read_to_string(&file).unwrap();
@@ -59,7 +59,7 @@ fn assert_one_process_gives_the_same(case: &Case, pictures: &[Vec<Canvas>; 4]) {
     );
 }
 
-/// The pictures of a case whose views call the joints as they are.
+/// Returns the pictures of a case whose views name the joints correctly.
 fn pictures(named: [Named; 4]) -> [Vec<Canvas>; 4] {
     let rig = rig();
     core::array::from_fn(|view| {

@@ -1,4 +1,4 @@
-//! A deployment of real processes gives the same bits as the same computation in one process.
+//! Tests that a deployment of real processes gives the same bits as the same computation in one process.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -24,7 +24,7 @@ fn turned_resized_and_distorted_frames() {
     let more = "[capture]\nsize = [120, 140]\n[results]\noverlay_every = 0\n";
     let case = Case::with_rig(&rig, "warped", &[20; 3], more);
     let ended = case.run();
-    // The planted figure is eight pixels high here, which the verdict doubts: what is compared is bits.
+    // The planted figure is only eight pixels high here, so the verdict is doubtful. Only the bits are compared.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let one = OneProcess {
         upright_size: Some([120, 140]),
@@ -54,7 +54,7 @@ fn the_released_energy() {
     one.assert_same(&case, 3, 20);
 }
 
-/// Expected errors, multiples of a quarter pixel, different for every part, view and frame.
+/// Returns expected errors in multiples of a quarter pixel, different for every part, view and frame.
 fn sigma_px(frame: usize, view: usize) -> Vec<f32> {
     let quarters = |part: usize| (part * 7 + frame * 3 + view * 5) % 40;
     (0..26).map(|part| quarters(part) as f32 / 4.0).collect()
@@ -70,7 +70,9 @@ fn parts_switched_off_with_all_views_at_once() {
     switched_off("expected-at-once", AT_ONCE, Views::All);
 }
 
-/// * `fuse`: further lines of the section `[paper]`.
+/// Compares runs with expected errors that switch off parts.
+///
+/// * `fuse`: additional lines of the section `[paper]`.
 fn switched_off(name: &str, fuse: &str, views: Views) {
     let more = PLAIN.to_owned()
         + fuse
@@ -105,7 +107,7 @@ fn switched_off(name: &str, fuse: &str, views: Views) {
     one.assert_same(&case, 3, 10);
 }
 
-/// One process that solves pairs of views, as several workers do.
+/// Returns one process that solves pairs of views, as several workers do.
 fn in_pairs() -> OneProcess {
     OneProcess {
         settings: EstimatorSettings {
@@ -116,7 +118,7 @@ fn in_pairs() -> OneProcess {
     }
 }
 
-/// One process that solves all views at once.
+/// Returns one process that solves all views at once.
 fn at_once() -> OneProcess {
     OneProcess {
         settings: EstimatorSettings {
@@ -172,7 +174,7 @@ fn tracked_poses() {
     let lines = case.lines("pose2d.jsonl");
     let n_full = lines.iter().filter(|line| line["search"] == "full").count();
     let n_tracked = lines.iter().filter(|line| line["search"] == "tracked").count();
-    // Frames 0 and 10 at least.
+    // At least frames 0 and 10 are searched in full, in each view.
     assert!(n_full >= 6 && n_tracked > 0, "{n_full} {n_tracked}");
     assert_eq!(n_full + n_tracked, 60);
 }

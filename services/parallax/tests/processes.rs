@@ -1,4 +1,4 @@
-//! Complete deployments of real processes, interrupted and with faults.
+//! Tests of complete deployments of real processes, with interruptions and faults.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -10,14 +10,14 @@ use common::started::{processes, signal};
 use common::{Case, PACED, PLAIN, Started};
 use serde_json::{Value, json};
 
-/// The frame numbers of a run's results.
+/// Returns the frame numbers of a run's results.
 fn frames(lines: &[Value]) -> Vec<u64> {
     lines.iter().map(|line| line["frame"].as_u64().unwrap()).collect()
 }
 
 #[test]
 fn an_interrupted_run_ends_cleanly() {
-    // To the parent only, as `kill` does, and to all processes at once, as a terminal does.
+    // The signal goes only to the parent, as with `kill`, or to all processes at once, as from a terminal.
     for (name, sign) in [("int-one", 1), ("int-all", -1)] {
         let case = Case::new(name, &[400; 2], PACED);
         let mut started = case.start(&["run", "deployment.toml"]);
@@ -37,7 +37,8 @@ fn an_interrupted_run_ends_cleanly() {
 
 #[test]
 fn signals_to_all_processes_at_once_end_the_run_in_order() {
-    // As systemd ends a unit (all processes, in any group), `timeout` a command (twice), and a closing terminal its
+    // Signals as systemd sends them to a unit (to all processes, in any group), `timeout` to a command (twice), and a closing terminal to
+    // its
     // processes (twice).
     for (name, signals, to_all) in [
         ("unit", &["TERM"][..], true),
@@ -52,7 +53,7 @@ fn signals_to_all_processes_at_once_end_the_run_in_order() {
         let run = started.id();
         let children: Vec<i64> = children.filter(|_| to_all).collect();
         for sent in signals {
-            // The children first: they must not act on the signal themselves.
+            // Children get the signal first, and must not act on it themselves.
             // A process that has ended after the first signal does not get the second.
             let all = children.iter().chain([&run]).map(i64::to_string);
             let script = format!("kill -s {sent} {} 2>&-", all.collect::<Vec<_>>().join(" "));
@@ -175,7 +176,7 @@ fn an_output_folder_belongs_to_one_run_at_a_time() {
         assert!(ended.stderr.contains(said), "{said}: {}", ended.stderr);
     }
     second.assert_nothing_left();
-    // A dead run does not block a new one, and its lines are complete.
+    // A dead run does not block a new one, and the lines of its files are complete.
     signal("KILL", started.id());
     assert_eq!(started.wait_among_others().status.code(), None);
     let more = ["--set", "capture.mode=lossless"];
@@ -199,7 +200,7 @@ fn results_of_an_earlier_run_are_replaced_only_when_asked_for() {
     let before = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
     let ended = run();
     assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    let said = "replace them with --force";
+    let said = "pass --force to replace them";
     assert!(ended.stderr.contains(said), "{}", ended.stderr);
     let after = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
     assert_eq!(before.modified().unwrap(), after.modified().unwrap());

@@ -1,4 +1,4 @@
-//! Other programs read a running deployment: through `client`, through datagrams, from Python.
+//! Tests of other programs that read a running deployment: with `client`, by datagrams, and from Python.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use core::time::Duration;
@@ -17,14 +17,14 @@ use serde_json::Value;
 
 use crate::common;
 
-/// The next moment.
+/// Returns the next moment.
 fn next(client: &mut Client) -> client::Moment {
     let moment = client.next(WATCHDOG).unwrap();
     assert!(moment.is_some(), "nothing came");
     moment.unwrap()
 }
 
-/// Waits until something holds.
+/// Waits until a condition is true.
 fn until(mut holds: impl FnMut() -> bool) {
     let begin = Instant::now();
     while !holds() {
@@ -33,7 +33,7 @@ fn until(mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// The file that some bytes of this process are those of.
+/// Returns the file that is mapped at some bytes of this process.
 fn mapped_file(bytes: &[u8]) -> String {
     let at = bytes.as_ptr().addr();
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
@@ -52,7 +52,7 @@ fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending()
     let live = PACED.replace("\"paced\"", "\"realtime\"");
     let case = Case::new("client", &[160; 2], &live);
     let wish = Wish::skeletons().with_poses().with_pictures().every_frame(64);
-    // Before there is a deployment.
+    // The deployment does not exist yet.
     let refused = Client::open(&case.name, &wish).unwrap_err();
     assert!(refused.is_not_running(), "{refused}");
     let mut client = Client::wait_for(&case.name, &wish).unwrap();
@@ -84,9 +84,9 @@ fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending()
         let moment = next(&mut client);
         moment.skeletons.is_some_and(|skeletons| skeletons.message().stamp.epoch == 1)
     });
-    // The run ends, and its files are removed, while the client is there.
+    // The run ends and removes its files while the client is connected.
     let ended = started.wait();
-    // A process was lost on the way.
+    // A process was lost during the run.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     case.assert_nothing_left();
     until(|| client.state() == State::Waiting);
@@ -95,9 +95,9 @@ fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending()
 
 #[test]
 fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
-    // As long as a client may need to join on a loaded machine, and then some.
+    // The run is longer than a client may need to join on a loaded machine.
     let case = Case::new("asleep", &[160; 2], PACED);
-    // Holds a picture of each view, and never looks again.
+    // This client holds a picture of each view, and never looks again.
     let mut asleep = Client::wait_for(&case.name, &Wish::views().with_pictures()).unwrap();
     let started = case.start(&["run", "deployment.toml", "--json"]);
     let held = loop {
@@ -121,7 +121,7 @@ fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
     let before = pixels();
     let so_far = case.lines("pose3d.jsonl").len();
     until(|| case.lines("pose3d.jsonl").len() > so_far + 25);
-    // Nobody has overwritten what is held.
+    // The held pictures were not overwritten.
     assert!(before == pixels());
     drop(held);
     let ended = started.wait();
@@ -166,7 +166,7 @@ fn a_client_across_short_runs_is_told_of_no_error() {
     let listening = std::thread::Builder::new()
         .name("listening".to_owned())
         .spawn(move || {
-            // Whether it joins in time does not matter here: what begins or ends under its hands is no error.
+            // The client need not join in time. A deployment that starts or ends while the client joins is not an error.
             while !ended.load(Ordering::Relaxed) {
                 client.next(Duration::from_millis(50)).unwrap();
             }
@@ -196,7 +196,7 @@ fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
         "{}",
         beyond.stderr
     );
-    // The other is a port that nobody listens on.
+    // No program listens on the other port.
     let arguments = [
         "run",
         "deployment.toml",
@@ -232,7 +232,7 @@ fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
     case.assert_nothing_left();
 }
 
-/// Tests that take long.
+/// Long tests; see `.ci/run`.
 #[cfg(feature = "long-tests")]
 mod long {
     #![expect(clippy::print_stderr, reason = "what is skipped is told")]
@@ -240,7 +240,7 @@ mod long {
     use std::path::Path;
     use std::process::Command;
 
-    /// Returns true if a Python has all that its tests need.
+    /// Returns true if a Python installation has everything that its tests need.
     fn is_able(python: &str) -> bool {
         let imports = Command::new(python).args(["-c", "import iceoryx2, numpy, pytest"]).output();
         imports.is_ok_and(|import| import.status.success())

@@ -1,4 +1,4 @@
-//! Deployments whose expected errors a network predicts from the frames.
+//! Tests of deployments in which a network predicts expected errors from the frames.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -17,7 +17,7 @@ use viewquality::{Card, ForecastInput, Forecaster, Unit, n_evidence};
 
 const N_PARTS: usize = 26;
 
-/// `sigma` of part `i` = mean red of the tile + `i` / 8 + response of part 1, at least 0; switched off
+/// Returns a network with `sigma` of part `i` = mean red of the tile + `i` / 8 + response of part 1, at least 0. A part is switched off
 /// beyond `tau`.
 fn network(tau: f32) -> Network {
     let k = n_evidence(N_PARTS);
@@ -55,7 +55,7 @@ fn network(tau: f32) -> Network {
     net
 }
 
-/// The search of a view, and its framing.
+/// Returns the search of a view, and its pyramid layout.
 fn step_of(plan: &ViewPlan) -> (ViewStep, Arc<Layout>) {
     let layout = Arc::new(plan.layout().clone());
     let step = ViewStep::new(
@@ -80,7 +80,7 @@ fn the_service_and_the_library_predict_the_same() {
     let mut forecaster = Forecaster::new(network);
     let (rig, model) = (planted::rig(2), planted::model());
     let [width, height] = planted::SIZE.map(|size| size as usize);
-    // No frame waits for the network: on a loaded machine one may have gone on without it.
+    // No frame waits for the network. On a loaded machine, a frame may have been processed without it.
     let mut n_late = 0;
     for (view, camera) in rig.cameras().iter().enumerate() {
         let (step, layout) = step_of(&pipeline::plan(&model, camera).unwrap());
@@ -114,7 +114,7 @@ fn the_service_and_the_library_predict_the_same() {
     assert!(n_late <= 4, "{n_late} of 16 without expected errors");
 }
 
-/// The candidates of every view, each for its own frame.
+/// Returns the candidates of every view, each for its own frame.
 fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>> {
     let [width, height] = planted::SIZE.map(|size| size as usize);
     let say = |(plan, frame): (&Arc<ViewPlan>, &usize)| {
@@ -150,7 +150,7 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
         let found = step.run(answers, &[]).joints.into_iter();
         found.map(|joint| joint.unwrap().in_world).collect()
     };
-    // The first view has another frame than the others.
+    // The first view has another frame than the other views.
     let mut answers = answers(&plans, &[7, 0, 0, 0]);
     let unaware = joints(&answers, 1.0);
     let first = answers[0].take();
@@ -195,7 +195,7 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
 
 #[test]
 fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
-    // The time limit alone would detect it after ten minutes.
+    // The time limit alone would only detect the hang after ten minutes.
     let more = "[capture]\nupright = false\nmode = \"realtime\"\n\
                 frame_rate_hz = 20\n[results]\noverlay_every = 0\n\
                 [paper]\nerrors = \"q.onnx\"\n[supervise]\nhang_limit_s = 600\n";
@@ -220,7 +220,7 @@ mod long {
 
     use super::*;
 
-    /// Lines about a view.
+    /// Returns the lines about a view.
     fn of_view(case: &Case, name: &str) -> Vec<Value> {
         let lines = case.lines("pose2d.jsonl");
         lines.into_iter().filter(|line| line["view"] == name).collect()

@@ -1,4 +1,4 @@
-//! Runs with realtime delivery: slow stages drop frames, and every dropped frame is counted.
+//! Tests of runs with realtime delivery: slow stages drop frames, and every dropped frame is counted.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -45,7 +45,7 @@ impl Finished {
         Self { report, lines }
     }
 
-    /// A count of one view.
+    /// Returns a count of one view.
     fn view(&self, view: usize, key: &str) -> u64 {
         self.report["views"][view][key].as_u64().unwrap()
     }
@@ -64,8 +64,8 @@ fn fast_stages_lose_no_frames() {
 
 #[test]
 fn slow_stages_process_fewer_frames_and_every_dropped_one_is_counted() {
-    // More frames per second than any machine can process. That slow views choose the same frames is tested with
-    // `stage::join::Cadence`; how soon they do depends on the load of the machine.
+    // There are more frames per second than any machine can process. That slow views choose the same frames is tested with
+    // `stage::join::Cadence`. How soon they do so depends on the load of the machine.
     let hurried = PACED.replace("= 20", "= 200");
     let more = format!("{LIVE}{hurried}size = [240, 320]\n");
     let case = Case::new("slow", &[300; 3], &more);
@@ -83,7 +83,7 @@ fn footage_without_a_frame_rate_ends_at_once_and_dropped_frames_are_counted() {
     let case = Case::new("unpaced", &[60; 2], LIVE);
     let ended = case.run();
     let run = Finished::new(&case, &ended);
-    // If no frame of both views was in time there is no pose in space, and the report states that.
+    // If no frame of both views was in time, there is no pose in space, and the report states this.
     let is_empty = run.report["recorded"]["summary"]["frames_with_pose"] == 0;
     let expected = if is_empty { 7 } else { 0 };
     assert_eq!(ended.status.code(), Some(expected), "{:#}", run.report);
@@ -110,7 +110,7 @@ fn a_slow_receiver_does_not_slow_its_sender() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let run = Finished::new(&case, &ended);
-    // Its camera sent all frames, except those dropped on a loaded machine.
+    // The camera sent all frames, except those dropped on a loaded machine.
     let unsent = &run.report["recorded"]["summary"]["frames_dropped_by_capture"];
     let unsent = unsent.as_u64().unwrap();
     assert!(2 * unsent < run.view(1, "dropped"), "{:#}", run.report);
@@ -121,7 +121,7 @@ fn a_slow_receiver_does_not_slow_its_sender() {
 
 #[test]
 fn a_process_in_an_endless_computation_is_detected_by_its_missing_progress() {
-    // The time limit alone would detect it after ten minutes.
+    // The time limit alone would only detect the hang after ten minutes.
     let patient = "[supervise]\nhang_limit_s = 600\n";
     let case = Case::new("spins", &[160; 2], &format!("{LIVE}{PACED}{patient}"));
     let spins = "name = \"b\"\nfault = \"spin@60+1\"";

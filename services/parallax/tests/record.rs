@@ -1,4 +1,4 @@
-//! Runs that are recorded and replayed: the later stages give the same results, bit for bit.
+//! Tests of recorded and replayed runs: the later stages give the same results, bit for bit.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -11,7 +11,7 @@ use common::{Case, Ended, PLAIN};
 use recording::Entry;
 use serde_json::{Value, json};
 
-/// Results without their times.
+/// Result files without times.
 const RESULTS: [&str; 4] = ["pose3d.jsonl", "pose3d.csv", "pose2d.jsonl", "pose3d.trc"];
 
 fn recorded(case: &Case, more: &[&str]) -> Value {
@@ -68,7 +68,7 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
             assert!(before == after, "{name} differs when replayed from {from}");
         }
     }
-    // Another setting gives another result, so results are computed and not copied from the recording.
+    // Another setting gives another result, so results are computed, not copied from the recording.
     let other = ["--from", "fuse", "--out", "other", "--set"];
     let ended = replayed(&case, &[&other[..], &["paper.alpha=0.2"]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -77,7 +77,7 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     let ended = replayed(&case, &[&other[..], &["paper.candidates=1"]].concat());
     assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("given by the recording"),
+        ended.stderr.contains("the recording determines this value"),
         "{}",
         ended.stderr
     );
@@ -126,11 +126,7 @@ fn omitted_messages_and_existing_files_are_reported() {
     let elsewhere = [&again[..], &["--set", "output=other"]].concat();
     let ended = case.start(&elsewhere).wait();
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("is there already"),
-        "{}",
-        ended.stderr
-    );
+    assert!(ended.stderr.contains("already exists"), "{}", ended.stderr);
     case.write("run.mcap", "something else");
     let ended = replayed(&case, &[]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
@@ -150,7 +146,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
     let poses = &recording.tracks["view-pose/v8/1"].entries;
     let entry = poses.iter().find(|pose| pose.frame == Some(3)).unwrap();
-    // Behind stamp and times, in the content. Six bytes of a pose move a joint.
+    // This is after stamp and times, in the content. Six changed bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
     file[at..at + 6].iter_mut().for_each(|byte| *byte ^= 0x15);
     case.write("run.mcap", &file);
@@ -169,7 +165,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
         damaged.iter().all(|one| one["chunk"] == *chunk),
         "{damaged:?}"
     );
-    // Which frames are in the chunk depends on how far the stages were behind.
+    // The frames in the chunk depend on how far the stages were behind.
     let frames = damaged.iter().filter_map(|one| one["frame"].as_u64());
     let hurt: Vec<u64> = frames.collect();
     let first = *hurt.iter().min().unwrap();
@@ -185,7 +181,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     }
     assert_eq!(after.lines().count(), N_FRAMES, "{after}");
 
-    // Nothing can be read of the last frames of one view, and of any frame of the other: the run ends where it ended.
+    // The last frames of one view and all frames of the other cannot be read. The replay ends at the same frame as the run.
     for (view, from) in [(0, 4), (1, 0)] {
         let poses = &recording.tracks[&format!("view-pose/v8/{view}")].entries;
         for entry in poses.iter().filter(|pose| pose.frame >= Some(from)) {
@@ -216,7 +212,7 @@ fn a_sender_that_starts_after_the_last_result_is_not_blocked() {
     ];
     let patient = ["--set", patient[0], "--set", patient[1]];
     let mut started = case.start(&[&arguments[..], &patient].concat());
-    // Its frames are not used: all results are there before it starts.
+    // The frames of this view are not used: all results exist before it starts.
     let pid = started.pid_of("replay --stage capture --index 1");
     signal("STOP", pid.into());
     started.until("all results", |folder| {
@@ -228,7 +224,7 @@ fn a_sender_that_starts_after_the_last_result_is_not_blocked() {
     let ended = started.wait();
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    for said in ["without all receivers", "had no room"] {
+    for said in ["before all receivers are connected", "had no room"] {
         assert!(!ended.stderr.contains(said), "{}", ended.stderr);
     }
 }

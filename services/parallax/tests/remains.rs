@@ -1,4 +1,4 @@
-//! Running deployments are listed, and leftovers of a killed run are removed.
+//! Tests that running deployments are listed, and leftovers of a killed run are removed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -10,7 +10,7 @@ use common::started::signal;
 use common::{Case, PACED, Started};
 use serde_json::Value;
 
-/// The deployment of a case in `status`.
+/// Returns the deployment of a case in `status`.
 fn status(case: &Case) -> Option<Value> {
     let ended = case.start(&["status", "--json"]).wait_among_others();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -73,7 +73,7 @@ fn an_unknown_deployment_name_is_refused() {
 #[test]
 fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
     let case = Case::new("stays", &[2; 2], "");
-    // First beside the deployments, then behind a link in place of their directory.
+    // The folder is first beside the deployments, then behind a link in place of their directory.
     let script = "mount -t tmpfs tmpfs /dev/shm\n\
         base=/dev/shm/px-$(id -u); name=$(sed -n 's/^name = \"\\(.*\\)\"/\\1/p' deployment.toml | head -n 1)\n\
         mkdir -m 700 $base; mkdir $base/photos $base/$name\n\
@@ -96,7 +96,7 @@ fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
     assert_eq!(ended.status.code(), Some(0), "{said}{}", ended.stderr);
     for words in [
         "folder clean: 0",
-        "photos: not a deployment: left alone",
+        "photos: not a deployment: ignored",
         "folder clean photos: 1",
         "folder run deployment.toml: 1",
         "is not the directory of a deployment (files in it: 1;",

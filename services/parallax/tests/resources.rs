@@ -1,4 +1,6 @@
-//! Runs without enough shared memory, file descriptors or a free name; leftovers of other users; no network sockets.
+//! Tests of runs without enough shared memory, file descriptors or a free name; of leftovers of other users; and that no network sockets
+//! are
+//! open.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;
@@ -27,7 +29,7 @@ fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal()
     let more = PLAIN.to_owned() + "[supervise]\nmax_restarts = 2\ndeadline_ms = 2000\n";
     let case = Case::new("filling", &[20; 3], &more);
     // A second process fills the rest of the shared memory as soon as the supervisor has its lock, and frees it before the
-    // next run. Five times, and further until it was early enough once.
+    // next run. This is done five times, and then repeated until the process was early enough once.
     let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
         n=0\n\
         for wait in 0 1 3 5 8 0 2 0 4 0 6 0 1 0 3 0 5 0 8 0; do\n\
@@ -72,7 +74,7 @@ fn a_file_that_cannot_grow_is_counted_and_ends_no_process() {
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
     let record = started.pid_of("results").to_string();
-    // The file is larger than that already.
+    // The file is already larger than this limit.
     let limit = "--fsize=1000:1000";
     let set = std::process::Command::new("prlimit").args(["--pid", &record, limit]).status();
     assert!(
@@ -155,7 +157,7 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
             file.and_then(|file| file.set_len(0)).ok();
         }
     }
-    // Usually it ends at once. It may also wait for a truncated file, which it notices after a minute.
+    // Usually the run ends at once. It may also wait for a truncated file, and notices this after a minute.
     let ended = started.wait_among_others();
     assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
     let causes = ["is gone or damaged", "has not answered the supervisor"];
@@ -221,7 +223,7 @@ fn leftovers_of_another_user_are_named_with_a_remedy() {
     }
 }
 
-/// The sockets of a process, by inode.
+/// Returns the sockets of a process, by inode.
 fn sockets(pid: u32) -> BTreeSet<String> {
     let entries = fs::read_dir(format!("/proc/{pid}/fd"));
     let links = entries.into_iter().flatten().flatten();
@@ -256,7 +258,7 @@ fn no_process_of_a_run_has_a_network_socket() {
             assert!(open.is_empty(), "process {pid} has a {protocol} socket");
         }
     }
-    // The sockets for wake-ups have names in the file system: so the listing does find sockets.
+    // The sockets for wake-ups have names in the file system. They show that the listing does find sockets.
     assert!(n_sockets > 10, "{n_sockets}");
     assert_eq!(started.wait().status.code(), Some(0));
 }
@@ -270,7 +272,7 @@ mod long {
     fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("filled", &[300; 3], &more);
-        // The processes are children of the run; one of them is killed when there is no room to start another.
+        // The processes are children of the run. One of them is killed when there is no space to start another.
         let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
             \"$PARALLAX\" run deployment.toml --force --json & run=$!\n\
             while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\
@@ -294,8 +296,7 @@ mod long {
         assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
-        // What the killed process leaves becomes free, so that the next one gets further or less far before there is no room:
-        // the queues, a topic or its wake-up is what is refused first.
+        // The killed process frees memory, so the next one may fail at different places: the queues, a topic or its wake-up is refused.
         for words in [
             "of shared memory",
             "free in /dev/shm",

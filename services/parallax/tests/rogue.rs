@@ -1,5 +1,5 @@
-//! A foreign process publishes invalid messages into a running deployment: they are refused and counted by cause, and the
-//! run goes on.
+//! Tests of a foreign process that publishes invalid messages into a running deployment. They are refused and counted by cause, and the
+//! run continues.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -21,7 +21,7 @@ use serde_json::Value;
 
 const N_FRAMES: usize = 200;
 
-/// A process of the same user that is not part of the deployment, but has access to its shared memory.
+/// A process of the same user that is not part of the deployment, but can access its shared memory.
 struct Rogue {
     bus: Bus,
     _waiter: Waiter,
@@ -68,7 +68,7 @@ impl Rogue {
         }
     }
 
-    /// A valid stamp and timing.
+    /// Returns a valid stamp and timing.
     fn stamp(&self, view: u32, frame: u64) -> (Stamp, Timing) {
         let now = now_nanos();
         let stamp = Stamp {
@@ -85,7 +85,7 @@ impl Rogue {
         (stamp, timing)
     }
 
-    /// Stamps and timings with one wrong value each.
+    /// Returns stamps and timings with one wrong value each.
     fn wrong_stamps(&self, view: u32) -> [(Stamp, Timing); 6] {
         let (stamp, timing) = self.stamp(view, 5);
         let ahead = now_nanos() + 3_600_000_000_000;
@@ -154,7 +154,7 @@ fn send_wrong_evidence(
     loan.send().unwrap();
 }
 
-/// Makes one value of a pose wrong; which one depends on the frame.
+/// Makes one value of a pose wrong. The frame decides which one.
 fn with_wrong_content(mut pose: ViewPose) -> ViewPose {
     let kind = pose.stamp.frame % 4;
     let candidate = &mut pose.candidates[0];
@@ -177,7 +177,7 @@ fn until<T>(mut poll: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-/// A run of two views that has written ten results.
+/// Starts a run of two views, and waits until it has written ten results.
 fn start(name: &str, more: &str) -> (Case, Started, Rogue) {
     let more = more.to_owned() + "[supervise]\nmax_restarts = 50\n";
     let case = Case::new(name, &[N_FRAMES; 2], &more);
@@ -187,7 +187,7 @@ fn start(name: &str, more: &str) -> (Case, Started, Rogue) {
     (case, started, rogue)
 }
 
-/// Checks that a run went on to its end; returns what it refused, as `process cause`.
+/// Checks that a run continued to its end. Returns the messages that it refused, as `process cause`.
 fn refused(case: &Case, ended: &Ended) -> BTreeSet<String> {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
@@ -241,7 +241,7 @@ fn a_foreign_process_cannot_publish_another_type_or_beside_the_right_sender() {
 
 #[test]
 fn invalid_poses_and_evidence_are_refused() {
-    // With lossless delivery the run would wait for the frames that the killed process had received.
+    // With lossless delivery, the run would wait for the frames that the killed process had received.
     let live = PACED.replace("\"paced\"", "\"realtime\"");
     let (case, mut started, rogue) = start("poses", &live);
     let poses: Publisher<ViewPose> = rogue.replace(&mut started, "pose --index 1", |bus| {
@@ -276,7 +276,7 @@ fn invalid_poses_and_evidence_are_refused() {
         send_wrong_evidence(&evidence, (stamp, timing));
         pause();
     }
-    // A valid stamp of a frame that may be due, with wrong content.
+    // This is a valid stamp of a frame that may be due, with wrong content.
     let next = case.lines("pose3d.jsonl").len() as u64;
     for frame in next..next + 24 {
         poses.send(&with_wrong_content(good(frame))).unwrap();
@@ -371,7 +371,7 @@ fn invalid_pairs_are_refused() {
     assert_all(&refused, &["triangulate"], &["index", "sender", "size"]);
 }
 
-/// A result that is accepted, with numbers that no sender of ours writes.
+/// Returns a result that is accepted, with numbers that Parallax never sends.
 fn odd_result(stamp: Stamp, timing: Timing) -> Box<Skeletons> {
     let mut result = Box::<Skeletons>::default();
     (result.stamp, result.timing) = (stamp, timing);

@@ -1,4 +1,4 @@
-//! Cores, priorities and locked memory: applied where permitted, reported where not.
+//! Tests of cores, priorities and locked memory: settings are applied if permitted, and otherwise reported.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 
 use common::{Case, PACED};
 
-/// A line of `/proc/PID/status`.
+/// Returns a value from `/proc/PID/status`.
 fn status_of(pid: u32, key: &str) -> String {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix(key));
@@ -27,7 +27,7 @@ fn processes_run_on_their_configured_cores() {
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     for (process, core) in [("pose-0", first), ("pose-1", last), ("results", last)] {
         let pid = started.pid_of(process);
-        // It logs this before anything else.
+        // The process logs this before anything else.
         let expected = core.to_string();
         started.until(process, |_| {
             status_of(pid, "Cpus_allowed_list:") == expected
@@ -37,7 +37,7 @@ fn processes_run_on_their_configured_cores() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     assert!(
-        !ended.stderr.contains("going on without"),
+        !ended.stderr.contains("continuing without it"),
         "{}",
         ended.stderr
     );
@@ -89,7 +89,7 @@ fn an_unknown_process_is_refused_by_name() {
     );
 }
 
-/// Runs the deployment without the privileges for real-time priority and locked memory; `None` if that is impossible.
+/// Runs the deployment without the privileges for real-time priority and locked memory. Returns `None` if this is impossible.
 fn without_rights(case: &Case) -> Option<Output> {
     let limits = ["--rtprio=0", "--memlock=65536:65536"];
     let program = common::started::parallax();

@@ -1,4 +1,4 @@
-//! The size in which frames are searched, where a deployment sets none; and people who are too small or too large.
+//! Tests of the size of searched frames if a deployment sets none, and of people who are too small or too large.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use core::fmt::Write as _;
@@ -12,7 +12,7 @@ use crate::common::{Case, PLAIN};
 
 const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
 
-/// Cameras of a kind, evenly around the stage, and a deployment that names nothing but them, the rig and the output.
+/// Writes cameras of the same kind, evenly around the stage, and a deployment with only the cameras, the rig and the output.
 fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64) {
     let ring = scene::RigChoice::Ring {
         n: sizes.len(),
@@ -48,7 +48,7 @@ fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64)
     for (camera, [width, height]) in rig.cameras().iter().zip(sizes) {
         let name = &camera.name;
         let file = format!("{name}.png");
-        // The picture is not looked at: only its size is.
+        // Only the size of the picture matters.
         let size = footage::Size::new(*width as usize, *height as usize);
         let shade = 40 + 20 * u8::try_from(text.len() % 7).unwrap();
         footage::Canvas::new(size, [shade; 3]).save_png(&case.path(&file)).unwrap();
@@ -70,20 +70,20 @@ fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
     deployment(&case, &[[1088, 1920]; 4], 1800.0, 1.0);
     let text = said(&case);
     for words in [
-        "is chosen: 0.25, a person is 7",
+        "is set automatically: 0.25, a person is 7",
         "px in 272x480; 4 cameras share the space in which a person of 1.70 m stands",
-        "capture.scale or capture.size sets it",
+        "capture.scale or capture.size overrides this",
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
     deployment(&case, &[[1088, 1920]; 4], 1800.0, 1000.0);
     assert_eq!(said(&case), text, "the same calibration in millimetres");
-    // What a user sets wins, and is not commented on.
+    // A setting of the user takes precedence, without a message.
     for set in ["capture.scale=0.5", "capture.size=[544,960]"] {
         let ended = case.start(&[DRY, &["--set", set]].concat()).wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         assert!(
-            !ended.stdout.contains("scale is chosen"),
+            !ended.stdout.contains("scale is set automatically"),
             "{}",
             ended.stdout
         );
@@ -112,7 +112,7 @@ fn cameras_of_different_sizes_are_told_apart_and_small_people_are_warned_of() {
     );
 }
 
-/// The summary as JSON, and as text.
+/// Returns the summary as JSON and as text.
 fn run(case: &Case, more: &[&str]) -> (Value, String) {
     let summary = |arguments: &[&str]| {
         let ended = case.start(&[&["run", "deployment.toml"], more, arguments].concat()).wait();
@@ -126,7 +126,7 @@ fn run(case: &Case, more: &[&str]) -> (Value, String) {
     )
 }
 
-/// How high the person of a view is in the three frames of `pose2d.jsonl`, pixels: the median.
+/// Returns the median height of a view's person over the three frames of `pose2d.jsonl`, in pixels.
 fn height_in_results(case: &Case, view: &str) -> f64 {
     let lines = case.lines("pose2d.jsonl");
     let of_view = lines.iter().filter(|line| line["view"] == view);
@@ -136,7 +136,7 @@ fn height_in_results(case: &Case, view: &str) -> f64 {
     heights[1]
 }
 
-/// The longer side of the rectangle around parts.
+/// Returns the longer side of the rectangle around parts.
 fn side(parts: &Value) -> f64 {
     let parts = parts.as_array().unwrap();
     let extent = |axis: &str| {
@@ -163,7 +163,7 @@ fn a_run_says_that_people_are_too_small_and_what_to_set() {
     assert_eq!(json["recorded"]["summary"]["person_px"]["a"], json!(px));
     let scale = outside["scale"].as_f64().unwrap();
     assert!((1.0..=2.0).contains(&scale), "{scale}");
-    let advice = format!("(110 to 350 suits the search): set capture.scale = {scale}");
+    let advice = format!("(110 to 350 px are best for the search): set capture.scale = {scale}");
     assert!(text.contains(&advice), "{text}");
 
     let (json, text) = run(&case, &["--set", "capture.size=[96,128]"]);

@@ -1,4 +1,5 @@
-//! A run from keypoints with errors, smoothed live and afterwards, against the truth; and folders that nothing can be made of.
+//! Tests of smoothing: a run from keypoints with errors, smoothed live and afterwards, is compared with the truth. Folders that cannot be
+//! smoothed are refused.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use core::fmt::Write as _;
@@ -15,7 +16,7 @@ use crate::common::{Case, Ended};
 const RATE_HZ: f64 = 30.0;
 const N_FRAMES: usize = 50;
 
-/// A deployment of keypoints that are off by some pixels, with the truth beside it.
+/// Creates a deployment of keypoints that are off by some pixels, with the truth beside it.
 fn case() -> Case {
     let rig = RigChoice::Ring {
         n: 3,
@@ -142,7 +143,7 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
             > 10
     );
     assert_angles(&case);
-    // Without `smooth` the next run has nothing smoothed, not what an earlier one has left.
+    // Without `smooth`, the next run has no smoothed files, not even those of an earlier run.
     let off = [
         "run",
         "deployment.toml",
@@ -157,7 +158,7 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
     );
 }
 
-/// A person with one joint.
+/// Returns a person with one joint.
 fn person(id: u64, joint: JointLine) -> PersonLine {
     PersonLine {
         id,
@@ -167,7 +168,7 @@ fn person(id: u64, joint: JointLine) -> PersonLine {
     }
 }
 
-/// A line with one joint of one person.
+/// Returns a line with one joint of one person.
 fn line(frame: u64, time_s: Option<f64>, joint: JointLine) -> FrameLine {
     FrameLine {
         frame,
@@ -186,7 +187,7 @@ fn each_of_several_people_is_smoothed_alone() {
     let case = Case::new("smooth-two", &[0], "");
     fs::create_dir(case.path("run")).unwrap();
     let at = |frame: u64, id: u64| placed(10.0 * id as f64 + 0.01 * frame as f64, 1e-4);
-    // The other one is not there in frames 20 to 22; nobody is in frame 30; who is followed changes.
+    // The second person is absent in frames 20 to 22, and nobody is present in frame 30. The followed person changes.
     let lines_of_two = (0..50).map(|frame| {
         let mut line = line(frame, Some(frame as f64 / 60.0), at(frame, 1));
         match frame {

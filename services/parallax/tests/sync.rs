@@ -1,4 +1,4 @@
-//! Clocks of cameras that are known: found from keypoints, written into the deployment, and used by a run.
+//! Tests with known clocks of cameras: found from keypoints, written into the deployment, and used by a run.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use core::fmt::Write as _;
@@ -11,15 +11,15 @@ use serde_json::Value;
 
 use crate::common::{Case, Ended};
 
-/// Frames a second of [`case`].
+/// Frames per second of [`case`].
 pub(crate) const RATE_HZ: f64 = 25.0;
 const N_FRAMES: usize = 150;
-/// When the first frame of every camera was taken, seconds: 13.4 frames apart at most.
+/// Time of the first frame of every camera, in seconds. They are at most 13.4 frames apart.
 const BEGIN_S: [f64; 3] = [0.2, 0.736, 0.456];
-/// A comment that has to stay.
+/// A comment that must be kept.
 const COMMENT: &str = "# the second camera hangs from the ceiling";
 
-/// Someone who walks, seen by three cameras.
+/// Returns a scene with a walking person, seen by three cameras.
 pub(crate) fn scene() -> Scene {
     let rig = RigChoice::Ring {
         n: 3,
@@ -33,9 +33,9 @@ pub(crate) fn scene() -> Scene {
     .unwrap()
 }
 
-/// A deployment of keypoints alone.
+/// Creates a deployment that has only keypoints.
 ///
-/// * `time_s`: when each frame of a camera shows the person.
+/// * `time_s`: time of the person in each frame of a camera, in seconds.
 pub(crate) fn case(
     scene: &Scene,
     rig: &Rig,
@@ -112,7 +112,7 @@ fn clocks_are_found_written_and_used() {
     assert_eq!(lines.len(), 6);
     for line in lines {
         let instant = line["frame"].as_u64().unwrap() as f64;
-        // Instant 0 is where the second camera begins: without its clock, people would be half a metre apart.
+        // Instant 0 is the beginning of the second camera. Without the camera's clock offset, people would be half a metre apart.
         let truth = scene.joints(BEGIN_S[1] + instant / RATE_HZ);
         let head = &line["people"][0]["joints"]["head"]["position_m"];
         let head = [0, 1, 2].map(|axis| head[axis].as_f64().unwrap_or(f64::NAN));
@@ -147,7 +147,7 @@ fn what_tells_nothing_is_refused_and_nothing_is_written() {
     assert!(ended.stderr.contains("c7"), "{}", ended.stderr);
 }
 
-/// A video of a tenth of a picture a second, with the sounds that begin at some times; false, with a message, without ffmpeg.
+/// Writes a video with one picture in ten seconds, and with sounds that begin at some times. Without ffmpeg, returns false with a message.
 #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 fn video(case: &Case, name: &str, sounds_s: &[f64], length_s: f64) -> bool {
     let mut samples = vec![0_i16; (length_s * 8000.0) as usize];
@@ -209,7 +209,7 @@ fn clocks_are_found_by_the_sounds_of_the_videos() {
     let text = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
     assert_eq!(text.matches("offset_ms = ").count(), 3, "{text}");
 
-    // A camera that heard nothing, and one without a microphone.
+    // One camera recorded only silence, the other has no microphone.
     video(&case, "quiet", &[], 11.0);
     case.edit("deployment.toml", "c2.mp4", "quiet.mp4");
     let ended = estimate(&case, &["--by", "sound"]);

@@ -1,4 +1,4 @@
-//! Facts that the files of cameras hold about themselves, in whole runs: numbers with gaps, tags of orientation.
+//! Tests of whole runs that use facts from the files of cameras: numbers with gaps, orientation tags.
 
 use std::fs;
 
@@ -20,7 +20,7 @@ fn a_gap_in_the_numbers_is_a_missing_picture_of_that_camera() {
             fs::remove_file(case.path(&format!("b/{frame:04}.png"))).unwrap();
         }
         let ended = case.run();
-        let said = "camera \"b\" has no picture of 2 of 6 frames (2 to 3)";
+        let said = "camera \"b\" has no picture for 2 of 6 frames (2 to 3)";
         assert!(ended.stderr.contains(said), "{}", ended.stderr);
         let (lines, due) = (case.lines("pose3d.jsonl"), whole.lines("pose3d.jsonl"));
         assert_eq!(lines.len(), 6);
@@ -50,7 +50,7 @@ fn cameras_that_do_not_begin_with_the_same_number_are_told() {
     }
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     assert!(
-        ended.stderr.contains("numbers of their own"),
+        ended.stderr.contains("are numbered separately"),
         "{}",
         ended.stderr
     );

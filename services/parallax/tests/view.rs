@@ -1,4 +1,4 @@
-//! The page of `parallax view`: what a browser gets of a running deployment and of a finished one, and who is refused.
+//! Tests of the page of `parallax view`: the data that a browser gets of a running deployment and of a finished one, and refused requests.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -14,12 +14,12 @@ use common::{Case, PACED, Started};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket, client};
 
-/// The side of the browser.
+/// The browser's end of the connection.
 struct Page {
     socket: WebSocket<TcpStream>,
 }
 
-/// A running `parallax view`, and where it listens.
+/// A running `parallax view`, and its address.
 struct View {
     started: Started,
     address: String,
@@ -52,13 +52,13 @@ impl View {
         Page { socket }
     }
 
-    /// Status line and content of what is asked for.
+    /// Returns status and content of the response to a request.
     fn get(&self, path: &str, host: &str, more: &str) -> (u16, String) {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(WATCHDOG)).unwrap();
         let asked =
             format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n{more}\r\n");
-        // The other side may have refused and closed before all was sent.
+        // The server may have refused and closed the connection before everything was sent.
         let _sent = stream.write_all(asked.as_bytes());
         let mut text = Vec::new();
         let _read = stream.read_to_end(&mut text);
@@ -80,7 +80,7 @@ impl Page {
         self.socket.send(Message::Text(text.into())).unwrap();
     }
 
-    /// The first message for which `take` has an answer.
+    /// Returns the result of `take` for the first message for which it has one.
     fn until<T>(&mut self, what: &str, mut take: impl FnMut(&Message) -> Option<T>) -> T {
         let begin = Instant::now();
         loop {
@@ -92,7 +92,7 @@ impl Page {
         }
     }
 
-    /// The first text of a type that is as it should be.
+    /// Returns the first text of a type that meets a condition.
     fn text(&mut self, kind: &str, is_it: impl Fn(&Value) -> bool) -> Value {
         self.until(kind, |message| {
             let value: Value = serde_json::from_str(message.to_text().ok()?).ok()?;
@@ -100,7 +100,7 @@ impl Page {
         })
     }
 
-    /// The view, the frame and the pixels of the next picture.
+    /// Returns the view, the frame and the pixels of the next picture.
     fn picture(&mut self) -> (u8, u64, [u32; 2]) {
         self.until("picture", |message| {
             let Message::Binary(bytes) = message else {
@@ -152,7 +152,7 @@ fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
     finished(&case);
 }
 
-/// A page about what that run has left: its folder, its recording, and either cut off.
+/// Checks a page about a finished run: its folder, its recording, and truncated versions of both.
 fn finished(case: &Case) {
     let out = fs::read_dir(case.path("out")).unwrap();
     let names = out.map(|out| out.unwrap().file_name().into_string().unwrap());
@@ -175,7 +175,7 @@ fn finished(case: &Case) {
         assert_eq!(last["frame"], hello["last"], "beyond the end is the end");
         view.end();
     }
-    // Cut off in the middle of a line, and in the middle of a message.
+    // The files are truncated in the middle of a line, and in the middle of a message.
     for (name, subject) in [("out/pose3d.jsonl", "out"), (&recording, &recording)] {
         let whole = fs::read(case.path(name)).unwrap();
         case.write(name, &whole[..whole.len() / 2 + 7]);
@@ -233,7 +233,7 @@ fn other_sites_strange_requests_and_nonsense_are_refused_and_the_page_goes_on() 
         let _refused = deep.socket.send(Message::Binary(vec![0; 99].into()));
     }
     view.open().text("hello", |value| value["mode"] == "waiting");
-    // Without a token nothing but the loopback.
+    // Without a token, only the loopback is allowed.
     let short = case.path("short");
     fs::write(&short, "short").unwrap();
     let ended = case

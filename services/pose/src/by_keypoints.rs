@@ -1,4 +1,4 @@
-//! Takes what another program found in a frame.
+//! Reads the keypoints that another program found in a frame.
 
 use failure::Failure;
 use messages::{Stamp, Status};
@@ -8,7 +8,7 @@ use crate::memory::KeypointState;
 use crate::view::{Found, View};
 
 impl View<'_> {
-    /// Takes the people of a frame. A frame whose file cannot be read is refused, with a warning the first time; a frame
+    /// Reads the people of a frame. If the file cannot be read, the frame is refused, with a warning the first time. A frame
     /// without a file has nobody in it.
     pub(crate) fn take(
         &self,

@@ -1,4 +1,4 @@
-//! Looks at a frame with a network that finds keypoints.
+//! Searches a frame with a network that finds keypoints.
 
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
@@ -10,7 +10,7 @@ use crate::memory::NetworkState;
 use crate::view::{Found, View};
 
 impl View<'_> {
-    /// Looks at a frame. One that the network cannot answer for is refused, with a warning the first time.
+    /// Searches a frame. If the network fails, the frame is refused, with a warning the first time.
     pub(crate) fn look(
         &self,
         step: &NetworkStep,
@@ -21,11 +21,7 @@ impl View<'_> {
         if let Err(error) = step.look(image, &mut state.memory) {
             if !state.has_failed {
                 let error = failure::wording::in_one_line(&error);
-                tracing::warn!(
-                    frame = stamp.frame,
-                    error,
-                    "the network has no answer for a frame"
-                );
+                tracing::warn!(frame = stamp.frame, error, "the network failed on a frame");
                 state.has_failed = true;
             }
             return Ok(Err(Status::BAD_INPUT));
@@ -35,7 +31,7 @@ impl View<'_> {
         Ok(found)
     }
 
-    /// The people of a frame that was looked at, and their maps.
+    /// Returns the people of a searched frame, with their maps.
     pub(crate) fn seen(
         &self,
         step: &NetworkStep,

@@ -1,4 +1,4 @@
-//! Task of the process.
+//! The job of the process.
 
 use core::time::Duration;
 
@@ -10,31 +10,31 @@ use pipeline::{NetworkStep, ViewStep};
 /// Keypoints that another program found in the footage of a view.
 #[derive(Debug)]
 pub struct Keypoints {
-    /// Step that makes evidence of them.
+    /// Step that turns the keypoints into evidence.
     pub step: NetworkStep,
-    /// Where they are.
+    /// Source of the keypoints.
     pub source: Source,
 }
 
-/// Files of keypoints, as frames of the pipeline.
+/// Keypoint files, mapped to frames of the pipeline.
 #[derive(Debug)]
 pub struct Source {
     /// The files.
     pub files: KeypointSource,
-    /// Which frame of them belongs to each common instant, where cameras have clocks of their own.
+    /// For cameras with clocks of their own: the frame of the files that belongs to each common instant.
     pub timeline: Option<Timeline>,
-    /// From pixels of the footage to pixels of the frame: `[[a, b, c], [d, e, f]]`.
+    /// Mapping from pixels of the footage to pixels of the frame: `[[a, b, c], [d, e, f]]`.
     pub frame_from_source: [[f64; 3]; 2],
 }
 
 impl Source {
-    /// Reads the people of a frame, pixels of the frame; nobody if no file has it.
+    /// Reads the people of a frame, in pixels of the frame. There is nobody if no file has the frame.
     ///
-    /// * `people`: replaced by them.
+    /// * `people`: replaced by the people of the frame.
     ///
     /// # Errors
     ///
-    /// A file cannot be read; `people` is empty then.
+    /// Fails if a file cannot be read; `people` is then empty.
     pub fn read(
         &self,
         frame: u64,
@@ -56,16 +56,16 @@ impl Source {
 /// The single-view step.
 #[derive(Debug)]
 pub enum Step {
-    /// By the filters of a model.
+    /// The filters of a model search the frames.
     Filters(Box<ViewStep>),
-    /// By a network that finds keypoints.
+    /// A network finds keypoints in the frames.
     Network(Box<NetworkStep>),
-    /// By keypoints that another program found.
+    /// Keypoints from another program are read.
     Keypoints(Box<Keypoints>),
 }
 
 impl Step {
-    /// Width and height of the frames.
+    /// Returns the width and height of the frames.
     pub(crate) fn size(&self) -> [usize; 2] {
         match self {
             Self::Filters(step) => step.layout().image_size,
@@ -75,27 +75,27 @@ impl Step {
     }
 }
 
-/// Task of the process of one view.
+/// The job of the process of one view.
 #[derive(Debug)]
 pub struct Job {
-    /// The view.
+    /// Index of the view.
     pub view: usize,
     /// The single-view step.
     pub step: Step,
-    /// Number of extra keypoints of a candidate.
+    /// Number of extra keypoints per candidate.
     pub n_extras: usize,
-    /// Processes that receive the candidates.
+    /// Number of processes that receive the candidates.
     pub n_pose_consumers: usize,
-    /// Processes that receive the evidence.
+    /// Number of processes that receive the evidence.
     pub n_evidence_consumers: usize,
-    /// First frame that is used.
+    /// First frame to use.
     pub start_frame: u64,
-    /// Distance between the frames used.
+    /// Distance between used frames.
     pub frame_step: u64,
-    /// Frame rate of the footage, if known; limits how far a pose may have moved.
+    /// Frame rate of the footage, if known. It limits how far a pose may have moved.
     pub frame_rate_hz: Option<f64>,
-    /// `Network`: most frames of the footage from one in which people are seen to the next one in which they can be followed.
+    /// For `Network`: largest number of frames of the footage between two frames in which the same people can be followed.
     pub most_apart: Option<f64>,
-    /// How long the process waits for receivers.
+    /// Time that the process waits for receivers.
     pub patience: Duration,
 }

@@ -1,4 +1,4 @@
-//! Receives frames, sends single-view candidates and their evidence.
+//! Finds people in single views: receives frames, and sends candidates with their evidence.
 #![forbid(unsafe_code)]
 
 mod by_keypoints;

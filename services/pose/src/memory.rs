@@ -7,20 +7,20 @@ use pipeline::NetworkMemory;
 
 /// State that is kept from frame to frame.
 pub(crate) enum Memory {
-    /// The last pose, and responses that do not lie in shared memory.
+    /// The last pose, and responses that are not in shared memory.
     Filters(Tracker, Vec<f32>),
     Network(Box<NetworkState>),
     Keypoints(Box<KeypointState>),
 }
 
-/// How long nobody is seen before a warning says so, nanoseconds: a minute.
+/// Time without a person after which a warning is logged, in nanoseconds: a minute.
 const LONG_NANOS: u64 = 60_000_000_000;
 
-/// State of a view that a network looks at.
+/// State of a view whose frames a network searches.
 #[derive(Debug, Default)]
 pub(crate) struct NetworkState {
     pub(crate) memory: NetworkMemory,
-    /// When a person was seen last, or a warning was given, and the number of frames since.
+    /// Time of the last person or the last warning, and number of frames since.
     pub(crate) nobody: Option<(u64, u64)>,
     /// True if a failure of the network was reported.
     pub(crate) has_failed: bool,
@@ -35,7 +35,7 @@ impl NetworkState {
             self.nobody = None;
         } else if now.saturating_sub(since) >= LONG_NANOS {
             tracing::warn!(
-                "nobody was seen in the last {} frames ({} s): is a person there, and does the detector fit (network.detector)?",
+                "nobody was seen in the last {} frames ({} s): is there a person, and is the detector suitable (network.detector)?",
                 n + 1,
                 now.saturating_sub(since) / 1_000_000_000
             );
@@ -51,6 +51,6 @@ impl NetworkState {
 pub(crate) struct KeypointState {
     pub(crate) memory: NetworkMemory,
     pub(crate) people: Vec<SeenKeypoints>,
-    /// True if a file that cannot be read was reported.
+    /// True if an unreadable file was reported.
     pub(crate) has_failed: bool,
 }

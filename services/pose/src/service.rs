@@ -13,7 +13,7 @@ use crate::view::View;
 ///
 /// # Errors
 ///
-/// Errors of the transport.
+/// Fails with errors of the transport.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut stage = Stage::new(service, job.patience);
     let view = View {

@@ -1,10 +1,10 @@
-//! From the section `[paper]` of a deployment to the settings of the single-view step.
+//! Converts the section `[paper]` of a deployment to the settings of the single-view step.
 
 use deployment::paper::{Config, Search};
 use fmp::TrackSettings;
 use pipeline::ViewSettings;
 
-/// The settings of the single-view step, without what is read of files.
+/// Returns the settings of the single-view step, without those that are read from files.
 pub fn settings(config: &Config) -> ViewSettings {
     ViewSettings {
         n_candidates: config.candidates,

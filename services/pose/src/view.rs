@@ -1,4 +1,4 @@
-//! Searches a frame, writes its evidence into shared memory, sends what was found and the evidence.
+//! Searches a frame, writes its evidence into shared memory, and sends the poses and the evidence.
 
 use std::rc::Rc;
 
@@ -17,11 +17,11 @@ use crate::memory::Memory;
 
 /// Poses found in a frame, and the evidence if a process receives it.
 pub(crate) struct Found<'a> {
-    /// Without stamp and times, as `header`.
+    /// The message, with a header without stamp and times.
     pub(crate) message: ViewPose,
     pub(crate) header: EvidenceHeader,
     pub(crate) evidence: Option<Loan<'a, f32, EvidenceHeader>>,
-    /// How long the stage waited for the memory of the evidence.
+    /// Time that the stage waited for the memory of the evidence, in nanoseconds.
     pub(crate) loan_nanos: u64,
 }
 
@@ -42,7 +42,7 @@ pub(crate) struct View<'a> {
 }
 
 impl View<'_> {
-    /// Searches a frame, and sends what was found.
+    /// Searches a frame, and sends the poses that were found.
     pub(crate) fn process(&self, frame: StreamFrame, memory: &mut Memory) -> Result<(), Failure> {
         let StreamFrame { nth, sample, turn } = frame;
         let outcome = self.solve(&sample, nth, memory)?;
@@ -81,7 +81,7 @@ impl View<'_> {
         Ok(())
     }
 
-    /// The estimate and its evidence, or why there is none.
+    /// Returns the candidates with their evidence, or the reason why there are none.
     fn solve(
         &self,
         sample: &Sample<u8, FrameHeader>,
@@ -97,7 +97,7 @@ impl View<'_> {
         let image = match Rgb8View::new(size[0], size[1], sample.payload()) {
             Ok(image) if size == expected => image,
             _ => {
-                tracing::warn!(?size, ?expected, "a frame of another size");
+                tracing::warn!(?size, ?expected, "a frame with another size");
                 return Ok(Err(Status::BAD_INPUT));
             }
         };
@@ -131,7 +131,7 @@ impl View<'_> {
         let scope = tracker.scope(layout, at);
         let mut found = self.find(step, (image, scope), responses)?;
         if step.needs_full_search(tracker, &found.estimate) {
-            // Its memory for evidence is released first.
+            // The memory for evidence is released first.
             drop(found);
             found = self.find(step, (image, Scope::whole(layout)), responses)?;
         }
@@ -142,7 +142,7 @@ impl View<'_> {
         found.message(layout).or_fail(ExitKind::Run)
     }
 
-    /// Searches a frame. Responses that a process receives are written into shared memory directly.
+    /// Searches a frame. If a process receives the responses, they are written directly into shared memory.
     fn find(
         &self,
         step: &ViewStep,
@@ -171,7 +171,8 @@ impl View<'_> {
         })
     }
 
-    /// Memory for the evidence of a frame, and how long the stage waited for it; none where no process receives evidence.
+    /// Returns memory for the evidence of a frame, and the time that the stage waited for it. Returns `None` if no process receives
+    /// evidence.
     pub(crate) fn loan(
         &self,
         n_values: usize,
@@ -186,7 +187,7 @@ impl View<'_> {
 }
 
 impl<'a> Searching<'a> {
-    /// The candidates, the search mode, and the size of their evidence.
+    /// Returns the message with candidates, search mode, and size of the evidence.
     fn message(self, layout: &Layout) -> Result<Found<'a>, WireError> {
         let estimate = &self.estimate;
         let mut message = wire::candidates_to_message(&estimate.candidates, layout.image_size)?;

@@ -1,4 +1,4 @@
-//! Receives frames and candidates, sends the expected error of every part.
+//! Predicts the expected error of every part: receives frames and candidates, and sends expected errors.
 #![forbid(unsafe_code)]
 
 mod service;

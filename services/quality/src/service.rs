@@ -12,33 +12,33 @@ use stage::{Context, Stage};
 use viewquality::{ForecastInput, Forecaster, Predictor};
 use wire::WireError;
 
-/// Task of the process of one view.
+/// The job of the process of one view.
 #[derive(Debug)]
 pub struct Job {
-    /// The view.
+    /// Index of the view.
     pub view: usize,
-    /// Where expected errors come from.
+    /// Source of the expected errors.
     pub source: Source,
     /// Pixels of the frame per pixel of the footage.
     pub frame_scale: f32,
-    /// Distance between the frames used, at least 1.
+    /// Distance between used frames, at least 1.
     pub frame_step: u64,
-    /// Processes that receive the expected errors.
+    /// Number of processes that receive the expected errors.
     pub n_consumers: usize,
-    /// How long the process waits for them.
+    /// Time that the process waits for its receivers.
     pub patience: Duration,
 }
 
-/// Where expected errors come from.
+/// Source of expected errors.
 #[derive(Debug)]
 pub enum Source {
-    /// A table, in pixels of the footage.
+    /// A table of errors in pixels of the footage.
     Table(Predictor),
-    /// A network that is run on the frames.
+    /// A network that searches the frames.
     Network(Box<NetworkSource>),
 }
 
-/// A network, and the model and pyramid of the view.
+/// A network, with the model and the pyramid of the view.
 #[derive(Debug)]
 pub struct NetworkSource {
     /// The network.
@@ -53,7 +53,7 @@ pub struct NetworkSource {
 ///
 /// # Errors
 ///
-/// Errors of the transport.
+/// Fails with errors of the transport.
 pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
     let view = job.view;
     let frame_scale = job.frame_scale;
@@ -99,12 +99,12 @@ fn from_table(
     wire::sigma_to_message(sigma_px.as_deref()).or_fail(ExitKind::Run)
 }
 
-/// The message without a prediction.
+/// Returns the message for a frame without a prediction.
 fn no_prediction() -> Result<ViewQuality, Failure> {
     wire::sigma_to_message(None).or_fail(ExitKind::Run)
 }
 
-/// The candidates of a view, and how well the parts of the first one fit.
+/// The candidates of a view, and the scores of the first candidate's parts.
 type Candidates = (Vec<Pose>, Vec<LocalScore>);
 
 fn candidates(source: &NetworkSource, pose: &ViewPose) -> Result<Candidates, WireError> {
@@ -113,8 +113,8 @@ fn candidates(source: &NetworkSource, pose: &ViewPose) -> Result<Candidates, Wir
     Ok((candidates, scores))
 }
 
-/// Runs the network on the best candidate, on the frame in shared memory. If that fails, the message has no prediction and
-/// the cause is logged: fusion can still use the view without its expected errors.
+/// Runs the network on the best candidate, on the frame in shared memory. If that fails, the cause is logged, and the message has no
+/// prediction. Fusion can still use the view without expected errors.
 fn predict(
     source: &mut NetworkSource,
     (candidates, scores): Candidates,
@@ -126,7 +126,7 @@ fn predict(
         return no_prediction();
     }
     let Some(frame) = frame else {
-        tracing::debug!(frame_number, "the frame is gone");
+        tracing::debug!(frame_number, "the frame does not exist any more");
         return no_prediction();
     };
     let [width, height] = layout.image_size;
@@ -135,7 +135,7 @@ fn predict(
     let image = match Rgb8View::new(width, height, frame.payload()) {
         Ok(image) if has_expected_size => image,
         _ => {
-            tracing::warn!(frame_number, "a frame of another size");
+            tracing::warn!(frame_number, "a frame with another size");
             return no_prediction();
         }
     };

@@ -1,9 +1,9 @@
-//! From `paper.errors` of a deployment to the rows of its table.
+//! Converts `paper.errors` of a deployment to a selection of rows in its table.
 
 use deployment::paper::ErrorTable;
 use viewquality::Selection;
 
-/// The rows of the table that are of the footage.
+/// Returns the rows of the table that belong to the footage.
 pub fn selection(table: &ErrorTable) -> Selection {
     Selection {
         subject: table.subject.clone().unwrap_or_default(),

@@ -1,6 +1,6 @@
-//! Messages for Foxglove, which shows such a recording as it is: its own message types as JSON, beside ours.
+//! Messages for Foxglove, in its own message types as JSON, besides Parallax's messages. With them, Foxglove can show a recording directly.
 //!
-//! The schemas (`foxglove/`) are those of Foxglove, of `@foxglove/schemas` 2.1.0 without descriptions (MIT licence).
+//! The schemas (`foxglove/`) are those of `@foxglove/schemas` 2.1.0, without descriptions (MIT licence).
 
 use std::collections::BTreeSet;
 
@@ -16,39 +16,39 @@ use recording::{Foreign, Kind, Message};
 use serde_json::{Value, json};
 use skeleton::JointSet;
 
-/// Quality of the JPEG files, percent.
+/// Quality of the JPEG files, in percent.
 const QUALITY: u8 = 75;
-/// The frame of reference of the skeleton.
+/// Frame of reference of the skeleton.
 const WORLD: &str = "world";
-/// Diameter of a joint, metres.
+/// Diameter of a joint, in metres.
 const JOINT_M: f64 = 0.04;
-/// Width of a line between joints, metres.
+/// Width of a line between joints, in metres.
 const LINE_M: f64 = 0.02;
-/// Standard deviations within which a point in space lies with 95 %.
+/// Number of standard deviations that contain a point in space with a probability of 95 %.
 const SPREAD: f64 = 2.796;
-/// Largest ellipsoid, metres; larger ones would hide everything.
+/// Maximum size of an ellipsoid, in metres. Larger ones would hide everything.
 const LARGEST_M: f64 = 2.0;
 
 /// The cameras and joints of a run.
 #[derive(Debug, Clone)]
 pub struct Stage {
-    /// The cameras as their frames show the world, in the order of views.
+    /// Cameras as their frames show the world, in the order of views.
     pub cameras: Vec<Camera>,
-    /// The joints of the result.
+    /// Joints of the result.
     pub joints: &'static JointSet,
 }
 
-/// Makes messages of Foxglove from ours.
+/// Creates messages for Foxglove from Parallax's messages.
 #[derive(Debug)]
 pub(crate) struct Foxglove {
     stage: Stage,
-    /// True if the places of the cameras have been written.
+    /// True if the poses of the cameras have been written.
     is_begun: bool,
-    /// The people that were there in the frame before.
+    /// People who were present in the previous frame.
     shown: BTreeSet<u64>,
 }
 
-/// Numbers of its topics; a calibration and a picture of every view follow.
+/// Index of the topic with the scene. A calibration and a picture topic of every view follow.
 const SCENE: usize = 0;
 const TRANSFORMS: usize = 1;
 const VIEWS: usize = 2;
@@ -62,7 +62,7 @@ impl Foxglove {
         }
     }
 
-    /// Its topics; messages name them by their place here.
+    /// Returns the topics. Messages refer to them by their index in this list.
     pub(crate) fn topics(&self) -> Vec<Foreign> {
         let topic = |topic: String, schema_name, schema| Foreign {
             topic,
@@ -96,10 +96,11 @@ impl Foxglove {
         topics
     }
 
-    /// The messages that follow from one of ours, with the numbers of their topics. Before the first stand those about the
-    /// cameras.
+    /// Returns the Foxglove messages for one of Parallax's messages, each with the index of its topic. Messages about the cameras come
+    /// before
+    /// the first one.
     ///
-    /// * `data`: as it is written into the recording.
+    /// * `data`: the message as written to the recording.
     pub(crate) fn messages(&mut self, kind: Kind, data: &[u8]) -> Vec<(usize, String)> {
         let Ok(message) = Message::parse(kind, data) else {
             return Vec::new();
@@ -135,7 +136,7 @@ impl Foxglove {
         all.into_iter().map(text).collect()
     }
 
-    /// Where the cameras are, and how they see.
+    /// Returns messages with the poses and intrinsics of the cameras.
     fn cameras(&self, time: &Value) -> Vec<(usize, Value)> {
         let transform = |camera: &Camera| {
             let world_from_camera = camera.camera_from_world.inverse();
@@ -172,7 +173,7 @@ impl Foxglove {
         Some((VIEWS + 2 * view + 1, message))
     }
 
-    /// Everybody in a frame, each an entity of the person's number; who is no longer there is taken away.
+    /// Returns the people in a frame, one entity per person, named by the person's number. People who are no longer present are removed.
     fn scene(&mut self, frame: &Skeletons, time: &Value) -> Value {
         let people = frame.listed().iter();
         let people = people.filter(|person| person.status == Status::OK);
@@ -261,7 +262,7 @@ fn calibration(camera: &Camera, time: &Value) -> Value {
     })
 }
 
-/// Where a joint lies with 95 %; none where that is not known, or everywhere.
+/// Returns the ellipsoid that contains a joint with a probability of 95 %. Returns `None` if it is unknown or unbounded.
 fn ellipsoid(joint: &Joint3d) -> Option<Value> {
     let [xx, xy, xz, yy, yz, zz] = joint.covariance;
     let covariance = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
@@ -304,7 +305,7 @@ fn is_sided(name: &str) -> bool {
     name.starts_with("right") || name.starts_with("left")
 }
 
-/// The colour of a side of the body, as in reports.
+/// Returns the colour of a side of the body, as in reports.
 fn colour(name: &str, alpha: f64) -> Value {
     let rgb = if name.starts_with("right") {
         [0.90, 0.62, 0.0]

@@ -1,4 +1,4 @@
-//! Writes every message of a deployment into one file, and sends them again from there ([`replay`]).
+//! Records every message of a deployment in one file, and replays recorded messages ([`replay`]).
 #![forbid(unsafe_code)]
 
 mod foxglove;

@@ -1,4 +1,4 @@
-//! Records a deployment that runs already, from a process that is not part of it.
+//! Records a running deployment from a process that is not part of it.
 
 use core::time::Duration;
 use std::time::Instant;
@@ -11,28 +11,28 @@ use crate::queue::queue;
 use crate::service::{Job, Recorder};
 use crate::writer::{Task, create, write_all};
 
-/// How often messages are received: the queues of pictures hold one.
+/// Interval at which messages are received. It is short, because the queues of pictures have space for one.
 const TURN: Duration = Duration::from_millis(4);
-/// How long the last heartbeats are waited for after the last result.
+/// Time to wait for the last heartbeats after the last result.
 const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 
-/// Outcome of a recording.
+/// Result of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kept {
-    /// Messages that were sent meanwhile and are not in the file.
+    /// Messages that were sent during the recording but are not in the file.
     pub n_lost: u64,
 }
 
-/// Writes every message of a deployment until its last result, or until it is asked to end. No sender waits: what does not
-/// fit into the queues is missing in the file, and counted.
+/// Writes every message of a deployment until its last result, or until it is asked to end. No sender waits: messages that do not
+/// fit into the queues are missing in the file, and counted.
 ///
-/// * `bus`: of an onlooker ([`Bus::as_onlooker`]).
-/// * `session`: the run.
-/// * `is_over`: whether to end.
+/// * `bus`: the bus of an onlooker ([`Bus::as_onlooker`]).
+/// * `session`: the session of the run.
+/// * `is_over`: returns true to end the recording.
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the file cannot be created, and what the transport reports.
+/// Fails with [`ExitKind::Input`] if the file cannot be created, and with errors of the transport.
 pub fn look_on(
     bus: &Bus,
     session: u64,
@@ -40,7 +40,10 @@ pub fn look_on(
     is_over: impl Fn() -> bool,
 ) -> Result<Kept, Failure> {
     let file = create(&job.file).map_err(|error| {
-        let text = format!("cannot make the recording {}: {error}", job.file.display());
+        let text = format!(
+            "cannot create the recording {}: {error}",
+            job.file.display()
+        );
         Failure::new(ExitKind::Input, text)
     })?;
     let channels = job.topics.channels(job.about.without);

@@ -1,4 +1,4 @@
-//! The queue of messages to be written. Its size in bytes is bounded; messages that do not fit are counted.
+//! The queue of messages to be written. Its size in bytes is limited; messages that do not fit are counted.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -7,15 +7,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use recording::Entry;
 
-/// Most messages in the queue, whatever their size.
+/// Maximum number of messages in the queue, of any size.
 const MAX_MESSAGES: usize = 1 << 14;
 
 /// A message on its way to the file.
 #[derive(Debug)]
 pub(crate) struct Item {
-    /// The number of its topic.
+    /// Index of the topic.
     pub topic: usize,
-    /// When it was received and sent.
+    /// Times at which the message was received and sent.
     pub entry: Entry,
     /// The bytes to be written.
     pub data: Vec<u8>,
@@ -25,7 +25,7 @@ pub(crate) struct Item {
 struct Shared {
     n_bytes: AtomicU64,
     n_items: AtomicU64,
-    /// The file cannot be written any more.
+    /// True if the file cannot be written any more.
     is_broken: AtomicBool,
     lost: Vec<AtomicU64>,
 }
@@ -48,7 +48,7 @@ impl Shared {
     }
 }
 
-/// The sending end.
+/// The sending end of the queue.
 #[derive(Debug)]
 pub(crate) struct Inlet {
     sender: Sender<Item>,
@@ -56,16 +56,16 @@ pub(crate) struct Inlet {
     max_bytes: u64,
 }
 
-/// The receiving end, of the writing thread.
+/// The receiving end of the queue, for the writing thread.
 #[derive(Debug)]
 pub(crate) struct Outlet {
     receiver: Receiver<Item>,
     shared: Arc<Shared>,
 }
 
-/// Makes a queue.
+/// Creates a queue.
 ///
-/// * `max_bytes`: largest total; a single larger message is accepted if the queue is empty.
+/// * `max_bytes`: limit on the total size. A single larger message is accepted if the queue is empty.
 pub(crate) fn queue(n_topics: usize, max_bytes: u64) -> (Inlet, Outlet) {
     let (sender, receiver) = bounded(MAX_MESSAGES);
     let shared = Arc::new(Shared {
@@ -83,7 +83,7 @@ pub(crate) fn queue(n_topics: usize, max_bytes: u64) -> (Inlet, Outlet) {
 }
 
 impl Inlet {
-    /// Returns true if there is room for a message of `n_bytes`.
+    /// Returns true if there is space for a message of `n_bytes`.
     pub(crate) fn has_room(&self, n_bytes: usize) -> bool {
         let waiting = self.shared.n_bytes.load(Ordering::Acquire);
         let n_items = self.shared.n_items.load(Ordering::Acquire);
@@ -97,7 +97,7 @@ impl Inlet {
         self.shared.is_broken.load(Ordering::Acquire)
     }
 
-    /// Adds a message; `false` if there is no room, and then it is counted.
+    /// Adds a message. If there is no space, counts the message as lost and returns `false`.
     pub(crate) fn push(&self, item: Item) -> bool {
         let (topic, n_bytes) = (item.topic, item.data.len());
         self.shared.add(n_bytes);
@@ -114,7 +114,7 @@ impl Inlet {
         self.shared.lost(topic, n);
     }
 
-    /// Lost messages of a topic.
+    /// Returns the number of lost messages of a topic.
     pub(crate) fn n_lost(&self, topic: usize) -> u64 {
         let count = self.shared.lost.get(topic);
         count.map_or(0, |count| count.load(Ordering::Relaxed))
@@ -122,7 +122,7 @@ impl Inlet {
 }
 
 impl Outlet {
-    /// The next message; `None` after `limit`. An error when the queue is empty and closed.
+    /// Returns the next message, or `None` after `limit`. Returns an error when the queue is empty and closed.
     pub(crate) fn next(&self, limit: Duration) -> Result<Option<Item>, ()> {
         match self.receiver.recv_timeout(limit) {
             Ok(item) => Ok(Some(item)),
@@ -131,19 +131,19 @@ impl Outlet {
         }
     }
 
-    /// Frees the room of a message that has been written.
+    /// Frees the space of a message that has been written.
     pub(crate) fn written(&self, item: &Item) {
         self.shared.remove(item.data.len());
     }
 
-    /// Frees the room of a message that could not be written; no more messages will be written.
+    /// Frees the space of a message that could not be written. No more messages will be written.
     pub(crate) fn lose(&self, item: &Item) {
         self.shared.is_broken.store(true, Ordering::Release);
         self.shared.remove(item.data.len());
         self.shared.lost(item.topic, 1);
     }
 
-    /// Lost messages by topic.
+    /// Returns the numbers of lost messages by topic.
     pub(crate) fn lost(&self) -> Vec<u64> {
         let lost = self.shared.lost.iter();
         lost.map(|count| count.load(Ordering::Relaxed)).collect()

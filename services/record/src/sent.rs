@@ -1,22 +1,22 @@
-//! Counts lost messages: those that senders report, less those received.
+//! Counts lost messages: the difference between reported and received messages.
 
 use std::collections::BTreeMap;
 
 /// The numbers of messages sent and received on one topic.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Sent {
-    /// By epoch of the sender.
+    /// Number of messages reported by the sender, by its epoch.
     reported: BTreeMap<u64, u64>,
     n_received: u64,
-    /// Lost messages that [`Self::lost`] has returned before.
+    /// Number of lost messages that [`Self::lost`] has already returned.
     n_known: u64,
 }
 
 impl Sent {
-    /// Takes a report of the sender.
+    /// Processes a report from the sender.
     ///
-    /// * `epoch`: of the sender.
-    /// * `n_sent`: messages sent in that epoch.
+    /// * `epoch`: epoch of the sender.
+    /// * `n_sent`: number of messages sent in that epoch.
     pub(crate) fn reported(&mut self, epoch: u64, n_sent: u64) {
         let reported = self.reported.entry(epoch).or_default();
         *reported = n_sent.max(*reported);
@@ -27,9 +27,9 @@ impl Sent {
         self.n_received += 1;
     }
 
-    /// Messages lost since the last call.
+    /// Returns the number of messages lost since the last call.
     ///
-    /// Call it when no message is in flight: a message that was sent and is not received yet counts as lost.
+    /// Call it when no messages are in flight: a message that was sent but not yet received counts as lost.
     pub(crate) fn lost(&mut self) -> u64 {
         let sent = self.reported.values().copied().fold(0, u64::saturating_add);
         let lost = sent.saturating_sub(self.n_received);

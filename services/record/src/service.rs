@@ -1,7 +1,7 @@
-//! Receives every message at once; a thread of its own writes them.
+//! Receives every message at once. A separate thread writes the messages.
 //!
-//! With realtime delivery no sender waits for the disk: messages that do not fit into the queue are dropped and counted.
-//! With lossless delivery senders wait while the queue is full, but not for ever.
+//! With realtime delivery, no sender waits for the disk: messages that do not fit into the queue are dropped and counted.
+//! With lossless delivery, senders wait while the queue is full, but not for ever.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -20,23 +20,23 @@ use crate::sent::Sent;
 use crate::topics::{Channel, Topics, counted_by};
 use crate::writer::{Task, create, file_of_life, write_all};
 
-/// Longest wait for room in the queue, with lossless delivery.
+/// With lossless delivery, longest wait for space in the queue.
 const LONGEST_WAIT: Duration = Duration::from_mins(1);
-/// How long the process waits for the last heartbeats after the last result.
+/// Time to wait for the last heartbeats after the last result.
 const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 
-/// Task of the process.
+/// The job of the process.
 #[derive(Debug)]
 pub struct Job {
-    /// The recording.
+    /// Path of the recording.
     pub file: PathBuf,
-    /// Description of the run; its session is replaced by that of the service.
+    /// Description of the run. Its session is replaced by that of the service.
     pub about: About,
     /// The topics of the deployment.
     pub topics: Topics,
-    /// Bytes that may wait to be written.
+    /// Maximum size of the messages that wait to be written, in bytes.
     pub queue_bytes: u64,
-    /// The cameras and joints of what is written for Foxglove besides; none for nothing.
+    /// Cameras and joints for the Foxglove messages; `None` to write none.
     pub foxglove: Option<Stage>,
 }
 
@@ -44,7 +44,7 @@ pub struct Job {
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the file cannot be created, and what the transport reports.
+/// Fails with [`ExitKind::Input`] if the file cannot be created, and with errors of the transport.
 pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let epoch = service.epoch();
@@ -59,7 +59,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     };
     let name = file_of_life(&job.file, epoch);
     let file = create(&name).map_err(|error| {
-        let text = format!("cannot make the recording {}: {error}", name.display());
+        let text = format!("cannot create the recording {}: {error}", name.display());
         Failure::new(kind, text)
     })?;
     let channels = job.topics.channels(job.about.without);
@@ -105,8 +105,8 @@ fn is_complete(file: &std::path::Path) -> bool {
     recording::scan(&mut file).is_ok_and(|recording| recording.extent.is_complete)
 }
 
-/// Reports that the work is finished, and waits for the stop request. Messages are still received and discarded: with
-/// lossless delivery a sender waits for room, and for its receivers before it begins.
+/// Reports that the work is finished, and waits for the stop request. Messages are still received and discarded, because with
+/// lossless delivery a sender waits for space, and waits for its receivers before it begins.
 fn rest(service: &Service, waiter: &Waiter, receivers: &[Receiver]) -> Result<(), Failure> {
     service.health().finished();
     while waiter.wait(Duration::from_millis(50))? != Woken::Stop {
@@ -117,16 +117,16 @@ fn rest(service: &Service, waiter: &Waiter, receivers: &[Receiver]) -> Result<()
     Ok(())
 }
 
-/// Receives everything, and puts it into the queue.
+/// Receives all messages, and puts them into the queue.
 pub(crate) struct Recorder<'a> {
-    /// The process that it belongs to; none for an onlooker, whose senders do not wait.
+    /// The process of the recorder; `None` for an onlooker, for which senders do not wait.
     service: Option<&'a Service>,
-    /// The run that is recorded.
+    /// Session of the recorded run.
     pub(crate) session: u64,
     inlet: &'a Inlet,
     receivers: Vec<Receiver>,
     sent: Vec<Sent>,
-    /// By topic: the topics whose messages it counts.
+    /// For each topic, the topics whose messages it counts.
     counts: Vec<Vec<usize>>,
     n_evidence: Vec<u64>,
     /// True if the last result has been received.
@@ -160,7 +160,7 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// Takes everything that waits.
+    /// Receives all waiting messages.
     pub(crate) fn receive_all(&mut self) -> Result<(), Failure> {
         for topic in 0..self.receivers.len() {
             while let Some(message) = self.receivers[topic].receive(|n| self.has_room(n))? {
@@ -172,7 +172,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Returns true if there is room for a number of bytes; waits for it with lossless delivery.
+    /// Returns true if there is space for a number of bytes. With lossless delivery, waits for space.
     fn has_room(&self, n_bytes: usize) -> bool {
         let Some(service) = self.service else {
             return self.inlet.has_room(n_bytes);
@@ -201,7 +201,7 @@ impl<'a> Recorder<'a> {
         }
         self.is_over |= kind == Kind::Skeletons && message.status == Status::END;
         let log_time = now_nanos();
-        // Some ends of streams have no send time.
+        // Some messages that end a stream have no send time.
         let sent_at = Some(message.sent_at).filter(|nanos| *nanos > 0);
         let entry = Entry {
             log_time,
@@ -226,7 +226,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Counts a message, and takes what it reports about other topics.
+    /// Counts a message, and processes its reports about other topics.
     fn note(&mut self, topic: usize, message: &Received) {
         if let Some([epoch, n_sent]) = message.life {
             for &other in &self.counts[topic] {
@@ -239,15 +239,15 @@ impl<'a> Recorder<'a> {
                 self.sent[other].reported(0, self.n_evidence[topic]);
             }
         }
-        // Senders count everything but the end of a stream: also frames without a picture.
+        // Senders count all messages except the end of a stream, including frames without a picture.
         let counts = message.status != Status::END;
         if counts {
             self.sent[topic].received();
         }
     }
 
-    /// Counts messages that were sent and not received, and logs how many messages of every topic are not in the file.
-    /// Returns the number of all.
+    /// Counts messages that were sent but not received. For every topic, logs how many messages are not in the file. Returns their total
+    /// number.
     pub(crate) fn settle(&mut self, channels: &[Channel]) -> u64 {
         let mut n_lost = 0;
         for (topic, channel) in channels.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The topics of a deployment, and which topics report the number of messages of other topics.
+//! The topics of a deployment, and the topics that report the number of messages on other topics.
 
 use messages::topic;
 use recording::{Kind, Without};
@@ -12,11 +12,11 @@ pub struct Topics {
     pub fused: Vec<String>,
     /// True if there are processes that send expected errors.
     pub has_quality: bool,
-    /// Views whose live cameras' pictures are kept as they came.
+    /// Views with live cameras whose original pictures are kept.
     pub pictures: Vec<usize>,
     /// Names of all processes.
     pub processes: Vec<String>,
-    /// Topics that no process of this machine publishes, as of a host of several; they are not recorded.
+    /// Topics that no process of this machine publishes, in a deployment of several hosts. They are not recorded.
     pub elsewhere: Vec<String>,
 }
 
@@ -25,15 +25,15 @@ pub struct Topics {
 pub(crate) struct Channel {
     pub(crate) kind: Kind,
     pub(crate) name: String,
-    /// `None` if the heartbeats of its sender do not count this topic.
+    /// The process that publishes the topic; `None` if its heartbeats do not count this topic.
     sender: Option<String>,
 }
 
 impl Topics {
-    /// All topics, heartbeats first: when a heartbeat has been read, every message that it counts can be received.
+    /// Returns all topics, heartbeats first. When a heartbeat has been read, all messages that it counts can be received.
     pub(crate) fn channels(&self, without: Without) -> Vec<Channel> {
         let mut channels = Vec::new();
-        // What comes from another host is published by the bridge, whose heartbeats count all of it together.
+        // The bridge publishes the messages from other hosts. Its heartbeats count all of them together.
         let is_here = |text: &String| self.processes.contains(text);
         let mut add = |kind, name: String, sender: Option<String>| {
             if !self.elsewhere.contains(&name) {
@@ -76,11 +76,11 @@ impl Topics {
     }
 }
 
-/// Indices of the topics whose messages a topic counts: heartbeats count the messages of their process, poses announce their
+/// Returns the indices of the topics whose messages a topic counts. Heartbeats count the messages of their process, poses announce their
 /// evidence, and pictures are numbered.
 pub(crate) fn counted_by(counter: &Channel, channels: &[Channel]) -> Vec<usize> {
     let is_counted = |other: &Channel| match counter.kind {
-        // Their numbers count themselves.
+        // Pictures are numbered, so they count themselves.
         Kind::Picture => other.name == counter.name,
         Kind::Health => {
             let sender = other.sender.as_ref();

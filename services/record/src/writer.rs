@@ -12,10 +12,10 @@ use recording::{About, Kind, WriteError, Writer};
 use crate::foxglove::Foxglove;
 use crate::queue::Outlet;
 
-/// Longest time from a message's arrival until it is in the file.
+/// Longest time from the arrival of a message until it is in the file.
 const FLUSH_PERIOD: Duration = Duration::from_secs(1);
 
-/// The file of an epoch of the process: a restarted process writes another file in the same folder.
+/// Returns the path of the file for an epoch of the process. A restarted process writes another file in the same folder.
 pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
     if epoch == 0 {
         return file.to_owned();
@@ -24,7 +24,7 @@ pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
     file.with_extension(format!("{epoch}.{ending}"))
 }
 
-/// Creates a new file, readable by its owner only because it shows people. It is locked while it is being written.
+/// Creates a new file. Only its owner can read it, because it shows people. The file is locked while it is written.
 pub(crate) fn create(file: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     let made = options.write(true).create_new(true).mode(0o600).open(file)?;
@@ -39,7 +39,7 @@ pub(crate) struct Task {
     pub file: File,
     pub about: About,
     pub topics: Vec<String>,
-    /// Messages for Foxglove, if they are written besides.
+    /// Creates the messages for Foxglove, if they are written.
     pub foxglove: Option<Foxglove>,
 }
 
@@ -100,7 +100,7 @@ pub(crate) fn write_all(task: Task, outlet: &Outlet) {
 fn log_error(error: &WriteError) {
     let source = core::error::Error::source(error);
     let why = source.map(ToString::to_string).unwrap_or_default();
-    tracing::error!(%error, why, "the recording ends here; what it holds can be read");
+    tracing::error!(%error, why, "the recording ends here; the messages in it can be read");
 }
 
 #[cfg(test)]

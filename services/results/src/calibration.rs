@@ -1,5 +1,5 @@
-//! Check of the cameras by the poses that every view found on its own: do they stand where the calibration says, and did they take
-//! their pictures when their times say?
+//! Checks the cameras with the poses that every view found on its own. A camera must be where the calibration says, and its pictures must
+//! have been taken at their stated times.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use runfiles::{CameraFit, Contradicted, Exchanged};
 
 use crate::{FrameRecord, Scene, ViewRecord, own};
 
-/// Follows all cameras over a run.
+/// Checks all cameras over a run.
 #[derive(Debug)]
 pub(crate) struct Calibration {
     watch: RigWatch,
@@ -36,15 +36,15 @@ impl Calibration {
         }
     }
 
-    /// Takes in what the views found in a frame, each on its own. Where there are several people, each view may have found
-    /// another one: such a frame says nothing.
+    /// Adds the poses that the views found in a frame, each on its own. A frame with several people is not used, because each view may have
+    /// found another person.
     pub(crate) fn add(&mut self, scene: &Scene, record: &FrameRecord) {
         if record.skeletons.n_seen > 1 {
             return;
         }
         let points: Vec<_> =
             (0..scene.views.len()).map(|view| parts(scene, record, view)).collect();
-        // What networks see in an empty room is somewhere else in each view, and no camera's fault.
+        // In an empty room, networks see false people at different positions in each view, which is not the fault of a camera.
         let is_there = |person: &SkeletonMessage| person.status == Status::OK;
         if !scene.has_maps || record.followed().is_some_and(is_there) {
             self.watch.note(&points);
@@ -57,8 +57,9 @@ impl Calibration {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|value| value * scale);
             fit.without_px = self.watch.without_px(view).map(|value| value * scale);
-            // With the footage of another camera, every camera contradicts the calibration; and one that is late sees a person
-            // who walks ahead of where the others do. One that was moved does not look late.
+            // If the footage of two cameras is exchanged, every camera contradicts the calibration. A late camera also contradicts it
+            // while a person
+            // walks. A moved camera does not look late.
             let is_named =
                 self.watch.is_reported(view) && self.exchanged.is_none() && !fit.out_of_step;
             if is_named && !fit.suspected {
@@ -66,14 +67,14 @@ impl Calibration {
                     camera = scene.views[view].name,
                     residual_px = fit.residual_px,
                     without_px = fit.without_px,
-                    "does not stand where the calibration says"
+                    "is not where the calibration says"
                 );
             }
             fit.suspected = is_named;
         }
     }
 
-    /// Estimates the delay of every camera, and logs once that one is out of step.
+    /// Estimates the delay of every camera, and logs once if a camera is out of step.
     fn follow_steps(
         &mut self,
         scene: &Scene,
@@ -94,29 +95,29 @@ impl Calibration {
             let step = self.steps.step(view);
             fit.offset_ms = step.map(|step| step.offset_ms);
             fit.offset_error_ms = step.map(|step| step.error_ms);
-            // With the footage of another camera, nothing fits.
+            // If the footage of two cameras is exchanged, no delay fits.
             let is_named = self.steps.is_reported(view) && self.exchanged.is_none();
             if is_named && !fit.out_of_step {
                 tracing::warn!(
                     camera = scene.views[view].name,
                     offset_ms = fit.offset_ms,
                     offset_error_ms = fit.offset_error_ms,
-                    "is out of step: its pictures were taken at other times than they say"
+                    "is out of step: its pictures were taken at other times than they state"
                 );
             }
             fit.out_of_step = is_named;
         }
     }
 
-    /// Logs it once.
+    /// Looks for two cameras whose footage is exchanged, and logs them once.
     fn find_exchanged(&mut self, scene: &Scene) {
         let Some(it) = self.swaps.swap().filter(|_| self.exchanged.is_none()) else {
             return;
         };
         let cameras = it.views.map(|view| scene.views[view].name.clone());
         tracing::warn!(
-            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, with the footage of the two \
-             exchanged by {:.1}{}",
+            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, but only by {:.1} if the footage of \
+             the two is exchanged{}",
             cameras[0],
             cameras[1],
             it.degrees,
@@ -124,7 +125,7 @@ impl Calibration {
             if it.is_sure {
                 ""
             } else {
-                "; it may be other two"
+                "; it may also be two other cameras"
             },
         );
         self.exchanged = Some(Exchanged {
@@ -135,7 +136,7 @@ impl Calibration {
         });
     }
 
-    /// Logs it once, as soon as it is known.
+    /// Logs a contradiction between the cameras once, as soon as it is known.
     fn tell_contradiction(&mut self, scene: &Scene) {
         let names = || scene.views.iter().map(|view| view.name.clone());
         let Some(it) = self.contradicted(names()).filter(|_| !self.is_contradiction_told) else {
@@ -150,9 +151,9 @@ impl Calibration {
         );
     }
 
-    /// Returns the contradiction between the cameras, if it has another reason than that two are exchanged.
+    /// Returns the contradiction between the cameras, unless it is explained by two exchanged cameras.
     ///
-    /// * `names`: of the views, in their order.
+    /// * `names`: names of the views, in their order.
     pub(crate) fn contradicted(&self, names: impl Iterator<Item = String>) -> Option<Contradicted> {
         let it = self.swaps.contradiction();
         let it = it.filter(|_| self.exchanged.is_none())?;
@@ -164,30 +165,32 @@ impl Calibration {
         })
     }
 
-    /// The two cameras that look exchanged.
+    /// Returns the two cameras that look exchanged.
     pub(crate) fn exchanged(&self) -> Option<&Exchanged> {
         self.exchanged.as_ref()
     }
 
-    /// The state of every camera, by name.
+    /// Returns the state of every camera, by name.
     ///
-    /// * `names`: of the views, in their order.
+    /// * `names`: names of the views, in their order.
     pub(crate) fn fits(&self, names: impl Iterator<Item = String>) -> BTreeMap<String, CameraFit> {
         names.zip(self.fits.iter().copied()).collect()
     }
 }
 
-/// The parts of a view's own best candidate, named after the side of the body, pixels of the frame; `None` where it sees nobody well.
+/// Returns the parts of a view's own best candidate, named by the side of the body, in pixels of the frame. Returns `None` if the view sees
+/// nobody well.
 fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2]>> {
     let fused = record.fused(view);
-    // Over the maps of networks, fusion leaves out a view that contradicts the others: that is what is looked for here.
+    // With maps of networks, fusion leaves out a view that contradicts the others. Such views must be checked, so this is no reason to
+    // skip the view.
     if fused.is_none() && !scene.has_maps {
         return None;
     }
     let readings = own::readings(scene, record, view)?;
     let is_exchanged = match fused {
         Some(fused) if !scene.has_maps => fused.exchanged == 1,
-        // Networks name sides as they see them; which are those of the body, the solution in space tells.
+        // Networks name sides as they see them. The solution in space shows which side is the person's left.
         _ => own::is_exchanged(scene, record, view, &readings),
     };
     let [named, exchanged] = readings;

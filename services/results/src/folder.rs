@@ -1,4 +1,4 @@
-//! The output folder: files grow beside their final name, and take it when they are whole.
+//! The output folder. Files are written under a temporary name, and renamed when they are complete.
 
 use std::fs::{self, File};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
@@ -6,25 +6,25 @@ use std::path::{Path, PathBuf};
 
 use runfiles::{FrameLine, RunSummary, SmoothReport};
 
-/// The file that says that a folder of pictures was made by a run.
+/// File that marks a folder of pictures as written by a run.
 const MARK: &str = ".parallax";
 
-/// The folder cannot be used.
+/// Error for an output folder that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {doing} {}", path.display())]
 pub struct FolderError {
     /// The attempted action.
     pub doing: &'static str,
-    /// The file or folder.
+    /// Path of the file or folder.
     pub path: PathBuf,
-    /// The error of the operating system.
+    /// Error of the operating system.
     pub source: io::Error,
 }
 
-/// A folder whose files are replaced whole.
+/// A folder whose files are replaced as a whole.
 ///
-/// A file `x` is written as `x.part` and renamed at the end, so that an earlier run's result stays
-/// until a new one is complete, and the name of an unfinished file shows that it is one.
+/// A file `x` is written as `x.part`, and renamed at the end. So the result of an earlier run is kept until the new one is complete,
+/// and the name of an unfinished file shows its state.
 #[derive(Debug)]
 pub struct Folder {
     dir: files::Folder,
@@ -33,16 +33,16 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Opens a folder, which is made if it is not there.
+    /// Opens a folder, and creates it if it does not exist.
     ///
-    /// * `resume`: go on where a killed process stopped, instead of beginning anew.
+    /// * `resume`: true to continue where a killed process stopped, instead of starting again.
     ///
     /// # Errors
     ///
-    /// [`FolderError`].
+    /// Fails with [`FolderError`] if the folder cannot be used.
     pub fn open(dir: &Path, resume: bool) -> Result<Self, FolderError> {
         let dir = files::Folder::create(dir).map_err(|source| FolderError {
-            doing: "make the folder",
+            doing: "create the folder",
             path: dir.to_owned(),
             source,
         })?;
@@ -53,18 +53,18 @@ impl Folder {
         })
     }
 
-    /// Returns true if a run has left all its files there under their final names.
+    /// Returns true if a run has finished all its files there, under their final names.
     pub fn is_finished(dir: &Path, session: u64) -> bool {
         let text =
             files::read_text(&dir.join(RunSummary::FILE), files::SETTINGS).unwrap_or_default();
         RunSummary::parse_session(&text) == Ok(session)
     }
 
-    /// Begins a file.
+    /// Starts a file.
     ///
     /// # Errors
     ///
-    /// [`FolderError`].
+    /// Fails with [`FolderError`] if the file cannot be created.
     pub fn file(&mut self, name: &str) -> Result<File, FolderError> {
         let part = part(name);
         let file = if self.resume {
@@ -80,11 +80,11 @@ impl Folder {
         Ok(file)
     }
 
-    /// Takes room for a file that is written at the end, when the disk may be full.
+    /// Reserves space for a file that is written at the end, when the disk may be full.
     ///
     /// # Errors
     ///
-    /// [`FolderError`].
+    /// Fails with [`FolderError`] if there is not enough space.
     pub fn reserve(&mut self, name: &str, bytes: usize) -> Result<(), FolderError> {
         let part = part(name);
         let is_there = || Ok(self.dir.resume(&part)?.metadata()?.len() == bytes as u64);
@@ -95,24 +95,24 @@ impl Folder {
             }
             self.dir.begin(&part)?.write_all(&vec![b' '; bytes])
         });
-        taken.map_err(|source| self.failed("make room for", name, source))?;
+        taken.map_err(|source| self.failed("reserve space for", name, source))?;
         self.parts.push(name.to_owned());
         Ok(())
     }
 
-    /// Writes a file for which room was taken.
+    /// Writes a file for which space was reserved.
     ///
     /// # Errors
     ///
-    /// The error of the operating system.
+    /// Fails with the error of the operating system.
     pub fn fill(&self, name: &str, text: &str) -> io::Result<()> {
-        // In place: what is emptied first may be taken by others.
+        // The file is overwritten in place: if it were truncated first, other programs could take the space.
         let mut file = self.dir.reopen(&part(name))?;
         file.write_all(text.as_bytes())?;
         file.set_len(text.len() as u64)
     }
 
-    /// Removes what a smoother made of an earlier run: it is not of this one.
+    /// Removes the files that a smoother created from an earlier run, because they do not belong to this one.
     pub(crate) fn remove_smoothed(&self) {
         if !self.dir.path().join(SmoothReport::FILE).exists() {
             return;
@@ -124,16 +124,16 @@ impl Folder {
         }
     }
 
-    /// Leaves a file the name of a part.
+    /// Leaves a file under its temporary name.
     pub fn leave(&mut self, name: &str) {
         self.parts.retain(|part| part != name);
     }
 
-    /// Begins a folder in the folder, empty unless it is resumed.
+    /// Creates a subfolder. It is empty, unless the run is resumed.
     ///
     /// # Errors
     ///
-    /// [`FolderError`].
+    /// Fails with [`FolderError`] if the subfolder cannot be created.
     pub fn folder(&mut self, name: &str) -> Result<PathBuf, FolderError> {
         let path = self.part(name);
         if !self.resume {
@@ -144,21 +144,21 @@ impl Folder {
             let mut mark = inner.begin(MARK)?;
             mark.write_all(b"pictures of a run of parallax\n")
         });
-        marked.map_err(|source| self.failed("make the folder", name, source))?;
+        marked.map_err(|source| self.failed("create the folder", name, source))?;
         self.parts.push(name.to_owned());
         Ok(path)
     }
 
-    /// Where a file is while it grows.
+    /// Returns the path of a file while it is written.
     pub fn part(&self, name: &str) -> PathBuf {
         self.dir.path().join(part(name))
     }
 
-    /// Writes a part anew, as a whole.
+    /// Rewrites an unfinished file as a whole.
     ///
     /// # Errors
     ///
-    /// The error of the operating system; the old part stays.
+    /// Fails with the error of the operating system. The old content is then kept.
     pub(crate) fn rewrite(&self, name: &str, text: &str) -> io::Result<()> {
         let beside = format!("{name}.head.part");
         let written = self.dir.begin(&beside);
@@ -178,16 +178,15 @@ impl Folder {
         }
     }
 
-    /// Gives every file its final name, in the order of their names: `summary.json` after all that it
-    /// speaks of.
+    /// Gives every file its final name, in alphabetical order: `summary.json` comes after the files that it mentions.
     ///
-    /// Returns what failed; the other files get their names all the same.
+    /// Returns the errors. All other files get their names nevertheless.
     pub fn finish(&self) -> Vec<FolderError> {
         let mut names = self.parts.clone();
         names.sort();
         let outcomes = names.iter().map(|name| {
             let (from, to) = (self.part(name), self.dir.path().join(name));
-            // A folder does not take the place of another by renaming.
+            // Renaming a folder does not replace another one, so that one is removed first.
             if from.is_dir() {
                 remove_pictures(&to)?;
             }
@@ -198,12 +197,12 @@ impl Folder {
     }
 }
 
-/// Name of a file while it grows.
+/// Returns the temporary name of a file.
 fn part(name: &str) -> String {
     format!("{name}.part")
 }
 
-/// Removes what a killed writer left after the last whole line.
+/// Removes an incomplete last line that a killed process left.
 fn cut_half_line(file: &mut File) -> io::Result<()> {
     let mut end = file.metadata()?.len();
     let mut block = [0; 4096];
@@ -220,12 +219,12 @@ fn cut_half_line(file: &mut File) -> io::Result<()> {
     file.set_len(0)
 }
 
-/// Removes a folder of pictures if a run has made it: it says so, or numbered pictures are all that it and its
-/// folders hold. A link to a folder is removed, and what it leads to stays.
+/// Removes a folder of pictures if a run has created it. This is the case if the folder has the mark of a run, or if it and its
+/// subfolders contain only numbered pictures. Of a link to a folder, only the link is removed.
 ///
 /// # Errors
 ///
-/// Anything else lies in it: then all of it stays.
+/// Fails if the folder contains anything else. Nothing is removed then.
 pub fn remove_pictures(path: &Path) -> Result<(), FolderError> {
     let failed = |source| FolderError {
         doing: "empty",
@@ -242,18 +241,15 @@ pub fn remove_pictures(path: &Path) -> Result<(), FolderError> {
     if !path.join(MARK).is_file()
         && let Some(other) = other_than_pictures(path, 2).map_err(failed)?
     {
-        let text = format!(
-            "{} is not a picture of a run; move it away",
-            other.display()
-        );
+        let text = format!("{} was not written by a run; move it away", other.display());
         return Err(failed(io::Error::other(text)));
     }
     fs::remove_dir_all(path).map_err(failed)
 }
 
-/// Something in a folder that is not a numbered picture.
+/// Returns a path in a folder that is not a numbered picture, if there is one.
 ///
-/// * `deep`: folders that may lie in each other.
+/// * `deep`: number of levels of subfolders that are searched.
 fn other_than_pictures(folder: &Path, deep: usize) -> io::Result<Option<PathBuf>> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -312,11 +308,11 @@ mod tests {
         let errors = folder.finish();
         let text = format!("{} {}", errors[0], errors[0].source);
         assert!(
-            text.contains("holiday.png is not a picture of a run"),
+            text.contains("holiday.png was not written by a run"),
             "{text}"
         );
         assert!(own.exists() && pictures.join("left/000001.png").exists());
-        // What earlier versions left does not say that it was made by a run.
+        // Earlier versions did not write the mark.
         fs::remove_file(own).unwrap();
         assert!(folder.finish().is_empty());
         assert!(!pictures.join("left").exists());

@@ -10,27 +10,27 @@ use pipeline::Sighting;
 
 use crate::{Missing, Scene};
 
-/// The messages of one view about one frame; `None` where none came.
+/// The messages of one view about one frame; `None` if a message did not come.
 #[derive(Debug, Clone, Default)]
 pub struct ViewRecord {
     /// The frame itself, without its pixels.
     pub frame: Option<FrameHeader>,
-    /// Its candidates.
+    /// Candidates of the view.
     pub pose: Option<ViewPose>,
-    /// Its expected errors.
+    /// Expected errors of the view.
     pub quality: Option<ViewQuality>,
-    /// Its pixels, if they are to be drawn on.
+    /// Pixels of the frame, if a picture is to be drawn.
     pub picture: Option<Picture>,
-    /// Why it has no part in the result, if it has none.
+    /// Reason why the view has no part in the result, if it has none.
     pub missing: Option<Missing>,
 }
 
 /// A frame's pixels, copied for drawing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// Width and height, pixels.
+    /// Width and height, in pixels.
     pub size: [usize; 2],
-    /// RGB, row major.
+    /// RGB pixels, row major.
     pub rgb: Vec<u8>,
 }
 
@@ -39,22 +39,22 @@ pub struct Picture {
 pub struct Absent {
     /// Index of the frame in the footage.
     pub frame: u64,
-    /// Why there is no result.
+    /// Reason why there is no result.
     pub reason: String,
-    /// Why every view would have had no part in it.
+    /// For every view, the reason why it would have had no part in the result.
     pub views: Vec<Missing>,
 }
 
-/// A message of a fusion process, without what it found.
+/// A message of a fusion process, without its poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FusedRecord {
-    /// Index of the pair; 0 for all views at once in space.
+    /// Index of the pair; 0 if all views are solved at once in space.
     pub index: usize,
     /// Status of the result: good, or why it is missing.
     pub status: Status,
-    /// When it was received and sent.
+    /// Times at which the message was received and sent.
     pub timing: Timing,
-    /// The views whose expected errors were used, each with their age in frames plus 1; 0 without any.
+    /// The views whose expected errors were used, each with the age of these in frames plus 1; 0 if none were used.
     pub sigma_ages: [(usize, u16); 2],
 }
 
@@ -94,24 +94,25 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
-    /// The followed person; `None` if there is nobody. Candidates of the views have no names, so their best ones are
+    /// Returns the followed person; `None` if there is nobody. Candidates of views have no identities, so the best candidate of each view
+    /// is
     /// compared with this person.
     pub fn followed(&self) -> Option<&SkeletonMessage> {
         self.skeletons.followed()
     }
 
-    /// Returns the pose of the person who is followed in a view; `None` if it has none.
+    /// Returns the pose of the followed person in a view, if there is one.
     pub(crate) fn fused(&self, view: usize) -> Option<&FusedView> {
         let fused = self.followed()?.listed_views().get(view)?;
         (fused.status == Status::OK).then_some(fused)
     }
 
-    /// Index of the frame in the footage.
+    /// Returns the index of the frame in the footage.
     pub fn frame(&self) -> u64 {
         self.skeletons.stamp.frame
     }
 
-    /// The candidates of a view, best first; none if it had none, or sent what cannot be read.
+    /// Returns the candidates of a view, best first. The list is empty if the view had none, or sent a message that cannot be read.
     pub(crate) fn candidates(&self, scene: &Scene, view: usize) -> Vec<Own> {
         let Some(message) = self.views.get(view).and_then(|view| view.pose.as_ref()) else {
             return Vec::new();
@@ -135,8 +136,8 @@ impl FrameRecord {
         })
     }
 
-    /// The candidate of a view that is the person, as far as the view itself can tell: the best one of the filters; of the people that a
-    /// network sees, the one nearest to where fusion put the person; the largest one where fusion left out the view.
+    /// Returns the candidate of a view that is the followed person, as far as the view itself can tell. With the filters, this is the best
+    /// candidate. With a network, it is the one closest to the fused person, or the largest one if fusion left out the view.
     pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Own> {
         let candidates = self.candidates(scene, view);
         if !scene.has_maps || candidates.len() < 2 {
@@ -158,15 +159,15 @@ impl FrameRecord {
         nearest.map(|(_, own)| own)
     }
 
-    /// How many frames ago the expected errors were predicted that fusion used for a view, at least: the
-    /// workers may differ. `None` if no pair of the view used any.
+    /// Returns the age in frames of the expected errors that fusion used for a view. It is the lowest age, because workers may differ.
+    /// Returns `None` if no pair of the view used any.
     pub(crate) fn sigma_used(&self, view: usize) -> Option<u16> {
         let ages = self.fused.iter().flat_map(|fused| fused.sigma_ages);
         let ages = ages.filter(|(other, _)| *other == view);
         ages.filter_map(|(_, age)| age.checked_sub(1)).max()
     }
 
-    /// The expected errors of a view's parts, pixels of the frame.
+    /// Returns the expected errors of a view's parts, in pixels of the frame.
     pub(crate) fn sigma_px(&self, scene: &Scene, view: usize) -> Option<Vec<f32>> {
         let message = self.views.get(view)?.quality.as_ref()?;
         wire::sigma_from_message(message, scene.model.n_parts()).ok().flatten()
@@ -176,12 +177,12 @@ impl FrameRecord {
 /// The pose of one person that a view found alone.
 #[derive(Debug, Clone)]
 pub(crate) struct Own {
-    /// The parts of the body, pixels of the frame, by the names of the view; NaN for one that is not seen.
+    /// The parts of the body in pixels of the frame, with the side names of the view. A part that is not seen is NaN.
     pub(crate) centres_px: Vec<[f64; 2]>,
     pub(crate) score: f32,
-    /// True if the view is sure that it is a person.
+    /// True if the view is sure that this is a person.
     pub(crate) is_clear: bool,
-    /// By the paper's method.
+    /// The pose by the paper's method.
     pub(crate) pose: Option<Pose>,
 }
 

@@ -7,13 +7,13 @@ use messages::{FrameHeader, MAX_VIEWS, Skeletons, Status, ViewPose, ViewQuality}
 use crate::missing::ViewHistory;
 use crate::{Absent, FrameRecord, FusedRecord, Missing, Picture, ViewRecord};
 
-/// Most frames that wait for their results; the oldest are discarded first.
+/// Maximum number of frames that wait for their results. The oldest are discarded first.
 const MAX_FRAMES: usize = 512;
 
-/// Most consecutive frames without a result (hours of them); a result further ahead has a wrong frame number.
+/// Maximum number of consecutive frames without a result (hours of footage). A result further ahead has a wrong frame number.
 const MAX_ABSENT: u64 = 1 << 20;
 
-/// Most pairs of a frame.
+/// Maximum number of pairs of a frame.
 const MAX_PAIRS: usize = MAX_VIEWS * (MAX_VIEWS - 1) / 2;
 
 /// The messages about frames whose results have not been received yet.
@@ -21,21 +21,21 @@ const MAX_PAIRS: usize = MAX_VIEWS * (MAX_VIEWS - 1) / 2;
 pub(crate) struct Gather {
     frames: BTreeMap<u64, Parts>,
     histories: Vec<ViewHistory>,
-    /// The latest epoch of the process that sends results.
+    /// Latest epoch of the process that sends results.
     epoch: u32,
-    /// The first frame that has no line yet.
+    /// The first frame without a line in the output.
     next: u64,
     frame_step: u64,
     /// True if an earlier epoch of this process was killed, and no result has been received since.
     is_resumed: bool,
 }
 
-/// Frames that a result settles.
+/// Frames that are complete once a result has been received.
 #[derive(Debug)]
 pub(crate) struct Settled {
-    /// Frames before it without a result, in order.
+    /// Earlier frames without a result, in order.
     pub(crate) absent: Vec<Absent>,
-    /// The record of its frame.
+    /// Record of the result's frame.
     pub(crate) record: FrameRecord,
 }
 
@@ -46,8 +46,10 @@ struct Parts {
 }
 
 impl Gather {
-    /// * `next`: the first frame that has no line yet.
-    /// * `is_resumed`: whether an earlier epoch of this process was killed.
+    /// Creates a collection without frames.
+    ///
+    /// * `next`: the first frame without a line in the output.
+    /// * `is_resumed`: true if an earlier epoch of this process was killed.
     pub(crate) fn new(n_views: usize, next: u64, frame_step: u64, is_resumed: bool) -> Self {
         Self {
             frames: BTreeMap::new(),
@@ -59,14 +61,14 @@ impl Gather {
         }
     }
 
-    /// Notes the ports of a view's capture and pose processes that are connected.
+    /// Updates the connected ports of a view's capture and pose processes.
     pub(crate) fn note_ports(&mut self, view: usize, ports: [Vec<u128>; 2]) {
         if let Some(history) = self.histories.get_mut(view) {
             history.note_ports(ports);
         }
     }
 
-    /// Notes a frame, with its pixels if they are to be drawn on.
+    /// Adds a frame, with its pixels if a picture is to be drawn.
     pub(crate) fn frame(&mut self, view: usize, header: &FrameHeader, picture: Option<Picture>) {
         if let Some(history) = self.histories.get_mut(view) {
             history.note_frame(header);
@@ -105,8 +107,8 @@ impl Gather {
         }
     }
 
-    /// Returns true if expected errors of a frame are still on their way: fusion used them, and their sender gives them to one receiver
-    /// after another.
+    /// Returns true if expected errors of a frame will still arrive. Fusion has used them, but their sender serves one receiver after
+    /// another.
     pub(crate) fn awaits_quality(&self, frame: u64) -> bool {
         let Some(parts) = self.frames.get(&frame) else {
             return false;
@@ -115,13 +117,14 @@ impl Gather {
             let record = parts.views.get(view);
             record.is_some_and(|record| record.quality.is_none())
         };
-        // An age of 1: predicted in this frame.
+        // An age of 1 means that the errors were predicted in this frame.
         let mut used = parts.fused.iter().flat_map(|fused| fused.sigma_ages);
         used.any(|(view, age)| age == 1 && is_absent(view))
     }
 
-    /// The record of a frame whose result has been received; earlier frames get no result any more. `None` if the frame has
-    /// been settled already: a restarted sender may send a result again.
+    /// Returns the record of a frame whose result has been received. Earlier frames without a result will not get one. Returns `None` if
+    /// the
+    /// frame is already complete, because a restarted sender may send a result again.
     pub(crate) fn result(&mut self, skeletons: Box<Skeletons>) -> Option<Settled> {
         let frame = skeletons.stamp.frame;
         let n_before = frame.checked_sub(self.next)?;
@@ -148,16 +151,16 @@ impl Gather {
         Some(Settled { absent, record })
     }
 
-    /// The frames after the last result when the stream has ended, up to the end of the longest footage.
+    /// Returns the frames after the last result when the stream has ended, up to the end of the longest footage.
     pub(crate) fn rest(&mut self) -> Vec<Absent> {
         let end = self.histories.iter().filter_map(ViewHistory::end).max();
         let most = self.next.saturating_add(MAX_ABSENT * self.frame_step);
         self.absent(end.unwrap_or(0).min(most), false)
     }
 
-    /// Frames before `end` without a result, and why.
+    /// Returns the frames before `end` without a result, with the reasons.
     ///
-    /// * `is_lost`: whether the process that sends results has been restarted since the last one.
+    /// * `is_lost`: true if the process that sends results has been restarted since the last result.
     fn absent(&mut self, end: u64, is_lost: bool) -> Vec<Absent> {
         let is_resumed = core::mem::take(&mut self.is_resumed);
         let mut absent = Vec::new();
@@ -205,7 +208,7 @@ impl Gather {
     }
 }
 
-/// The reasons of all views, each once.
+/// Returns the reasons of all views, each once.
 fn summary(views: &[Missing]) -> String {
     let reasons: BTreeSet<&str> = views.iter().map(|missing| missing.reason()).collect();
     reasons.into_iter().collect::<Vec<_>>().join(", ")
@@ -322,7 +325,7 @@ mod tests {
             gather.pose(0, &pose(frame));
         }
         gather.pose(1, &pose(8));
-        // Frame 2 was dropped by both views, frame 4 by one.
+        // Both views dropped frame 2, one view dropped frame 4.
         let got = gather.result(skeletons(6)).unwrap();
         let expected = [(0, "dropped, late"), (2, "dropped"), (4, "dropped, late")];
         assert_eq!(reasons(&got.absent), expected);
@@ -344,7 +347,7 @@ mod tests {
     fn frames_after_the_last_result_are_listed_up_to_the_end_of_footage() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.result(skeletons(0)).unwrap();
-        // Its result came too late; there is none of frame 2, and none of the other view.
+        // The pose of frame 1 came too late. There is none of frame 2, and none of the other view.
         gather.pose(0, &pose(1));
         for (view, end) in [(0, 3), (1, 2)] {
             let mut last = pose(end);

@@ -1,4 +1,4 @@
-//! How high people are in the frames that are searched.
+//! Heights of people in the searched frames.
 
 use std::collections::BTreeMap;
 
@@ -7,13 +7,13 @@ use messages::{FusedView, MAX_PARTS, Skeletons, Status};
 
 use crate::Scene;
 
-/// Fewest poses of a view after which its median height is judged.
+/// Minimum number of poses of a view before its median height is judged.
 const MIN_POSES: u64 = 20;
 
 /// Counts the heights of people, by view.
 #[derive(Debug)]
 pub(crate) struct Heights {
-    /// By whole pixels: how many poses.
+    /// For each view, the number of poses by height in whole pixels.
     counts: Vec<BTreeMap<u32, u64>>,
     has_warned: bool,
 }
@@ -26,7 +26,7 @@ impl Heights {
         }
     }
 
-    /// Adds a result; warns once if people are smaller or larger than the search is good for.
+    /// Adds a result. Warns once if people are too small or too large for the search.
     pub(crate) fn add(&mut self, scene: &Scene, frame: &Skeletons) {
         let people = frame.listed().iter();
         for person in people.filter(|person| person.status == Status::OK) {
@@ -42,7 +42,7 @@ impl Heights {
     }
 
     fn warn(&mut self, scene: &Scene) {
-        // A network sees everybody in a window of its own size.
+        // A network sees every person in a window of its own size, so the size in the picture does not matter.
         if self.has_warned || scene.has_maps {
             return;
         }
@@ -56,7 +56,7 @@ impl Heights {
         if let Some((view, px)) = outside {
             self.has_warned = true;
             tracing::warn!(
-                "people are {px:.0} px high in the frames of {}, where {} to {} suits the search: see capture.scale",
+                "people are {px:.0} px high in the frames of {}, but {} to {} px are best for the search: see capture.scale",
                 scene.views[view].name,
                 USABLE_PX[0],
                 USABLE_PX[1],
@@ -64,7 +64,7 @@ impl Heights {
         }
     }
 
-    /// The median of every view, pixels of the frame, by name; none of a view without a pose.
+    /// Returns the median height of every view that has poses, in pixels of the frame, by name.
     pub(crate) fn medians(
         &self,
         names: impl Iterator<Item = String>,
@@ -73,13 +73,13 @@ impl Heights {
     }
 }
 
-/// The longer side of the rectangle around the centres of the parts, pixels of the frame.
+/// Returns the longer side of the rectangle around the centres of the parts, in pixels of the frame.
 pub(crate) fn height_px(fused: &FusedView) -> Option<f64> {
     let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
     geometry::longer_side(parts.iter().copied()).filter(|px| px.is_finite())
 }
 
-/// The lower median.
+/// Returns the lower median.
 fn median(counts: &BTreeMap<u32, u64>) -> Option<f64> {
     let half = counts.values().sum::<u64>().div_ceil(2);
     let mut n = 0;

@@ -1,4 +1,4 @@
-//! Task of the process.
+//! The job of the process.
 
 use std::path::PathBuf;
 
@@ -6,16 +6,16 @@ use deployment::results::Config;
 
 use crate::Scene;
 
-/// Task of the process.
+/// The job of the process.
 #[derive(Debug)]
 pub struct Job {
-    /// Names and geometry that the messages refer to by number.
+    /// Names and geometry to which messages refer by number.
     pub scene: Scene,
-    /// Which files to write.
+    /// Settings that choose the files to write.
     pub config: Config,
     /// The output folder.
     pub output: PathBuf,
-    /// First frame of the footage that is used.
+    /// First frame of the footage to use.
     pub start_frame: u64,
     /// Number of fusion workers.
     pub n_workers: usize,

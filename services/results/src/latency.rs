@@ -1,4 +1,4 @@
-//! Where the time goes: computation, waiting and transport, from the stamps in the messages.
+//! Measures how much time goes into computation, waiting and transport, from the stamps in the messages.
 
 use std::collections::BTreeMap;
 
@@ -8,18 +8,18 @@ use runfiles::{LatencyReport, Percentiles};
 
 use crate::FrameRecord;
 
-/// Longest duration that is resolved, microseconds: an hour.
+/// Longest duration that the histograms resolve, in microseconds: an hour.
 const LONGEST_MICROS: u64 = 3_600_000_000;
 
 /// Collects durations frame by frame.
 ///
-/// A hop is split in two: while the receiver was still busy (its previous message was sent after this
-/// one was) it counts as waiting, what remains as transport. The way of a frame is walked backwards
-/// from the result: the pair that came last, the view whose pose came last.
+/// Each hop has two parts. Waiting is the time in which the receiver was still busy: it sent its previous message after this message
+/// was sent. The rest is transport. The path of a frame is followed backwards
+/// from the result: to the pair that came last, then to the view whose pose came last.
 #[derive(Debug)]
 pub struct Latency {
     histograms: BTreeMap<(Kind, &'static str), Histogram<u32>>,
-    /// When every process sent last, by stage and number.
+    /// Time of the last message of every process, by stage and number.
     sent: BTreeMap<(&'static str, usize), u64>,
     n_workers: usize,
     total: Total,
@@ -45,13 +45,13 @@ const STAGES: [&str; 5] = ["capture", "pose", "quality", "fuse", "triangulate"];
 const HOPS: [&str; 3] = ["capture to pose", "pose to fuse", "fuse to triangulate"];
 
 impl Latency {
-    /// Begins.
+    /// Starts without durations.
     ///
-    /// * `n_workers`: fusion processes, to which pairs are dealt in turn.
+    /// * `n_workers`: number of fusion processes, to which pairs are assigned in turn.
     ///
     /// # Errors
     ///
-    /// Those of the histograms, for bounds that are fixed here: none.
+    /// Fails if the bounds of the histograms are wrong. They are constants, so this does not happen.
     pub fn new(n_workers: usize) -> Result<Self, CreationError> {
         let stages = STAGES.map(|stage| (Kind::Stage, stage));
         let transport = HOPS.map(|hop| (Kind::Transport, hop));
@@ -100,7 +100,7 @@ impl Latency {
         self.remember(record);
     }
 
-    /// The path of a frame, from the result back to its capture.
+    /// Follows the path of a frame, from the result back to its capture.
     fn walk(&mut self, record: &FrameRecord) -> Option<()> {
         let result = record.skeletons.timing;
         let pair = record.fused.iter().max_by_key(|pair| pair.timing.sent_at_nanos)?;
@@ -170,7 +170,7 @@ impl Latency {
         }
     }
 
-    /// How the time so far divides.
+    /// Returns the report about the frames so far.
     pub fn report(&self) -> LatencyReport {
         let of = |kind| {
             let those = self.histograms.iter().filter(move |histogram| histogram.0.0 == kind);
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// One way: capture 10..20, pose 22..52, fuse 53..73, triangulate 75..80.
+    /// A frame on its path: capture 10..20, pose 22..52, fuse 53..73, triangulate 75..80.
     fn timed(frame: u64, start_ms: u64) -> FrameRecord {
         let mut it = record(frame);
         for view in &mut it.views {
@@ -269,7 +269,7 @@ mod tests {
     fn time_behind_a_busy_process_is_waiting_not_transport() {
         let mut latency = Latency::new(1).unwrap();
         latency.add(&timed(0, 0));
-        // The pose process is busy until 52; frame 1 was sent at 30 and taken at 54.
+        // The pose process is busy until 52. Frame 1 was sent at 30 and received at 54.
         let mut second = timed(1, 32);
         for view in &mut second.views {
             if let Some(frame) = &mut view.frame {

@@ -1,7 +1,7 @@
-//! Writes what a deployment leaves behind.
+//! Writes the output files of a deployment.
 //!
-//! Reading order: [`Scene`] (what the numbers in messages mean), [`FrameRecord`] (all messages about
-//! one frame), the writers of one format each, and [`Output`], which puts them together.
+//! Reading order: [`Scene`] (the meaning of the numbers in messages), [`FrameRecord`] (all messages about
+//! one frame), the writers of one format each, and [`Output`], which combines them.
 #![forbid(unsafe_code)]
 
 mod scene;

@@ -1,9 +1,9 @@
-//! A file of lines that are there whole or not at all.
+//! A file that contains only complete lines.
 
 use std::fs::File;
 use std::io::{self, Write as _};
 
-/// A file that grows by whole lines, however full the disk is.
+/// A file that grows by complete lines, even if the disk becomes full.
 #[derive(Debug)]
 pub(crate) struct Lines {
     file: File,
@@ -12,11 +12,13 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
+    /// Takes over a file.
+    ///
     /// * `file`: opened for appending.
     ///
     /// # Errors
     ///
-    /// Its length cannot be found out.
+    /// Fails if the length of the file cannot be determined.
     pub(crate) fn new(file: File) -> io::Result<Self> {
         let len = file.metadata()?.len();
         Ok(Self {
@@ -31,16 +33,16 @@ impl Lines {
         self.len == 0
     }
 
-    /// Returns true if lines could not be written.
+    /// Returns true if some lines could not be written.
     pub(crate) fn lacks_some(&self) -> bool {
         self.lacks_some
     }
 
-    /// Appends lines; if that fails, what was written of them is taken back.
+    /// Appends lines. On failure, a partly written line is removed again.
     ///
     /// # Errors
     ///
-    /// The first error of the operating system.
+    /// Fails with the first error of the operating system.
     pub(crate) fn append(&mut self, text: &str) -> io::Result<()> {
         let written = self.file.write_all(text.as_bytes());
         if written.is_ok() {
@@ -49,7 +51,7 @@ impl Lines {
         }
         self.lacks_some = true;
         if let Err(error) = self.file.set_len(self.len) {
-            tracing::debug!(%error, "cannot take back half a line");
+            tracing::debug!(%error, "cannot remove an incomplete line");
         }
         written
     }

@@ -1,24 +1,24 @@
-//! Why a view has no part in a result.
+//! Reasons why a view has no part in a result.
 
 use messages::{FrameHeader, Status, ViewPose};
 
-/// Why a view has no part in a result.
+/// Reason why a view has no part in a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
-    /// It sent a message without a pose: no person was found, or there was no frame.
+    /// The view sent a message without a pose: no person was found, or there was no frame.
     Empty(Status),
-    /// Its message came too late, or had not come yet.
+    /// The view's message came too late, or had not come yet.
     Late,
-    /// It skipped the frame: a later pose came, or the end of its poses.
+    /// The view skipped the frame: a later pose came, or the end of its poses.
     Dropped,
-    /// Its process, or the one that fuses the views, had died.
+    /// The view's process, or the process that fuses the views, had died.
     Lost,
-    /// Its footage has fewer frames.
+    /// The view's footage has fewer frames.
     Ended,
 }
 
 impl Missing {
-    /// The reason as written to the files of a run.
+    /// Returns the reason as written to the files of a run.
     pub fn reason(self) -> &'static str {
         match self {
             Self::Empty(status) => status.reason(),
@@ -30,32 +30,32 @@ impl Missing {
     }
 }
 
-/// State of one view's processes, by the messages that were received.
+/// State of one view's processes, derived from the received messages.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ViewHistory {
-    /// The connected ports of its capture and pose processes.
+    /// Connected ports of the capture and pose processes.
     ports: [Vec<u128>; 2],
-    /// The latest epoch of its pose process that a message came from.
+    /// Latest epoch of the pose process from which a message came.
     epoch: u32,
-    /// The latest epoch of its pose process that a result used.
+    /// Latest epoch of the pose process that a result used.
     used_epoch: u32,
-    /// A port has disappeared, and no pose has come since.
+    /// True if a port has disappeared, and no pose has come since.
     lost_process: bool,
     last_frame: Option<u64>,
-    /// Its pose process has sent the end of its stream: no pose will come any more.
+    /// True if the pose process has sent the end of its stream, so that no more poses will come.
     has_sent_all: bool,
-    /// The latest epoch of its capture process, and the last frame of that epoch.
+    /// Latest epoch of the capture process, and the last frame of that epoch.
     captured: Option<(u32, u64)>,
-    /// The port of its capture process has disappeared, and no frame of the next epoch has come.
+    /// True if the port of the capture process has disappeared, and no frame of the next epoch has come.
     lost_capture: bool,
-    /// The last frame before that process was restarted, and the first after it.
+    /// Last frame before the capture process was restarted, and first frame after it.
     gap: Option<[u64; 2]>,
-    /// Its first frame that does not exist.
+    /// First frame beyond the end of the footage.
     end: Option<u64>,
 }
 
 impl ViewHistory {
-    /// Takes a frame, or the end of the stream.
+    /// Processes a frame, or the end of the stream.
     pub(crate) fn note_frame(&mut self, header: &FrameHeader) {
         let (epoch, frame) = (header.stamp.epoch, header.stamp.frame);
         if let Some((before, last)) = self.captured
@@ -70,12 +70,12 @@ impl ViewHistory {
         }
     }
 
-    /// Its first frame that does not exist, once that is known.
+    /// Returns the first frame beyond the end of the footage, once it is known.
     pub(crate) fn end(&self) -> Option<u64> {
         self.end
     }
 
-    /// Takes a pose, or the end of the stream.
+    /// Processes a pose, or the end of the stream.
     pub(crate) fn note_pose(&mut self, pose: &ViewPose) {
         self.lost_process = false;
         if pose.status == Status::END {
@@ -87,20 +87,20 @@ impl ViewHistory {
         self.last_frame = self.last_frame.max(Some(pose.stamp.frame));
     }
 
-    /// Takes the ports that are connected. A process that was restarted at once was lost all the same.
+    /// Updates the connected ports. A process that was restarted quickly still counts as lost.
     pub(crate) fn note_ports(&mut self, ports: [Vec<u128>; 2]) {
         let is_gone = |port: &u128| !ports.iter().flatten().any(|other| other == port);
         let is_lost = self.ports.iter().flatten().any(is_gone);
         self.lost_process |= is_lost && self.last_frame.is_some();
-        // A pose of a frame that capture sent before its death does not mean that capture is back.
+        // A pose may belong to a frame that capture sent before its death, so a pose does not show that capture is back.
         self.lost_capture |= self.ports[0].iter().any(is_gone) && self.captured.is_some();
         self.ports = ports;
     }
 
-    /// Takes a result, and returns why the view would have no part in it.
+    /// Processes a result, and returns the reason why the view would have no part in it.
     ///
-    /// * `pose`: its message about that frame.
-    /// * `is_first`: whether this is the first result of a restarted process.
+    /// * `pose`: the view's message about that frame.
+    /// * `is_first`: true if this is the first result of a restarted process.
     pub(crate) fn note_result(
         &mut self,
         frame: u64,
@@ -153,7 +153,7 @@ mod tests {
         [vec![7], vec![n]]
     }
 
-    /// A view that has sent poses of frames 0 and 1, both with results.
+    /// Returns a view that has sent poses of frames 0 and 1, both used in results.
     fn history() -> ViewHistory {
         let mut history = ViewHistory::default();
         history.note_ports(ports(1));
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(history.note_result(6, None, false), Missing::Late);
     }
 
-    /// A frame of an epoch of the capture process.
+    /// Returns a frame from an epoch of the capture process.
     fn captured(frame: u64, epoch: u32) -> FrameHeader {
         FrameHeader {
             stamp: Stamp {

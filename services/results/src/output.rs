@@ -1,4 +1,4 @@
-//! Everything that is written about a frame, and at the end about the run.
+//! Writes all files about frames, and at the end those about the run.
 
 use std::fs;
 use std::io;
@@ -22,7 +22,7 @@ use crate::{
 /// Part whose epipolar lines are drawn.
 const EPIPOLAR_PART: usize = 6;
 const TRC: &str = "pose3d.trc";
-/// Bytes reserved for the files written at the end: several times what sixteen views need.
+/// Bytes reserved for each file that is written at the end: several times what sixteen views need.
 const RESERVED_BYTES: usize = 32 << 10;
 
 /// The files of a run.
@@ -42,14 +42,14 @@ pub struct Output {
     smoothing: Option<Smoothing>,
 }
 
-/// The output cannot be begun.
+/// Error when starting the output.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// A file cannot be made.
+    /// A file cannot be created.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The histograms cannot be made.
-    #[error("cannot make the latency histograms")]
+    /// The histograms cannot be created.
+    #[error("cannot create the latency histograms")]
     Latency(#[from] hdrhistogram::CreationError),
     /// The first line cannot be written.
     #[error("cannot write to the output folder")]
@@ -57,14 +57,14 @@ pub enum OutputError {
 }
 
 impl Output {
-    /// Begins the files of a run. Room for those written at its end is reserved now.
+    /// Starts the files of a run. Space for the files that are written at the end is reserved now.
     ///
-    /// * `n_workers`: fusion processes, for the latency of each.
-    /// * `folder`: where; what a killed recorder left there is gone on with if it is resumed.
+    /// * `n_workers`: number of fusion processes, for the latency of each.
+    /// * `folder`: the output folder. If it is resumed, the files of a killed process are continued.
     ///
     /// # Errors
     ///
-    /// [`OutputError`].
+    /// Fails with [`OutputError`] if the files cannot be started.
     pub fn begin(
         scene: Scene,
         config: &Config,
@@ -112,7 +112,7 @@ impl Output {
     ///
     /// # Errors
     ///
-    /// [`OutputError`].
+    /// Fails with [`OutputError`] if the file cannot be started.
     pub fn smooth(&mut self) -> Result<(), OutputError> {
         let file = self.folder.file(FrameLine::SMOOTHED_FILE)?;
         self.smoothing = Some(Smoothing::begin(&self.scene, file)?);
@@ -120,13 +120,13 @@ impl Output {
         Ok(())
     }
 
-    /// The first frame that has no line yet; none if there is no line.
+    /// Returns the first frame without a line; `None` if there are no lines.
     pub fn next_frame(&self) -> Option<u64> {
         let step = self.scene.frame_step.max(1);
         self.tally.last_frame().map(|last_frame| last_frame.saturating_add(step))
     }
 
-    /// Writes frames without a result, with the reason. Frames before them that no message was about are written, too.
+    /// Writes frames without a result, with the reason. Also writes earlier frames about which no message came.
     pub fn absent(&mut self, absent: &[Absent]) {
         for it in absent {
             self.fill_up_to(it.frame);
@@ -134,7 +134,7 @@ impl Output {
         }
     }
 
-    /// Writes lines for the frames that were left out because they waited for the disk too long.
+    /// Writes lines for frames that were left out because the disk was too slow.
     fn fill_up_to(&mut self, frame: u64) {
         let begin = self.next_frame().unwrap_or(frame);
         for frame in (begin..frame).step_by(self.scene.frame_step.max(1) as usize) {
@@ -156,7 +156,7 @@ impl Output {
         }
     }
 
-    /// Writes the line of a frame; without it nothing else of the frame is written, and it does not count as written.
+    /// Writes the line of a frame. If that fails, nothing else of the frame is written, and the frame does not count as written.
     fn begin_frame(&mut self, line: FrameLine) -> bool {
         let smoothed = self.smoothing.as_mut().map_or(Ok(()), |smoothing| smoothing.frame(&line));
         let written = append(&mut self.pose3d_jsonl, [line]);
@@ -166,7 +166,7 @@ impl Output {
         is_written
     }
 
-    /// Writes the rows of a frame in the tables.
+    /// Writes the rows of a frame to the tables.
     fn rows(&mut self, frame: &Skeletons) {
         let row = trc::row(&self.scene, self.tally.n_lines(), frame);
         let rows = self.pose3d_csv.append(&pose3d::csv_rows(&self.scene, frame));
@@ -175,7 +175,7 @@ impl Output {
         self.note(row);
     }
 
-    /// Writes one frame. What fails is counted, and never stops anything.
+    /// Writes one frame. Failures are counted, but do not stop the run.
     pub fn frame(&mut self, record: &FrameRecord) {
         self.fill_up_to(record.frame());
         self.latency.add(record);
@@ -210,12 +210,12 @@ impl Output {
         canvas.save_png(&file).map_err(io::Error::other)
     }
 
-    /// Counts results that came but could not be written in time.
+    /// Counts results that were received but could not be written in time.
     pub fn missed(&mut self, n: u64) {
         self.tally.missed(n);
     }
 
-    /// The scene that messages are read with.
+    /// Returns the scene that gives messages their meaning.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -225,10 +225,10 @@ impl Output {
         self.tally.summary()
     }
 
-    /// Writes what is known of the whole run, and gives every file its name. What fails is counted:
-    /// whatever there is room for is there.
+    /// Writes the files about the whole run, and gives every file its final name. Failures are counted, and all other files are still
+    /// written.
     ///
-    /// * `session`: the run.
+    /// * `session`: session of the run.
     pub fn finish(mut self, session: u64) -> Summary {
         let report = self.latency.report();
         self.leave_incomplete();
@@ -248,12 +248,12 @@ impl Output {
         self.folder.remove_smoothed();
         for error in self.folder.finish() {
             let is_first = self.tally.failed(&error);
-            tracing::error!(%error, is_first, "a file keeps its name of an unfinished file");
+            tracing::error!(%error, is_first, "a file keeps its temporary name");
         }
         self.tally.summary()
     }
 
-    /// Leaves files with lines missing the names of parts.
+    /// Leaves files that lack lines under their temporary names.
     fn leave_incomplete(&mut self) {
         let files = [
             (FrameLine::FILE, Some(&self.pose3d_jsonl)),
@@ -269,11 +269,11 @@ impl Output {
         }
     }
 
-    /// The head of `pose3d.trc` holds the number of rows, so it is written last.
+    /// Writes the head of `pose3d.trc`. It contains the number of rows, so it is written last.
     fn head_trc(&self) -> io::Result<()> {
         let rows = files::read_text(&self.folder.part(TRC), files::RESULTS)?;
         let n_rows = rows.lines().count() as u64;
-        // Without a rate there are no rows.
+        // Without a rate there are no rows, so the value does not matter.
         let rate_hz = self.scene.frame_rate_hz.unwrap_or_default();
         let text = trc::header(&self.scene, rate_hz, n_rows) + &rows;
         self.folder.rewrite(TRC, &text)
@@ -294,7 +294,7 @@ impl Output {
         });
         let axes = match scene.up_in_world {
             Some(_) => "y up",
-            None => "the world's: the rig does not say which way is up",
+            None => "those of the world, because the rig does not give the upward direction",
         };
         RunSummary {
             frame_rate_hz: scene.frame_rate_hz,
@@ -308,17 +308,17 @@ impl Output {
         }
     }
 
-    /// Reports the first failure, counts all.
+    /// Counts all failures, and logs the first.
     fn note(&mut self, outcome: io::Result<()>) {
         if let Err(error) = outcome
             && self.tally.failed(&error)
         {
-            tracing::error!(%error, "cannot write results; the pipeline goes on, failures are counted");
+            tracing::error!(%error, "cannot write results; the pipeline continues, and failures are counted");
         }
     }
 }
 
-/// Appends lines, all or none.
+/// Appends all lines, or none.
 fn append<L: Line>(file: &mut Lines, lines: impl IntoIterator<Item = L>) -> io::Result<()> {
     let mut text = String::new();
     for line in lines {

@@ -1,4 +1,4 @@
-//! Pictures of a view: its single-view pose, and of everybody the fused pose, the extra keypoints, and one part's epipolar lines.
+//! Draws overlays of a view: its single-view pose, the fused poses of all people, the extra keypoints, and the epipolar lines of one part.
 
 use footage::{ACCENT, CENTRE, Canvas, FAINT, Limb, Side, Size, draw_limbs, line_width};
 use geometry::epipolar::epipolar_curve;
@@ -7,12 +7,12 @@ use nalgebra::{Point2, Point3};
 
 use crate::{FrameRecord, Scene, pose3d};
 
-/// Points of one epipolar line.
+/// Number of points on one epipolar line.
 const N_POINTS: usize = 64;
 
 /// Draws a view that has a picture.
 ///
-/// * `part`: the part whose epipolar lines are drawn, from 0.
+/// * `part`: index of the part whose epipolar lines are drawn, counted from 0.
 pub(crate) fn draw(
     scene: &Scene,
     record: &FrameRecord,
@@ -48,12 +48,12 @@ pub(crate) fn draw(
     Some(canvas)
 }
 
-/// Two thirds of the width of the fused pose's lines: a pixel on a small picture.
+/// Returns two thirds of the line width of fused poses: one pixel in a small picture.
 fn thin(canvas: &Canvas) -> f64 {
     line_width(canvas.size()) / 1.5
 }
 
-/// The poses of all people in a view.
+/// Returns the poses of all people in a view.
 fn fused(record: &FrameRecord, view: usize) -> impl Iterator<Item = &FusedView> {
     let people = record.skeletons.listed().iter();
     let poses = people.filter_map(move |person| person.listed_views().get(view));
@@ -83,7 +83,7 @@ fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: u
     }
 }
 
-/// Where the extra keypoints of all people lie in the view.
+/// Draws the extra keypoints of all people.
 fn draw_keypoints(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
     let camera = scene.views[view].framing.camera();
     let width = line_width(canvas.size());
@@ -106,7 +106,7 @@ fn side_of(name: &str) -> Side {
     }
 }
 
-/// Where the part's point in every other view may lie in this one.
+/// Draws the epipolar lines on which the part must be, according to every other view.
 fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize, part: usize) {
     let to = scene.views[view].framing.camera();
     for other in (0..scene.views.len()).filter(|i| *i != view) {
@@ -120,7 +120,7 @@ fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: us
     }
 }
 
-/// The joints of a pose; none if the model has other parts than the joint set is made of.
+/// Returns the joints of a pose; `None` if the parts of the model do not fit the joint set.
 pub(crate) fn joints_of(scene: &Scene, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
     let n_parts = scene.joints.joints.iter().flat_map(|joint| joint.parts).max()? + 1;
     (parts.len() >= n_parts).then(|| scene.joints.from_parts(parts))
@@ -194,7 +194,7 @@ mod tests {
         let (with, without) = (pixels(&with), pixels(&without));
         let changed: Vec<usize> = (0..with.len()).filter(|&i| with[i] != without[i]).collect();
         assert!(!changed.is_empty());
-        // A pixel of the frame is two of the footage, whose middle is (79.5, 59.5): the point lies at 4 m.
+        // A pixel of the frame is two pixels of the footage, whose centre is (79.5, 59.5). The point is 4 m away.
         for it in changed {
             let (x, y) = ((it % 80) as f64, (it / 80) as f64);
             let off = (x - 41.5).hypot(y - 31.5);

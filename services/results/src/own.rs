@@ -1,4 +1,4 @@
-//! Poses that every view found alone, beside the person who is followed in space.
+//! Compares the poses that every view found alone with the followed person in space.
 
 use geometry::Camera;
 use messages::{Joint3d, SkeletonMessage};
@@ -7,13 +7,14 @@ use crate::overlay::joints_of;
 use crate::pose3d::is_placed;
 use crate::{FrameRecord, Scene};
 
-/// Farthest that the median joint of a view lies from the result where the view shows the same person, metres.
+/// Maximum distance of a view's median joint from the result, in metres, if the view shows the same person.
 const SAME_PERSON_M: f64 = 0.25;
-/// Largest distance of a joint that counts, metres.
+/// Maximum distance of a joint that is counted, in metres. Larger distances count as this value.
 const MOST_M: f64 = 0.3;
 
-/// The parts of a view's best candidate, pixels of the frame, with sides as the network or the filters name them, and exchanged; `None`
-/// where it has none, or is not sure enough of it.
+/// Returns the parts of a view's best candidate in pixels of the frame, once with the sides as named by the network or filters, and once
+/// with
+/// exchanged sides. Returns `None` if the view has no candidate, or is not sure enough of it.
 pub(crate) fn readings(
     scene: &Scene,
     record: &FrameRecord,
@@ -26,7 +27,7 @@ pub(crate) fn readings(
     Some([named.clone(), exchanged.unwrap_or(named)])
 }
 
-/// Returns true if the solution fits the parts of a view better with the sides exchanged.
+/// Returns true if the parts of a view fit the solution better with exchanged sides.
 pub(crate) fn is_exchanged(
     scene: &Scene,
     record: &FrameRecord,
@@ -40,8 +41,8 @@ pub(crate) fn is_exchanged(
     sum(&readings[1]) < sum(&readings[0])
 }
 
-/// Distances of what the views show from the joints of the solution, metres at their depth, each at most 0.3; of the views that show the
-/// same person, or if fewer than two do, of all.
+/// Returns the distances of the views' joints from the joints of the solution, in metres at their depth, each at most 0.3. Only views that
+/// show the same person are used. If fewer than two views do, all views are used.
 pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
     let of_view = |view: usize| {
         let readings = readings(scene, record, view)?;
@@ -58,7 +59,8 @@ pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
     counted.flatten().map(|counted| counted.min(MOST_M)).collect()
 }
 
-/// Distances of a view's joints from those of the solution, pixels of the frame and metres, where both are known.
+/// Returns the distances of a view's joints from those of the solution, in pixels of the frame and in metres. Only joints with both are
+/// returned.
 fn distances(
     scene: &Scene,
     record: &FrameRecord,
@@ -95,7 +97,7 @@ mod tests {
         assert!(readings(&scene, &record, 0).is_some());
         record.views[0].pose = None;
         assert!(readings(&scene, &record, 0).is_none());
-        // The parts of this model are no joints.
+        // The parts of this model are not joints.
         assert_eq!(distances_m(&scene, &record), [0.0; 0]);
     }
 
@@ -110,7 +112,7 @@ mod tests {
         let pixel = camera.project(&joint.in_world.into()).unwrap();
         let [px, metres] = distance(camera, &joint, [pixel.x + 3.0, pixel.y - 4.0]).unwrap();
         assert!((px - 5.0).abs() < 1e-9);
-        // Three metres before the world's origin.
+        // The camera is three metres in front of the world's origin.
         assert!((metres - 5.0 * 5.0 / camera.intrinsics.fx).abs() < 1e-9);
         let outside = Joint3d {
             in_world: [9.0, 0.0, 2.0],
@@ -124,7 +126,7 @@ mod tests {
         assert!(distance(camera, &unplaced, [0.0, 0.0]).is_none());
     }
 
-    /// A joint that is the one part of the model.
+    /// A joint set with one joint, which is the only part of the model.
     static ONE: skeleton::JointSet = skeleton::JointSet {
         name: "one",
         joints: &[skeleton::Joint {
@@ -142,7 +144,7 @@ mod tests {
         let mut record = record(0);
         record.views.push(record.views[1].clone());
         record.skeletons.people[0].n_joints = 1;
-        // The joint stands where every view saw its part, six metres before the cameras.
+        // The joint is where every view saw its part, six metres in front of the cameras.
         let [parts, _] = readings(&scene, &record, 0).unwrap();
         let lens = scene.views[0].framing.camera().intrinsics;
         let right = [
@@ -156,7 +158,7 @@ mod tests {
             all.len() == 3 && all.iter().all(|value| *value < 1e-6),
             "{all:?}"
         );
-        // A view that saw somebody a metre beside is left out.
+        // A view that saw a person a metre aside is left out.
         let aside = Camera {
             camera_from_world: nalgebra::Isometry3::translation(0.5, 0.0, 3.0),
             ..scene.views[2].framing.camera().clone()
@@ -165,7 +167,7 @@ mod tests {
         let framing = geometry::Framing::new(&aside, [80, 60], None, whole, 0.0).unwrap();
         scene.views[2].framing = framing;
         assert_eq!(distances_m(&scene, &record).len(), 2);
-        // Of two views that disagree neither is known to be right: both count, the error up to a limit.
+        // If two views disagree, it is not known which one is right. Both count, and their errors are limited.
         record.views[0].pose = None;
         let both = distances_m(&scene, &record);
         assert!(

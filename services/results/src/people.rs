@@ -1,4 +1,4 @@
-//! Everybody over the run: how many people there are besides the followed person, and a summary of each.
+//! All people of the run: counts the people besides the followed person, and summarises each person.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,36 +9,36 @@ use runfiles::{People, PersonLine, PersonSummary};
 use crate::pose3d::is_placed;
 use crate::trust::Trusted;
 
-/// Results with others before it is said: a ghost of few frames is not worth a warning.
+/// Number of results with other people before this is logged. Fewer frames may be a false detection.
 const MANY: u64 = 10;
-/// Nobody has the same id after a longer absence, seconds: `people` forgets who has been gone for a minute.
+/// After an absence of this time, in seconds, a person gets a new id. The crate `people` forgets a person after a minute.
 pub(crate) const GONE_S: f64 = 61.0;
 
-/// Counts the people of the results; says once that there are several.
+/// Counts the people in the results. Logs once that there are several.
 #[derive(Debug)]
 pub(crate) struct Counted {
     follow: Follow,
     n_with_others: u64,
     most: u32,
-    /// Ids of all who were followed.
+    /// Ids of all people who were followed.
     ids: BTreeSet<u64>,
-    /// Those who are there, or may come back.
+    /// People who are present, or may come back.
     each: BTreeMap<u64, One>,
-    /// Those who cannot come back.
+    /// Summaries of people who cannot come back.
     gone: BTreeMap<u64, PersonSummary>,
 }
 
-/// One person so far.
+/// Counts of one person so far.
 #[derive(Debug, Default)]
 struct One {
     frames: u64,
     first_frame: u64,
     last_frame: u64,
-    /// When the last frame was taken, seconds.
+    /// Time of the person's last frame, in seconds.
     seen_s: f64,
     n_joints: u64,
     n_placed: u64,
-    /// Sum of the squared reprojection errors, and their number.
+    /// Sum of the squared reprojection errors, and number of errors.
     squared_px: (f64, u64),
     trusted: Trusted,
 }
@@ -46,7 +46,7 @@ struct One {
 impl One {
     /// Counts a frame.
     ///
-    /// * `placed_px`: of each joint the reprojection error, pixels; `None` of a joint without a place, NaN where it is not known.
+    /// * `placed_px`: reprojection error of each joint, in pixels; `None` for a joint without a position, NaN if the error is not known.
     fn add(&mut self, frame: u64, placed_px: impl Iterator<Item = Option<f64>>) {
         if self.frames == 0 {
             self.first_frame = frame;
@@ -89,10 +89,10 @@ impl Counted {
         }
     }
 
-    /// Adds a person of a frame, for the summary of each.
+    /// Adds a person in a frame to the person's summary.
     ///
-    /// * `limbs`: pairs of joints that a bone connects.
-    /// * `time_s`: of the frame, if it is known.
+    /// * `limbs`: pairs of joints that are connected by a bone.
+    /// * `time_s`: time of the frame in seconds, if it is known.
     pub(crate) fn person(
         &mut self,
         frame: u64,
@@ -113,13 +113,13 @@ impl Counted {
         one.seen_s = time_s.unwrap_or(one.seen_s);
     }
 
-    /// Keeps no more than the summary of those who cannot come back, after the people of a frame were added.
+    /// Reduces people who cannot come back to their summaries. Called after the people of a frame were added.
     pub(crate) fn forget(&mut self, now_s: f64) {
         let gone = self.each.extract_if(.., |_, one| now_s - one.seen_s > GONE_S);
         self.gone.extend(gone.map(|(id, one)| (id, one.summary(id))));
     }
 
-    /// Adds a person of a frame that a killed process had written.
+    /// Adds a person in a frame that a killed process had written.
     pub(crate) fn line(&mut self, frame: u64, person: &PersonLine, time_s: Option<f64>) {
         if person.status != runfiles::FrameLine::OK {
             return;
@@ -143,7 +143,7 @@ impl Counted {
         if frame.n_seen > 1 {
             self.n_with_others += 1;
             if self.n_with_others == MANY {
-                tracing::warn!("others are in view: {}", self.people().text());
+                tracing::warn!("other people are in view: {}", self.people().text());
             }
         }
     }

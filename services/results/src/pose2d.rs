@@ -6,13 +6,13 @@ use runfiles::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
 use crate::scene::View;
 use crate::{FrameRecord, Scene};
 
-/// The lines of one frame, one a view.
+/// Returns the lines of one frame, one per view.
 ///
-/// `single` names parts as the model does, by the side of the image; `fused` by the side of the body:
-/// the two differ where `facing` is `behind`. Types and levels count from 1, as in the reference.
+/// `single` names parts by the side of the image, as the model does. `fused` names them by the side of the body.
+/// The names differ if `facing` is `behind`. Types and levels are counted from 1, as in the reference program.
 ///
-/// `sigma_px` is what was predicted for this frame. `sigma_used` is what fusion had of the view in time:
-/// 0 the same, n what was predicted n frames before, none nothing, and every part counted as usable.
+/// `sigma_px` has the errors predicted for this frame. `sigma_used` tells which errors of the view fusion had in time:
+/// 0 for those of this frame, n for those of n frames before. Null means that there were none, and every part counted as usable.
 pub(crate) fn lines(scene: &Scene, record: &FrameRecord) -> impl Iterator<Item = ViewLine> {
     (0..scene.views.len()).map(|view| line(scene, record, view))
 }
@@ -26,7 +26,7 @@ fn line(scene: &Scene, record: &FrameRecord, view: usize) -> ViewLine {
     let scale = it.source_scale();
     let sigma = record.sigma_px(scene, view);
     ViewLine {
-        // Poses from maps are those of the body: the sides of each view are not told.
+        // Poses from maps use the sides of the body, and there is no information about the sides in each view.
         facing: fused.filter(|_| !scene.has_maps).map(facing),
         frame: record.frame(),
         fused: fused.map(|fused| fused_pose(it, fused)),

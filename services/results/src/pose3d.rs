@@ -7,14 +7,14 @@ use runfiles::{FrameLine, JointLine, Kept, PersonLine, PlacedJoint, Sides};
 
 use crate::{Absent, FrameRecord, Scene};
 
-/// First line of `pose3d.csv`; one row a joint of a person follows, empty where there is no position, and in a frame with nobody one row a
-/// joint without a person.
+/// First line of `pose3d.csv`. Then follows one row per joint of a person, with empty cells if there is no position. A frame with nobody
+/// has one row per joint, without a person.
 pub(crate) const CSV_HEADER: &str = "frame,time_s,person,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
 cov_yy_m2,cov_yz_m2,cov_zz_m2,reprojection_px,views,status";
 
 const _: () = assert!(runfiles::MOST_PEOPLE == messages::MAX_PEOPLE);
 
-/// The joints of a person with their names, as many as both sides know.
+/// Returns the joints of a person with their names, as many as both lists have.
 pub(crate) fn joints<'a>(
     scene: &'a Scene,
     person: &'a SkeletonMessage,
@@ -23,7 +23,7 @@ pub(crate) fn joints<'a>(
     names.zip(person.listed_joints())
 }
 
-/// The extra keypoints of a person with their names, as many as both sides know.
+/// Returns the extra keypoints of a person with their names, as many as both lists have.
 pub(crate) fn keypoints<'a>(
     scene: &'a Scene,
     person: &'a SkeletonMessage,
@@ -32,12 +32,12 @@ pub(crate) fn keypoints<'a>(
     names.zip(person.listed_keypoints())
 }
 
-/// Returns true if a joint has a position that can be written down.
+/// Returns true if a joint has a finite position.
 pub(crate) fn is_placed(joint: &Joint3d) -> bool {
     joint.status == Status::OK && joint.in_world.iter().all(|value| value.is_finite())
 }
 
-/// The line of a result.
+/// Returns the line of a result.
 pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
     let frame = &record.skeletons;
     let missing = missing(scene, record).into_iter();
@@ -81,7 +81,7 @@ fn person_line(scene: &Scene, person: &SkeletonMessage) -> PersonLine {
     }
 }
 
-/// The line of a frame that has no result: the reason, and why every view has no part in it.
+/// Returns the line of a frame without a result: the reason, and for every view the reason why it has no part in the result.
 pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
     let views = scene.views.iter().enumerate();
     let why = |view: usize| it.views.get(view).map_or(it.reason.as_str(), |view| view.reason());
@@ -105,9 +105,9 @@ fn finite(number: f64) -> Option<f64> {
     Some(number).filter(|value| value.is_finite())
 }
 
-/// A person without any joint, for the rows of a frame with nobody.
+/// Returns a person without joints, for the rows of a frame with nobody.
 ///
-/// * `status`: of the frame.
+/// * `status`: status of the frame.
 pub(crate) fn nobody(scene: &Scene, status: Status) -> SkeletonMessage {
     let mut person = SkeletonMessage {
         status,
@@ -121,14 +121,14 @@ pub(crate) fn nobody(scene: &Scene, status: Status) -> SkeletonMessage {
     person
 }
 
-/// A frame without a result.
+/// Returns a frame without a result.
 pub(crate) fn nothing(frame: u64) -> Box<Skeletons> {
     let mut nothing = Box::<Skeletons>::default();
     (nothing.stamp.frame, nothing.status) = (frame, Status::NO_FRAME);
     nothing
 }
 
-/// The views that have no part in the result, and why.
+/// Returns the views that have no part in the result, with the reasons.
 pub(crate) fn missing<'a>(
     scene: &'a Scene,
     record: &FrameRecord,
@@ -152,7 +152,7 @@ fn joint(scene: &Scene, it: &Joint3d) -> JointLine {
     })
 }
 
-/// The rows of one frame in `pose3d.csv`, each with its end.
+/// Returns the rows of one frame in `pose3d.csv`, each with its line end.
 pub(crate) fn csv_rows(scene: &Scene, frame: &Skeletons) -> String {
     if frame.listed().is_empty() {
         return rows_of(scene, frame.stamp.frame, &nobody(scene, frame.status));

@@ -1,4 +1,4 @@
-//! Meaning of the numbers in messages: names of views and joints, models, and pixels of the footage.
+//! The meaning of the numbers in messages: names of views and joints, models, and pixels of the footage.
 
 use std::sync::Arc;
 
@@ -11,46 +11,46 @@ use skeleton::JointSet;
 /// One view of the deployment.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// The camera's name in the rig.
+    /// Name of the camera in the rig.
     pub name: String,
-    /// From the footage to the frames that messages speak of.
+    /// Mapping from the footage to the frames of the messages.
     pub framing: Framing,
-    /// The pyramid of those frames.
+    /// Pyramid of these frames.
     pub layout: Arc<Layout>,
 }
 
-/// Everything a reader of messages has to know.
+/// Everything that is needed to interpret messages.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// The model.
     pub model: Arc<Model>,
-    /// The views, as they are numbered in messages.
+    /// The views, in the order of their numbers in messages.
     pub views: Vec<View>,
-    /// True if the candidates of a view are the people that a network sees: fusion decides which of them is the person.
+    /// True if the candidates of a view are people that a network sees. Fusion then decides which of them is the followed person.
     pub has_maps: bool,
-    /// Least heat of half of the joints of a person who serves to check the places of the cameras, 0 to 1.
+    /// Heat, from 0 to 1, that half of a person's joints must reach before the person is used to check the cameras.
     pub least_heat: f64,
     /// The joints of the result.
     pub joints: &'static JointSet,
     /// Names of the extra keypoints of the result.
     pub extra_keypoints: Vec<String>,
-    /// Frames of the footage per second, where known.
+    /// Frames of the footage per second, if known.
     pub frame_rate_hz: Option<f64>,
-    /// Distance between the frames used.
+    /// Distance between used frames.
     pub frame_step: u64,
-    /// Which of several people is followed.
+    /// Choice of the followed person.
     pub follow: Follow,
-    /// Against gravity, where the rig knows.
+    /// Upward direction, if the rig gives it.
     pub up_in_world: Option<UnitVector3<f64>>,
 }
 
 impl Scene {
-    /// When a frame was taken, seconds after frame 0 of the footage, where known.
+    /// Returns the time of a frame in seconds after frame 0 of the footage, if known.
     pub fn time_s(&self, frame: u64) -> Option<f64> {
         self.frame_rate_hz.map(|rate| frame as f64 / rate)
     }
 
-    /// Names of the views whose bits are set.
+    /// Returns the names of the views whose bits are set.
     pub fn names(&self, mask: u32) -> Vec<&str> {
         self.views
             .iter()
@@ -60,10 +60,10 @@ impl Scene {
             .collect()
     }
 
-    /// The axes of `OpenSim` from those of the world: y up.
+    /// Returns the rotation from the axes of the world to those of `OpenSim`, which has y up.
     ///
-    /// With the world's z up `(X, Y, Z) = (y, z, x)`; another up is turned to z first, the short way
-    /// round. Without one the world's axes stay.
+    /// If z is up in the world, `(X, Y, Z) = (y, z, x)`. Another upward direction is first rotated to z, along the shortest path.
+    /// If the upward direction is unknown, the world's axes are kept.
     pub fn opensim_from_world(&self) -> Matrix3<f64> {
         self.up_in_world.map_or_else(Matrix3::identity, |up| {
             geometry::y_up_from_world(&up).into_inner()
@@ -72,12 +72,12 @@ impl Scene {
 }
 
 impl View {
-    /// A point of the frame in pixels of the footage.
+    /// Converts a point of the frame to pixels of the footage.
     pub fn in_source(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         self.framing.source_from_output().map(|row| row[0] * x + row[1] * y + row[2])
     }
 
-    /// Pixels of the footage per pixel of the frame.
+    /// Returns the number of pixels of the footage per pixel of the frame.
     pub fn source_scale(&self) -> f64 {
         let [[a, b, _], [c, d, _]] = self.framing.source_from_output();
         (a * d - b * c).abs().sqrt()

@@ -1,6 +1,6 @@
-//! Receives every message at once; a thread of its own writes the files.
+//! Receives every message at once. A separate thread writes the files.
 //!
-//! Senders wait for slow receivers, so this process never makes one wait: it copies every message into a queue. If the disk
+//! Senders wait for slow receivers, so this process must not be slow: it copies every message into a queue. If the disk
 //! cannot keep up, the newest results are dropped and counted.
 
 use core::time::Duration;
@@ -18,20 +18,20 @@ use crate::job::Job;
 use crate::writer::Writer;
 use crate::{Folder, FrameRecord, Picture};
 
-/// How long expected errors that were used are waited for, and the pause between two looks.
+/// Maximum wait for expected errors that were used, and interval between checks.
 const AWAITED: Duration = Duration::from_secs(2);
 const AWAIT_PAUSE: Duration = Duration::from_micros(500);
 
-/// Writes what is published, until the footage ends or a stop is requested.
+/// Writes all messages until the footage ends or a stop is requested.
 ///
 /// # Errors
 ///
-/// [`failure::ExitKind::Input`] if the output folder cannot be used, and what the transport reports.
+/// Fails with [`failure::ExitKind::Input`] if the output folder cannot be used, and with errors of the transport.
 pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let ports = Ports::open(service, &job, &mut waiter)?;
     if service.epoch() > 0 && Folder::is_finished(&job.output, service.session()) {
-        // The process was killed after its work was complete; starting over would empty the files.
+        // The process was killed after its work was complete. Starting over would empty the files.
         return ports.rest(service, &waiter);
     }
     let [n_views, n_joints] = [job.scene.views.len(), job.scene.joints.joints.len()];
@@ -43,14 +43,15 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
         ports.receive_inputs(&context, &mut gather, &writer)?;
         while let Some(skeletons) = ports.skeletons.receive_boxed(&context)? {
-            // The inputs of a result were sent before it, so they can all be received now; but for expected errors that fusion
-            // was given first.
+            // The inputs of a result were sent before it, so all of them can be received now. Expected errors are an exception: fusion may
+            // have
+            // received them first.
             ports.receive_inputs(&context, &mut gather, &writer)?;
             let begin = Instant::now();
             while may_await && gather.awaits_quality(skeletons.stamp.frame) {
                 std::thread::sleep(AWAIT_PAUSE);
                 ports.receive_inputs(&context, &mut gather, &writer)?;
-                // They do not come: they were lost, and others may be.
+                // The errors do not come. They were lost, and those of later frames may be lost too.
                 may_await = begin.elapsed() < AWAITED;
             }
             if skeletons.status == Status::END {
@@ -73,12 +74,12 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     ports.rest(service, &waiter)
 }
 
-/// Passes a result, and the frames before it without one, to the writing thread.
+/// Passes a result to the writing thread, with earlier frames that have no result.
 fn take(service: &Service, skeletons: Box<Skeletons>, gather: &mut Gather, writer: &Writer) {
     let health = service.health();
     let frame = skeletons.stamp.frame;
     let Some(settled) = gather.result(skeletons) else {
-        // The frame has its line already.
+        // The output already has a line for this frame.
         health.dropped(Cause::Late, 1);
         return;
     };
@@ -91,7 +92,7 @@ fn take(service: &Service, skeletons: Box<Skeletons>, gather: &mut Gather, write
     health.queued(writer.n_waiting());
 }
 
-/// Records the latency of a result, overall and for every view that was used, and how long it waited in this process.
+/// Records the latency of a result, overall and for every used view, and its waiting time in this process.
 fn record_latency(service: &Service, record: &FrameRecord) {
     let (health, skeletons) = (service.health(), &record.skeletons);
     if skeletons.status != Status::OK {
@@ -209,8 +210,8 @@ impl Ports {
         Ok(())
     }
 
-    /// Reports that the work is finished, and waits for the stop request. Messages are still received and discarded: with
-    /// lossless delivery a sender waits for room, such as a replay that sends more than the results need.
+    /// Reports that the work is finished, and waits for the stop request. Messages are still received and discarded, because with
+    /// lossless delivery a sender waits until there is space. An example is a replay that sends more than the results need.
     fn rest(&self, service: &Service, waiter: &Waiter) -> Result<(), Failure> {
         service.health().finished();
         while waiter.wait(Duration::from_millis(50))? != Woken::Stop {

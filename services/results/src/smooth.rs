@@ -1,4 +1,4 @@
-//! `pose3d-smooth.jsonl` while the run lasts: joints smoothed with what was before alone.
+//! Writes `pose3d-smooth.jsonl` during the run: joints are smoothed using only earlier frames.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -12,11 +12,11 @@ use crate::Scene;
 use crate::lines::Lines;
 use crate::people::GONE_S;
 
-/// The smoothers of a run, and its file.
+/// The smoothers of a run, and the output file.
 #[derive(Debug)]
 pub(crate) struct Smoothing {
     people: BTreeMap<u64, Person>,
-    /// Those who cannot come back.
+    /// People who cannot come back.
     gone: BTreeMap<u64, SmoothedPerson>,
     /// Names of the joints, then of the extra keypoints.
     names: Vec<String>,
@@ -26,13 +26,13 @@ pub(crate) struct Smoothing {
     file: Lines,
 }
 
-/// The smoother of a person, since the first frame with the person.
+/// Smoother of one person, from the person's first frame on.
 #[derive(Debug)]
 struct Person {
     smoother: Smoother,
     counts: Vec<SmoothedJoint>,
     n_unsure: usize,
-    /// Time of the last frame with the person, seconds.
+    /// Time of the last frame with the person, in seconds.
     seen_s: f64,
 }
 
@@ -63,8 +63,8 @@ impl Smoothing {
         })
     }
 
-    /// Smooths the joints of everybody in a frame, and writes its line. A frame without a time is taken for one of a run at 30 Hz: the delay
-    /// in the report is then wrong by the same factor.
+    /// Smooths the joints of all people in a frame, and writes the frame's line. If frames have no times, 30 Hz is assumed. The delay
+    /// in the report is then wrong by the same factor as the rate.
     pub(crate) fn frame(&mut self, line: &FrameLine) -> io::Result<()> {
         let time_s = line.time_s.unwrap_or(line.frame as f64 / 30.0);
         let there: Vec<u64> = line.people.iter().map(|person| person.id).collect();
@@ -87,13 +87,15 @@ impl Smoothing {
         self.file.append(&runfiles::to_line(&line)?)
     }
 
-    /// Lets go of the smoothers of those who cannot come back: a run of days sees many people.
+    /// Removes the smoothers of people who cannot come back, because a run of days sees many people.
     fn forget(&mut self, time_s: f64) {
         let names = &self.names;
         let gone = self.people.extract_if(.., |_, person| time_s - person.seen_s > GONE_S);
         self.gone.extend(gone.map(|(id, person)| (id, report_of(names, id, &person))));
     }
 
+    /// Smooths the joints of one person.
+    ///
     /// * `measured`: `None` in a frame without the person.
     fn person(
         &mut self,
@@ -124,7 +126,7 @@ impl Smoothing {
         lines::smoothed(id, measured.cloned(), joints)
     }
 
-    /// Returns the report of the smoothing since the process was started last.
+    /// Returns the report about the smoothing since the last start of the process.
     pub(crate) fn report(&self) -> SmoothReport {
         let gone = self.gone.values().cloned();
         let people = self.people.iter().map(|(id, person)| report_of(&self.names, *id, person));

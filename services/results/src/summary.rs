@@ -1,4 +1,4 @@
-//! Counts of the seen and the missed, over the whole run.
+//! Counts of results and losses over the whole run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,9 +20,9 @@ pub(crate) struct Tally {
     squared_px: (f64, u64),
     last_frame: Option<u64>,
     n_without: u64,
-    /// By view.
+    /// Number of dropped frames, by view.
     dropped: Vec<u64>,
-    /// By view: bytes of evidence, and frames.
+    /// Bytes of evidence and number of frames, by view.
     evidence: Vec<[u64; 2]>,
     calibration: Calibration,
     heights: Heights,
@@ -54,8 +54,7 @@ impl Tally {
         }
     }
 
-    /// Counts what a killed recorder had written: reads `pose3d.jsonl` again. A file that is not
-    /// there, or a broken line, counts for nothing.
+    /// Restores the counts of a killed process by reading `pose3d.jsonl` again. A missing file and broken lines are ignored.
     pub(crate) fn resume(scene: &Scene, file: &Path) -> Self {
         let mut tally = Self::new(scene);
         let text = files::read_text(file, files::RESULTS).unwrap_or_default();
@@ -170,12 +169,12 @@ impl Tally {
         self.squared_px.1 += 1;
     }
 
-    /// Counts results that came but could not be written in time.
+    /// Counts results that were received but could not be written in time.
     pub(crate) fn missed(&mut self, n: u64) {
         self.summary.frames_not_recorded += n;
     }
 
-    /// Counts a write that failed; returns whether it is the first.
+    /// Counts a failed write. Returns true if it is the first.
     pub(crate) fn failed(&mut self, what: &dyn core::fmt::Display) -> bool {
         self.summary.writes_failed += 1;
         let is_first = self.summary.first_failure.is_none();
@@ -183,19 +182,19 @@ impl Tally {
         is_first
     }
 
-    /// Counts a frame that has no result.
+    /// Counts a frame without a result.
     pub(crate) fn without(&mut self, frame: u64) {
         self.last_frame = Some(frame);
         self.summary.frames_missed += 1;
         self.n_without += 1;
     }
 
-    /// The last frame that was counted.
+    /// Returns the last counted frame.
     pub(crate) fn last_frame(&self) -> Option<u64> {
         self.last_frame
     }
 
-    /// Frames that were counted, with a result or without.
+    /// Returns the number of counted frames, with and without a result.
     pub(crate) fn n_lines(&self) -> u64 {
         self.summary.frames + self.n_without
     }

@@ -1,4 +1,4 @@
-//! A scene of two views, and records of it.
+//! A scene of two views for tests, with records of frames.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::{FrameRecord, Scene, View, ViewRecord};
 
-/// Two views of 160x120 footage in frames of 80x60, 60 Hz of which every second frame is used.
+/// Returns a scene with two views of 160x120 footage in frames of 80x60. The footage has 60 Hz, and every second frame is used.
 pub(crate) fn scene() -> Scene {
     let model = Arc::new(model());
     let layout = Arc::new(Layout::new(&model, 80, 60).unwrap());
@@ -73,7 +73,7 @@ fn model() -> Model {
     .unwrap()
 }
 
-/// A result with one person, whose every joint stands at (1, 2, 3).
+/// Returns a result with one person, with every joint at (1, 2, 3).
 pub(crate) fn skeletons(frame: u64) -> Box<Skeletons> {
     let joint = Joint3d {
         in_world: [1.0, 2.0, 3.0],
@@ -113,7 +113,7 @@ pub(crate) fn skeletons(frame: u64) -> Box<Skeletons> {
     skeletons
 }
 
-/// A frame in which both views found a person.
+/// Returns a frame in which both views found a person.
 pub(crate) fn record(frame: u64) -> FrameRecord {
     let pose = Pose {
         score: 0.5,

@@ -1,11 +1,12 @@
-//! `times.jsonl`: when every frame was captured, solved in each view and turned into a result, and by which epoch of a process.
+//! `times.jsonl`: for every frame, the times at which it was captured, solved in each view and turned into a result, and the epochs of the
+//! processes.
 
 use messages::Status;
 use runfiles::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 
 use crate::{FrameRecord, Scene};
 
-/// The line of a frame. What differs from run to run stands here and in no other file of lines.
+/// Returns the line of a frame. Values that differ from run to run are only in this file, not in the other files of lines.
 pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> TimesLine {
     let pose = &record.skeletons;
     let ms = |nanos: u64| milliseconds(nanos, pose.stamp.session);
@@ -33,7 +34,7 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> TimesLine {
     }
 }
 
-/// Since the beginning; 0 for what was before it.
+/// Returns the time since `since`, in milliseconds; 0 for earlier times.
 fn milliseconds(nanos: u64, since: u64) -> f64 {
     (nanos.saturating_sub(since) / 1000) as f64 / 1000.0
 }

@@ -1,7 +1,7 @@
-//! `pose3d.trc` for `OpenSim`: tab separated, metres, y up.
+//! `pose3d.trc` for `OpenSim`: tab separated, in metres, y up.
 //!
-//! The format is of one person. While the run lasts it is not known who will come, so the file has who is followed; `parallax export` gives
-//! every person a file.
+//! The format is for one person. During the run it is not known how many people will come, so the file has the followed person.
+//! `parallax export` writes a file for every person.
 
 use messages::Skeletons;
 use nalgebra::Vector3;
@@ -9,9 +9,9 @@ use nalgebra::Vector3;
 use crate::Scene;
 use crate::pose3d::{is_placed, joints, keypoints, nobody};
 
-/// One row, with its end; the three cells of a missing joint are `NaN`.
+/// Returns one row, with its line end. The three cells of a missing joint are `NaN`.
 ///
-/// * `row`: number of the row, from 1.
+/// * `row`: number of the row, counted from 1.
 pub(crate) fn row(scene: &Scene, row: u64, frame: &Skeletons) -> String {
     let axes = scene.opensim_from_world();
     let time = scene.time_s(frame.stamp.frame).unwrap_or(0.0);
@@ -23,10 +23,10 @@ pub(crate) fn row(scene: &Scene, row: u64, frame: &Skeletons) -> String {
     formats::trc::row(row, time, points)
 }
 
-/// The five lines before the rows.
+/// Returns the five lines before the rows.
 ///
 /// * `rate_hz`: frames of the footage per second.
-/// * `n_rows`: rows that follow.
+/// * `n_rows`: number of rows that follow.
 pub(crate) fn header(scene: &Scene, rate_hz: f64, n_rows: u64) -> String {
     let rate_hz = rate_hz / scene.frame_step.max(1) as f64;
     let joints = scene.joints.joints.iter().map(|joint| joint.name);
@@ -69,7 +69,7 @@ mod tests {
         assert_eq!(got.markers.len(), 14);
         assert_eq!(got.markers[0], "right_ankle");
         assert_eq!(got.frames.len(), 2);
-        // z is up in the scene: (y, z, x).
+        // z is up in the scene, so the axes are (y, z, x).
         assert_eq!(got.frames[1][0], Some([0.5, 1.75, -0.25]));
     }
 

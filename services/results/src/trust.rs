@@ -1,4 +1,4 @@
-//! Judges how far the results can be trusted, from the results of the followed person, frame by frame.
+//! Judges how far the results can be trusted, from the results for the followed person, frame by frame.
 
 use std::collections::BTreeMap;
 
@@ -9,19 +9,19 @@ use runfiles::{Doubt, Trust};
 use crate::height::height_px;
 use crate::pose3d::is_placed;
 
-/// Steps in which lengths of bones are counted, metres, and the longest.
+/// Step in which lengths of bones are counted, in metres, and the longest length.
 const LENGTH_STEP_M: f64 = 0.001;
 const LONGEST_M: f64 = 1.0;
-/// Farthest that the middle of a body moves between two results, metres, and metres a second.
+/// Maximum movement of the middle of a body between two results, in metres, and in metres per second.
 const FARTHEST_M: f64 = 0.5;
 const FASTEST_M_S: f64 = 6.0;
-/// Standard deviations in a median absolute deviation of normal errors.
+/// Ratio of the standard deviation to the median absolute deviation, for normally distributed errors.
 const SD_PER_MAD: f64 = 1.4826;
 
-/// Steps in which deviations of bodies are counted, standard deviations.
+/// Step in which deviations of bodies are counted, in standard deviations.
 const STEP: f64 = 0.05;
 
-/// Counts what speaks for and against the results.
+/// Collects evidence for and against the results.
 #[derive(Debug, Default)]
 pub(crate) struct Trusted {
     frames: u64,
@@ -30,24 +30,24 @@ pub(crate) struct Trusted {
     n_unsure: u64,
     n_joints: u64,
     n_joints_implausible: u64,
-    /// How many bodies, by their deviation in [`STEP`]s.
+    /// Number of bodies by their deviation, in units of [`STEP`].
     deviations: BTreeMap<u32, u64>,
-    /// Sum of the squared shares of the person's height, and their number.
+    /// Sum of the squared errors, as shares of the person's height, and number of errors.
     squared: (f64, u64),
-    /// Sum of the distances of what the views found, metres, and their number.
+    /// Sum of the distances of the views' joints from the result, in metres, and number of distances.
     distances: (f64, u64),
-    /// By bone: how many results have it, by its length in [`LENGTH_STEP_M`]s.
+    /// For each bone, the number of results by its length, in units of [`LENGTH_STEP_M`].
     lengths: BTreeMap<(usize, usize), Vec<u32>>,
-    /// When the last result was, seconds, and where its body.
+    /// Time of the last result in seconds, and position of its body.
     last: Option<(f64, Vector3<f64>)>,
     n_jumps: u64,
     warned: Vec<Doubt>,
 }
 
 impl Trusted {
-    /// Adds the person who is followed in a result; warns once of each reason not to trust the results.
+    /// Adds the person who is followed in a result. Warns once for each reason not to trust the results.
     ///
-    /// * `person`, `limbs`, the rest: as for [`Trusted::count`].
+    /// * `person`, `limbs` and the others: as for [`Trusted::count`].
     pub(crate) fn add(
         &mut self,
         person: Option<&SkeletonMessage>,
@@ -68,11 +68,11 @@ impl Trusted {
         }
     }
 
-    /// Adds a person of a result; returns false for what is not judged, skeletons of something else than people.
+    /// Adds a person in a result. Returns false for skeletons of something other than people, which are not judged.
     ///
-    /// * `limbs`: pairs of joints that a bone connects.
-    /// * `time_s`: of the frame, if it is known.
-    /// * `distances_m`: of what the views show from the joints, metres.
+    /// * `limbs`: pairs of joints that are connected by a bone.
+    /// * `time_s`: time of the frame in seconds, if it is known.
+    /// * `distances_m`: distances of the views' joints from the result, in metres.
     pub(crate) fn count(
         &mut self,
         pose: &SkeletonMessage,
@@ -142,7 +142,7 @@ impl Trusted {
         self.last = Some((now_s, middle));
     }
 
-    /// The scatter of the lengths of the bones, metres.
+    /// Returns the scatter of the lengths of the bones, in metres.
     fn bone_scatter_m(&self) -> Option<f64> {
         let scatters: Vec<f64> =
             self.lengths.values().filter_map(|value| scatter_m(value)).collect();
@@ -179,7 +179,8 @@ fn place(pose: &SkeletonMessage, joint: usize) -> Option<Vector3<f64>> {
     Some(joint.in_world.into())
 }
 
-/// Median absolute deviation of counted lengths from their median, as a standard deviation, metres; none of fewer than two.
+/// Returns the median absolute deviation of counted lengths from their median, converted to a standard deviation, in metres. Returns `None`
+/// for fewer than two lengths.
 fn scatter_m(counts: &[u32]) -> Option<f64> {
     let n: u32 = counts.iter().sum();
     if n < 2 {
@@ -202,7 +203,7 @@ fn scatter_m(counts: &[u32]) -> Option<f64> {
     Some(SD_PER_MAD * deviation as f64 * LENGTH_STEP_M)
 }
 
-/// The mean height of the person in the views that were used, pixels of their frames.
+/// Returns the mean height of the person in the used views, in pixels of their frames.
 fn mean_height_px(pose: &SkeletonMessage) -> Option<f64> {
     let views = pose.listed_views().iter().enumerate();
     let used = views.filter(|(view, _)| pose.views_used >> view & 1 == 1);
@@ -258,7 +259,7 @@ mod tests {
         for nth in 0..20 {
             let mut pose = result(Sides::SURE);
             pose.joints[1].status = Status::OK;
-            // Every fourth bone is 20 cm too long; the person walks, and is elsewhere in two results.
+            // Every fourth bone is 20 cm too long. The person walks, and is at another position in two results.
             let long = if nth % 4 == 0 {
                 0.2
             } else {

@@ -1,4 +1,4 @@
-//! The thread that writes, and the queue before it.
+//! The writing thread and its queue.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -13,10 +13,10 @@ use crate::gather::Settled;
 use crate::job::Job;
 use crate::{Absent, Folder, FrameRecord, Output};
 
-/// Results that may wait to be written.
+/// Number of results that may wait to be written.
 const QUEUE: usize = 256;
 
-/// Records to be written: frames without a result, then one with a result.
+/// Records to be written: frames without a result, then a frame with a result.
 struct Batch {
     absent: Vec<Absent>,
     record: Option<FrameRecord>,
@@ -39,7 +39,7 @@ pub(crate) struct Writer {
 impl Writer {
     pub(crate) fn start(job: Job, service: &Service) -> Result<Self, Failure> {
         let (session, resume) = (service.session(), service.epoch() > 0);
-        // A folder that became unwritable during the run must not end the other processes.
+        // If a folder becomes unwritable during the run, this must not end the other processes.
         let kind = if resume {
             ExitKind::Run
         } else {
@@ -79,7 +79,7 @@ impl Writer {
         self.overlay_every > 0 && nth.is_multiple_of(self.overlay_every)
     }
 
-    /// Queues a record; `false` if it was dropped because the queue is full.
+    /// Queues a record. Returns `false` if it was dropped because the queue is full.
     pub(crate) fn write(&self, Settled { absent, record }: Settled) -> bool {
         let record = Some(record);
         match self.queue.try_send(Batch { absent, record }) {
@@ -94,15 +94,15 @@ impl Writer {
         }
     }
 
-    /// Queues the frames without a result after the last one; waits for room because nothing follows.
+    /// Queues the frames without a result after the last one. Waits for space, because nothing follows.
     pub(crate) fn rest(&self, absent: Vec<Absent>) {
         let record = None;
         if let Err(error) = self.queue.send(Batch { absent, record }) {
-            tracing::debug!(%error, "the writing thread is gone");
+            tracing::debug!(%error, "the writing thread has ended");
         }
     }
 
-    /// Results that wait to be written.
+    /// Returns the number of results that wait to be written.
     pub(crate) fn n_waiting(&self) -> usize {
         let written = self.n_written.load(Ordering::Relaxed);
         self.n_queued.get().saturating_sub(written) as usize

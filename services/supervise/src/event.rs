@@ -5,42 +5,42 @@ use core::time::Duration;
 
 use messages::Health;
 
-/// How a process ended.
+/// Cause of the end of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Death {
-    /// It ended on its own: with an exit status other than 0, or with 0 before it had finished.
+    /// The process ended on its own: with an exit status other than 0, or with 0 before it had finished.
     Exit {
         /// The exit status.
         status: i32,
     },
-    /// A signal ended it.
+    /// The process was ended by a signal.
     Signal {
-        /// The signal.
+        /// Number of the signal.
         number: i32,
     },
-    /// It was killed because its main loop hung.
+    /// The process was killed because its main loop hung.
     Hung {
-        /// For how long.
+        /// Duration of the hang.
         still: Duration,
     },
-    /// It was killed because one iteration of its main loop took far more processor time than any before.
+    /// The process was killed because one iteration of its main loop took far more processor time than any iteration before.
     Spun {
         /// Processor time of that iteration.
         worked: Duration,
-        /// Processor time of the longest one before.
+        /// Processor time of the longest iteration before.
         longest: Duration,
     },
-    /// It was killed because it sent no heartbeat.
+    /// The process was killed because it sent no heartbeat.
     Silent {
-        /// For how long.
+        /// Time since the last heartbeat.
         still: Duration,
     },
-    /// It was killed because its main loop never started.
+    /// The process was killed because its main loop never started.
     NeverBegan {
-        /// How long the supervisor waited.
+        /// Time that the supervisor waited.
         waited: Duration,
     },
-    /// It could not be started.
+    /// The process could not be started.
     NotStarted,
 }
 
@@ -69,61 +69,61 @@ impl fmt::Display for Death {
     }
 }
 
-/// An event of a run; `process` is the name of a process.
+/// An event of a run. `process` is the name of a process.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event<'a> {
     /// A process has been started.
     Started {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
-        /// Its process id.
+        /// Process id.
         pid: u32,
-        /// How often it has been restarted.
+        /// Number of restarts of the process.
         epoch: u32,
     },
     /// A process has written a line.
     Line {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
         /// The line.
         text: &'a str,
     },
     /// A process has sent a heartbeat.
     Health {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
         /// The heartbeat.
         health: &'a Health,
     },
     /// A process has finished.
     Finished {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
     },
     /// A process has died.
     Died {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
-        /// How.
+        /// Cause of the death.
         death: Death,
     },
     /// A process will be started again.
     Restarting {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
-        /// The pause before.
+        /// Pause before the restart.
         pause: Duration,
     },
     /// A process will not be started again.
     GivenUp {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
-        /// How often it was restarted.
+        /// Number of restarts of the process.
         restarts: u32,
     },
-    /// A process is stopped: every process that sends to it is given up.
+    /// A process is stopped because every process that sends to it has been given up.
     Dismissed {
-        /// Its name.
+        /// Name of the process.
         process: &'a str,
     },
     /// The stop request is sent to all processes.

@@ -25,55 +25,54 @@ impl Outcome {
 /// The outcome of one process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProcessOutcome {
-    /// Its name.
+    /// Name of the process.
     pub name: String,
-    /// Its service.
+    /// Service that the process runs.
     pub service: String,
-    /// How it ended.
+    /// State at the end of the run.
     pub state: State,
-    /// How often it was restarted.
+    /// Number of restarts.
     pub restarts: u32,
-    /// Its counts, over all restarts.
+    /// Counts over all restarts.
     pub counts: Counts,
-    /// Its last heartbeat.
+    /// Last heartbeat.
     pub last: Option<Health>,
-    /// Its last metrics; not checked.
+    /// Last metrics, which have not been checked.
     pub measured: Option<Metrics>,
 }
 
 /// The state of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// It runs.
+    /// The process is running.
     Running,
-    /// It has received the end of stream and sent it on.
+    /// The process has received the end of the stream, and sent it on.
     Finished,
-    /// It was stopped before it had finished.
+    /// The process was stopped before it had finished.
     Stopped,
-    /// It failed too often.
+    /// The process failed too often.
     GivenUp,
 }
 
 /// The counts of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Messages received.
+    /// Number of received messages.
     pub n_received: u64,
-    /// Messages sent.
+    /// Number of sent messages.
     pub n_sent: u64,
-    /// Messages or frames that were lost before they reached it, or came too late.
+    /// Number of messages or frames that were lost before they reached the process, or came too late.
     pub n_dropped: u64,
-    /// Peak memory over all restarts, including shared memory, bytes.
+    /// Peak memory over all restarts, including shared memory, in bytes.
     pub peak_memory_bytes: u64,
-    /// Frames that the processor computed because the GPU was lost.
+    /// Number of frames that the processor computed because the GPU was lost.
     pub n_without_gpu: u64,
-    /// Messages that it refused, by cause ([`Refusal::ALL`]); includes heartbeats on its topic that were not
-    /// its own.
+    /// Messages that the process refused, by cause ([`Refusal::ALL`]). Includes heartbeats on its topic that it did not send.
     pub refused: [u64; Refusal::N],
 }
 
 impl Counts {
-    /// Adds the counts since the last start.
+    /// Returns the sum of these counts and the counts since the last start.
     pub(crate) fn and(self, health: Option<&Health>) -> Self {
         health.map_or(self, |health| Self {
             n_received: self.n_received.saturating_add(health.n_received),

@@ -10,17 +10,17 @@ use tracing::Level;
 /// A deployment, as the supervisor sees it.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// The program that runs every service: `executable service <service> <args>`.
+    /// Program that runs every service: `executable service <service> <args>`.
     pub executable: PathBuf,
-    /// The standard input of every process, also after a restart: a file could be removed in the meantime.
+    /// Standard input of every process, also after a restart. A file could have been removed in the meantime.
     pub given: Vec<u8>,
-    /// Description of the deployment that others of this user can read while it runs ([`Namespace::description`]).
+    /// Description of the deployment, which other programs of this user can read while it runs ([`Namespace::description`]).
     pub description: Vec<u8>,
-    /// The location of the deployment.
+    /// Namespace of the deployment.
     pub namespace: Namespace,
-    /// The session, which goes into the stamp of every message.
+    /// Session, which is part of the stamp of every message.
     pub session: u64,
-    /// Delivery: decides what happens when a receiver is slower than its sender.
+    /// Delivery, which decides what happens if a receiver is slower than its sender.
     pub delivery: Delivery,
     /// All topics, including those of the heartbeats.
     pub topics: Vec<TopicPlan>,
@@ -28,28 +28,29 @@ pub struct Plan {
     pub processes: Vec<ProcessSpec>,
     /// Time limits.
     pub policy: Policy,
-    /// The least important events that services log.
+    /// Log level of the services.
     pub log: Level,
 }
 
 /// One process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProcessSpec {
-    /// Its unique name in the deployment, for example `pose-2`.
+    /// Unique name of the process in the deployment, for example `pose-2`.
     pub name: String,
-    /// Which service it is, for example `pose`.
+    /// Service that the process runs, for example `pose`.
     pub service: String,
-    /// Its own arguments; those of every service are added.
+    /// Arguments of this process. The arguments of all services are added.
     pub args: Vec<OsString>,
-    /// Role: decides what happens to the run without the process.
+    /// Role, which decides what happens to the run without the process.
     pub role: Role,
-    /// Names of the processes that send to it. Once all of them are given up, it is stopped: its receivers would wait
-    /// for a process that is alive and has nothing to send.
+    /// Names of the processes that send to this process. If all of them have been given up, this process is stopped. Otherwise its
+    /// receivers
+    /// would wait for a process that is alive but has nothing to send.
     pub senders: Vec<String>,
-    /// Its requests to the system's scheduler.
+    /// Scheduling that the process requests from the system.
     pub scheduling: Scheduling,
-    /// After some messages: how many times the processor time of the longest iteration of its main loop an
-    /// iteration may take. One that takes more is taken for an endless loop. None if the iterations are not
+    /// Limit on the processor time of an iteration of the main loop, relative to the longest iteration so far. It applies after some
+    /// messages. An iteration that takes longer counts as an endless loop. `None` if the iterations are not
     /// comparable.
     pub most_work: Option<u32>,
 }
@@ -65,35 +66,35 @@ pub enum Role {
     Optional,
 }
 
-/// How much patience there is.
+/// Time limits and restart limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Policy {
     /// A process that has worked for this long is restarted at once.
     pub steady_after: Duration,
-    /// Pause before the restart of one that died sooner; doubles with every such death.
+    /// Pause before the restart of a process that died sooner. It doubles with every such death.
     pub first_pause: Duration,
     /// Longest pause before a restart.
     pub longest_pause: Duration,
-    /// Restarts within the window after which a process is given up.
+    /// Number of restarts within the window after which a process is given up.
     pub max_restarts: usize,
-    /// How long a restart counts.
+    /// Length of the window in which restarts are counted.
     pub restart_window: Duration,
-    /// How long a process may take until the first iteration of its main loop.
+    /// Longest time until the first iteration of a process's main loop.
     pub startup_limit: Duration,
-    /// How long a stopped process (SIGSTOP) may send no heartbeat; and the processor time that any iteration
-    /// of a main loop may take, however short those before were ([`ProcessSpec::most_work`]).
+    /// Longest time without a heartbeat for a stopped process (SIGSTOP). Also the processor time that every iteration
+    /// of a main loop may take, however short earlier iterations were ([`ProcessSpec::most_work`]).
     pub stopped_limit: Duration,
-    /// How long any process may send no heartbeat. A separate thread sends them, so a silent process is
+    /// Longest time without a heartbeat for any process. A separate thread sends heartbeats, so a silent process is
     /// stopped or gets no processor time.
     pub silence_limit: Duration,
-    /// How long the main loop of a process may hang: longer than any frame takes.
+    /// Longest time that the main loop of a process may hang. It is longer than any frame takes.
     pub hang_limit: Duration,
-    /// How long a process may wait for messages without receiving any, once others have finished and some
+    /// Longest time that a process may wait without receiving a message. It applies after other processes have finished and some
     /// were restarted or given up.
     pub idle_limit: Duration,
-    /// How long processes may take to end after the stop request.
+    /// Time that processes have to end after the stop request.
     pub grace: Duration,
-    /// Period of the clean-up after dead processes, besides that at every death.
+    /// Interval between clean-ups after dead processes. There is also a clean-up at every death.
     pub clean_period: Duration,
 }
 
@@ -117,10 +118,10 @@ impl Default for Policy {
 }
 
 impl Policy {
-    /// The pause before the next restart, or none if the process is to be given up.
+    /// Returns the pause before the next restart, or `None` if the process is to be given up.
     ///
-    /// * `recent`: restarts within the window.
-    /// * `hasty`: how many times in a row it died before [`Policy::steady_after`].
+    /// * `recent`: number of restarts within the window.
+    /// * `hasty`: how many times in a row the process died before [`Policy::steady_after`].
     pub(crate) fn pause(&self, recent: usize, hasty: u32) -> Option<Duration> {
         if recent >= self.max_restarts {
             return None;

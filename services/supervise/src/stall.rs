@@ -1,4 +1,4 @@
-//! Ends the process where shared memory does not answer.
+//! Ends the process if shared memory does not answer.
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::{io, thread};
 
-/// Watches a thread, from another one, until it is dropped.
+/// Watches a thread from another thread, until dropped.
 #[derive(Debug)]
 pub(crate) struct Stall {
     watched: Arc<Watched>,
-    /// The end of the watching: the receiver notices that it is gone.
+    /// Dropping this sender ends the watching thread, whose receiver notices it.
     _end: SyncSender<()>,
 }
 
@@ -21,19 +21,19 @@ struct Watched {
 }
 
 impl Stall {
-    /// Begins to watch.
+    /// Starts to watch the current thread.
     ///
-    /// * `limit`: how long there may be no turn. A time in which the whole process was stopped does not count.
+    /// * `limit`: longest time between two calls of [`Self::turn`]. Time in which the whole process was stopped does not count.
     /// * `on_stall`: called once, from the other thread.
     ///
     /// # Errors
     ///
-    /// There is no other thread.
+    /// Fails if the other thread cannot be started.
     pub(crate) fn watch(limit: Duration, on_stall: fn()) -> io::Result<Self> {
         let watched = Arc::new(Watched::default());
         let (end, ended) = sync_channel(0);
         let seen = Arc::clone(&watched);
-        // A stopped process sleeps through many ticks and counts one.
+        // A stopped process sleeps through many ticks, but counts only one.
         let tick = limit / 60;
         thread::Builder::new().name("stall".to_owned()).spawn(move || {
             let (mut turns, mut waited) = (0, Duration::ZERO);
@@ -53,12 +53,12 @@ impl Stall {
         Ok(Self { watched, _end: end })
     }
 
-    /// The watched thread is alive.
+    /// Reports that the watched thread is alive.
     pub(crate) fn turn(&self) {
         self.watched.turns.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Calls what may take as long as it likes.
+    /// Calls a function that may take any time.
     pub(crate) fn outside(&self, call: impl FnOnce()) {
         self.watched.is_outside.store(true, Ordering::Relaxed);
         call();

@@ -15,18 +15,18 @@ use crate::stall::Stall;
 use crate::watch::{Phase, Sequel, Watch, death_of};
 use crate::{Death, Event, Outcome, Plan, Role};
 
-/// Longest sleep of the supervisor: how late a hang or a due restart may be noticed.
+/// Longest sleep of the supervisor, and so the longest delay until a hang or a due restart is noticed.
 const TURN: Duration = Duration::from_millis(50);
-/// An iteration that took this long means that the supervisor itself was stopped, and received no heartbeats.
+/// If an iteration took this long, the supervisor itself was stopped and received no heartbeats.
 const ASLEEP: Duration = Duration::from_secs(2);
-/// Longest time without an answer from shared memory: the transport may wait for ever for a file that was cut off.
+/// Longest time without an answer from shared memory. The transport may wait for ever if a file was truncated.
 const LONGEST_STALL: Duration = Duration::from_mins(1);
 /// Message after such a stall.
 const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  \
-    hint: something else has filled, cut off or changed files in /dev/shm while they were in use: make room there; \
-    `parallax clean` removes what is left\n";
+    hint: another program has filled /dev/shm, or truncated or changed files there: free some space there; \
+    `parallax clean` removes the leftovers\n";
 
-/// The run failed.
+/// Error of a failed run.
 #[derive(Debug, thiserror::Error)]
 pub enum SuperviseError {
     /// The deployment cannot be locked.
@@ -35,7 +35,7 @@ pub enum SuperviseError {
     /// There is not enough memory, or too few open files.
     #[error(transparent)]
     Preflight(#[from] PreflightError),
-    /// Its topics cannot be created.
+    /// The topics of the deployment cannot be created.
     #[error(transparent)]
     Bus(#[from] BusError),
     /// A topic of heartbeats cannot be subscribed to.
@@ -44,23 +44,23 @@ pub enum SuperviseError {
     /// A process reports that its input is wrong.
     #[error("{process} cannot work: {message}")]
     Unusable {
-        /// Its name.
+        /// Name of the process.
         process: String,
-        /// Its exit status.
+        /// Exit status of the process.
         kind: ExitKind,
-        /// Its output.
+        /// Output of the process.
         message: String,
     },
     /// An essential process failed too often.
     #[error("{process} {death}, and was given up after {restarts} restarts\n{message}")]
     GivenUp {
-        /// Its name.
+        /// Name of the process.
         process: String,
-        /// Its last death.
+        /// Cause of the last death.
         death: Death,
-        /// How often it had been restarted.
+        /// Number of restarts.
         restarts: u32,
-        /// The end of its output.
+        /// End of the output.
         message: String,
     },
     /// The child processes cannot be watched.
@@ -90,27 +90,27 @@ impl Fault for SuperviseError {
     }
 }
 
-/// When the stop request is repeated: soon enough to count as the same request (`failure::Stop`).
+/// Time after which the stop request is repeated. It is short enough to count as the same request (`failure::Stop`).
 const REPEAT_STOP: core::ops::Range<Duration> =
     Duration::from_millis(100)..Duration::from_millis(300);
 
 /// Runs a deployment until all its processes have finished, `stop` is requested, or it fails.
 ///
-/// A process has finished when its heartbeats report so. It is stopped once all have finished, so that its
-/// last message remains available to a restarted receiver. A process that ends without having finished and
-/// without a stop request has failed, whatever its exit status.
+/// A process has finished when its heartbeats report so. Processes are stopped only when all have finished, so that the
+/// last message of each remains available to a restarted receiver. If a process ends without having finished and
+/// without a stop request, it has failed, whatever its exit status.
 ///
-/// Afterwards no process, file or shared memory of the deployment is left, whatever the outcome. Call it from
-/// a thread that lives as long as the run: its children end with it.
+/// Afterwards no process, file or shared memory of the deployment is left, whatever the outcome. Call this function from
+/// a thread that lives as long as the run, because the child processes end with the thread.
 ///
-/// The exception: where shared memory does not answer for a minute, the process ends at once, with a message and the exit
-/// status of [`ExitKind::Run`], and files may be left.
+/// There is one exception: if shared memory does not answer for a minute, this process ends at once, with a message and the exit
+/// status of [`ExitKind::Run`]. Files may then be left.
 ///
-/// * `on_event`: is called for every event, and must not take long.
+/// * `on_event`: called for every event. It must not take long.
 ///
 /// # Errors
 ///
-/// [`SuperviseError`].
+/// Fails with [`SuperviseError`] if the run fails.
 pub fn run(
     plan: &Plan,
     stop: &Stop,
@@ -120,12 +120,12 @@ pub fn run(
     let stall = Stall::watch(LONGEST_STALL, || failure::end_process(STALLED))
         .map_err(SuperviseError::Watch)?;
     let on_event = &mut |event: Event<'_>| stall.outside(|| on_event(event));
-    // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.
+    // Dropped in reverse order: ports, topics, bus, and last the lock, which removes every file.
     let lock = plan.namespace.acquire()?;
     preflight(&plan.topics)?;
     let bus = Bus::open(&plan.namespace, SUPERVISOR, stop)?;
     let _topics = bus.create_topics(&plan.topics)?;
-    // Says to others that all topics are there.
+    // The description tells other programs that all topics exist.
     lock.describe(&plan.description)?;
     let mut waiter = bus.waiter();
     let now = Instant::now();
@@ -191,7 +191,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Stops the processes that wait for messages that nothing is left to send.
+    /// Stops processes that wait for messages, if no process is left that sends them.
     fn dismiss(&mut self, now: Instant) {
         for index in 0..self.watches.len() {
             let watch = &self.watches[index];
@@ -216,7 +216,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Time until the next restart.
+    /// Returns the time until the next restart.
     fn until_due(&self) -> Duration {
         let now = Instant::now();
         self.watches
@@ -330,10 +330,10 @@ impl Supervisor<'_> {
         let Some(status) = child.try_wait().map_err(SuperviseError::Watch)? else {
             return Ok(());
         };
-        // Its last messages.
+        // Receives the last messages of the process.
         self.receive(index, now);
         let watch = &mut self.watches[index];
-        // A process that was signalled together with the supervisor may end earlier.
+        // A process may end early if it was signalled together with the supervisor.
         let is_in_order =
             watch.reports_finished() || watch.is_dismissed || self.stop.is_requested();
         if let Some(death) = death_of(status, is_in_order) {
@@ -350,7 +350,7 @@ impl Supervisor<'_> {
         let watch = &mut self.watches[index];
         let process = watch.spec.name.as_str();
         (self.on_event)(Event::Died { process, death });
-        // Dropping the child waits for its end, which the clean-up needs.
+        // Dropping the child waits for its end. The clean-up needs this.
         match watch.die(death, &self.plan.policy, now) {
             Sequel::Restart(pause) => {
                 let process = watch.spec.name.as_str();
@@ -359,7 +359,7 @@ impl Supervisor<'_> {
             Sequel::GiveUp => {
                 let process = watch.spec.name.as_str();
                 if let Err(error) = Losses::of(&self.plan.namespace).note(process) {
-                    tracing::warn!(process, %error, "senders will wait for it for long");
+                    tracing::warn!(process, %error, "senders will wait a long time for it");
                 }
                 (self.on_event)(Event::GivenUp {
                     process: &watch.spec.name,
@@ -379,7 +379,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Returns an error if the run cannot go on without a process.
+    /// Returns an error if the run cannot continue without a process.
     fn check_needed(&self, index: usize, death: Death) -> Result<(), SuperviseError> {
         let watch = &self.watches[index];
         let needed = match watch.spec.role {
@@ -402,8 +402,9 @@ impl Supervisor<'_> {
         })
     }
 
-    /// Returns true if all processes have finished, or the others only wait: if one was given up or restarted, others
-    /// may never receive the end of stream.
+    /// Returns true if all processes have finished. Also returns true if one was given up or restarted and the others only wait, because
+    /// they
+    /// may never receive the end of the stream.
     fn is_done(&self, now: Instant) -> bool {
         let was_lost = |watch: &Watch| watch.is_given_up() || watch.epoch > 0;
         let may_miss_end =
@@ -433,8 +434,8 @@ impl Supervisor<'_> {
             let now = Instant::now();
             let waited = now.saturating_duration_since(begin);
             let patient = waited < self.plan.policy.grace;
-            // Two signals at the same time may merge into one, and its sender may be the other process:
-            // repeat ours.
+            // Two signals at the same time may merge into one, and its sender may be the other process. So the
+            // signal is repeated.
             if !is_repeated && REPEAT_STOP.contains(&waited) {
                 is_repeated = true;
                 self.watches.iter().filter_map(Watch::child).for_each(Child::terminate);
@@ -450,7 +451,7 @@ impl Supervisor<'_> {
         self.clean(Instant::now());
     }
 
-    /// Releases a process that has ended, or has run out of time.
+    /// Releases a process that has ended, or whose time is over.
     fn release(&mut self, index: usize, patient: bool) {
         let watch = &mut self.watches[index];
         let Phase::Running(child) = &mut watch.phase else {

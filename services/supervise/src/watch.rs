@@ -12,11 +12,11 @@ use runtime::{Child, Subscriber};
 
 use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 
-/// A main loop with an iteration within this time is waiting, not computing.
+/// If a main loop has had an iteration within this time, it is waiting, not computing.
 const WAITING: Duration = Duration::from_secs(1);
-/// Messages that a process has to send first: the first ones take more work than the others.
+/// Number of messages that a process has to send before iterations are compared, because the first ones take more work.
 const WARM_UP_MESSAGES: u64 = 8;
-/// Lines of output that are kept to explain a death.
+/// Number of output lines that are kept to explain a death.
 const KEPT_LINES: usize = 40;
 
 /// A supervised process.
@@ -27,13 +27,13 @@ pub(crate) struct Watch {
     pub(crate) metrics: Subscriber<Metrics>,
     pub(crate) phase: Phase,
     pub(crate) epoch: u32,
-    /// When it was restarted, within the window.
+    /// Times of restarts within the window.
     restarts: VecDeque<Instant>,
     /// Time of the first iteration of the main loop since the last start.
     at_work_since: Option<Instant>,
-    /// True if the main loop ran before an earlier restart: its input was good then.
+    /// True if the main loop ran before an earlier restart. Its input was then usable.
     has_worked: bool,
-    /// How many times in a row it died before [`Policy::steady_after`].
+    /// How many times in a row the process died before [`Policy::steady_after`].
     n_hasty: u32,
     output: VecDeque<String>,
     /// Counts before the last restart.
@@ -44,31 +44,31 @@ pub(crate) struct Watch {
     last: Option<Health>,
     /// The last metrics, possibly from before a restart.
     measured: Option<Metrics>,
-    /// The last heartbeat, by its own time stamp.
+    /// Time of the last heartbeat, by the heartbeat's own time stamp.
     heartbeat: Change,
-    /// The last iteration of the main loop.
+    /// Time of the last iteration of the main loop.
     iteration: Change,
-    /// The last received message.
+    /// Time of the last received message.
     received: Change,
     work: Work,
-    /// True if it was stopped because nothing is left that sends to it.
+    /// True if the process was stopped because no process is left that sends to it.
     pub(crate) is_dismissed: bool,
 }
 
 /// The state of a process.
 #[derive(Debug)]
 pub(crate) enum Phase {
-    /// It runs.
+    /// The process is running.
     Running(Child),
-    /// It will be started at this time.
+    /// The process will be started at this time.
     Due(Instant),
-    /// It ended regularly.
+    /// The process ended regularly.
     Ended(State),
-    /// It will not be restarted.
+    /// The process will not be restarted.
     GivenUp,
 }
 
-/// A counter, and when it last changed.
+/// A counter, and the time of its last change.
 #[derive(Debug, Clone, Copy)]
 struct Change {
     count: u64,
@@ -87,22 +87,24 @@ impl Change {
     }
 }
 
-/// The processor time of the iterations of a main loop. Unlike wall-clock time it does not depend on other
-/// load, and waiting takes little of it (a spinning process iterates all the time).
+/// Processor time of the iterations of a main loop. Unlike wall-clock time, it does not depend on other
+/// load. Waiting takes little processor time (a spinning process iterates all the time).
 #[derive(Debug, Clone, Copy, Default)]
 struct Work {
-    /// Processor time of the process at the first heartbeat after its last iteration, milliseconds modulo
+    /// Processor time of the process at the first heartbeat after its last iteration, in milliseconds modulo
     /// 2^32.
     at_iteration: u32,
-    /// Processor time since then.
+    /// Processor time since the last iteration.
     since_iteration: Duration,
-    /// The longest iteration since the last start; those between two heartbeats count as one.
+    /// Processor time of the longest iteration since the last start. All iterations between two heartbeats count as one.
     longest: Duration,
 }
 
 impl Work {
-    /// * `iterated`: whether there was an iteration since the last heartbeat.
-    /// * `is_first`: whether it is the first one.
+    /// Processes the processor time in a heartbeat.
+    ///
+    /// * `iterated`: true if there was an iteration since the last heartbeat.
+    /// * `is_first`: true if this is the first heartbeat.
     fn note(&mut self, cpu_millis: u32, iterated: bool, is_first: bool) {
         let used = u64::from(cpu_millis.wrapping_sub(self.at_iteration));
         self.since_iteration = Duration::from_millis(used);
@@ -119,16 +121,16 @@ impl Work {
 /// Consequence of a death.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sequel {
-    /// A restart, after a pause.
+    /// The process is restarted after a pause.
     Restart(Duration),
-    /// Nothing: it failed too often.
+    /// The process is not restarted, because it failed too often.
     GiveUp,
-    /// The run fails: the input is wrong.
+    /// The run fails, because the input is wrong.
     Fail(ExitKind),
 }
 
 impl Watch {
-    /// A process to be started at once.
+    /// Returns a process that is to be started at once.
     pub(crate) fn new(
         spec: ProcessSpec,
         heartbeats: Subscriber<Health>,
@@ -158,7 +160,7 @@ impl Watch {
         }
     }
 
-    /// Notes that the process was started.
+    /// Records that the process was started.
     pub(crate) fn begin(&mut self, child: Child, now: Instant) {
         self.phase = Phase::Running(child);
         self.output.clear();
@@ -185,7 +187,7 @@ impl Watch {
         self.output.push_back(line.to_owned());
     }
 
-    /// Processes a heartbeat. Those from before a restart are ignored, those of other processes and runs
+    /// Processes a heartbeat. Heartbeats from before a restart are ignored, and those of other processes and runs are
     /// counted.
     pub(crate) fn note_health(&mut self, health: &Health, session: u64, now: Instant) -> bool {
         if health.session != session {
@@ -209,7 +211,7 @@ impl Watch {
         self.iteration.note(health.n_loops, now);
         if self.iteration.count > 0 && self.at_work_since.is_none() {
             self.at_work_since = Some(now);
-            // It could not receive messages before.
+            // The process could not receive messages before.
             self.received.at = now;
         }
         self.received.note(health.n_received, now);
@@ -218,7 +220,7 @@ impl Watch {
         true
     }
 
-    /// Keeps metrics, also of a process that was killed.
+    /// Keeps metrics, also of a killed process.
     pub(crate) fn note_metrics(&mut self, metrics: &Metrics) {
         self.measured = Some(*metrics);
     }
@@ -228,7 +230,7 @@ impl Watch {
         false
     }
 
-    /// Restarts all timers: the supervisor itself was stopped.
+    /// Restarts all timers, because the supervisor itself was stopped.
     pub(crate) fn restart_timers(&mut self, now: Instant) {
         self.heartbeat.at = now;
         self.iteration.at = now;
@@ -254,7 +256,7 @@ impl Watch {
         } else if still <= policy.hang_limit {
             None
         } else if silent > still / 2 {
-            // A stopped process makes no iterations either; report the missing heartbeats.
+            // A stopped process makes no iterations either, so the missing heartbeats are reported.
             Some(Death::Silent { still: silent })
         } else {
             Some(Death::Hung { still })
@@ -273,10 +275,10 @@ impl Watch {
             && self.at_work_since.is_some_and(worked)
     }
 
-    /// Notes a death, and decides what follows.
+    /// Records a death, and decides what follows.
     pub(crate) fn die(&mut self, death: Death, policy: &Policy, now: Instant) -> Sequel {
         self.past = self.past.and(self.current.take().as_ref());
-        // An input that was usable before may be usable again; other processes still have it.
+        // An input that was usable before may be usable again, and other processes still use it.
         if !self.has_worked
             && let Death::Exit { status } = death
             && let Some(kind) = ExitKind::of_status(status).filter(|kind| kind.is_permanent())
@@ -303,7 +305,7 @@ impl Watch {
         Sequel::Restart(pause)
     }
 
-    /// Notes a regular end: the process had finished or was stopped.
+    /// Records a regular end: the process had finished or was stopped.
     pub(crate) fn end(&mut self) {
         self.phase = Phase::Ended(if self.reports_finished() {
             State::Finished
@@ -312,7 +314,7 @@ impl Watch {
         });
     }
 
-    /// Returns true if it has received the end of stream and sent it on.
+    /// Returns true if the process has received the end of the stream and sent it on.
     pub(crate) fn is_finished(&self) -> bool {
         match self.phase {
             Phase::Ended(_) => true,
@@ -321,7 +323,7 @@ impl Watch {
         }
     }
 
-    /// Returns true if it waits for messages, and has received none for so long that none will come.
+    /// Returns true if the process waits for messages, but has received none for so long that none will come.
     pub(crate) fn is_idle(&self, policy: &Policy, now: Instant) -> bool {
         let since = |change: Change| now.saturating_duration_since(change.at);
         self.child().is_some()
@@ -329,7 +331,7 @@ impl Watch {
             && since(self.received) > policy.idle_limit
     }
 
-    /// Returns true if its heartbeats report that it has finished.
+    /// Returns true if the heartbeats of the process report that it has finished.
     pub(crate) fn reports_finished(&self) -> bool {
         self.current.is_some_and(|health| health.finished != 0)
     }
@@ -338,7 +340,7 @@ impl Watch {
         matches!(self.phase, Phase::GivenUp)
     }
 
-    /// Returns true if it will send nothing more, without having sent the end of its stream.
+    /// Returns true if the process will not send anything more, but has not sent the end of its stream.
     pub(crate) fn is_lost(&self) -> bool {
         match self.phase {
             Phase::GivenUp => true,
@@ -347,7 +349,7 @@ impl Watch {
         }
     }
 
-    /// Its output about its end: from the last `error:` on, or the last lines.
+    /// Returns the output that explains the end of the process: from the last `error:` on, or the last lines.
     pub(crate) fn message(&self) -> String {
         let begin = self
             .output
@@ -377,9 +379,9 @@ impl Watch {
     }
 }
 
-/// How a process died, from its exit status; none if it ended regularly.
+/// Returns the cause of a death from the exit status; `None` if the process ended regularly.
 ///
-/// * `is_in_order`: whether it had finished or was stopped.
+/// * `is_in_order`: true if the process had finished or was stopped.
 pub(crate) fn death_of(status: ExitStatus, is_in_order: bool) -> Option<Death> {
     match (status.code(), status.signal()) {
         (Some(0), _) if is_in_order => None,

@@ -1,4 +1,4 @@
-//! Deployments whose processes are killed, stopped, or fail.
+//! Tests of deployments whose processes are killed, stopped, or fail.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test reports that it is skipped")]
 
@@ -90,7 +90,7 @@ fn a_sender_that_waits_for_a_killed_receiver_continues() {
         ],
     );
     case.plan.policy.max_restarts = 0;
-    // The sink has the messages that were sent before the dam blocked the sender.
+    // The sink received the messages that were sent before the dam blocked the sender.
     let run = case.run(kill_once("dam", "-9", |event| {
         is_line(event, "dam", "holding")
     }));
@@ -200,10 +200,10 @@ fn a_stopped_process_is_detected() {
             ("source", "send 1000000 1 1", Role::Essential),
         ],
     );
-    // Only the state of the process can show it.
+    // With this limit, only the state of the process can show that it is stopped.
     case.plan.policy.silence_limit = Duration::from_mins(10);
     case.plan.policy.hang_limit = Duration::from_mins(10);
-    // Late enough for it to have sent a heartbeat.
+    // The process is stopped after it has sent a heartbeat.
     let mut freeze = kill_once("source", "-STOP", |event| {
         is_line(event, "source", "sent 512")
     });
@@ -230,7 +230,7 @@ fn a_hanging_main_loop_is_detected() {
     assert_eq!(state_of(&run, "knot"), State::Finished);
 }
 
-/// The deaths of a process that computes for its usual time, and then for long.
+/// Returns the deaths of a process that first computes for its usual time, and then for a long time.
 fn deaths_of_computing_process(how: &str, most_work: Option<u32>) -> Vec<Death> {
     let mut case = Case::new(Delivery::Realtime, &[("mill", how, Role::Essential)]);
     case.plan.policy.hang_limit = Duration::from_mins(10);
@@ -277,7 +277,7 @@ fn a_long_computation_is_awaited() {
             ("source", "send 3 1 1", Role::Essential),
         ],
     );
-    // A failed process, finished ones, and a computation that is longer than the idle limit.
+    // One process fails, others finish, and one computes for longer than the idle limit.
     case.plan.policy.max_restarts = 0;
     let run = case.run(|_, _| {});
     assert_eq!(run.deaths("thinker"), []);
@@ -418,7 +418,7 @@ fn a_run_without_any_view_left_fails() {
 #[test]
 fn a_process_that_never_starts_its_main_loop_is_killed() {
     let mut case = Case::new(Delivery::Realtime, &[("mute", "idle", Role::Essential)]);
-    // A program that runs but sends no heartbeat.
+    // This program runs, but sends no heartbeat.
     case.plan.executable = "/bin/sleep".into();
     case.plan.policy.startup_limit = Duration::from_millis(200);
     case.plan.policy.max_restarts = 0;
@@ -446,7 +446,7 @@ fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
         .unwrap();
     let mut lines = BufReader::new(supervisor.stdout.take().unwrap()).lines();
     let pids: Vec<u32> = (0..2).map(|_| lines.next().unwrap().unwrap().parse().unwrap()).collect();
-    // Both have started: their files exist.
+    // Both processes have started, because their files exist.
     assert!(pids.iter().all(|&pid| is_alive(pid)), "{pids:?}");
     supervisor.kill().unwrap();
     supervisor.wait().unwrap();
@@ -457,7 +457,7 @@ fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
 #[test]
 fn full_shared_memory_is_an_error_with_the_numbers_instead_of_sigbus() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
-    // A file system of 8 megabytes, mounted for this process only.
+    // Mounts a file system of 8 megabytes for this process only.
     let script = format!(
         "mount -t tmpfs -o size=8m tmpfs /dev/shm || exit 99; exec {} fill {}",
         env!("CARGO_BIN_EXE_supervise-dummy"),

@@ -1,4 +1,4 @@
-//! Deployments without faults.
+//! Tests of deployments without faults.
 
 use crate::common;
 

@@ -1,4 +1,4 @@
-//! Joins what the views found and who it is, solves over the evidence in place, sends.
+//! Joins the poses of the views with the identities of people, solves over the evidence in shared memory, and sends the results.
 
 use core::time::Duration;
 use std::cell::Ref;
@@ -14,21 +14,22 @@ use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Stage};
 use wire::SolvedPerson;
 
-/// The process's work by the method of networks.
+/// The job of the process, for people found by networks.
 #[derive(Debug)]
 pub struct SpaceJob {
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
-    /// Triangulates the extra keypoints.
+    /// Step that triangulates the extra keypoints.
     pub extras: ExtrasStep,
-    /// Frames of the footage per second, if that is known: without it nothing is moved from the time of its picture to the instant
-    /// of its frame.
+    /// Frames of the footage per second, if known. Without it, positions are not corrected for the time between the picture and the instant
+    /// of
+    /// its frame.
     pub frame_rate_hz: Option<f64>,
-    /// Distance between the frames used, at least 1.
+    /// Distance between used frames, at least 1.
     pub frame_step: u64,
-    /// Processes that receive the result.
+    /// Number of processes that receive the result.
     pub n_consumers: usize,
-    /// How long a view or the process before may be silent.
+    /// Time that a view, or the process before, may be silent.
     pub patience: Duration,
 }
 
@@ -41,11 +42,11 @@ enum Input {
 
 /// Solves every frame in space, until all inputs end or a stop is requested.
 ///
-/// * `step`: keeps the sides and bone lengths of the previous frames.
+/// * `step`: keeps the sides and bone lengths from previous frames.
 ///
 /// # Errors
 ///
-/// Errors of the transport.
+/// Fails with errors of the transport.
 pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> Result<(), Failure> {
     let mut stage = Stage::new(service, job.patience);
     stage.skip_when_behind(job.frame_step);
@@ -67,7 +68,7 @@ pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> R
         people,
         output: stage.output(&topic::skeletons(), job.n_consumers)?,
     };
-    // Of the extra keypoints, by person.
+    // Motions of the extra keypoints, by person.
     let mut motions = BTreeMap::new();
     stage.run(|frame| solver.solve(frame, &mut step, &mut motions))
 }
@@ -77,7 +78,7 @@ struct Solver<'a> {
     service: &'a Service,
     job: &'a SpaceJob,
     held: Vec<Held<f32, EvidenceHeader>>,
-    /// Slot of the people.
+    /// Slot of the input with the people.
     people: usize,
     output: Output<'a, Skeletons>,
 }
@@ -128,7 +129,7 @@ impl Solver<'_> {
         self.output.send_and_account(frame.turn(), 0, *message)
     }
 
-    /// The maps of a view; none, and counted, if they are malformed.
+    /// Returns the maps of a view. Malformed maps are counted, and an empty list is returned.
     fn maps<'a>(&self, sample: &'a Sample<f32, EvidenceHeader>) -> Vec<PersonMaps<'a>> {
         let context = Context::of(self.service);
         let read = wire::maps_from_message(sample.header(), sample.payload());

@@ -1,4 +1,4 @@
-//! Receives who is in a frame and its evidence, or the poses of pairs; sends joints in the world.
+//! Computes joints in the world: receives the people of a frame with the evidence, or the poses of pairs, and sends skeletons.
 #![forbid(unsafe_code)]
 
 mod in_space;

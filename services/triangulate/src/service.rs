@@ -1,4 +1,4 @@
-//! Joins the poses of views and pairs, settles left and right, triangulates, sends.
+//! Joins the poses of views and pairs, decides left and right, triangulates, and sends the results.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -12,37 +12,38 @@ use runtime::Service;
 use stage::{Frame, Item, Stage};
 use wire::{SolvedPerson, WireError};
 
-/// Identity of the followed person, the only one by the paper's method, which gives no identities.
+/// Identity of the followed person. The paper's method has only one person, without identities.
 const UNNAMED: u64 = 1;
 
-/// Task of the process.
+/// The job of the process.
 #[derive(Debug)]
 pub struct Job {
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
-    /// Grouping of the views: solved in pairs or all at once.
+    /// Grouping of the views: solved in pairs, or all at once.
     pub views: Views,
-    /// The pairs of the deployment; if all views are solved at once: the first view with each other one. They are assigned
-    /// to the workers in turn.
+    /// The pairs of the deployment, assigned to the workers in turn. If all views are solved at once, the first view with each other
+    /// view.
     pub pairs: Vec<[usize; 2]>,
-    /// Frames of the footage per second, if that is known: without it nothing is moved from the time of its picture to the instant
-    /// of its frame.
+    /// Frames of the footage per second, if known. Without it, positions are not corrected for the time between the picture and the instant
+    /// of
+    /// its frame.
     pub frame_rate_hz: Option<f64>,
     /// Number of fusion workers.
     pub n_workers: usize,
-    /// Processes that receive the result.
+    /// Number of processes that receive the result.
     pub n_consumers: usize,
-    /// How long a view or a worker may be silent.
+    /// Time that a view or a worker may be silent.
     pub patience: Duration,
 }
 
 /// Triangulates every frame, until all inputs end or a stop is requested.
 ///
-/// * `step`: keeps the facing of the previous frame.
+/// * `step`: keeps the facing direction from the previous frame.
 ///
 /// # Errors
 ///
-/// Errors of the transport.
+/// Fails with errors of the transport.
 pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), Failure> {
     let n_views = job.plans.len();
     let mut stage = Stage::new(service, job.patience);
@@ -100,18 +101,18 @@ enum Input {
 #[derive(Debug)]
 struct Found {
     candidates: Vec<Pose>,
-    /// Evidence of their pictures for the direction in which they face.
+    /// Evidence of the pictures for the direction in which each pose faces.
     front: Vec<FrontEvidence>,
-    /// How long after the instant of the frame the picture was taken, seconds.
+    /// Time from the instant of the frame until the picture was taken, in seconds.
     skew_s: f64,
 }
 
-/// The poses of a pair, and the expected errors of both views that its worker used.
+/// The poses of a pair, and the expected errors of both views that the worker used.
 #[derive(Debug)]
 struct PairInput {
     views: [usize; 2],
     answer: Option<PairResult>,
-    /// With their age in frames.
+    /// Expected errors of both views in pixels, with their age in frames.
     sigma_px: [Option<(u16, Vec<f32>)>; 2],
 }
 
@@ -129,7 +130,7 @@ fn decode_pair(job: &Job, message: &PairPose) -> Result<PairInput, WireError> {
     })
 }
 
-/// The single-view poses with the expected errors that fusion used: the latest if workers used different ones.
+/// Returns the single-view poses with the expected errors that fusion used. If workers used different errors, returns the latest.
 fn view_answers(
     frame: &mut Frame<'_, Input>,
     n_views: usize,
@@ -159,8 +160,8 @@ fn view_answers(
     (0..n_views).map(&mut answer).collect()
 }
 
-/// The skeleton from the fused and the single-view poses. A pair is used only if the single-view poses of both views were
-/// received here too.
+/// Computes the skeleton from the fused and the single-view poses. A pair is only used if the single-view poses of both views were
+/// received here.
 fn skeleton(
     solved: Views,
     views: &[Option<ViewResult>],

@@ -1,8 +1,8 @@
-//! From the section `[paper]` of a deployment to the settings of the skeleton step.
+//! Converts the section `[paper]` of a deployment to the settings of the skeleton step.
 
 use deployment::paper::Combine;
 
-/// How a view's pose is made of those of its pairs.
+/// Returns how a view's pose is combined from the poses of its pairs.
 pub fn combine(from: Combine) -> pipeline::Combine {
     match from {
         Combine::Mean => pipeline::Combine::Mean,

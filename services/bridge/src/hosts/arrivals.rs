@@ -1,27 +1,27 @@
-//! Which frame of the run a message from another host is for, and what became of the frames without one.
+//! Assigns messages from another host to frames of the run, and counts the frames without a message.
 
 use messages::Status;
 
-/// How far beyond the middle between two instants a message keeps to the one that is next, in periods: clocks that are as far
-/// apart would else change between two.
+/// Tolerance in periods: beyond the middle between two instants, a message still belongs to the one that is next. Otherwise messages would
+/// jump between two instants if two clocks differ by half a period.
 const SLACK: f64 = 0.1;
 
-/// The instants of the run: `start + nth * period`, by our clock.
+/// The instants of the run: `start + nth * period`, by this host's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// The first instant, nanoseconds.
+    /// Time of the first instant, in nanoseconds.
     pub start_nanos: u64,
-    /// From one to the next, nanoseconds.
+    /// Time from one instant to the next, in nanoseconds.
     pub period_nanos: f64,
 }
 
 impl Grid {
-    /// When an instant is, nanoseconds.
+    /// Returns the time of an instant, in nanoseconds.
     pub fn at(&self, nth: u64) -> u64 {
         self.start_nanos.saturating_add((nth as f64 * self.period_nanos).round() as u64)
     }
 
-    /// The latest instant that is not after a time; 0 before all.
+    /// Returns the latest instant that is not after a time; 0 before the first.
     pub fn latest(&self, nanos: u64) -> u64 {
         self.exact(nanos).max(0.0) as u64
     }
@@ -31,19 +31,19 @@ impl Grid {
     }
 }
 
-/// Why there is no message for a frame.
+/// Reason why there is no message for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gap {
-    /// It did not come in time, though its host is there.
+    /// The message did not come in time, although its host answers.
     Late,
-    /// Its host did not answer.
+    /// The host did not answer.
     Gone,
-    /// A newer one came before it: the link or the camera's process had no time for it.
+    /// A newer message came first: the link or the camera's process had no time for this one.
     LeftOut,
 }
 
 impl Gap {
-    /// Status that is published in place of the message.
+    /// Returns the status that is published in place of the message.
     pub fn status(self) -> Status {
         match self {
             Self::Late => Status::LATE,
@@ -53,39 +53,39 @@ impl Gap {
     }
 }
 
-/// Where a message belongs.
+/// Frame to which a message belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// To this frame. Those from [`Arrivals::next`] to it have none.
+    /// The message belongs to this frame. Frames from [`Arrivals::next`] up to it have no message.
     Frame(u64),
-    /// To one that was given up.
+    /// The message belongs to a frame that was given up.
     Late,
-    /// To none: there is one for this frame, or it is before or beyond all.
+    /// The message belongs to no frame: its frame already has one, or it is before or after all frames.
     Surplus,
 }
 
 /// Counts of the frames and messages of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tally {
-    /// Frames with a message.
+    /// Number of frames with a message.
     pub n_used: u64,
-    /// Frames given up while their host was there.
+    /// Number of frames given up although their host answers.
     pub n_late: u64,
-    /// Frames given up because their host did not answer.
+    /// Number of frames given up because their host did not answer.
     pub n_gone: u64,
-    /// Frames that a newer one came before.
+    /// Number of frames left out because a newer message came first.
     pub n_left_out: u64,
-    /// Messages that came after their frame was given up; their frames are among the above.
+    /// Number of messages that came after their frame was given up. These frames are included in the counts above.
     pub n_came_late: u64,
-    /// Messages for which there was no frame.
+    /// Number of messages without a frame.
     pub n_surplus: u64,
 }
 
-/// The messages of one view. Reads no clock.
+/// The messages of one view. Does not read a clock.
 #[derive(Debug, Clone)]
 pub struct Arrivals {
     grid: Grid,
-    /// How long after its instant a frame is given up, nanoseconds: where its host is there, and where it is not.
+    /// Time after its instant at which a frame is given up, in nanoseconds: first if its host answers, then if it does not.
     patience: [u64; 2],
     n_frames: u64,
     next: u64,
@@ -93,8 +93,10 @@ pub struct Arrivals {
 }
 
 impl Arrivals {
-    /// * `patience`: how long after its instant a frame is given up, nanoseconds: where its host is there, and where it is not.
-    /// * `n_frames`: of the run.
+    /// Creates the state of a view.
+    ///
+    /// * `patience`: time after its instant at which a frame is given up, in nanoseconds: first if its host answers, then if it does not.
+    /// * `n_frames`: number of frames of the run.
     /// * `next`: the first frame that has not been published.
     pub fn new(grid: Grid, patience: [u64; 2], n_frames: u64, next: u64) -> Self {
         Self {
@@ -106,7 +108,7 @@ impl Arrivals {
         }
     }
 
-    /// The first frame that has not been published.
+    /// Returns the first frame that has not been published.
     pub fn next(&self) -> u64 {
         self.next
     }
@@ -121,9 +123,9 @@ impl Arrivals {
         self.tally
     }
 
-    /// Where a message belongs.
+    /// Returns the frame to which a message belongs.
     ///
-    /// * `instant_nanos`: the instant that its host gave it, by our clock.
+    /// * `instant_nanos`: the instant that the sending host assigned, converted to this host's clock.
     pub fn place(&mut self, instant_nanos: u64) -> Place {
         let exact = self.grid.exact(instant_nanos);
         let nth = if (exact - self.next as f64).abs() <= 0.5 + SLACK {
@@ -139,7 +141,7 @@ impl Arrivals {
         if nth >= self.next {
             return Place::Frame(nth);
         }
-        // The frame before the next one is either given up, or has its message: clocks of different rates.
+        // The previous frame was given up, or it already has its message because the clocks have different rates.
         if self.given_up() > 0 {
             self.tally.n_came_late += 1;
             Place::Late
@@ -149,7 +151,7 @@ impl Arrivals {
         }
     }
 
-    /// The frame whose instant is nearest; 0 before all.
+    /// Returns the frame with the nearest instant; 0 before the first.
     pub fn nearest(&self, instant_nanos: u64) -> u64 {
         self.grid.exact(instant_nanos).round().max(0.0) as u64
     }
@@ -158,13 +160,13 @@ impl Arrivals {
         self.tally.n_late + self.tally.n_gone
     }
 
-    /// A frame was published with its message.
+    /// Records that a frame was published with its message.
     pub fn used(&mut self) {
         self.tally.n_used += 1;
         self.next += 1;
     }
 
-    /// A frame was published without one.
+    /// Records that a frame was published without a message.
     pub fn gave_up(&mut self, gap: Gap) {
         match gap {
             Gap::Late => self.tally.n_late += 1,
@@ -174,9 +176,9 @@ impl Arrivals {
         self.next += 1;
     }
 
-    /// Why the next frame is given up, if it is time for that.
+    /// Returns the reason to give up the next frame, if its message is overdue.
     ///
-    /// * `is_there`: whether its host answers.
+    /// * `is_there`: true if its host answers.
     pub fn overdue(&self, now_nanos: u64, is_there: bool) -> Option<Gap> {
         let [patience, gap] = if is_there {
             [self.patience[0], 0]
@@ -188,7 +190,7 @@ impl Arrivals {
         is_due.then_some(if gap == 0 { Gap::Late } else { Gap::Gone })
     }
 
-    /// When the next frame is given up, by our clock, nanoseconds.
+    /// Returns the time at which the next frame is given up, by this host's clock, in nanoseconds.
     pub fn due_nanos(&self, is_there: bool) -> u64 {
         let patience = self.patience[usize::from(!is_there)];
         self.grid.at(self.next).saturating_add(patience)

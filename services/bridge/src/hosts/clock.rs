@@ -1,55 +1,55 @@
-//! How far the clock of another host is from ours: offset and drift, with a bound.
+//! Estimates the offset and drift of another host's clock, with a bound on the error.
 //!
 //! An exchange of four times (RFC 5905, section 8) bounds the offset by half of its round trip, however the delay is divided between the
-//! two ways. Of every part of a window the exchange with the shortest round trip counts, as in the clock filter of NTP. A line
-//! through these gives offset and drift.
+//! two directions. The window is divided into parts. Of each part, only the exchange with the shortest round trip is used, as in the clock
+//! filter of NTP. A line through these exchanges gives offset and drift.
 
 use std::collections::VecDeque;
 
-/// Parts of the window; of each the best exchange is kept.
+/// Number of parts of the window. The best exchange of each part is kept.
 const N_PARTS: usize = 12;
-/// Length of a part, nanoseconds.
+/// Length of a part, in nanoseconds.
 const PART_NANOS: u64 = 5_000_000_000;
-/// A drift is estimated from exchanges that are this far apart, nanoseconds.
+/// Minimum time between the exchanges from which a drift is estimated, in nanoseconds.
 const LEAST_SPAN: u64 = 5_000_000_000;
-/// The most that two clocks may drift apart where nothing is known: the kernel slews either by 500 ppm at most.
+/// Maximum relative drift of two clocks if nothing is known. The kernel adjusts each clock by at most 500 ppm.
 const MOST_DRIFT: f64 = 1e-3;
-/// The longest round trip that is used, nanoseconds.
+/// Longest round trip that is used, in nanoseconds.
 const MOST_TRIP: u64 = 2_000_000_000;
-/// Exchanges in a row that contradict the estimate, from which on the other clock counts as another.
+/// Number of consecutive exchanges contradicting the estimate after which the other clock counts as a new one.
 const N_ODD: u32 = 3;
 
-/// The four times of a question and its answer, nanoseconds.
+/// The four times of a question and its answer, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Exchange {
-    /// When the question went, by our clock.
+    /// Time at which the question was sent, by this host's clock.
     pub asked_at: u64,
-    /// When it came, by theirs.
+    /// Time at which the question arrived, by the other clock.
     pub received_at: u64,
-    /// When the answer went, by theirs.
+    /// Time at which the answer was sent, by the other clock.
     pub answered_at: u64,
-    /// When it came, by ours.
+    /// Time at which the answer arrived, by this host's clock.
     pub heard_at: u64,
 }
 
-/// Four times that contradict each other.
+/// Error if the four times contradict each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExchangeError {
-    /// One of the clocks went back.
+    /// One of the clocks was set back.
     #[error("the answer is dated before its question")]
     Backwards,
-    /// The other host says that it took longer than the whole exchange.
-    #[error("the answer took {inside} ns, the whole exchange only {outside} ns")]
+    /// The other host claims to have taken longer than the whole exchange.
+    #[error("the answer took {inside} ns, but the whole exchange only {outside} ns")]
     Inside {
-        /// From question to answer there, nanoseconds.
+        /// Time from question to answer on the other host, in nanoseconds.
         inside: u64,
-        /// From question to answer here, nanoseconds.
+        /// Time from question to answer on this host, in nanoseconds.
         outside: u64,
     },
     /// The round trip was too long to compare the clocks.
     #[error("the round trip took {trip} ns, too long to compare the clocks")]
     Slow {
-        /// Its length, nanoseconds.
+        /// Length of the round trip, in nanoseconds.
         trip: u64,
     },
 }
@@ -57,40 +57,40 @@ pub enum ExchangeError {
 /// Estimate of another host's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Difference between their time and ours, added to ours to have theirs, nanoseconds.
+    /// Offset of the other clock, in nanoseconds. Added to this host's time, it gives the other host's time.
     pub offset_nanos: i64,
-    /// Amount by which a second of theirs is shorter than ours, billionths.
+    /// Drift in parts per billion: how much shorter a second of the other clock is than one of this host's clock.
     pub drift_ppb: f64,
-    /// How far the offset can be from the truth, nanoseconds: half of the best round trip, and what the drift may have added.
+    /// Bound on the error of the offset, in nanoseconds: half of the best round trip, and the possible effect of the drift.
     pub bound_nanos: u64,
-    /// The shortest round trip of the window, nanoseconds.
+    /// Shortest round trip in the window, in nanoseconds.
     pub trip_nanos: u64,
-    /// Exchanges that it rests on.
+    /// Number of exchanges used for the estimate.
     pub n_exchanges: usize,
 }
 
 impl Estimate {
-    /// Their time in ours.
+    /// Converts a time of the other clock to this host's clock.
     pub fn ours(&self, theirs: u64) -> u64 {
         let ours = i128::from(theirs) - i128::from(self.offset_nanos);
         ours.clamp(0, i128::from(u64::MAX)) as u64
     }
 
-    /// Our time in theirs.
+    /// Converts a time of this host's clock to the other clock.
     pub fn theirs(&self, ours: u64) -> u64 {
         let theirs = i128::from(ours) + i128::from(self.offset_nanos);
         theirs.clamp(0, i128::from(u64::MAX)) as u64
     }
 
-    /// A warning where the bound is a larger share of the time between two frames than it may be.
+    /// Returns a warning if the bound is too large a share of the time between two frames.
     ///
-    /// * `max_share`: the largest.
+    /// * `max_share`: largest share without a warning.
     pub fn warning(&self, period_nanos: u64, max_share: f64) -> Option<String> {
         let share = self.bound_nanos as f64 / period_nanos.max(1) as f64;
         (share > max_share).then(|| {
             format!(
-                "its clock is known to {:.3} ms only, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %): \
-                 the network's round trips take {:.3} ms at best; a quieter network helps; if cameras stamp their \
+                "its clock is only known to {:.3} ms, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %), \
+                 because round trips on the network take {:.3} ms at best; use a network with less traffic; if cameras stamp their \
                  pictures themselves, run `chrony` or `linuxptp` on all hosts",
                 self.bound_nanos as f64 * 1e-6,
                 100.0 * share,
@@ -101,20 +101,20 @@ impl Estimate {
     }
 }
 
-/// An exchange, as it counts.
+/// An exchange in the form used for the estimate.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
-    /// Our time in its middle, nanoseconds.
+    /// Time of the middle of the exchange, by this host's clock, in nanoseconds.
     at: u64,
-    /// Theirs minus ours, nanoseconds.
+    /// The other clock minus this host's clock, in nanoseconds.
     offset: i64,
     trip: u64,
 }
 
-/// The clock of another host. Reads none itself.
+/// The clock of another host. Does not read a clock itself.
 #[derive(Debug, Clone, Default)]
 pub struct Clock {
-    /// The best exchange of every part of the window, oldest first, with the number of the part.
+    /// The best exchange of every part of the window, oldest first, with the index of the part.
     parts: VecDeque<(u64, Sample)>,
     n_exchanges: usize,
     n_odd: u32,
@@ -122,11 +122,11 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Takes an exchange.
+    /// Adds an exchange.
     ///
     /// # Errors
     ///
-    /// [`ExchangeError`]; it is not used then.
+    /// Fails with [`ExchangeError`] if the times contradict each other. The exchange is then not used.
     pub fn add(&mut self, exchange: Exchange) -> Result<(), ExchangeError> {
         let sample = sample(&exchange)?;
         if self.contradicts(&sample) {
@@ -134,7 +134,7 @@ impl Clock {
             if self.n_odd < N_ODD {
                 return Ok(());
             }
-            // The other host was started again, or its clock set.
+            // The other host was restarted, or its clock was set.
             self.parts.clear();
             (self.n_exchanges, self.n_resets) = (0, self.n_resets + 1);
         }
@@ -154,25 +154,25 @@ impl Clock {
         Ok(())
     }
 
-    /// Forgets everything: the other bridge was started again, perhaps with its host.
+    /// Forgets all exchanges, because the other bridge was restarted, perhaps with its host.
     pub fn forget(&mut self) {
         self.parts.clear();
         (self.n_exchanges, self.n_odd) = (0, 0);
     }
 
-    /// How often the other clock was found to be another than before.
+    /// Returns how often the other clock was found to be a new one.
     pub fn n_resets(&self) -> u32 {
         self.n_resets
     }
 
-    /// Returns the estimate at a time of ours; `None` before the first exchange.
+    /// Returns the estimate at a time of this host's clock; `None` before the first exchange.
     pub fn estimate(&self, now: u64) -> Option<Estimate> {
         let all = || self.parts.iter().map(|part| part.1);
         let best = all().min_by_key(|sample| sample.trip)?;
         let line = Line::through(&all(), best);
         let at = |time: u64| line.at(time);
         let bound = all().map(|sample| {
-            // What the exchange itself bounds, how far the line misses it, and what an error of the drift makes since.
+            // Sum of the exchange's own bound, its distance from the line, and the effect of the drift's error since then.
             let off = (at(sample.at) - sample.offset as f64).abs();
             let age = time_between(now, sample.at).abs();
             sample.trip as f64 / 2.0 + off + line.drift_error * age
@@ -187,7 +187,7 @@ impl Clock {
         })
     }
 
-    /// Returns true if an exchange cannot come from the clock that is known.
+    /// Returns true if an exchange cannot come from the known clock.
     fn contradicts(&self, sample: &Sample) -> bool {
         let Some(known) = self.estimate(sample.at) else {
             return false;
@@ -218,25 +218,26 @@ fn sample(it: &Exchange) -> Result<Sample, ExchangeError> {
     })
 }
 
-/// From one time to another, nanoseconds.
+/// Returns the time between two times, in nanoseconds.
 fn time_between(later: u64, earlier: u64) -> f64 {
     (i128::from(later) - i128::from(earlier)) as f64
 }
 
-/// Offset over time.
+/// Linear model of the offset over time.
 struct Line {
-    /// Our time, nanoseconds.
+    /// Reference time by this host's clock, in nanoseconds.
     origin: u64,
-    /// Offset there, nanoseconds.
+    /// Offset at the reference time, in nanoseconds.
     offset: f64,
-    /// Its change, nanoseconds a nanosecond.
+    /// Change of the offset, in nanoseconds per nanosecond.
     drift: f64,
-    /// How far the drift can be from the truth.
+    /// Bound on the error of the drift.
     drift_error: f64,
 }
 
 impl Line {
-    /// A line through exchanges, each weighted by the square of its round trip; level where they are too close.
+    /// Fits a line to exchanges, weighted by the squares of their round trips. If the exchanges are too close in time, the line has no
+    /// drift.
     fn through(all: &(impl Iterator<Item = Sample> + Clone), best: Sample) -> Self {
         let level = Self {
             origin: best.at,
@@ -279,7 +280,7 @@ impl Line {
     }
 }
 
-/// How far a drift can be from the truth: any two exchanges bound it, since at each the offset is known to half of its round trip.
+/// Returns a bound on the error of a drift. Any two exchanges give a bound, because at each the offset is known to half of its round trip.
 fn drift_error(drift: f64, all: &(impl Iterator<Item = Sample> + Clone)) -> f64 {
     let pairs = all
         .clone()

@@ -1,21 +1,21 @@
-//! Comparison of the files and settings of two hosts of a deployment.
+//! Compares the files and settings of two hosts in a deployment.
 
 use formats::checksum::fnv1a;
 use serde::{Deserialize, Serialize};
 
-/// Hashes of what must be the same on all hosts, by name. They detect mistakes; the keys protect against attacks.
+/// Hashes of the files and settings that must be the same on all hosts, by name. They detect mistakes. The keys protect against attacks.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Fingerprint(Vec<(String, String)>);
 
-/// Something that two hosts have differently.
+/// A file or setting that differs between two hosts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{what} differs: {here} here, {there} there")]
 pub struct Difference {
-    /// Name of the file or setting: `rig`, `model`.
+    /// Name of the file or setting, such as `rig` or `model`.
     pub what: String,
-    /// Its hash on the host that compares.
+    /// Hash on the host that compares.
     pub here: String,
-    /// Its hash on the other.
+    /// Hash on the other host.
     pub there: String,
 }
 
@@ -26,12 +26,12 @@ impl Fingerprint {
         self.0.push((what.to_owned(), hash));
     }
 
-    /// Adds a short text as it is, such as a version.
+    /// Adds a short text without hashing it, such as a version.
     pub fn add_text(&mut self, what: &str, text: &str) {
         self.0.push((what.to_owned(), text.to_owned()));
     }
 
-    /// Returns the entries that differ, in our order; then those that only the other has.
+    /// Returns the entries that differ, in the order of this fingerprint. Entries that only the other one has come last.
     pub fn differences(&self, other: &Self) -> Vec<Difference> {
         let find = |all: &Self, what: &str| {
             let found = all.0.iter().find(|entry| entry.0 == what);
@@ -47,7 +47,7 @@ impl Fingerprint {
         compared.filter(|compared| compared.here != compared.there).collect()
     }
 
-    /// How many things it has.
+    /// Returns the number of entries.
     pub fn len(&self) -> usize {
         self.0.len()
     }

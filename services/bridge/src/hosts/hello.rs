@@ -1,23 +1,23 @@
-//! How a host with cameras introduces itself, and what the host that fuses answers: JSON, short and rare.
+//! The introduction of a host with cameras, and the answer of the host that fuses. Both are JSON, because they are short and rare.
 
 use serde::{Deserialize, Serialize};
 
 use crate::hosts::VERSION;
 use crate::hosts::fingerprint::{Difference, Fingerprint};
 
-/// The longest introduction or answer, bytes.
+/// Maximum length of an introduction or answer, in bytes.
 const MOST_BYTES: usize = 1 << 16;
 
-/// A host that wants to take part.
+/// Introduction of a host that wants to join a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
-    /// [`crate::hosts::VERSION`] of its link.
+    /// [`crate::hosts::VERSION`] of the host.
     pub version: u16,
-    /// Its name.
+    /// Name of the host.
     pub host: String,
-    /// The start of its bridge.
+    /// Start of the host's bridge.
     pub origin: u64,
-    /// Fingerprint of its files and settings.
+    /// Fingerprint of the host's files and settings.
     pub fingerprint: Fingerprint,
 }
 
@@ -25,51 +25,51 @@ pub struct Hello {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Answer {
-    /// It takes part.
+    /// The host may join the run.
     Welcome(Welcome),
-    /// It does not, for these reasons; `here` is the host that fuses.
+    /// The host may not join, for these reasons. `here` is the host that fuses.
     Refused(Vec<Difference>),
 }
 
 /// Facts about the run that a host with cameras needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Welcome {
-    /// The start of the bridge of the host that fuses.
+    /// Start of the bridge of the host that fuses.
     pub origin: u64,
-    /// The session of its run, which is the time that its instants are counted from, by its clock, nanoseconds.
+    /// Session of the run: the time from which its instants are counted, by the clock of the host that fuses, in nanoseconds.
     pub session: u64,
 }
 
-/// Bytes that are no introduction or answer.
+/// Error for bytes that are not an introduction or answer.
 #[derive(Debug, thiserror::Error)]
 pub enum HelloError {
-    /// Too long.
-    #[error("{0} bytes, at most {MOST_BYTES} are read")]
+    /// There are too many bytes.
+    #[error("{0} bytes, but at most {MOST_BYTES} are allowed")]
     Long(usize),
-    /// Not what is expected.
+    /// The content is not an introduction or answer.
     #[error("not an introduction")]
     Json(#[from] serde_json::Error),
 }
 
 impl Hello {
-    /// As bytes.
+    /// Returns the introduction as bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         serde_json::to_vec(self).unwrap_or_default()
     }
 
-    /// Reads an introduction.
+    /// Parses an introduction.
     ///
     /// # Errors
     ///
-    /// [`HelloError`].
+    /// Fails with [`HelloError`] if the bytes are not an introduction.
     pub fn parse(bytes: &[u8]) -> Result<Self, HelloError> {
         Ok(serde_json::from_slice(short(bytes)?)?)
     }
 
     /// Returns the answer to this introduction.
     ///
-    /// * `is_known`: whether there is a host of that name with cameras.
-    /// * `ours`: what the host that fuses has.
+    /// * `is_known`: true if the deployment has a host of this name with cameras.
+    /// * `ours`: fingerprint of the host that fuses.
     pub fn answer(&self, is_known: bool, ours: &Fingerprint, welcome: Welcome) -> Answer {
         let mut differences = Vec::new();
         if self.version != VERSION {
@@ -96,16 +96,16 @@ impl Hello {
 }
 
 impl Answer {
-    /// As bytes.
+    /// Returns the answer as bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         serde_json::to_vec(self).unwrap_or_default()
     }
 
-    /// Reads an answer.
+    /// Parses an answer.
     ///
     /// # Errors
     ///
-    /// [`HelloError`].
+    /// Fails with [`HelloError`] if the bytes are not an answer.
     pub fn parse(bytes: &[u8]) -> Result<Self, HelloError> {
         Ok(serde_json::from_slice(short(bytes)?)?)
     }

@@ -1,38 +1,38 @@
-//! The maps of a view on their way between two hosts, as Gaussians after its poses.
+//! Format of a view's maps between two hosts: Gaussians, after the poses.
 //!
-//! Bytes, little endian: number of people (`u32`); for every person the place of the first cell and the distance of cells (two `f64`
-//! each), number of columns, rows and Gaussians (`u32` each); for every Gaussian its joint (`u32`), place, height and precision (six
-//! `f32`).
+//! All numbers are little endian. The number of people comes first (`u32`). For every person follow the position of the first cell and the
+//! distance between cells (two `f64` each), and the numbers of columns, rows and Gaussians (`u32` each). For every Gaussian follow its
+//! joint (`u32`), position, height and precision (six `f32`).
 
-/// Bytes of each person, and of each Gaussian.
+/// Number of bytes per person, and per Gaussian.
 const PERSON: usize = 44;
 const EACH: usize = 28;
-/// Most Gaussians of a message.
+/// Maximum number of Gaussians in a message.
 pub const MOST_GAUSSIANS: usize = 1024;
 
-/// A Gaussian of the heat of a joint's map.
+/// A Gaussian of the heat in a joint's map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gaussian {
-    /// The joint.
+    /// Index of the joint.
     pub joint: u32,
-    /// Where it is highest: column and row, cells of the map.
+    /// Position of the maximum: column and row, in cells of the map.
     pub at: [f32; 2],
-    /// The heat there.
+    /// Heat at the maximum.
     pub heat: f32,
-    /// The inverse of its covariance: across, both, down; per square cell.
+    /// Inverse of the covariance, per square cell: horizontal, mixed and vertical entry.
     pub precision: [f32; 3],
 }
 
 /// The maps of a person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PersonGaussians {
-    /// Centre of the first cell, pixels of the frame.
+    /// Centre of the first cell, in pixels of the frame.
     pub first_px: [f64; 2],
-    /// Distance of neighbouring cells, across and down, pixels of the frame.
+    /// Distance between neighbouring cells, horizontally and vertically, in pixels of the frame.
     pub cell_px: [f64; 2],
     /// Number of columns and rows.
     pub size: [u32; 2],
-    /// The highest first, of one joint after the other.
+    /// Gaussians of one joint after the other, the highest of each joint first.
     pub gaussians: Vec<Gaussian>,
 }
 
@@ -43,27 +43,27 @@ pub struct Maps {
     pub people: Vec<PersonGaussians>,
 }
 
-/// Bytes that are no maps.
+/// Error for bytes that are not maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MapsError {
-    /// The maps are cut off, or longer than their header says.
+    /// The maps are truncated, or longer than their header says.
     #[error("maps of {len} bytes, expected {expected}")]
     Length {
-        /// Their length.
+        /// Length of the maps.
         len: usize,
-        /// Length by their own head, or the shortest possible.
+        /// Length according to the header, or the shortest possible length.
         expected: usize,
     },
-    /// There are more than any host sends.
-    #[error("{got} Gaussians, at most {MOST_GAUSSIANS}")]
+    /// There are more Gaussians than any host sends.
+    #[error("{got} Gaussians, but at most {MOST_GAUSSIANS} are allowed")]
     Many {
-        /// How many.
+        /// Number of Gaussians.
         got: usize,
     },
 }
 
 impl Maps {
-    /// The maps as bytes. Beyond [`MOST_GAUSSIANS`] the last are left out.
+    /// Returns the maps as bytes. If there are more than [`MOST_GAUSSIANS`], the last ones are left out.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = (self.people.len() as u32).to_le_bytes().to_vec();
         let mut n_left = MOST_GAUSSIANS;
@@ -89,11 +89,11 @@ impl Maps {
         out
     }
 
-    /// Reads maps. Whether the cells lie in the picture, and whether the numbers can be, is for the receiver to say.
+    /// Parses maps. The receiver must check that the cells are in the picture, and that the numbers are plausible.
     ///
     /// # Errors
     ///
-    /// [`MapsError`].
+    /// Fails with [`MapsError`] if the bytes are not maps.
     pub fn parse(bytes: &[u8]) -> Result<Self, MapsError> {
         let mut reader = Reader { bytes, at: 0 };
         let n_people = reader.u32()?;
@@ -224,7 +224,7 @@ mod tests {
         assert!(refused(&[&whole[..], b"x"].concat()).contains("149 bytes, expected 148"));
         let mut many = whole;
         many[44..48].copy_from_slice(&1200_u32.to_le_bytes());
-        assert!(refused(&many).contains("1200 Gaussians, at most 1024"));
+        assert!(refused(&many).contains("1200 Gaussians, but at most 1024 are allowed"));
     }
 
     proptest! {

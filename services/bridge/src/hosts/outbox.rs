@@ -1,20 +1,20 @@
-//! Messages that wait to be sent to another host. Bounded: the newest of every lane waits, and few are on their way.
+//! Messages that wait to be sent to another host. In every lane, only the newest message waits, and few are under way.
 
 use std::collections::VecDeque;
 
-/// Parcels of a lane that may be on their way without having been acknowledged.
+/// Maximum number of unacknowledged parcels of a lane that are under way.
 const MOST_ON_WAY: usize = 3;
-/// After this time without an acknowledgement a parcel counts as lost, nanoseconds.
+/// Time without an acknowledgement after which a parcel counts as lost, in nanoseconds.
 const LOST_AFTER: u64 = 1_500_000_000;
 
 /// A message to be sent next.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Parcel<T> {
-    /// Its lane.
+    /// Index of the lane.
     pub lane: usize,
-    /// Counts the parcels of its lane, from 0.
+    /// Number of the parcel in its lane, counted from 0.
     pub sequence: u64,
-    /// Parcels of its lane that newer ones overtook before they were sent.
+    /// Number of parcels in the lane that newer ones overtook before they were sent.
     pub n_overtaken: u64,
     /// Content of the message.
     pub item: T,
@@ -23,19 +23,19 @@ pub struct Parcel<T> {
 /// Counts of the parcels of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sent {
-    /// Offered.
+    /// Number of parcels offered.
     pub n_offered: u64,
-    /// Overtaken by newer ones before they were sent.
+    /// Number of parcels that newer ones overtook before they were sent.
     pub n_overtaken: u64,
-    /// Given to the link.
+    /// Number of parcels passed to the link.
     pub n_sent: u64,
-    /// Acknowledged by the other host.
+    /// Number of parcels that the other host acknowledged.
     pub n_acknowledged: u64,
-    /// Sent, and never acknowledged.
+    /// Number of parcels that were sent but never acknowledged.
     pub n_lost: u64,
 }
 
-/// The lanes to one other host. Reads no clock.
+/// The lanes to one other host. Does not read a clock.
 #[derive(Debug)]
 pub struct Outbox<T> {
     lanes: Vec<Lane<T>>,
@@ -44,13 +44,13 @@ pub struct Outbox<T> {
 #[derive(Debug)]
 struct Lane<T> {
     waiting: Option<T>,
-    /// Sequence, and when it was sent.
+    /// Sequences and send times of the parcels that are under way.
     on_way: VecDeque<(u64, u64)>,
     sent: Sent,
 }
 
 impl<T> Outbox<T> {
-    /// Empty lanes.
+    /// Creates empty lanes.
     pub fn new(n_lanes: usize) -> Self {
         let lane = || Lane {
             waiting: None,
@@ -62,7 +62,7 @@ impl<T> Outbox<T> {
         }
     }
 
-    /// Puts something into a lane; what waited there is overtaken.
+    /// Puts a message into a lane. A message that waits there is overtaken.
     pub fn offer(&mut self, lane: usize, item: T) {
         if let Some(lane) = self.lanes.get_mut(lane) {
             lane.sent.n_offered += 1;
@@ -72,7 +72,7 @@ impl<T> Outbox<T> {
         }
     }
 
-    /// The next parcel that may be sent, of the lane with the fewest on their way; it counts as sent.
+    /// Returns the next parcel to send, from the lane with the fewest parcels under way. The parcel counts as sent.
     pub fn next(&mut self, now_nanos: u64) -> Option<Parcel<T>> {
         for lane in &mut self.lanes {
             lane.forget_lost(now_nanos);
@@ -94,10 +94,10 @@ impl<T> Outbox<T> {
         })
     }
 
-    /// A parcel has arrived. Earlier messages of its lane that were not acknowledged are lost, because the link keeps
+    /// Records that a parcel has arrived. Earlier parcels of its lane that were not acknowledged are lost, because the link keeps
     /// the order.
     ///
-    /// Returns how long after it was sent, nanoseconds; none if it was not on its way.
+    /// Returns the time since it was sent, in nanoseconds; `None` if it was not under way.
     pub fn acknowledge(&mut self, lane: usize, sequence: u64, now_nanos: u64) -> Option<u64> {
         let lane = self.lanes.get_mut(lane)?;
         let at = lane.on_way.iter().position(|parcel| parcel.0 == sequence)?;
@@ -113,12 +113,12 @@ impl<T> Outbox<T> {
         self.lanes.get(lane).map_or_else(Sent::default, |lane| lane.sent)
     }
 
-    /// Lanes with something that waits.
+    /// Returns the number of lanes in which a message waits.
     pub fn n_waiting(&self) -> usize {
         self.lanes.iter().filter(|lane| lane.waiting.is_some()).count()
     }
 
-    /// Returns true if nothing waits, and nothing is on its way.
+    /// Returns true if no message waits or is under way.
     pub fn is_empty(&self) -> bool {
         self.lanes.iter().all(|lane| lane.waiting.is_none() && lane.on_way.is_empty())
     }
@@ -165,7 +165,7 @@ mod tests {
                 n_sent += 1;
             }
         }
-        // Three of either lane at a time, every one and a half seconds.
+        // Three parcels of each lane are sent at a time, every one and a half seconds.
         assert!((36..=42).contains(&n_sent), "{n_sent}");
         for lane in 0..2 {
             let it = outbox.sent(lane);

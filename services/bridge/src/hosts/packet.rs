@@ -1,4 +1,4 @@
-//! A message of a view on its way between two hosts.
+//! Format of a view's message between two hosts.
 
 use formats::checksum::fnv1a;
 use messages::Status;
@@ -6,21 +6,21 @@ use messages::Status;
 use crate::hosts::VERSION;
 
 const MAGIC: [u8; 4] = *b"PXHP";
-/// Bytes before the body.
+/// Number of bytes before the body.
 pub const HEAD_BYTES: usize = 128;
-/// Where the hash stands: the last eight bytes of the head.
+/// Position of the hash: the last eight bytes of the head.
 const HASH_AT: usize = HEAD_BYTES - 8;
-/// The largest number of a frame, that of `wire`.
+/// Limit on the number of a frame, as in `wire`.
 const MOST_FRAMES: u64 = 1 << 48;
-/// The furthest that a picture may be from the instant of its frame, nanoseconds: an hour.
+/// Maximum time between a picture and the instant of its frame, in nanoseconds: an hour.
 const MOST_SKEW: u64 = 3_600_000_000_000;
 
 /// Kind of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
-    /// A frame as JPEG; empty without a picture.
+    /// A frame as JPEG. The body is empty if there is no picture.
     Frame,
-    /// Poses of a view, as in a recording; after them its [`Maps`](crate::hosts::Maps), where they cross.
+    /// Poses of a view, as in a recording. If maps are sent, [`Maps`](crate::hosts::Maps) follow.
     ViewPose,
     /// Expected errors of a view, as in a recording.
     ViewQuality,
@@ -42,105 +42,105 @@ impl Content {
     }
 }
 
-/// The head of a packet. All times are of the sending host's `CLOCK_MONOTONIC`, nanoseconds.
+/// The head of a packet. All times are of the sending host's `CLOCK_MONOTONIC`, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Head {
     /// Kind of the body.
     pub content: Content,
-    /// The view.
+    /// Index of the view.
     pub view: u32,
     /// Status of the result: good, or why it is missing.
     pub status: Status,
-    /// The start of the sending bridge, a number of its own: sequences begin anew with it.
+    /// Start of the sending bridge, which identifies it. Sequences start again with each bridge.
     pub origin: u64,
-    /// Counts what was sent of this view and content, from 0.
+    /// Number of the message among those of this view and content, counted from 0.
     pub sequence: u64,
-    /// The frame, as the sending host counts.
+    /// Number of the frame on the sending host.
     pub frame: u64,
-    /// The instant that the frame belongs to.
+    /// Instant of the frame.
     pub instant_nanos: u64,
-    /// When the picture was taken.
+    /// Time at which the picture was taken.
     pub captured_at_nanos: u64,
-    /// When the stage that made the message had its input.
+    /// Time at which the stage that created the message received its input.
     pub received_at_nanos: u64,
-    /// When that stage sent it.
+    /// Time at which that stage sent the message.
     pub sent_at_nanos: u64,
-    /// When the packet was ready to go.
+    /// Time at which the packet was ready to be sent.
     pub packed_at_nanos: u64,
-    /// How long after its instant the picture was taken, nanoseconds.
+    /// Time from the instant until the picture was taken, in nanoseconds.
     pub skew_nanos: i64,
-    /// Frames that the camera's process had no time for, since its run began.
+    /// Number of frames for which the camera's process had no time, since its run began.
     pub n_dropped: u64,
-    /// Messages of this view and content that newer ones overtook before they were sent, since the bridge began.
+    /// Number of messages of this view and content that newer ones overtook before they were sent, since the bridge started.
     pub n_overtaken: u64,
-    /// Width and height of the frame, pixels; 0 without a picture.
+    /// Width and height of the frame, in pixels; 0 without a picture.
     pub size: [u32; 2],
 }
 
-/// A packet that was checked.
+/// A checked packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet<'a> {
-    /// Its head.
+    /// Head of the packet.
     pub head: Head,
-    /// Its body: see [`Content`].
+    /// Body of the packet; see [`Content`].
     pub body: &'a [u8],
 }
 
-/// Limits that a packet is checked against.
+/// Limits for the check of a packet.
 #[derive(Debug, Clone, Copy)]
 pub struct Expected<'a> {
-    /// The views of the sending host.
+    /// Views of the sending host.
     pub views: &'a [usize],
-    /// Width and height of the frames of every view of the deployment, pixels.
+    /// Width and height of the frames of every view of the deployment, in pixels.
     pub sizes: &'a [[u32; 2]],
-    /// Largest body, bytes.
+    /// Maximum size of the body, in bytes.
     pub max_body: usize,
 }
 
-/// Bytes that are no packet of the sender.
+/// Error for bytes that are not a packet of the sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PacketError {
-    /// It is cut off, or longer than it says.
+    /// The packet is truncated, or longer than its head says.
     #[error("a packet of {len} bytes, expected {expected}")]
     Length {
-        /// Its length.
+        /// Length of the packet.
         len: usize,
-        /// Length by its head, or the shortest possible.
+        /// Length according to the head, or the shortest possible length.
         expected: usize,
     },
-    /// It does not begin as packets do.
+    /// The packet does not start with the mark of packets.
     #[error("not a packet of Parallax: it begins with {0:02x?}")]
     Magic([u8; 4]),
     /// The other host has another version.
     #[error(
-        "version {got} of the link, here is version {VERSION}; use the same Parallax on all hosts"
+        "version {got} of the link, but this host has version {VERSION}; use the same version of Parallax on all hosts"
     )]
     Version {
-        /// Its version.
+        /// Version of the other host.
         got: u16,
     },
-    /// Its bytes are not those that were sent.
+    /// The bytes differ from those that were sent.
     #[error("hash {got:016x} of the content, expected {expected:016x}")]
     Hash {
-        /// Hash of its bytes.
+        /// Hash of the received bytes.
         got: u64,
-        /// Hash by its head.
+        /// Hash in the head.
         expected: u64,
     },
-    /// A number out of range.
+    /// A number is out of range.
     #[error("{field} is {got}, expected {expected}")]
     Value {
         /// Name of the field.
         field: &'static str,
-        /// Its value.
+        /// Value of the field.
         got: u64,
-        /// Accepted value, or the largest.
+        /// Accepted value, or the largest accepted one.
         expected: u64,
     },
 }
 
 impl Packet<'_> {
-    /// The packet as bytes.
+    /// Returns the packet as bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let head = &self.head;
         let mut out = Vec::with_capacity(HEAD_BYTES + self.body.len());
@@ -176,11 +176,11 @@ impl Packet<'_> {
 }
 
 impl<'a> Packet<'a> {
-    /// Reads a packet and checks everything that can be checked without its receiver.
+    /// Parses a packet, and checks everything that can be checked without its receiver.
     ///
     /// # Errors
     ///
-    /// [`PacketError`].
+    /// Fails with [`PacketError`] if the bytes are not a valid packet.
     pub fn parse(bytes: &'a [u8], expected: &Expected<'_>) -> Result<Self, PacketError> {
         let Some((head, body)) = bytes.split_at_checked(HEAD_BYTES) else {
             return Err(PacketError::Length {
@@ -253,7 +253,7 @@ fn check(head: &Head, body: usize, expected: &Expected<'_>) -> Result<(), Packet
             });
         }
     }
-    // A frame without a picture has no body; everything else has one.
+    // A frame without a picture has no body. All other packets have one.
     let has_body = has_picture || head.content != Content::Frame;
     if has_body != (body > 0) {
         return Err(PacketError::Value {
@@ -276,9 +276,9 @@ fn most(field: &'static str, got: u64, expected: u64) -> Result<(), PacketError>
     Ok(())
 }
 
-/// Returns the hash of a head without its last field, and a body.
+/// Returns the hash of a head without its last field, and of a body.
 fn hash(head: &[u8], body: &[u8]) -> u64 {
-    // Of the body word by word: FNV byte by byte takes as long as a network.
+    // The body is hashed in units of eight bytes, because FNV byte by byte takes as long as a network.
     let words = body.chunks(8).fold(0xcbf2_9ce4_8422_2325_u64, |sum, word| {
         let mut bytes = [0; 8];
         bytes[..word.len()].copy_from_slice(word);
@@ -289,11 +289,11 @@ fn hash(head: &[u8], body: &[u8]) -> u64 {
     fnv1a(head) ^ words.wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
-/// The fields of a head that are not read yet.
+/// The fields of a head that have not been read yet.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
-    /// The next bytes; zeros beyond the end.
+    /// Returns the next bytes, with zeros beyond the end.
     fn take<const N: usize>(&mut self) -> [u8; N] {
         let (now, rest) = self.0.split_first_chunk().unwrap_or((&[0; N], &[]));
         self.0 = rest;

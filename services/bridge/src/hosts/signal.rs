@@ -1,4 +1,4 @@
-//! Short questions and answers between two hosts: times, and what has arrived.
+//! Short messages between two hosts: times, and acknowledgements.
 
 use formats::checksum::fnv1a;
 
@@ -8,50 +8,50 @@ use crate::hosts::packet::Content;
 const MAGIC: [u8; 4] = *b"PXHS";
 const BYTES: usize = 56;
 
-/// A short message between two bridges. Times are of the clock of who writes them, nanoseconds.
+/// A short message between two bridges. Times are of the writing host's clock, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
-    /// A question for the time of the other host.
+    /// Asks for the time of the other host.
     Ping {
-        /// The start of the asking bridge.
+        /// Start of the asking bridge.
         origin: u64,
-        /// When it asked.
+        /// Time at which the question was sent.
         asked_at: u64,
     },
-    /// The answer to a [`Self::Ping`].
+    /// Answers a [`Self::Ping`].
     Pong {
-        /// The start of the answering bridge.
+        /// Start of the answering bridge.
         origin: u64,
-        /// When the other asked, as it said.
+        /// Time at which the question was sent, copied from the question.
         asked_at: u64,
-        /// When the question came.
+        /// Time at which the question arrived.
         received_at: u64,
-        /// When the answer went.
+        /// Time at which the answer was sent.
         answered_at: u64,
     },
-    /// A packet has arrived.
+    /// Acknowledges a packet.
     Ack {
-        /// The start of the bridge that had sent it.
+        /// Start of the bridge that sent the packet.
         origin: u64,
-        /// Its view.
+        /// View of the packet.
         view: u32,
-        /// Its content.
+        /// Content of the packet.
         content: Content,
-        /// Its sequence.
+        /// Sequence of the packet.
         sequence: u64,
     },
 }
 
-/// Bytes that are no signal.
+/// Error for bytes that are not a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{len} bytes are not a signal of version {VERSION}")]
 pub struct SignalError {
-    /// How many they are.
+    /// Number of bytes.
     pub len: usize,
 }
 
 impl Signal {
-    /// The signal as bytes.
+    /// Returns the signal as bytes.
     pub fn to_bytes(self) -> [u8; BYTES] {
         let (code, extra, numbers) = match self {
             Self::Ping { origin, asked_at } => (1_u8, 0, [origin, asked_at, 0, 0]),
@@ -81,11 +81,11 @@ impl Signal {
         bytes
     }
 
-    /// Reads a signal.
+    /// Parses a signal.
     ///
     /// # Errors
     ///
-    /// [`SignalError`].
+    /// Fails with [`SignalError`] if the bytes are not a signal.
     pub fn parse(bytes: &[u8]) -> Result<Self, SignalError> {
         let error = SignalError { len: bytes.len() };
         let whole: &[u8; BYTES] = bytes.try_into().map_err(|_odd| error)?;
@@ -125,7 +125,7 @@ impl Signal {
             },
             _ => return Err(error),
         };
-        // What is not used is zero.
+        // Unused bytes must be zero.
         (signal.to_bytes() == *whole).then_some(signal).ok_or(error)
     }
 }

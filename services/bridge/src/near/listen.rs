@@ -1,4 +1,4 @@
-//! Receipt of packets over the link: every packet is checked, decoded in a thread of its view, and acknowledged then.
+//! Receives packets over the link. Every packet is checked, decoded in a thread of its view, and then acknowledged.
 
 use std::sync::{Arc, Mutex};
 
@@ -19,22 +19,22 @@ use crate::link::Link;
 use crate::maps::{self, ViewMaps};
 use crate::topics::{Topics, host_of};
 
-/// Packets of a view that wait to be decoded: more than a host that keeps to the rules has on its way.
+/// Maximum number of packets of a view that wait to be decoded. It is more than a correct host has under way.
 const MOST_WAITING: usize = 8;
-/// Messages that wait to be published.
+/// Maximum number of messages that wait to be published.
 const MOST_ARRIVED: usize = 256;
 
-/// A message that was decoded.
+/// A decoded message.
 pub(super) struct Arrived {
     pub(super) head: Head,
-    /// Pixels, or the message as in a recording; empty without either.
+    /// Pixels, or the message as in a recording; empty if there is neither.
     pub(super) body: Vec<u8>,
-    /// The maps that came with poses.
+    /// Maps that came with the poses.
     pub(super) maps: Option<maps::Checked>,
-    /// When it came, and when it was decoded.
+    /// Times at which the message arrived and was decoded.
     pub(super) came_at: u64,
     pub(super) decoded_at: u64,
-    /// Its bytes on the way.
+    /// Number of bytes that were transferred.
     pub(super) n_bytes: usize,
 }
 
@@ -43,13 +43,13 @@ impl Arrived {
         self.head.view as usize
     }
 
-    /// Returns true if it goes beside another message of its frame, which is the one that counts.
+    /// Returns true if the message accompanies another message of its frame, which is the one that is counted.
     pub(super) fn is_beside(&self) -> bool {
         self.head.content == Content::ViewQuality
     }
 }
 
-/// A packet that was checked and waits to be decoded.
+/// A checked packet that waits to be decoded.
 struct Waiting {
     head: Head,
     body: Vec<u8>,
@@ -57,9 +57,9 @@ struct Waiting {
     n_bytes: usize,
 }
 
-/// Begins to listen. Returns what arrives.
+/// Starts to listen. Returns the receiver of arriving messages.
 ///
-/// * `own`: the start of this bridge, and the text that is answered to questions about the state of all hosts.
+/// * `own`: start of this bridge, and the text with the state of all hosts, which is sent on request.
 pub(super) fn listen(
     service: &Service,
     (job, role): (&Job, &Near),
@@ -119,7 +119,7 @@ struct Gate {
     remotes: Arc<Vec<Remote>>,
     sizes: Vec<[u32; 2]>,
     carry: Carry,
-    /// By view.
+    /// Queues of packets, by view.
     inlets: Vec<Option<Sender<Waiting>>>,
 }
 
@@ -134,7 +134,7 @@ impl Gate {
         let expected = Expected {
             views: &remote.views,
             sizes: &self.sizes,
-            // No JPEG of a frame is larger than its pixels and its tables.
+            // A JPEG of a frame is not larger than its pixels and tables.
             max_body: self.most_body(),
         };
         let packet = match Packet::parse(bytes, &expected) {
@@ -146,7 +146,8 @@ impl Gate {
             Content::ViewPose | Content::ViewQuality => self.carry == Carry::Poses,
         };
         if !crosses {
-            return remote.malformed(&"a message that does not cross: link.carry is another there");
+            return remote
+                .malformed(&"a message that must not be sent: link.carry differs on that host");
         }
         let mut state = remote.state();
         if state.welcomed != Some(packet.head.origin) {
@@ -182,7 +183,7 @@ struct Decoder {
     link: Arc<Link>,
     remotes: Arc<Vec<Remote>>,
     remote: usize,
-    /// Where acknowledgements go.
+    /// Name under which acknowledgements are sent.
     down: String,
     size: [u32; 2],
     /// Properties of the view's maps, if they are sent.
@@ -200,7 +201,7 @@ impl Decoder {
                 sequence: it.head.sequence,
             };
             let arrived = self.decode(it);
-            // Only now: the other host sends no faster than this one decodes.
+            // The packet is acknowledged only now, so that the other host does not send faster than this one decodes.
             self.link.send(&self.down, ack.to_bytes().to_vec(), true);
             if let Some(arrived) = arrived
                 && self.arrived.send(arrived).is_err()
@@ -217,14 +218,14 @@ impl Decoder {
             Content::Frame if it.head.status == Status::OK => {
                 let pixels = jpeg::decode(&it.body, self.size);
                 if pixels.is_none() {
-                    remote.malformed(&"a JPEG that is damaged, or of another size");
+                    remote.malformed(&"a JPEG that is damaged, or has another size");
                 }
                 pixels?
             }
             Content::Frame => Vec::new(),
             Content::ViewPose => {
                 let Some((poses, maps)) = maps::split(&it.body) else {
-                    remote.malformed(&"poses that are cut off");
+                    remote.malformed(&"truncated poses");
                     return None;
                 };
                 let maps = self.check(maps);
@@ -243,27 +244,27 @@ impl Decoder {
         })
     }
 
-    /// A message as in a recording.
+    /// Checks a message and returns it as in a recording.
     fn message(&self, kind: Kind, bytes: Vec<u8>) -> Option<Vec<u8>> {
         let parsed = Message::parse(kind, &bytes).map(|_| ());
         let parsed = parsed.inspect_err(|error| self.remotes[self.remote].malformed(error));
         parsed.ok().map(|()| bytes)
     }
 
-    /// The maps after poses; none where there are none.
+    /// Reads the maps after poses; `None` if there are no maps.
     fn check(&self, bytes: &[u8]) -> Result<Option<maps::Checked>, String> {
         match &self.maps {
             _ if bytes.is_empty() => Ok(None),
             Some(maps) => maps.unpack(bytes).map(Some).map_err(|error| error.to_string()),
             None => Err(format!(
-                "{} bytes after poses, where no maps cross",
+                "{} bytes after poses, although no maps are sent",
                 bytes.len()
             )),
         }
     }
 }
 
-/// The kind of message in a recording; none for frames.
+/// Returns the kind of message in a recording; `None` for frames.
 pub(super) fn kind_of(content: Content) -> Option<Kind> {
     match content {
         Content::Frame => None,
@@ -272,7 +273,7 @@ pub(super) fn kind_of(content: Content) -> Option<Kind> {
     }
 }
 
-/// Answers to our questions about the time, and the questions of hosts that begin.
+/// Receives answers to questions about the time, and questions of hosts that start.
 fn hear_signals(
     link: &Arc<Link>,
     topics: &Topics,
@@ -304,7 +305,7 @@ fn hear_signals(
                 received_at,
                 answered_at,
             }) => {
-                // Of the bridge whose messages are taken: what came before it may be of another clock.
+                // Only answers of the welcomed bridge are used. Earlier ones may be from another clock.
                 if remote.state().welcomed == Some(of) {
                     remote.exchanged(Exchange {
                         asked_at,

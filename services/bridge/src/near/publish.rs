@@ -1,4 +1,4 @@
-//! Writes what came from another host into the shared memory of this one.
+//! Writes messages from other hosts into the shared memory of this one.
 
 use crate::hosts::{Content, Estimate, Head};
 use deployment::hosts::Carry;
@@ -43,18 +43,21 @@ fn send_maps(
     Ok(())
 }
 
-/// The times of a message, by our clock, nanoseconds. None lies in the future, whatever the error of the clock.
+/// The times of a message by this host's clock, in nanoseconds. None of them is in the future, whatever the error of the other clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Times {
     captured_at: u64,
     received_at: u64,
     sent_at: u64,
-    /// How long after the instant of its frame the picture was taken.
+    /// Time from the instant of the frame until the picture was taken.
     skew: i64,
 }
 
 impl Times {
-    /// * `instant`: that its host gave it, by our clock; `due`: that of its frame here.
+    /// Converts the times of a message.
+    ///
+    /// * `instant`: instant that the sending host assigned, by this host's clock.
+    /// * `due`: instant of the frame on this host.
     pub(super) fn of(head: &Head, clock: &Estimate, instant: u64, due: u64) -> Self {
         let now = now_nanos();
         let ours = |nanos: u64| clock.ours(nanos).min(now);
@@ -98,7 +101,7 @@ impl Publisher {
                 view = self.view,
                 n,
                 expected,
-                "beginning without all receivers"
+                "starting before all receivers are connected"
             );
         }
     }
@@ -186,7 +189,7 @@ impl Publisher {
         Ok(())
     }
 
-    /// Sends that there is nothing for a frame, and why; or that the stream has ended.
+    /// Sends that a frame has no message and why, or that the stream has ended.
     pub(super) fn send_nothing(
         &self,
         service: &Service,

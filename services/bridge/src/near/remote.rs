@@ -7,10 +7,10 @@ use crate::hosts::{Clock, Difference, Estimate, Exchange};
 use crate::job::NearHost;
 use crate::join::listed;
 
-/// A host that has not been heard for this long does not answer, nanoseconds.
+/// Time without a message after which a host counts as not answering, in nanoseconds.
 const SILENT_AFTER: u64 = 1_200_000_000;
 
-/// Another host. Shared with the threads of the link.
+/// Another host. The value is shared with the threads of the link.
 #[derive(Debug)]
 pub(super) struct Remote {
     pub(super) name: String,
@@ -22,22 +22,22 @@ pub(super) struct Remote {
 #[derive(Debug, Default, Clone)]
 pub(super) struct State {
     pub(super) clock: Clock,
-    /// The start of its bridge that was welcomed.
+    /// Start of the welcomed bridge.
     pub(super) welcomed: Option<u64>,
     pub(super) refused: Option<Vec<Difference>>,
     heard_at: Option<u64>,
     pub(super) n_packets: u64,
     pub(super) n_bytes: u64,
-    /// Packets that were none, with the reason of the last.
+    /// Number of malformed packets, and reason of the last one.
     pub(super) n_malformed: u64,
     pub(super) last_malformed: String,
-    /// Packets of a bridge that was not welcomed (yet).
+    /// Number of packets from a bridge that was not welcomed, or not yet.
     pub(super) n_unknown: u64,
-    /// Packets that came before its clock was known.
+    /// Number of packets that came before the clock of the host was known.
     pub(super) n_without_clock: u64,
-    /// Packets for which there was no room: it does not keep to the rules.
+    /// Number of packets for which there was no space, because the host sends too many.
     pub(super) n_no_room: u64,
-    /// How often it came, and went.
+    /// Number of times that the host appeared, and disappeared.
     pub(super) n_came: u64,
     pub(super) n_went: u64,
     was_there: bool,
@@ -57,17 +57,17 @@ impl Remote {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// It was heard.
+    /// Records that a message of the host arrived.
     pub(super) fn heard(&self, now: u64) {
         self.state().heard_at = Some(now);
     }
 
-    /// Returns true if it was welcomed, and heard lately.
+    /// Returns true if the host was welcomed, and has sent a message recently.
     pub(super) fn is_there(&self, now: u64) -> bool {
         self.state().is_there(now)
     }
 
-    /// Returns the estimate of its clock.
+    /// Returns the estimate of the host's clock.
     pub(super) fn estimate(&self, now: u64) -> Option<Estimate> {
         self.state().clock.estimate(now)
     }
@@ -76,7 +76,7 @@ impl Remote {
         self.state().n_without_clock += 1;
     }
 
-    /// An exchange of times with it.
+    /// Adds an exchange of times with the host.
     pub(super) fn exchanged(&self, exchange: Exchange) {
         let mut state = self.state();
         state.heard_at = Some(exchange.heard_at);
@@ -85,40 +85,43 @@ impl Remote {
         }
     }
 
-    /// A bridge of that host was welcomed.
+    /// Records that a bridge of the host was welcomed.
     pub(super) fn welcomed(&self, origin: u64, now: u64) {
         let mut state = self.state();
         state.heard_at = Some(now);
         if state.welcomed.replace(origin) != Some(origin) {
-            // Perhaps with the host: its clock is another then.
+            // The host may have been restarted, too. Its clock is then a new one.
             state.clock.forget();
             state.refused = None;
         }
     }
 
-    /// A bridge of that host was refused; logged where that is new.
+    /// Records that a bridge of the host was refused. Logs the reasons if they are new.
     pub(super) fn refused(&self, why: &[Difference]) {
         let mut state = self.state();
         if state.refused.as_deref() != Some(why) {
             let why = listed(why);
-            tracing::warn!(host = self.name, "refused, as the host sees it: {why}");
+            tracing::warn!(
+                host = self.name,
+                "refused, from the point of view of that host: {why}"
+            );
         }
         state.refused = Some(why.to_vec());
         state.welcomed = None;
     }
 
-    /// It sent something that is not a packet.
+    /// Records that the host sent bytes that are not a packet.
     pub(super) fn malformed(&self, why: &dyn core::fmt::Display) {
         let mut state = self.state();
         state.n_malformed += 1;
         state.last_malformed = why.to_string();
         if state.n_malformed.is_power_of_two() {
             let n = state.n_malformed;
-            tracing::warn!(host = self.name, %why, n, "what came from this host is refused");
+            tracing::warn!(host = self.name, %why, n, "messages of this host are refused");
         }
     }
 
-    /// Logs whether it is there where that has changed, and once a clock that is not known well enough.
+    /// Logs when the host starts or stops answering. Also logs once if its clock is not known well enough.
     pub(super) fn watch(&self, now: u64, period_nanos: f64, max_share: f64) {
         let mut state = self.state();
         let is_there = state.is_there(now);

@@ -1,4 +1,4 @@
-//! The state of all hosts as JSON: for `parallax hosts status`, and as a file beside the results.
+//! The state of all hosts as JSON, for `parallax hosts status` and as a file beside the results.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -14,16 +14,16 @@ use super::listen::Arrived;
 use super::remote::Remote;
 use crate::timing::Timing;
 
-/// How long the messages of a view took.
+/// Durations of a view's messages.
 #[derive(Debug, Default)]
 struct Times {
-    /// From the send time of its stage until it was encoded, there.
+    /// Time from the stage's send time until the message was encoded, on the other host.
     encode: Timing,
-    /// From there to here.
+    /// Transfer time from the other host to this one.
     network: Timing,
-    /// Until it was decoded, here.
+    /// Time until the message was decoded, on this host.
     decode: Timing,
-    /// All of it, with the publishing.
+    /// Total time, including publishing.
     all: Timing,
     n_bytes: u64,
     n_overtaken: u64,
@@ -50,12 +50,12 @@ impl Report {
         }
     }
 
-    /// The newest text.
+    /// Returns the newest text.
     pub(super) fn text(&self) -> Arc<Mutex<String>> {
         Arc::clone(&self.text)
     }
 
-    /// A message was published.
+    /// Adds the durations of a published message.
     pub(super) fn took(&mut self, view: usize, it: &Arrived, clock: &Estimate) {
         let times = self.views.entry(view).or_default();
         let head = &it.head;
@@ -74,7 +74,7 @@ impl Report {
 
     /// Writes the state.
     ///
-    /// * `views`: of every view of another host its number, that of its host and its tally.
+    /// * `views`: for every view of another host, its index, the index of its host, and its counts.
     pub(super) fn write(
         &mut self,
         remotes: &[Remote],

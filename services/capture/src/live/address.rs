@@ -7,62 +7,63 @@ use footage::{FootageError, LiveAddress, PixelFormat, Size, StreamSpec, Transpor
 use messages::Status;
 use runtime::{FourCc, VideoDevice, VideoError, VideoMode, VideoWish};
 
-/// A live camera, and what is wanted of it.
+/// A live camera, with the requested settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LiveCamera {
-    /// Where it is.
+    /// Address of the camera.
     pub address: LiveAddress,
-    /// Format of the pixels, of a device; none for any that is read.
+    /// Pixel format of a device; `None` for any supported format.
     pub format: Option<String>,
-    /// Width and height, pixels; none for what the camera has.
+    /// Width and height in pixels; `None` to keep the camera's setting.
     pub size: Option<[u32; 2]>,
-    /// Pictures per second; none for what the camera has.
+    /// Pictures per second; `None` to keep the camera's setting.
     pub rate_hz: Option<f64>,
     /// Controls to set on a device, by name.
     pub controls: BTreeMap<String, i64>,
-    /// How packets of an RTSP camera travel.
+    /// Transport of an RTSP camera's packets.
     pub transport: Option<Transport>,
-    /// True if the times that an RTSP camera gives for its pictures are used, if they are plausible.
+    /// True if the times that an RTSP camera gives for its pictures are used when they are plausible.
     pub has_own_clock: bool,
 }
 
-/// Why a live camera cannot be used.
+/// Error if a live camera cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// The stream.
+    /// The stream fails.
     #[error(transparent)]
     Stream(#[from] FootageError),
-    /// The device.
+    /// The device fails.
     #[error(transparent)]
     Device(#[from] VideoError),
-    /// A format that is not read here.
-    #[error("the format {format:?} is not read; these are: {}", known())]
+    /// The format is not supported.
+    #[error(
+        "the format {format:?} is not supported; supported formats: {}",
+        known()
+    )]
     Format {
-        /// As asked for, or as the device is set.
+        /// Format that was requested, or to which the device is set.
         format: String,
     },
     /// The stream does not give its rate.
-    #[error(
-        "{address} does not say how many pictures it has per second: set `frame_rate_hz` of the camera"
-    )]
+    #[error("{address} does not state its frame rate: set `frame_rate_hz` of the camera")]
     NoRate {
-        /// Without a password.
+        /// Address without a password.
         address: String,
     },
-    /// Nothing came for some time.
-    #[error("{address} is silent")]
+    /// No picture came for some time.
+    #[error("{address} sends no pictures")]
     Silent {
-        /// Without a password.
+        /// Address without a password.
         address: String,
     },
-    /// Another camera is where this one was.
-    #[error("{address} is another camera now: {found}, expected {expected}")]
+    /// Another camera has the address of this one.
+    #[error("{address} is a different camera now: {found}, expected {expected}")]
     Another {
-        /// Where.
+        /// Address of the camera.
         address: String,
-        /// Which is there.
+        /// Camera that has the address now.
         found: String,
-        /// Which was there.
+        /// Camera that had the address before.
         expected: String,
     },
 }
@@ -78,7 +79,7 @@ impl Fault for LiveError {
 }
 
 impl LiveError {
-    /// Why there are no pictures, for the messages.
+    /// Returns the reason why there are no pictures, for the messages.
     pub(crate) fn status(&self) -> Status {
         match self {
             Self::Stream(FootageError::SizeChanged { .. })
@@ -96,7 +97,7 @@ fn known() -> String {
 }
 
 impl LiveCamera {
-    /// A camera as it is set.
+    /// Returns a camera that keeps its current settings.
     pub fn new(address: LiveAddress) -> Self {
         Self {
             address,
@@ -109,11 +110,11 @@ impl LiveCamera {
         }
     }
 
-    /// Size and rate of its pictures. A device is set as it is wanted, a stream is asked unless both are given.
+    /// Returns the size and rate of the pictures. A device is set as requested. A stream is queried, unless both are given.
     ///
     /// # Errors
     ///
-    /// [`LiveError`].
+    /// Fails with [`LiveError`] if the camera cannot be used.
     pub fn look(&self) -> Result<(Size, f64), LiveError> {
         let (size, rate_hz) = match &self.address {
             LiveAddress::Device(path) => {
@@ -133,7 +134,7 @@ impl LiveCamera {
         Ok((size, rate_hz))
     }
 
-    /// Sets a device as it is wanted.
+    /// Sets a device as requested.
     pub(super) fn set(
         &self,
         device: &VideoDevice,

@@ -1,28 +1,29 @@
-//! From the clock of a camera to that of this machine.
+//! Converts times of a camera's clock to the clock of this machine.
 
 use std::collections::VecDeque;
 
-/// For how long an offset counts, nanoseconds: long enough that some packet was quick, short enough that clocks do not part.
+/// Time for which an offset is used, in nanoseconds. It is long enough to include a fast packet, and short enough that clocks do not
+/// drift apart.
 const WINDOW_NANOS: u64 = 10_000_000_000;
-/// A change of the offset by which the camera's clock was set, nanoseconds.
+/// Change of the offset, in nanoseconds, that shows that the camera's clock was set.
 const JUMP_NANOS: u64 = 2_000_000_000;
 
-/// Shortest and longest plausible delay by the clock of a camera, nanoseconds: no picture arrives before it was taken,
-/// and nothing waits for one that comes much later.
+/// Shortest and longest plausible delay by a camera's clock, in nanoseconds. No picture arrives before it was taken,
+/// and one that comes much later is not awaited.
 const DELAYS_NANOS: [i64; 2] = [0, 150_000_000];
-/// Amount by which a trusted clock may leave these limits, nanoseconds, so that a short excursion does not count.
+/// Amount by which a trusted clock may exceed these limits, in nanoseconds, so that a short deviation does not matter.
 const SLACK_NANOS: i64 = 5_000_000;
-/// Pictures before the clock of a camera is believed or not.
+/// Number of pictures before the clock of a camera is judged.
 const N_FOR_VERDICT: u32 = 30;
 
-/// The least of the numbers of the last ten seconds: times and numbers, both ascending.
+/// Minimum of the numbers of the last ten seconds. Stores times and numbers, both ascending.
 #[derive(Debug, Default)]
 struct Least(VecDeque<(u64, i64)>);
 
 impl Least {
-    /// Adds a number; one that is far from those before stands for another clock.
+    /// Adds a number. A number that is far from the earlier ones shows that the clock was set.
     ///
-    /// * Returns the least.
+    /// * Returns the minimum.
     fn add(&mut self, at_nanos: u64, number: i64) -> i64 {
         let all = &mut self.0;
         let is_jump = |&(_, least): &(u64, i64)| number.abs_diff(least) > JUMP_NANOS;
@@ -41,16 +42,16 @@ impl Least {
     }
 }
 
-/// Moves presentation times to `CLOCK_MONOTONIC`: by the least delay of the last ten seconds, so that frames that were held up
-/// on the way keep their distances.
+/// Converts presentation times to `CLOCK_MONOTONIC`, using the smallest delay of the last ten seconds. Frames that were delayed
+/// on their way keep their distances.
 #[derive(Debug, Default)]
 pub(super) struct ClockMap(Least);
 
 impl ClockMap {
-    /// When a picture was taken, but for the delay that every picture has; never later than it arrived.
+    /// Returns the time at which a picture was taken, except for the delay that all pictures have. It is never later than the arrival.
     ///
-    /// * `presented_nanos`: by the camera's clock.
-    /// * `arrived_at_nanos`: by that of this machine.
+    /// * `presented_nanos`: presentation time by the camera's clock.
+    /// * `arrived_at_nanos`: time of arrival by this machine's clock.
     pub(super) fn taken_at(&mut self, presented_nanos: i64, arrived_at_nanos: u64) -> u64 {
         let offset = arrived_at_nanos.cast_signed().saturating_sub(presented_nanos);
         let least = self.0.add(arrived_at_nanos, offset);
@@ -61,34 +62,37 @@ impl ClockMap {
 /// Verdict on the clock of a camera.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// Too few pictures so far.
+    /// There are too few pictures so far.
     #[default]
     Unknown,
-    /// That of this machine.
+    /// The clock agrees with that of this machine.
     Right,
-    /// Another, or its pictures come too late.
+    /// The clock differs, or the pictures come too late.
     Wrong,
 }
 
-/// Judges the clock of a camera that stamps its pictures, by their delays.
+/// Judges the clock of a camera that stamps its pictures, by the delays of the pictures.
 ///
-/// A small error of a clock cannot be distinguished from the time that a picture is on its way. With a large error,
-/// pictures would come from the future, or so late that nobody waits for them.
+/// A small error of a clock cannot be distinguished from the transfer time of a picture. With a large error,
+/// pictures would come from the future, or too late to be awaited.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
     least: Least,
     n: u32,
     /// Verdict so far.
     pub(super) verdict: Verdict,
-    /// The shortest delay of the last ten seconds, nanoseconds.
+    /// Shortest delay of the last ten seconds, in nanoseconds.
     pub(super) delay_nanos: i64,
 }
 
 impl OwnClock {
-    /// When a picture was taken, `CLOCK_MONOTONIC`; never later than it arrived. None while the clock is not believed.
+    /// Returns the time at which a picture was taken, by `CLOCK_MONOTONIC`. It is never later than the arrival. Returns `None` while the
+    /// clock
+    /// is not trusted.
     ///
-    /// * `taken_unix`: by the clock of the camera, nanoseconds since 1970 began; `arrived_unix`: by that of this machine.
-    /// * `arrived_at_nanos`: by `CLOCK_MONOTONIC`.
+    /// * `taken_unix`: time by the camera's clock, in nanoseconds since the beginning of 1970.
+    /// * `arrived_unix`: time of arrival by this machine's clock, in nanoseconds since the beginning of 1970.
+    /// * `arrived_at_nanos`: time of arrival by `CLOCK_MONOTONIC`.
     pub(super) fn taken_at(
         &mut self,
         [taken_unix, arrived_unix]: [i64; 2],
@@ -157,7 +161,7 @@ mod tests {
         assert_eq!(last, 399 * 40 * MS + 20 * MS);
     }
 
-    /// Judges a camera whose clock is ahead by some milliseconds and whose pictures take some: verdict, delay, last time.
+    /// Judges a camera whose clock is ahead by some milliseconds and whose pictures have some delay. Returns verdict, delay and last time.
     fn judged(ahead_ms: i64, delay_ms: impl Fn(u64) -> u64) -> (Verdict, i64, Option<u64>) {
         let mut clock = OwnClock::default();
         let mut last = None;

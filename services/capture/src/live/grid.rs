@@ -1,30 +1,32 @@
-//! The instants that all cameras of a run have in common, and which picture belongs to which.
+//! The common instants of all cameras in a run, and the assignment of pictures to them.
 
 use std::collections::VecDeque;
 
 use messages::Status;
 
-/// How far a picture may be from its instant beyond half a period, in periods: what jitters about the middle between two
-/// instants stays with one of them.
+/// Distance beyond half a period that a picture may have from its instant, in periods. With this tolerance, pictures that jitter around the
+/// middle between two instants stay with one of them.
 const SLACK: f64 = 0.1;
-/// Intervals that the period of a camera is the median of, and how many are needed.
+/// Number of intervals whose median is the period of a camera, and number of intervals that are needed.
 const N_INTERVALS: usize = 15;
 const LEAST_INTERVALS: usize = 5;
-/// How far the clock of a camera may be from that of this machine, nanoseconds.
+/// Largest accepted difference between a camera's clock and that of this machine, in nanoseconds.
 const MAX_OFF_NANOS: u64 = 2_000_000_000;
 
-/// Instants `start + k / rate`. Reads no clock.
+/// The instants `start + k / rate`. Does not read a clock.
 #[derive(Debug)]
 pub(crate) struct Grid {
     start_nanos: u64,
     period: f64,
-    /// The time of the last picture, and the newest intervals between pictures, nanoseconds.
+    /// Time of the last picture, and newest intervals between pictures, in nanoseconds.
     last: Option<u64>,
     intervals: VecDeque<u64>,
 }
 
 impl Grid {
-    /// * `rate_hz`: instants per second.
+    /// Creates the instants.
+    ///
+    /// * `rate_hz`: number of instants per second.
     pub(crate) fn new(start_nanos: u64, rate_hz: f64) -> Self {
         Self {
             start_nanos,
@@ -34,37 +36,37 @@ impl Grid {
         }
     }
 
-    /// From one instant to the next, nanoseconds.
+    /// Returns the time from one instant to the next, in nanoseconds.
     pub(crate) fn period_nanos(&self) -> u64 {
         self.period.round() as u64
     }
 
-    /// When an instant is, nanoseconds.
+    /// Returns the time of an instant, in nanoseconds.
     pub(crate) fn due_nanos(&self, nth: u64) -> u64 {
         self.start_nanos.saturating_add((nth as f64 * self.period).round() as u64)
     }
 
-    /// The latest instant that is not after `now_nanos`; 0 before all.
+    /// Returns the latest instant that is not after `now_nanos`; 0 before the first.
     pub(crate) fn latest(&self, now_nanos: u64) -> u64 {
         self.exact(now_nanos).max(0.0) as u64
     }
 
-    /// Seconds since the first instant.
+    /// Returns the seconds since the first instant.
     pub(crate) fn seconds(&self, at_nanos: u64) -> f64 {
         self.exact(at_nanos) * self.period * 1e-9
     }
 
-    /// How long after an instant a picture was taken, nanoseconds.
+    /// Returns the time from an instant until a picture was taken, in nanoseconds.
     pub(crate) fn off_nanos(&self, at_nanos: u64, nth: u64) -> i64 {
         ((self.exact(at_nanos) - nth as f64) * self.period).round() as i64
     }
 
-    /// The place of a time among the instants.
+    /// Returns the position of a time among the instants.
     fn exact(&self, at_nanos: u64) -> f64 {
         at_nanos.cast_signed().wrapping_sub(self.start_nanos.cast_signed()) as f64 / self.period
     }
 
-    /// Returns the fault of the time of a picture: equal to or before that of the one before, or not of this moment.
+    /// Returns the fault in the time of a picture: equal to or earlier than that of the previous picture, or far from the current time.
     pub(crate) fn wrong_clock(&mut self, at_nanos: u64, arrived_at_nanos: u64) -> Option<Status> {
         if at_nanos.abs_diff(arrived_at_nanos) > MAX_OFF_NANOS {
             return Some(Status::CLOCK_JUMPED);
@@ -78,7 +80,7 @@ impl Grid {
             }
             return None;
         }
-        // A clock that goes on from an earlier time is wrong once.
+        // If the clock was set back, only one picture counts as wrong.
         Some(if at_nanos == last {
             Status::TIME_REPEATED
         } else {
@@ -86,7 +88,7 @@ impl Grid {
         })
     }
 
-    /// Learns the period of the camera from the times of its first pictures, ascending.
+    /// Measures the period of the camera from the times of its first pictures, in ascending order.
     pub(crate) fn learn(&mut self, times: impl Iterator<Item = u64>) {
         for at_nanos in times.take(N_INTERVALS + 1) {
             self.wrong_clock(at_nanos, at_nanos);
@@ -94,10 +96,12 @@ impl Grid {
         self.last = None;
     }
 
-    /// The instant that a picture belongs to: `next`, or a later one; none if all that are near have one.
+    /// Returns the instant that a picture belongs to: `next` or a later one. Returns `None` if all near instants have a picture.
     ///
-    /// A picture is at most half a period away, of a camera that is faster than the instants half a period of its own, and in
-    /// either case a tenth more. So cameras of one rate keep their phase, and of a faster camera the nearest is taken.
+    /// The distance of a picture from its instant is at most half a period of the instants. If the camera is faster, it is at most half a
+    /// period of the camera. In either case a tolerance of a tenth is added. So cameras with the same rate keep their phase, and of a
+    /// faster
+    /// camera the nearest picture is used.
     pub(crate) fn place(&self, at_nanos: u64, next: u64) -> Option<u64> {
         let exact = self.exact(at_nanos);
         let reach = 0.5 * self.own_period().min(1.0) + SLACK;
@@ -109,7 +113,7 @@ impl Grid {
         is_later.then_some(nearest as u64)
     }
 
-    /// The period of the camera, in periods of the grid.
+    /// Returns the period of the camera, in periods of the instants.
     fn own_period(&self) -> f64 {
         if self.intervals.len() < LEAST_INTERVALS {
             return 1.0;
@@ -128,7 +132,7 @@ mod tests {
 
     const START: u64 = 5_000_000_000;
 
-    /// The instants of pictures, in periods of 30 Hz after the first instant.
+    /// Returns the instants of pictures whose times are given in periods of 30 Hz after the first instant.
     fn placed(times: impl IntoIterator<Item = f64>) -> Vec<Option<u64>> {
         let mut grid = Grid::new(START, 30.0);
         let mut next = 0;

@@ -1,4 +1,4 @@
-//! A live camera that is open: a video device, or a stream.
+//! An open live camera: a video device or a stream.
 
 use core::time::Duration;
 use std::path::{Path, PathBuf};
@@ -16,33 +16,33 @@ use super::address::{LiveCamera, LiveError, size_of};
 use super::clock::{ClockMap, OwnClock, Verdict};
 use super::originals::{KeptStream, Original, Originals};
 
-/// Longest wait for a picture of a device, so that a stop is noticed.
+/// Longest wait for a picture of a device, so that a stop request is noticed.
 const PAUSE: Duration = Duration::from_millis(100);
-/// After this long without a picture a device is opened again, nanoseconds.
+/// Time without a picture after which a device is opened again, in nanoseconds.
 const SILENCE_NANOS: u64 = 5_000_000_000;
-/// A gap between two times of a stream beyond which pictures are missing, in periods.
+/// Gap between two times of a stream from which pictures count as missing, in periods.
 const GAP: f64 = 1.5;
 
-/// One picture as read from a camera.
+/// One picture read from a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Taken {
-    /// When it was taken, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the picture was taken, by `CLOCK_MONOTONIC`, in nanoseconds.
     pub at_nanos: u64,
-    /// When it was here.
+    /// Time at which the picture arrived.
     pub arrived_at_nanos: u64,
-    /// Pictures before it that the camera lost.
+    /// Number of pictures before this one that the camera lost.
     pub n_lost: u64,
-    /// Pictures before it that were lost for want of a buffer, because this process was slow.
+    /// Number of pictures before this one that were lost because this process was slow and no buffer was free.
     pub n_overtaken: u64,
-    /// True if its pixels are good.
+    /// True if the pixels are valid.
     pub is_whole: bool,
-    /// Clock that says when it was taken.
+    /// Clock that gives the time of the picture.
     pub timed_by: TimedBy,
-    /// The shortest delay of its pictures by the camera's own clock, believed or not, nanoseconds; none where that is not known.
+    /// Shortest delay of the pictures by the camera's own clock, in nanoseconds, even if that clock is not trusted; `None` if unknown.
     pub delay_nanos: Option<i64>,
 }
 
-/// A camera that is open.
+/// An open camera.
 #[derive(Debug)]
 pub(super) enum Input {
     Device(Box<Device>),
@@ -50,8 +50,10 @@ pub(super) enum Input {
 }
 
 impl Input {
-    /// * `before`: the device that was open before, which may have another number now.
-    /// * `originals`: takes what is to be kept as it comes, if anything is.
+    /// Opens a camera.
+    ///
+    /// * `before`: the device that was open before. It may have another number now.
+    /// * `originals`: queue for original pictures, if they are to be kept.
     /// * `is_bare`: see [`StreamSpec::is_bare`].
     pub(super) fn open(
         camera: &LiveCamera,
@@ -90,7 +92,7 @@ impl Input {
         }
     }
 
-    /// Ends the wait for a picture from another thread.
+    /// Returns a handle with which another thread can end the wait for a picture.
     pub(super) fn end(&self) -> Option<StreamEnd> {
         match self {
             Self::Device(_) => None,
@@ -98,7 +100,7 @@ impl Input {
         }
     }
 
-    /// Reads the next picture into `rgb`; none if there is none yet.
+    /// Reads the next picture into `rgb`. Returns `None` if there is none yet.
     pub(super) fn next(&mut self, rgb: &mut [u8]) -> Result<Option<Taken>, LiveError> {
         match self {
             Self::Device(it) => it.next(rgb),
@@ -107,7 +109,7 @@ impl Input {
     }
 }
 
-/// A video device that streams.
+/// An open video device.
 #[derive(Debug)]
 pub(super) struct Device {
     stream: VideoStream,
@@ -193,14 +195,14 @@ impl Device {
     }
 }
 
-/// How many numbers are missing between two; none if the camera began to count anew.
+/// Returns how many numbers are missing between two; 0 if the camera has started to count again.
 fn missing(last: Option<u32>, now: u32) -> u64 {
     let gap = last.map_or(1, |last| now.wrapping_sub(last));
     let is_ahead = (1..1 << 31).contains(&gap);
     if is_ahead { u64::from(gap - 1) } else { 0 }
 }
 
-/// Opens a camera that was open before: where it was, or under whatever number it has now.
+/// Opens a camera that was open before, at the same path or under its new number.
 fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
     let there = VideoDevice::open(path);
     if let Ok(device) = &there
@@ -227,7 +229,7 @@ fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
     })
 }
 
-/// A stream of a network.
+/// A network stream.
 #[derive(Debug)]
 pub(super) struct Stream {
     decoder: LiveStream,
@@ -235,7 +237,7 @@ pub(super) struct Stream {
     clock: ClockMap,
     /// The clock of a camera that stamps its pictures; `None` if it is not used.
     own_clock: Option<OwnClock>,
-    /// Without a password.
+    /// Address without a password.
     address: String,
     period_nanos: Option<f64>,
     last: Option<i64>,
@@ -284,32 +286,32 @@ impl Stream {
     }
 }
 
-/// Logs whether the clock of a camera is believed.
+/// Logs whether the clock of a camera is trusted.
 fn say_of_clock(clock: &OwnClock, camera: &str) {
     let delay_ms = clock.delay_nanos as f64 * 1e-6;
     if clock.verdict == Verdict::Right {
         tracing::info!(
             camera,
             delay_ms,
-            "this camera tells when its pictures were taken"
+            "this camera states when its pictures were taken"
         );
     } else {
         tracing::warn!(
             camera,
             delay_ms,
-            "by its own clock the pictures of this camera come before they were taken, or too late to be waited for: they count as \
-             taken when they came; set its clock and that of this machine by one time server"
+            "by its own clock, the pictures of this camera arrive before they were taken, or too late to be used: they count as \
+             taken when they arrived; set the camera's clock and that of this machine from the same time server"
         );
     }
 }
 
-/// The clock of this machine, nanoseconds since 1970 began; 0 before.
+/// Returns the time of this machine's clock, in nanoseconds since the beginning of 1970; 0 for earlier times.
 fn unix_nanos() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     i64::try_from(since.unwrap_or_default().as_nanos()).unwrap_or(i64::MAX)
 }
 
-/// How many pictures are missing in a gap between two, nanoseconds.
+/// Returns how many pictures are missing in a gap between two pictures. The gap is given in nanoseconds.
 fn missing_by_time(gap: i64, period: f64) -> u64 {
     let periods = gap as f64 / period;
     if periods > GAP {
@@ -319,12 +321,12 @@ fn missing_by_time(gap: i64, period: f64) -> u64 {
     }
 }
 
-/// Opens a live camera, and returns one picture of it, RGB, row major: the first that is whole after `n_skipped`, by which
-/// exposure has settled.
+/// Opens a live camera, and returns one picture: RGB, row major. It is the first complete picture after `n_skipped` pictures, in which
+/// the exposure can settle.
 ///
 /// # Errors
 ///
-/// [`LiveError`]; also if nothing comes.
+/// Fails with [`LiveError`] if the camera cannot be used, or no picture comes.
 pub fn take_picture(camera: &LiveCamera, n_skipped: usize) -> Result<(Size, Vec<u8>), LiveError> {
     let (size, _) = camera.look()?;
     let rgb = settled_picture(camera, size, n_skipped, false);
@@ -356,7 +358,7 @@ fn settled_picture(
     }
 }
 
-/// Ends a stream that is silent for too long, until this is dropped.
+/// Ends a stream that is silent for too long. Stops watching when dropped.
 #[derive(Debug)]
 #[expect(dead_code, reason = "its end is what is waited for")]
 struct Watched(Option<SyncSender<()>>);

@@ -1,4 +1,4 @@
-//! Pictures as a live camera sent them, on their way to a recording: nothing waits for them, and what does not fit is counted.
+//! Queue of a live camera's original pictures for a recording. No process waits for it, and pictures that do not fit are counted.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -6,30 +6,30 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use footage::{Piece, PieceKind, Pieces, Size};
 use messages::NO_SEQUENCE;
 
-/// Bytes that may wait: a second of large raw pictures.
+/// Maximum number of waiting bytes: a second of large raw pictures.
 const MAX_BYTES: usize = 128 << 20;
-/// Pieces of a stream that wait for the decoder to say when they were taken, and decoded pictures that are remembered.
+/// Maximum number of pieces of a stream that wait until the decoder gives their times, and of decoded pictures that are remembered.
 const MAX_PENDING: usize = 64;
-/// The time of a piece is rounded to milliseconds.
+/// Tolerance for the time of a piece, which is rounded to milliseconds.
 const SAME_NANOS: u64 = 1_000_000;
 
-/// A picture as it came.
+/// An original picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Original {
-    /// Format of its bytes, as [`messages::PictureHeader::format`].
+    /// Format of the bytes, as in [`messages::PictureHeader::format`].
     pub format: [u8; 4],
     pub bytes: Vec<u8>,
-    /// When it was taken, and when it was here; `CLOCK_MONOTONIC`, nanoseconds.
+    /// Times at which the picture was taken and arrived, by `CLOCK_MONOTONIC`, in nanoseconds.
     pub at_nanos: u64,
     pub arrived_at_nanos: u64,
-    /// The number that the camera gave it, or [`NO_SEQUENCE`].
+    /// Number that the camera gave the picture, or [`NO_SEQUENCE`].
     pub sequence: u64,
-    /// Its time in the stream; 0 without one.
+    /// Time of the picture in the stream; 0 if it has none.
     pub presented_nanos: u64,
     pub bytes_per_row: u32,
     pub size: Size,
     pub is_whole: bool,
-    /// How often the camera had been opened before; [`Originals::put`] sets it.
+    /// Number of times that the camera had been opened before. [`Originals::put`] sets it.
     pub connection: u32,
 }
 
@@ -42,7 +42,7 @@ struct State {
     n_connections: u32,
 }
 
-/// The pictures that wait to be sent to the recording, numbered; those that are lost have numbers too.
+/// Numbered pictures that wait to be sent to the recording. Lost pictures also have numbers.
 #[derive(Debug, Default)]
 pub(crate) struct Originals(Mutex<State>);
 
@@ -51,12 +51,12 @@ impl Originals {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The camera was opened.
+    /// Records that the camera was opened.
     pub(super) fn connected(&self) {
         self.state().n_connections += 1;
     }
 
-    /// Adds a picture, or counts it if there is no room.
+    /// Adds a picture, or counts it if there is no space.
     pub(super) fn put(&self, original: Original) {
         let mut state = self.state();
         let number = state.next;
@@ -76,12 +76,12 @@ impl Originals {
         ));
     }
 
-    /// Counts pictures that were lost before they were here.
+    /// Counts pictures that were lost before they arrived.
     fn lose(&self, n: u64) {
         self.state().next += n;
     }
 
-    /// The oldest picture, with its number.
+    /// Removes and returns the oldest picture, with its number.
     pub(crate) fn take(&self) -> Option<(u64, Original)> {
         let mut state = self.state();
         let (number, original) = state.waiting.pop_front()?;
@@ -89,19 +89,19 @@ impl Originals {
         Some((number, original))
     }
 
-    /// Number of all pictures so far.
+    /// Returns the number of all pictures so far.
     pub(crate) fn n_all(&self) -> u64 {
         self.state().next
     }
 }
 
-/// The pieces of a stream, which wait until its decoder has said when their pictures were taken.
+/// Pieces of a stream that wait until its decoder has given the times of their pictures.
 #[derive(Debug)]
 pub(super) struct KeptStream {
     originals: std::sync::Arc<Originals>,
     size: Size,
     pending: VecDeque<Piece>,
-    /// Times of decoded pictures, in the stream and on the clock of this machine.
+    /// Times of decoded pictures, in the stream and by this machine's clock.
     decoded: VecDeque<(i64, u64)>,
 }
 
@@ -115,9 +115,10 @@ impl KeptStream {
         }
     }
 
-    /// A picture was decoded.
+    /// Records that a picture was decoded.
     ///
-    /// * `label_nanos`: its time in the stream; `at_nanos`: when it was taken.
+    /// * `label_nanos`: time of the picture in the stream.
+    /// * `at_nanos`: time at which the picture was taken.
     pub(super) fn decoded(&mut self, label_nanos: i64, at_nanos: u64) {
         self.decoded.push_back((label_nanos, at_nanos));
         if self.decoded.len() > MAX_PENDING {
@@ -166,7 +167,9 @@ impl KeptStream {
         }
     }
 
-    /// When the picture of a piece was taken: as its decoded one, else by the distance to the last.
+    /// Returns the time at which the picture of a piece was taken. It is that of its decoded picture, or follows from the distance to the
+    /// last
+    /// one.
     fn taken_at(&self, nanos: i64) -> u64 {
         let is_it = |decoded: &&(i64, u64)| decoded.0.abs_diff(nanos) <= SAME_NANOS;
         if let Some(&(_, at)) = self.decoded.iter().find(is_it) {
@@ -237,7 +240,7 @@ mod tests {
         kept.put_decoded(0);
         assert_eq!(originals.n_all(), 0, "no time is known yet");
         kept.decoded(33_366_667, 5000 * MS);
-        // The second was not decoded.
+        // The second piece was not decoded.
         kept.decoded(100_100_000, 5067 * MS);
         kept.put_decoded(9000 * MS);
         let all: Vec<([u8; 4], u64)> = core::iter::from_fn(|| {

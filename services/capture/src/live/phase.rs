@@ -1,31 +1,35 @@
-//! How far the pictures of a camera are from the common instants, and whether that changes.
+//! Measures how far the pictures of a camera are from the common instants, and whether that changes.
 
 use std::collections::VecDeque;
 
-/// Pictures whose median is one measurement, for how long such measurements count, nanoseconds, and how many there are at most.
+/// Number of pictures whose median is one measurement, time for which measurements are used in nanoseconds, and maximum number of
+/// measurements.
 const N_PICTURES: usize = 15;
 const WINDOW_NANOS: u64 = 60_000_000_000;
 const MOST_MEASUREMENTS: usize = 240;
-/// Least time for which a camera must have been measured before its drift is reported, nanoseconds.
+/// Minimum time for which a camera must have been measured before its drift is reported, in nanoseconds.
 const LEAST_NANOS: u64 = 5_000_000_000;
 
-/// Follows the skew of a camera. Reads no clock.
+/// Follows the skew of a camera. Does not read a clock.
 #[derive(Debug)]
 pub(crate) struct Phase {
     period_nanos: u64,
-    /// Times and skews of pictures that are not in a measurement yet, nanoseconds.
+    /// Times and skews of pictures that are not part of a measurement yet, in nanoseconds.
     newest: Vec<(u64, i64)>,
-    /// Times and skews, nanoseconds; whole periods are added where the camera passed from one instant to the next, so that
-    /// the skews of a camera that drifts do not jump.
+    /// Times and skews of the measurements, in nanoseconds. When a camera drifts from one instant to the next, a whole period is added, so
+    /// that
+    /// its skew does not jump.
     measured: VecDeque<(u64, i64)>,
-    /// Periods that were added so far, nanoseconds.
+    /// Sum of the periods that were added so far, in nanoseconds.
     added: i64,
     /// True if the times are those of the camera's own clock.
     is_own_time: bool,
 }
 
 impl Phase {
-    /// * `period_nanos`: from one instant to the next.
+    /// Creates a phase without measurements.
+    ///
+    /// * `period_nanos`: time from one instant to the next, in nanoseconds.
     pub(crate) fn new(period_nanos: u64) -> Self {
         Self {
             period_nanos,
@@ -36,9 +40,9 @@ impl Phase {
         }
     }
 
-    /// Begins anew if the pictures that follow have their times from another clock than those before.
+    /// Starts again if the times of the following pictures are from another clock than before.
     ///
-    /// * `is_own_time`: whether they are from the camera's own.
+    /// * `is_own_time`: true if the times are from the camera's own clock.
     pub(crate) fn by_clock(&mut self, is_own_time: bool) {
         if is_own_time != self.is_own_time {
             *self = Self {
@@ -48,9 +52,9 @@ impl Phase {
         }
     }
 
-    /// Adds a picture. Returns whether there is a new measurement.
+    /// Adds a picture. Returns true if there is a new measurement.
     ///
-    /// * `skew_nanos`: how long after its instant it was taken.
+    /// * `skew_nanos`: time from the picture's instant until it was taken, in nanoseconds.
     pub(crate) fn add(&mut self, at_nanos: u64, skew_nanos: i64) -> bool {
         self.newest.push((at_nanos, skew_nanos));
         if self.newest.len() < N_PICTURES {
@@ -75,13 +79,14 @@ impl Phase {
         true
     }
 
-    /// The median skew of the last pictures, nanoseconds; `None` before there are enough.
+    /// Returns the median skew of the last pictures, in nanoseconds; `None` if there are too few pictures.
     pub(crate) fn skew_nanos(&self) -> Option<i64> {
         self.measured.back().map(|measured| measured.1.saturating_sub(self.added))
     }
 
-    /// Amount by which the camera falls behind the instants, parts per billion: negative for one that is faster. `None`
-    /// while it was measured for too short a time.
+    /// Returns how fast the camera falls behind the instants, in parts per billion. It is negative for a camera that is too fast. Returns
+    /// `None`
+    /// if the camera was measured for too short a time.
     pub(crate) fn drift_ppb(&self) -> Option<i64> {
         let ends = self.measured.front().zip(self.measured.back())?;
         if ends.1.0.saturating_sub(ends.0.0) < LEAST_NANOS {
@@ -116,9 +121,9 @@ mod tests {
 
     const PERIOD: u64 = 33_333_333;
 
-    /// The phase of a camera after some seconds.
+    /// Returns the phase of a camera after some seconds.
     ///
-    /// * `interval`: between its pictures, nanoseconds.
+    /// * `interval`: time between pictures, in nanoseconds.
     fn after(seconds: u64, interval: f64, jitter: i64) -> Phase {
         let mut phase = Phase::new(PERIOD);
         for nth in 0..30 * seconds {

@@ -1,4 +1,4 @@
-//! The thread that keeps a live camera open, and its newest pictures.
+//! The thread that keeps a live camera open, and the newest pictures of the camera.
 
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -14,43 +14,43 @@ use super::address::{LiveCamera, LiveError};
 use super::input::{Input, Taken};
 use super::originals::Originals;
 
-/// Pictures that wait at most: an older one makes room for a newer one, so that nothing is ever late by more.
+/// Maximum number of waiting pictures. The oldest is replaced by a new one, so pictures are never late by more than this number.
 const N_WAITING: usize = 4;
-/// Least number of pictures before a rate is reported.
+/// Minimum number of pictures before a rate is reported.
 const LEAST_FOR_RATE: u64 = 30;
-/// After this long without a picture a decoder is ended that has no limit of its own, or does not keep it.
+/// Time without a picture after which a decoder is ended, if it has no limit of its own or does not keep to it.
 const LONGEST_SILENCE: Duration = Duration::from_secs(15);
-/// Pause before a camera is opened again: the first, and the longest after further failures.
+/// First pause before a camera is opened again, and longest pause after further failures.
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 
 /// A picture that waits to be used.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    /// Its pixels, row major.
+    /// Pixels of the picture, row major.
     pub rgb: Vec<u8>,
-    /// When it was taken, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the picture was taken, by `CLOCK_MONOTONIC`, in nanoseconds.
     pub at_nanos: u64,
-    /// When it was here.
+    /// Time at which the picture arrived.
     pub arrived_at_nanos: u64,
-    /// Pictures before it that it has overtaken: this process was slow.
+    /// Number of earlier pictures that this one has overtaken, because this process was slow.
     pub n_overtaken: u64,
-    /// Clock that says when it was taken.
+    /// Clock that gives the time of the picture.
     pub timed_by: TimedBy,
 }
 
-/// Counts of the pictures up to here.
+/// Counts of all pictures so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Tally {
     pub n_connections: u64,
-    /// Lost by the camera; delivered by it, among them those that were overtaken or are damaged.
+    /// Number of pictures that the camera lost, and number that it delivered. The latter includes overtaken and damaged pictures.
     pub n_lost: u64,
     pub n_delivered: u64,
     pub n_overtaken: u64,
     pub n_damaged: u64,
     /// Pictures per second since the camera was opened.
     pub rate_hz: Option<f64>,
-    /// [`Taken::timed_by`] and [`Taken::delay_nanos`] of the last.
+    /// [`Taken::timed_by`] and [`Taken::delay_nanos`] of the last picture.
     pub timed_by: TimedBy,
     pub delay_nanos: Option<i64>,
 }
@@ -59,12 +59,12 @@ pub(crate) struct Tally {
 struct State {
     waiting: VecDeque<Picture>,
     spare: Vec<Vec<u8>>,
-    /// Overtaken since a picture was taken from here.
+    /// Number of pictures that were overtaken since the last picture was taken from the queue.
     n_overtaken: u64,
     tally: Tally,
-    /// Why there are no pictures; none while the camera is open, or is being opened for the first time.
+    /// Reason why there are no pictures; `None` while the camera is open, or is being opened for the first time.
     trouble: Option<Status>,
-    /// Ends the wait for a stream; and since when it has lasted.
+    /// Handle that ends the wait for a stream, and time at which the wait began.
     end: Option<StreamEnd>,
     waits_since: Option<Instant>,
     is_over: bool,
@@ -82,7 +82,7 @@ impl Shared {
     }
 }
 
-/// A camera that is opened, and opened again, by a thread of its own until this is dropped.
+/// A camera that a separate thread opens, and opens again after failures, until this is dropped.
 #[derive(Debug)]
 pub(crate) struct Source {
     shared: Arc<Shared>,
@@ -90,8 +90,10 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// * `size`: that of its pictures; with another it is in trouble.
-    /// * `originals`: takes its pictures as they come, if they are to be kept.
+    /// Starts the thread.
+    ///
+    /// * `size`: size of the pictures. Another size counts as a failure of the camera.
+    /// * `originals`: queue for original pictures, if they are to be kept.
     pub(crate) fn start(
         camera: &LiveCamera,
         size: Size,
@@ -112,7 +114,7 @@ impl Source {
         })
     }
 
-    /// The oldest picture that waits; none if none comes within `patience`.
+    /// Returns the oldest waiting picture; `None` if there is none within `patience`.
     pub(crate) fn next(&self, patience: Duration) -> Option<Picture> {
         let state = self.shared.state();
         let is_empty = |state: &mut State| state.waiting.is_empty();
@@ -129,12 +131,12 @@ impl Source {
         Some(picture)
     }
 
-    /// Its memory is used for a later picture.
+    /// Returns a picture whose memory can be used again.
     pub(crate) fn give_back(&self, picture: Picture) {
         self.shared.state().spare.push(picture.rgb);
     }
 
-    /// Why there are no pictures, if the camera is known to be in trouble.
+    /// Returns the reason why there are no pictures, if the camera is known to have failed.
     pub(crate) fn trouble(&self) -> Option<Status> {
         self.shared.state().trouble
     }
@@ -189,7 +191,7 @@ impl Keeper {
             };
             let Some(error) = failed else { return };
             let status = error.status();
-            // Whether it sends a boundary in front of its first picture is found by trying.
+            // Only a test shows whether the camera sends a boundary before its first picture.
             let is_tried = self.camera.is_http() && n_read == 0;
             is_bare ^= is_tried;
             if is_tried && is_bare && said.is_none() {
@@ -209,7 +211,7 @@ impl Keeper {
         }
     }
 
-    /// Reads until the camera fails; no error if it is not wanted any more.
+    /// Reads until the camera fails. Returns no error if the camera is not needed any more.
     fn read_all(&self, input: &mut Input, n_read: &mut u64) -> Option<LiveError> {
         {
             let mut state = self.shared.state();
@@ -233,12 +235,12 @@ impl Keeper {
             match read {
                 Ok(None) => spare = Some(rgb),
                 Ok(Some(taken)) => {
-                    // A decoder that starts has not found its camera yet.
+                    // A decoder that has just started has not found its camera yet.
                     if *n_read == 0 {
                         self.shared.state().tally.n_connections += 1;
                     }
                     *n_read += 1;
-                    // Times of another clock are counted anew.
+                    // The rate is measured again if the times are from another clock.
                     if is_own_time != (taken.timed_by == TimedBy::CAMERA) {
                         (pace, is_own_time) = (Pace::default(), !is_own_time);
                     }
@@ -251,7 +253,7 @@ impl Keeper {
         }
     }
 
-    /// Memory for a picture.
+    /// Returns memory for a picture.
     fn room(&self) -> Vec<u8> {
         let spare = self.shared.state().spare.pop();
         let mut rgb = spare.unwrap_or_default();
@@ -259,7 +261,7 @@ impl Keeper {
         rgb
     }
 
-    /// Puts a picture where it is waited for; returns memory that is not needed.
+    /// Puts a picture into the queue. Returns memory that is not needed any more.
     fn post(&self, taken: Taken, rgb: Vec<u8>, rate_hz: Option<f64>) -> Option<Vec<u8>> {
         let mut state = self.shared.state();
         state.trouble = None;
@@ -294,7 +296,7 @@ impl Keeper {
         overtaken
     }
 
-    /// Sends why there are no pictures, and waits before the next attempt.
+    /// Reports why there are no pictures, and waits before the next attempt.
     fn rest(&self, status: Status, pause: Duration) {
         let mut state = self.shared.state();
         state.trouble = Some(status);
@@ -305,7 +307,7 @@ impl Keeper {
     }
 }
 
-/// The rate of a camera by its own times, since it was opened.
+/// Measures the rate of a camera by its own times, since it was opened.
 #[derive(Debug, Default)]
 struct Pace {
     first_nanos: Option<u64>,
@@ -313,7 +315,9 @@ struct Pace {
 }
 
 impl Pace {
-    /// * `n_made`: pictures since the one before, with this one.
+    /// Adds a picture, and returns the rate if it is known.
+    ///
+    /// * `n_made`: number of pictures since the previous call, including this one.
     fn rate_hz(&mut self, n_made: u64, at_nanos: u64) -> Option<f64> {
         let Some(first) = self.first_nanos else {
             self.first_nanos = Some(at_nanos);

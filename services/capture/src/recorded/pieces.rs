@@ -1,4 +1,4 @@
-//! A recorded stream from a picture on, as it was.
+//! Reconstructs a recorded stream from a picture on.
 
 use std::io;
 use std::path::Path;
@@ -7,10 +7,10 @@ use recording::{Buffer, Kind};
 
 use super::table::{Part, Picture, Table};
 
-/// The bytes of a head and of the pictures after it, from the last picture before `first` that needs no other, to the end of the
-/// connection.
+/// Returns the bytes of a head and of the following pictures, up to the end of the connection. The pictures begin with the last one before
+/// `first` that does not depend on another picture.
 ///
-/// After a gap, and after a damaged message, pictures are left out up to the next that needs no other.
+/// After a gap or a damaged message, pictures are left out up to the next one that does not depend on another picture.
 pub(super) fn from(
     file: &Path,
     table: &Table,
@@ -42,21 +42,24 @@ pub(super) fn from(
     }))
 }
 
-/// State of the stream: decides which pieces may follow.
+/// State of the stream, which decides what pieces may follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// Nothing was sent.
+    /// Nothing has been sent yet.
     Begin,
-    /// The head was sent just now.
+    /// The head was the last piece.
     Head,
-    /// Pictures that follow one another.
+    /// Consecutive pictures have been sent.
     Pictures,
-    /// Something is missing.
+    /// A picture is missing.
     Gap,
 }
 
 impl State {
-    /// * `is_next`: it follows the one before it; `is_read`: it is not damaged.
+    /// Returns the state after a piece.
+    ///
+    /// * `is_next`: true if the piece directly follows the previous one.
+    /// * `is_read`: true if the piece is not damaged.
     fn after(self, format: [u8; 4], is_next: bool, is_read: bool) -> Self {
         match (self, &format) {
             (Self::Begin, b"MKV0") if is_read => Self::Head,

@@ -1,4 +1,4 @@
-//! Which recorded picture belongs to which common instant.
+//! Assignment of recorded pictures to common instants.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -12,14 +12,14 @@ use recording::{Entry, Kind, Track};
 use super::RecordedError;
 use crate::live::Grid;
 
-/// A picture was sent at most this long after it was taken, nanoseconds; another time is damage.
+/// Longest time from taking a picture until it was sent, in nanoseconds. A longer time shows damage.
 const MAX_AGE_NANOS: u64 = 60_000_000_000;
-/// Slowest and fastest common instants, hertz.
+/// Lowest and highest rate of common instants, in hertz.
 const RATES_HZ: [f64; 2] = [0.01, 10_000.0];
-/// The time of a piece of a stream is rounded to milliseconds.
+/// Tolerance for the time of a piece of a stream, which is rounded to milliseconds.
 const SAME_NANOS: i64 = 1_000_000;
 
-/// A picture at an instant.
+/// A picture that belongs to an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Picture {
     pub instant: u64,
@@ -27,7 +27,7 @@ pub(super) struct Picture {
     pub entry: Entry,
     pub format: [u8; 4],
     pub bytes_per_row: u32,
-    /// Restarts of the process that recorded it, and how often it had opened the camera.
+    /// Number of restarts of the recording process, and number of times that it had opened the camera.
     pub connection: [u32; 2],
     pub label_nanos: i64,
 }
@@ -58,9 +58,9 @@ pub(super) struct Table {
     pub size: Size,
     pub rate_hz: f64,
     pub grid: Grid,
-    /// By time: those that have an instant.
+    /// Pictures with an instant, by time.
     pub pictures: Vec<Picture>,
-    /// Everything of streams, by number.
+    /// All messages of streams, by number.
     pub parts: Vec<Part>,
     pub labels: BTreeMap<([u32; 2], i64), usize>,
 }
@@ -68,7 +68,7 @@ pub(super) struct Table {
 impl Table {
     /// Reads the heads of all pictures of a camera.
     ///
-    /// * `rate_hz`: common instants per second; none for those of the recorded run.
+    /// * `rate_hz`: number of common instants per second; `None` for the instants of the recorded run.
     pub(super) fn read(
         file: &mut File,
         camera: &str,
@@ -133,7 +133,7 @@ impl Table {
         Ok(table)
     }
 
-    /// Gives every instant its picture.
+    /// Assigns a picture to every instant.
     fn place(&mut self, heads: &[(Entry, PictureHeader)]) {
         let is_picture = |picture: &&(Entry, PictureHeader)| {
             let header = &picture.1;
@@ -173,24 +173,24 @@ impl Table {
         }
     }
 
-    /// Frames up to the last picture.
+    /// Returns the number of frames up to the last picture.
     pub(super) fn n_frames(&self) -> u64 {
         self.pictures.last().map_or(0, |picture| picture.instant + 1)
     }
 
-    /// The first picture that is not before an instant.
+    /// Returns the first picture that is not before an instant.
     pub(super) fn first_at(&self, instant: u64) -> usize {
         self.pictures.partition_point(|picture| picture.instant < instant)
     }
 
-    /// The first picture after those of the connection of another.
+    /// Returns the first picture of a later connection than that of a given picture.
     pub(super) fn after_connection(&self, at: usize) -> usize {
         let rest = self.pictures.get(at..).unwrap_or_default();
         let n = rest.iter().take_while(|picture| picture.connection == rest[0].connection);
         at + n.count()
     }
 
-    /// The picture of that time in the stream.
+    /// Returns the picture with a given time in the stream.
     pub(super) fn of_label(&self, connection: [u32; 2], label_nanos: i64) -> Option<usize> {
         let from = (connection, label_nanos.saturating_sub(SAME_NANOS));
         let to = (connection, label_nanos.saturating_add(SAME_NANOS));
@@ -199,7 +199,7 @@ impl Table {
         nearest.map(|nearest| *nearest.1)
     }
 
-    /// Seconds from the first instant.
+    /// Returns the time of a picture in seconds from the first instant.
     pub(super) fn seconds(&self, picture: &Picture) -> f64 {
         self.grid.seconds(picture.at_nanos)
     }
@@ -224,7 +224,7 @@ fn part(it: &(Entry, PictureHeader)) -> Option<Part> {
     })
 }
 
-/// The heads of the messages of a topic, without the end, and without those that are damaged as far as that shows.
+/// Returns the heads of a topic's messages, without the end of the stream and without messages that are visibly damaged.
 fn heads(
     input: &mut BufReader<&mut File>,
     track: &Track,
@@ -234,7 +234,7 @@ fn heads(
     for entry in &track.entries {
         let head = recording::read_head(input, track.kind, entry, &mut buffer)?;
         let header: PictureHeader = pod_read_unaligned(head);
-        // The number and the time of sending are told by the checked index of the file, too.
+        // The index of the file also has the frame number and the send time, and its checksum was verified.
         let is_same = entry.frame.is_none_or(|frame| frame == header.stamp.frame)
             && entry.publish_time == header.timing.sent_at_nanos;
         let age = header.timing.sent_at_nanos.abs_diff(header.stamp.captured_at_nanos);

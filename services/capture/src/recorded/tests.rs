@@ -1,4 +1,4 @@
-//! Pictures of live cameras that were recorded, as footage.
+//! Tests of recorded pictures of live cameras, used as footage.
 
 use std::io::Write as _;
 
@@ -14,9 +14,9 @@ const SIZE: Size = Size {
 };
 const START: u64 = 7_000_000_000;
 
-/// A recording of raw pictures of the camera `left`, each of one brightness.
+/// Writes a recording with raw pictures of the camera `left`, each of one brightness.
 ///
-/// * `pictures`: number, milliseconds after the first instant, brightness.
+/// * `pictures`: number, milliseconds after the first instant, and brightness of each picture.
 fn recording(pictures: &[(u64, u64, u8)]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.mcap");
@@ -94,7 +94,7 @@ fn every_instant_has_the_nearest_picture_and_the_others_are_left_out() {
         (0, 2, 10),
         (1, 98, 11),
         (2, 205, 12),
-        // None at 300; two at 400.
+        // There is no picture at 300, and there are two at 400.
         (3, 399, 13),
         (4, 430, 14),
         (5, 501, 15),

@@ -1,4 +1,4 @@
-//! Every simulated fault, and real failures.
+//! Tests of every simulated fault, and of real failures.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::*;
 
 const SIZE: Size = Size::new(12, 8);
 
-/// Images of a colour each, 10 a second.
+/// Writes images of one colour each, 10 per second.
 fn images(n: u8) -> (TempDir, SourceSpec) {
     let folder = tempfile::tempdir().unwrap();
     for nth in 0..n {
@@ -28,12 +28,12 @@ fn save(folder: &Path, nth: u8, size: Size) {
     Canvas::new(size, [nth, 0, 0]).save_png(&file).unwrap();
 }
 
-/// The outcome of every frame: the colour of its picture, or why there is none.
+/// Returns the outcome of every frame: the colour of its picture, or the reason why there is none.
 fn all(supply: &mut Supply) -> Vec<String> {
     let mut all = Vec::new();
     loop {
         let index = supply.index();
-        // Half a second between frames: reopening is tried at every frame.
+        // Frames are half a second apart, so reopening is tried at every frame.
         match supply.step((index + 1) * PAUSE_NANOS) {
             Step::Picture => {
                 assert_eq!(supply.pixels().len(), SIZE.rgb_bytes());
@@ -49,7 +49,7 @@ fn open(spec: &SourceSpec, faults: &str, is_live: bool) -> Supply {
     Supply::open((spec, None), &faults.parse().unwrap(), is_live, 2).unwrap()
 }
 
-/// The outcomes of eight frames with faults.
+/// Returns the outcomes of eight frames with faults.
 fn under(faults: &str) -> Vec<String> {
     let (_folder, spec) = images(8);
     let [live, recorded] = [true, false].map(|is_live| all(&mut open(&spec, faults, is_live)));

@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 use capture::FeedError;
 use footage::FootageError;
 
-/// The hint for footage that cannot be used.
+/// Returns the hint for footage that cannot be used.
 ///
 /// * `camera`: the camera of the footage.
 pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
@@ -20,7 +20,7 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
             if source.kind() == ErrorKind::PermissionDenied =>
         {
             format!(
-                "this is the `source` of {camera}: the user of Parallax must be able to read it, and to enter (x) every folder above it"
+                "this is the `source` of {camera}: you need permission to read it, and to enter (x) every folder above it"
             )
         }
         FeedError::Footage(
@@ -29,21 +29,21 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
             | FootageError::BadRate { .. }
             | FootageError::StartBeyondEnd { .. },
         ) => format!(
-            "`capture.start_frame`, `frame_step`, `n_frames` and `frame_rate_hz` say which frames are used; this concerns {camera}"
+            "`capture.start_frame`, `frame_step`, `n_frames` and `frame_rate_hz` set which frames of {camera} are used"
         ),
         FeedError::Footage(FootageError::FfmpegMissing { .. }) => format!(
-            "this is for the `source` of {camera}; ffmpeg and ffprobe come in one package, and both are needed; folders of pictures \
+            "the `source` of {camera} needs both ffmpeg and ffprobe, which come in one package; folders of pictures \
              need neither"
         ),
         FeedError::Footage(
             FootageError::Video { .. } | FootageError::Image { .. } | FootageError::Empty { .. },
         ) => format!(
-            "this is the `source` of {camera}; a player, or `ffprobe FILE`, shows whether the file is whole"
+            "this is the `source` of {camera}; use a video player or `ffprobe FILE` to check that the file is complete"
         ),
         _ => format!(
-            "the `source` of {camera} is a video, an image, a folder of images, a glob or a scene (synth://...), or it is left out where there \
-             are `keypoints`; \
-             relative paths are relative to the deployment file"
+            "the `source` of {camera} can be a video, an image, a folder of images, a glob or a scene (synth://...). With `keypoints`, \
+             it may be left out. \
+             Relative paths are relative to the deployment file"
         ),
     }
 }

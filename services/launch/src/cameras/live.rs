@@ -1,4 +1,4 @@
-//! Properties of the pictures of every camera before the run: of files, and of live cameras.
+//! Determines the properties of every camera's pictures before the run, for files and live cameras.
 
 use std::path::Path;
 use std::thread;
@@ -12,15 +12,15 @@ use scene::Address;
 
 use super::{Footage, advice, source};
 
-/// Frames of a live camera that runs until it is stopped: the most of any footage.
+/// Number of frames of a live camera without an end. It is larger than that of any footage.
 pub(crate) const ENDLESS: u64 = 1_000_000_000_000;
 
-/// Returns true if the source of a camera is live: a file of such a name is not.
+/// Returns true if the source of a camera is live. If a file has this name, the source is the file.
 pub fn is_live(source: &str) -> bool {
     footage::is_live(source) && !Path::new(source).is_file()
 }
 
-/// The live camera of an entry of a deployment; none if its source is footage.
+/// Returns the live camera of an entry of a deployment; `None` if its source is footage.
 pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
     let address = LiveAddress::parse(&camera.source).filter(|_| is_live(&camera.source))?;
     Some(LiveCamera {
@@ -37,9 +37,9 @@ pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
     })
 }
 
-/// Reads the metadata of every camera's footage; live cameras are asked all at once.
+/// Reads the metadata of every camera's footage. All live cameras are queried at the same time.
 ///
-/// * `is_here`: whether a camera is on this machine; of others what the calibration says.
+/// * `is_here`: returns true if a camera is on this machine. For other cameras, the calibration gives the properties.
 pub(crate) fn footage(
     deployment: &Deployment,
     is_here: &dyn Fn(usize) -> bool,
@@ -67,7 +67,7 @@ pub(crate) fn footage(
                     found.map(|look| of_live(look, capture)).map_err(|error| refused(error, camera))
                 }
                 Some(Err(_panic)) => {
-                    Err(Failure::new(ExitKind::Run, "a camera could not be asked"))
+                    Err(Failure::new(ExitKind::Run, "a camera could not be queried"))
                 }
             }
         });
@@ -82,15 +82,17 @@ pub(crate) fn footage(
     }
 }
 
-/// The footage at common instants.
+/// Returns the footage at common instants.
 fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage>, Failure> {
     let capture = &deployment.capture;
     let mut clocks = Vec::new();
     for (camera, found) in footage.iter().enumerate() {
         let name = &deployment.cameras[camera].name;
         let rate_hz = found.frame_rate_hz.ok_or_else(|| {
-            let message = format!("cameras have `offset_ms`, and nothing says how many frames per second camera {name:?} has");
-            Failure::new(ExitKind::Config, message).with_hint("give `capture.frame_rate_hz`")
+            let message = format!(
+                "cameras have `offset_ms`, but the frame rate of camera {name:?} is not known"
+            );
+            Failure::new(ExitKind::Config, message).with_hint("set `capture.frame_rate_hz`")
         })?;
         clocks.push(deployment.clock(camera, rate_hz * capture.frame_step as f64));
     }
@@ -99,7 +101,7 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     let looked = cameras.map(|((camera, timeline), found)| {
         let info = Retimed::look(&source(camera, capture), Some(&timeline)).map_err(|error| {
             let hint = format!(
-                "camera {:?} with `offset_ms` and `drift_ppm`: does its footage overlap with that of the others?",
+                "camera {:?} with `offset_ms` and `drift_ppm`: does its footage overlap in time with that of the other cameras?",
                 camera.name
             );
             Failure::new(ExitKind::Input, error).with_hint(hint)
@@ -114,8 +116,8 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     looked.collect()
 }
 
-/// From the beginning of a run to its first frame in real time, nanoseconds: until every process has started, and streams
-/// have shown their first picture.
+/// Returns the time from the beginning of a run to its first frame in real time, in nanoseconds. By then every process has started, and
+/// streams have delivered their first picture.
 pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
     const FOOTAGE: u64 = 2_000_000_000;
     const DEVICES: u64 = 3_000_000_000;
@@ -136,7 +138,7 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     })?;
     if let Some(depth) = info.depth {
         tracing::warn!(
-            "camera {:?}: the pictures of {} have 16 bits and use {}: the brightest value is {}; they are scaled by that",
+            "camera {:?}: the pictures of {} have 16 bits, but use only {}: the brightest value is {}; they are scaled accordingly",
             camera.name,
             camera.source,
             depth.bits,
@@ -146,8 +148,8 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     if info.is_interlaced {
         let file = failure::wording::shell(&camera.source);
         tracing::warn!(
-            "camera {:?}: {} is interlaced: every picture consists of two halves from different moments, so that \
-             people who move have edges like combs; `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` makes whole pictures of them",
+            "camera {:?}: {} is interlaced: every picture consists of two halves from different moments, so \
+             moving people have jagged edges; use `ffmpeg -i {file} -vf bwdif=mode=send_frame -c:v libx264 -crf 15 progressive.mp4` to deinterlace it",
             camera.name,
             camera.source
         );
@@ -173,7 +175,7 @@ fn of_live((size, rate_hz): (footage::Size, f64), capture: &Config) -> Footage {
 fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failure> {
     let capture = &deployment.capture;
     let rig = inputs::rig_of(deployment)?;
-    // One that is not in the rig is reported later, by name.
+    // If the camera is not in the rig, this is reported later, with its name.
     let size = rig.camera(&camera.name).map_or([1; 2], |camera| camera.intrinsics.size);
     let rate_hz = capture.frame_rate_hz;
     Ok(Footage {
@@ -186,7 +188,7 @@ fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failur
 
 fn refused(error: LiveError, camera: &Camera) -> Failure {
     let hint = format!(
-        "this is the live camera {:?}; `parallax cameras` lists the video devices of this machine with what they offer, and \
+        "this is the live camera {:?}; `parallax cameras` lists the video devices of this machine and their formats, and \
          `parallax cameras view {}` takes a picture",
         camera.name,
         failure::wording::shell(footage::without_passwords(&camera.source))

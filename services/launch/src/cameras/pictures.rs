@@ -1,4 +1,4 @@
-//! Facts that the files of cameras hold about their pictures: how these are to be turned, and which frames their numbers are.
+//! Properties that the files of cameras state about their pictures: the rotation to apply, and the frame numbers.
 
 use deployment::Deployment;
 use deployment::capture::{Camera, Rotate, Tag};
@@ -13,13 +13,14 @@ use inputs::rig_of;
 
 use super::is_live;
 
-/// The deployment with `rotate` and `numbers` of every camera that does not give them, from what its files say; logs what is done.
+/// Returns the deployment with `rotate` and `numbers` of every camera that does not set them, as determined from its files. Logs the
+/// result.
 ///
-/// Files that cannot be read are left to those who read them.
+/// Files that cannot be read are ignored here, and reported when they are used.
 ///
 /// # Errors
 ///
-/// The calibration cannot be read.
+/// Fails if the calibration cannot be read.
 pub fn settled(deployment: &Deployment) -> Result<Deployment, Failure> {
     let mut settled = deployment.clone();
     let is_of_files = |camera: &Camera| {
@@ -39,7 +40,7 @@ pub fn settled(deployment: &Deployment) -> Result<Deployment, Failure> {
 fn turn(deployment: &mut Deployment, files: &[usize]) -> Result<(), Failure> {
     let cameras = &deployment.cameras;
     let open = files.iter().filter(|file| cameras[**file].rotate.is_none());
-    // All at once: each answer takes as long as a program takes to start.
+    // All files are queried at the same time, because each query starts a program.
     let open: Vec<usize> = open.copied().collect();
     let tagged = open.par_iter().map(|&camera| Tagged::read(&cameras[camera].source));
     let tagged: Vec<Option<Tagged<'_>>> = tagged.collect();
@@ -61,7 +62,7 @@ fn turn(deployment: &mut Deployment, files: &[usize]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How the pictures of a file are turned for a camera of a rig; logs what is done.
+/// Returns how the pictures of a file are rotated for a camera of a rig. Logs the result.
 pub fn rotation(source: &str, camera: &str, rig: &Rig) -> Rotation {
     let is_turned =
         Tagged::read(source).is_some_and(|tagged| tagged.does_turn(camera, &with_up(rig.clone())));
@@ -72,7 +73,7 @@ pub fn rotation(source: &str, camera: &str, rig: &Rig) -> Rotation {
     }
 }
 
-/// Footage whose pictures are to be turned.
+/// Footage with a tag that asks for a rotation.
 struct Tagged<'a> {
     source: &'a str,
     stored: Size,
@@ -80,7 +81,7 @@ struct Tagged<'a> {
 }
 
 impl<'a> Tagged<'a> {
-    /// None for footage without a tag, or that cannot be read.
+    /// Reads the tag. Returns `None` for footage without a tag, or footage that cannot be read.
     fn read(source: &'a str) -> Option<Self> {
         let (stored, tag) = footage::stored(&SourceSpec::new(source)).ok()?;
         (!tag.is_none()).then_some(Self {
@@ -90,13 +91,13 @@ impl<'a> Tagged<'a> {
         })
     }
 
-    /// Returns true if the calibration of a camera is of the turned picture; logs the reason.
+    /// Returns true if a camera was calibrated with the rotated picture. Logs the reason.
     fn does_turn(&self, camera: &str, rig: &Rig) -> bool {
         let (does_turn, why) = by_calibration(camera, rig, self.stored, self.tag);
         let done = if does_turn {
-            "which is done"
+            "which is applied"
         } else {
-            "which is not done"
+            "which is not applied"
         };
         tracing::warn!(
             "camera {camera:?}: the orientation tag of {} asks for its pictures to be {}, {done}: {why}",
@@ -107,7 +108,7 @@ impl<'a> Tagged<'a> {
     }
 }
 
-/// The rig with a direction of up, if need be that of cameras that are held level.
+/// Returns the rig with an upward direction. If the rig has none, the cameras are assumed to be level.
 fn with_up(rig: Rig) -> Rig {
     if rig.up_in_world().is_some() {
         return rig;
@@ -120,9 +121,10 @@ fn with_up(rig: Rig) -> Rig {
     level.unwrap_or(rig)
 }
 
-/// Returns true if a calibration is of the turned picture, and the reason for it.
+/// Returns true if a calibration is of the rotated picture, and the reason for this decision.
 fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, String) {
-    const BY_HAND: &str = "`rotate = 0` (as they are stored) or `rotate = \"tag\"` of the [[camera]] says it for good";
+    const BY_HAND: &str =
+        "`rotate = 0` (as stored) or `rotate = \"tag\"` in the [[camera]] sets it explicitly";
     let Some(camera) = rig.camera(name) else {
         return (true, BY_HAND.to_owned());
     };
@@ -132,19 +134,15 @@ fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, Stri
     if tag.swaps_sides() && is_wide(turned) != is_wide(stored) && width != height {
         let does_turn = is_wide(turned) == (width > height);
         let pixels = if does_turn { turned } else { stored };
-        let how = if does_turn {
-            "turned"
-        } else {
-            "as they are stored"
-        };
+        let how = if does_turn { "turned" } else { "as stored" };
         let why = format!(
-            "the calibration is of {width}x{height} pixels, and the pictures have {pixels} {how}"
+            "the calibration is for {width}x{height} pixels, and the pictures have {pixels} {how}"
         );
         return (does_turn, why);
     }
-    // What the calibrated picture must be turned by, for up to be up in it.
+    // The rotation that turns the calibrated picture upright.
     let Some(roll) = upright_roll(camera, rig).map(f64::to_degrees) else {
-        return (true, format!("players show it so; {BY_HAND}"));
+        return (true, format!("video players show it like this; {BY_HAND}"));
     };
     let most = if tag.swaps_sides() { 45.0 } else { 90.0 };
     let does_turn = roll.abs() < most;
@@ -186,8 +184,8 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
         Counting::InOrder => {
             if numbers.iter().any(|number| *number != numbers[0]) {
                 tracing::warn!(
-                    "the numbers of the pictures ({}) lie too far apart to be those of frames: pictures are paired in their order; \
-                     `numbers = [first, step]` of a [[camera]] says which numbers are frames",
+                    "the numbers of the pictures ({}) are too far apart to be frame numbers: pictures are paired in their order; \
+                     set `numbers = [first, step]` in a [[camera]] to define which numbers are frames",
                     ends()
                 );
             }
@@ -196,8 +194,8 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
         Counting::Common(common) => {
             if numbers.iter().any(|number| number[0] != numbers[0][0]) {
                 tracing::warn!(
-                    "cameras do not begin with the same picture ({}): frames are paired by these numbers; where each camera counts for \
-                     itself, `numbers = [first, step]` of its [[camera]] says which is the number of frame 0",
+                    "cameras do not begin with the same picture ({}): frames are paired by these numbers; if each camera counts \
+                     separately, set `numbers = [first, step]` in its [[camera]] to define the number of frame 0",
                     ends()
                 );
             }
@@ -205,8 +203,8 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
         }
         Counting::Own(own) => {
             tracing::warn!(
-                "the pictures of the cameras have numbers of their own ({}): the first of each is frame 0; do they begin together? \
-                 `numbers = [first, step]` of a [[camera]] says which is the number of frame 0",
+                "the pictures of each camera are numbered separately ({}): the first picture of each is frame 0; do the cameras begin at the same time? \
+                 Set `numbers = [first, step]` in a [[camera]] to define the number of frame 0",
                 ends()
             );
             own
@@ -214,7 +212,7 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
     };
     for (nth, counted) in of_cameras.iter().enumerate() {
         if let Some(gaps) = gaps(&numbers[nth], *counted) {
-            tracing::warn!("camera {:?} has no picture of {gaps}", name(nth));
+            tracing::warn!("camera {:?} has no picture for {gaps}", name(nth));
         }
     }
     for (camera, PictureNumbers { first, step }) in cameras.into_iter().zip(of_cameras) {
@@ -222,7 +220,7 @@ fn count(deployment: &mut Deployment, files: &[usize]) {
     }
 }
 
-/// The frames between the first and the last picture that have none, in words; none where there are none.
+/// Describes the frames between the first and the last picture that have no picture. Returns `None` if there are none.
 fn gaps(numbers: &[u64], counted: PictureNumbers) -> Option<String> {
     const MOST_NAMED: usize = 5;
     let PictureNumbers { first, step } = counted;

@@ -16,18 +16,18 @@ use skeleton::JointSet;
 use crate::recorded;
 use crate::resolved::Resolved;
 
-/// Which trajectories of a run.
+/// Choice of a run's trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Lines {
-    /// As found.
+    /// As found by the run.
     #[default]
     Raw,
-    /// As `parallax smooth` has smoothed them.
+    /// As smoothed by `parallax smooth`.
     Smooth,
 }
 
 impl Lines {
-    /// The file.
+    /// Returns the name of the file with these trajectories.
     pub fn file(self) -> &'static str {
         match self {
             Self::Raw => FrameLine::FILE,
@@ -36,37 +36,37 @@ impl Lines {
     }
 }
 
-/// Options of the user for a run.
+/// The user's options for a run.
 #[derive(Debug, Clone, Default)]
 pub struct Given {
     /// Name of the trial in the files.
     pub name: String,
     /// Names of the points in the files.
     pub naming: Naming,
-    /// Which trajectories.
+    /// Choice of trajectories.
     pub lines: Lines,
-    /// Frames of the footage per second, where the run does not know.
+    /// Frames of the footage per second, if the run has no frame rate.
     pub rate_hz: Option<f64>,
-    /// Against gravity, in the world of the rig, instead of what the rig says.
+    /// Upward direction in the world of the rig, in place of the one in the rig.
     pub up: Option<UnitVector3<f64>>,
 }
 
 /// A run to be exported.
 #[derive(Debug)]
 pub struct Origin {
-    /// Trajectories of each person; at least one.
+    /// Trajectories of each person. There is at least one person.
     pub trials: Vec<Trial>,
-    /// The folder or the recording.
+    /// Folder of the run, or its recording.
     pub source: PathBuf,
-    /// Which trajectories of it.
+    /// Choice of trajectories.
     pub lines: Lines,
-    /// Missing or damaged parts of the run, in words.
+    /// Descriptions of missing or damaged parts of the run.
     pub flaws: Vec<String>,
-    /// Why it is not known which way is up; none where the rig has been asked, even if it does not know.
+    /// Reason why the rig could not be read for the upward direction. `None` if the rig was read, even if it does not give the direction.
     pub up_unknown: Option<String>,
-    /// The deployment and its rig, or why there is none.
+    /// The deployment and its rig, or the reason why they are missing.
     pub setup: Result<(Resolved, Rig), String>,
-    /// The recording.
+    /// The recording, if the run is read from one.
     pub recording: Option<Recording>,
 }
 
@@ -75,7 +75,8 @@ impl Origin {
     ///
     /// # Errors
     ///
-    /// `source` is neither the folder of a run nor a recording; a line cannot be read; no frame has a joint (`Degraded`).
+    /// Fails if `source` is neither the folder of a run nor a recording, or a line cannot be read. Fails with `Degraded` if no frame has a
+    /// joint.
     pub fn read(source: &Path, given: &Given) -> Result<Self, Failure> {
         let mut flaws = Vec::new();
         let (resolved, recording, gathering);
@@ -86,7 +87,7 @@ impl Origin {
             gathering = lines(source, given.lines, views, &mut flaws)?;
         } else if given.lines == Lines::Smooth {
             let message = format!(
-                "{} is not a folder: recordings hold only what was measured",
+                "{} is not a folder: recordings only contain measured trajectories",
                 source.display()
             );
             return Err(Failure::new(ExitKind::Usage, message));
@@ -105,10 +106,10 @@ impl Origin {
             };
             Failure::new(
                 kind,
-                format!("{}: {error}; nothing is written", source.display()),
+                format!("{}: {error}; nothing was written", source.display()),
             )
         })?;
-        // All have the same places.
+        // All trials have the same frames and times.
         check_rate(&trials[0], given)?;
         flaws.extend(of_times(&trials[0], n_lines));
         let setup = resolved.and_then(|resolved| {
@@ -131,11 +132,11 @@ impl Origin {
         })
     }
 
-    /// The cameras as their footage shows them.
+    /// Returns the cameras as their footage shows them.
     ///
     /// # Errors
     ///
-    /// There is no deployment or no rig; the rig does not have the camera.
+    /// Fails if there is no deployment or no rig, or the rig lacks a camera.
     pub(super) fn cameras(&self) -> Result<Vec<ViewCamera>, Failure> {
         let (resolved, rig) = self.setup()?;
         (0..resolved.deployment.cameras.len())
@@ -154,7 +155,7 @@ impl Origin {
     }
 }
 
-/// Refuses a frame rate that is not that of the run.
+/// Refuses a frame rate that contradicts the run.
 fn check_rate(trial: &Trial, given: &Given) -> Result<(), Failure> {
     if let Some(rate_hz) = given.rate_hz
         && trial
@@ -163,14 +164,14 @@ fn check_rate(trial: &Trial, given: &Given) -> Result<(), Failure> {
     {
         let own = trial.rate_hz.unwrap_or_default();
         let message = format!(
-            "--rate {rate_hz} contradicts the times of the run, which has {own} frames a second"
+            "--rate {rate_hz} contradicts the times of the run, which has {own} frames per second"
         );
         return Err(Failure::new(ExitKind::Usage, message));
     }
     Ok(())
 }
 
-/// Returns the faults of the frames and their times.
+/// Describes the faults of the frames and their times.
 fn of_times(trial: &Trial, n_lines: usize) -> Vec<String> {
     let mut flaws = Vec::new();
     if trial.n_repeated > 0 {
@@ -188,7 +189,7 @@ fn of_times(trial: &Trial, n_lines: usize) -> Vec<String> {
     flaws
 }
 
-/// A camera as its footage shows it.
+/// Returns a camera as its footage shows it.
 pub(super) fn camera(resolved: &Resolved, rig: &Rig, nth: usize) -> Result<ViewCamera, Failure> {
     let entry = &resolved.deployment.cameras[nth];
     let refused = |why: String| {
@@ -220,7 +221,7 @@ fn of_folder(folder: &Path) -> Result<Resolved, String> {
     serde_json::from_str(&text).map_err(|error| format!("{}: {error}", file.display()))
 }
 
-/// Reads `pose3d.jsonl`, line by line; of a run that has not ended, what is there.
+/// Reads `pose3d.jsonl` line by line. If the run has not ended, reads the lines that exist.
 fn lines(
     folder: &Path,
     which: Lines,
@@ -233,12 +234,15 @@ fn lines(
     let path = if is_whole { whole } else { part };
     let file = files::open(&path).map_err(|error| {
         in_file(&path, &error).with_hint(match which {
-            Lines::Raw => "name the folder that a run has written, or an MCAP file",
-            Lines::Smooth => "`parallax smooth` writes it",
+            Lines::Raw => "give the folder of a finished run, or an MCAP file",
+            Lines::Smooth => "run `parallax smooth` first, which writes this file",
         })
     })?;
     if !is_whole {
-        flaws.push(format!("{} is of a run that has not ended", path.display()));
+        flaws.push(format!(
+            "{} belongs to a run that has not ended",
+            path.display()
+        ));
     }
     let mut gathering = Gathering::new(views);
     let mut input = BufReader::new(file);
@@ -254,7 +258,7 @@ fn lines(
             None => continue,
             Some(Err(_)) if !text.ends_with('\n') => {
                 flaws.push(format!(
-                    "{}: line {number} is cut off, and left out",
+                    "{}: line {number} is truncated, and left out",
                     path.display()
                 ));
                 break;
@@ -316,7 +320,7 @@ fn messages(
     Ok(gathering)
 }
 
-/// The line of a result, as far as an export needs it.
+/// Returns the line of a result, with the fields that an export needs.
 fn line(skeletons: &Skeletons, joints: &JointSet, resolved: &Resolved) -> FrameLine {
     let frame = skeletons.stamp.frame;
     let people = skeletons.listed().iter();

@@ -11,10 +11,10 @@ use footage::{Canvas, FootageError, Size, VideoWriter};
 use super::pictures::Pictures;
 use super::{Written, cannot_write, interrupted};
 
-/// The file that says that a folder was made by Parallax, and may be replaced.
+/// File that marks a folder as written by Parallax, so that it may be replaced.
 const MARK: &str = ".parallax";
 
-/// A folder of keypoints: in it one for each view, with a file for each frame.
+/// Writes a folder of keypoints. It contains a folder for each view, with a file for each frame.
 pub(super) fn openpose(
     trials: &[Trial],
     cameras: &[ViewCamera],
@@ -29,18 +29,18 @@ pub(super) fn openpose(
         fs::rename(&beside, path).map_err(|error| cannot_write(path, &error))
     });
     if placed.is_err() {
-        // The error that is reported came first.
+        // The first error is reported, so an error here is ignored.
         drop(fs::remove_dir_all(&beside));
     }
     placed?;
     let mut notes = vec![
-        "BODY_25 without the points that no joint gives (nose, eyes, ears, toes, heels, unless a network names them)".to_owned(),
-        "the confidence is the share of the views that a joint was triangulated from; `pose_keypoints_sd_px` beside it is its \
+        "BODY_25 without the points that are not joints (nose, eyes, ears, toes, heels, unless a network finds them)".to_owned(),
+        "the confidence is the share of the views from which a joint was triangulated; `pose_keypoints_sd_px` is its \
          standard deviation in the picture"
             .to_owned(),
     ];
     if trials[0].joints.joints.iter().any(|joint| joint.name == "head") {
-        notes.push("the head is left out: BODY_25 has none".to_owned());
+        notes.push("the head is left out, because BODY_25 has no head".to_owned());
     }
     Ok(Written {
         format: "openpose",
@@ -49,7 +49,7 @@ pub(super) fn openpose(
             "pixels of the footage",
             "x right, y down, the centre of the top-left pixel at (0, 0)",
             "0, 0, 0; nobody in a frame without a result",
-            "standard deviation, pixels, beside the format",
+            "standard deviation in pixels, as an addition to the format",
         ],
         notes,
     })
@@ -65,7 +65,7 @@ fn write_all(
     let at = |path: &Path, done: io::Result<()>| done.map_err(|error| cannot_write(path, &error));
     let trial = &trials[0];
     if folder.exists() {
-        // Of a process that was killed.
+        // The folder was left by a process that was killed.
         at(folder, fs::remove_dir_all(folder))?;
     }
     let room = files::Folder::create(folder).map_err(|error| cannot_write(folder, &error))?;
@@ -90,7 +90,7 @@ fn write_all(
     Ok(())
 }
 
-/// The video of a view with the pose drawn on it.
+/// Writes the video of a view, with the pose drawn on it.
 pub(super) fn video(
     trials: &[Trial],
     pictures: &mut Pictures,
@@ -105,12 +105,12 @@ pub(super) fn video(
         Ok(n_without)
     });
     if placed.is_err() {
-        // The error that is reported came first.
+        // The first error is reported, so an error here is ignored.
         drop(fs::remove_file(&beside));
     }
     let n_without = placed?;
     let mut notes = vec![format!(
-        "the ellipses are {} standard deviations of the joints, as the view sees them",
+        "the ellipses show {} standard deviations of the joints, as the view sees them",
         annotate::DEVIATIONS
     )];
     if n_without > 0 {
@@ -129,7 +129,7 @@ pub(super) fn video(
     })
 }
 
-/// Returns how many frames have no picture.
+/// Draws all frames. Returns the number of frames without a picture.
 fn draw_all(
     trials: &[Trial],
     pictures: &mut Pictures,

@@ -1,4 +1,4 @@
-//! The pictures of a view, frame by frame: of its footage, else of the recording.
+//! The pictures of a view, frame by frame, from its footage or from the recording.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,7 +16,7 @@ use super::{Origin, of_footage};
 use crate::prepare;
 use crate::resolved::Resolved;
 
-/// The pictures of a view. Frames are asked for in order.
+/// The pictures of a view. Frames must be requested in order.
 #[derive(Debug)]
 pub(super) struct Pictures {
     /// The camera, as these pictures show it.
@@ -28,7 +28,7 @@ pub(super) struct Pictures {
 enum From {
     Footage {
         feed: Box<Retimed>,
-        /// The frame that the feed gave last.
+        /// Number of the last frame that the feed returned.
         at: Option<u64>,
         is_over: bool,
     },
@@ -41,11 +41,12 @@ enum From {
 }
 
 impl Pictures {
-    /// Those of all views.
+    /// Opens the pictures of all views.
     ///
     /// # Errors
     ///
-    /// A view has none: it was live and was not recorded, or consists of keypoints alone; or its footage cannot be read.
+    /// Fails if a view has no pictures, because it was live and not recorded, or has only keypoints. Also fails if its footage cannot be
+    /// read.
     pub(super) fn all(origin: &Origin) -> Result<Vec<Self>, Failure> {
         let (resolved, rig) = origin.setup()?;
         let cameras = resolved.deployment.cameras.iter().enumerate();
@@ -71,11 +72,11 @@ impl Pictures {
         all.collect()
     }
 
-    /// The picture of a frame: RGB, row major, of the size of the view; none where there is none.
+    /// Returns the picture of a frame: RGB, row major, of the size of the view. Returns `None` if the frame has no picture.
     ///
     /// # Errors
     ///
-    /// The footage or the recording cannot be read.
+    /// Fails if the footage or the recording cannot be read.
     pub(super) fn at(&mut self, frame: u64) -> Result<Option<&[u8]>, Failure> {
         let n_bytes = 3 * self.view.size.iter().map(|size| *size as usize).product::<usize>();
         match &mut self.from {
@@ -100,7 +101,7 @@ impl Pictures {
                 match recording::read(file, Kind::Frame, entry, buffer) {
                     Ok(message) if message.elements.len() == n_bytes => Ok(Some(message.elements)),
                     Err(error @ recording::ReadError::Read(_)) => Err(in_file(path, &error)),
-                    // A damaged picture is none.
+                    // A damaged picture counts as missing.
                     Ok(_) | Err(_) => Ok(None),
                 }
             }
@@ -111,19 +112,19 @@ impl Pictures {
 fn none(camera: &str, why: &str) -> Failure {
     let message = format!("camera {camera:?} has no pictures to draw on: {why}");
     Failure::new(ExitKind::Input, message).with_hint(
-        "leave out mp4, or export the recording of `parallax record`, which holds pictures (without `--without pixels`)",
+        "leave out mp4, or export a recording of `parallax record`, which contains pictures (except with `--without pixels`)",
     )
 }
 
 fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, String> {
     let camera = &resolved.deployment.cameras[nth];
     if camera.source.is_empty() || Blank::is_blank(&camera.source) {
-        return Err("it consists of keypoints".to_owned());
+        return Err("it has only keypoints".to_owned());
     }
     if crate::cameras::is_live(&camera.source) {
         return Err("it was live".to_owned());
     }
-    // All have the same places.
+    // All trials have the same frames and times.
     let trial = &origin.trials[0];
     let spec = SourceSpec {
         start: trial.first_frame,
@@ -138,7 +139,7 @@ fn footage(origin: &Origin, resolved: &Resolved, nth: usize) -> Result<From, Str
     let due = footage.map_or([0; 2], |footage| footage.size.map(|size| size as usize));
     if [size.width, size.height] != due {
         return Err(format!(
-            "{} is {size}, and was {}x{} in the run",
+            "{} is {size}, but was {}x{} in the run",
             camera.source, due[0], due[1]
         ));
     }

@@ -1,4 +1,4 @@
-//! Folders that are written once, runs that are not whole, and what a run does not tell.
+//! Tests of exports: folders are written once, incomplete runs are read, and missing facts are reported.
 
 use std::fs;
 
@@ -29,7 +29,7 @@ impl Console for Silent {
 /// A line of a frame in which nobody was found.
 const LINE: &str = r#"{"frame":0,"people":[],"status":"too few views","time_s":0.0,"views_missing":{},"views_present":[]}"#;
 
-/// A person whose joints are all at one place.
+/// Returns a person whose joints are all at the same position.
 fn person(id: u64, x_m: f64) -> String {
     let joint = format!(
         r#"{{"covariance_m2":[1e-4,0,0,1e-4,0,1e-4],"position_m":[{x_m:?},2.0,3.0],"reprojection_px":1.0,"views":["a"]}}"#
@@ -61,7 +61,7 @@ fn line(frame: u64, people: &[String]) -> String {
         + "\n"
 }
 
-/// Lines of frames with one person.
+/// Returns lines of frames with one person.
 fn lines(n: u64) -> String {
     (0..n).map(|frame| line(frame, &[person(1, 1.0)])).collect()
 }
@@ -130,7 +130,7 @@ fn each_of_several_people_has_a_file_and_one_alone_the_simple_name() {
     .concat();
     let folder = run(&[("pose3d.jsonl", &text)]);
     let origin = Origin::read(folder.path(), &given()).unwrap();
-    // Bodies at one point have no bones for glb and bvh.
+    // `glb` and `bvh` are left out: if all joints are at one point, there are no bones.
     let formats = ["c3d", "trc", "csv", "csv-long"];
     let written = exported(&origin, &job(folder.path(), &formats)).unwrap();
     assert_eq!(written.len(), 2 * formats.len());
@@ -219,7 +219,7 @@ fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
     let origin = Origin::read(folder.path(), &Given::default()).unwrap();
     let refused =
         |formats: &[&str]| exported(&origin, &job(folder.path(), formats)).unwrap_err().to_string();
-    assert!(refused(&["c3d", "csv"]).contains("how many frames per second"));
+    assert!(refused(&["c3d", "csv"]).contains("the run has no frame rate"));
     assert!(refused(&["openpose"]).contains("deployment.json"));
     assert!(!folder.path().join("export").exists());
     exported(&origin, &job(folder.path(), &["csv"])).unwrap();
@@ -233,7 +233,10 @@ fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
     )
     .unwrap();
     let error = exported(&origin, &job(folder.path(), &["trc"])).unwrap_err();
-    assert!(error.to_string().contains("which way is up"), "{error}");
+    assert!(
+        error.to_string().contains("the upward direction is not known"),
+        "{error}"
+    );
     let folder = run(&[("pose3d.jsonl", &lines(2))]);
     let error = Origin::read(
         folder.path(),
@@ -254,7 +257,7 @@ fn runs_that_are_not_whole_say_so_and_those_without_a_joint_are_refused() {
     assert_eq!(origin.trials[0].slots.len(), 2);
     let flaws = origin.flaws.join("\n");
     assert!(
-        flaws.contains("has not ended") && flaws.contains("line 3 is cut off"),
+        flaws.contains("has not ended") && flaws.contains("line 3 is truncated"),
         "{flaws}"
     );
     for text in ["", LINE, &format!("{LINE}\n{LINE}\n")] {

@@ -13,18 +13,18 @@ use posenetwork::{Detector, JointMaps, PoseNetwork};
 
 use crate::find_every::FindEvery;
 
-/// The network that finds the joints, and the detector that finds its boxes.
+/// The network that finds the joints, and the detector that finds the boxes.
 pub(super) struct Eyes {
     joints: PoseNetwork,
     detector: Detector,
     n_people: usize,
 }
 
-/// The keypoints of one person, pixels of the picture.
+/// The keypoints of one person, in pixels of the picture.
 pub(super) type Found = Vec<Option<Keypoint>>;
 
 impl Eyes {
-    /// Opens the networks of a camera; where the method is the paper's, those that ship.
+    /// Opens the networks of a camera. With the paper's method, opens the shipped networks.
     pub(super) fn open(deployment: &Deployment, camera: usize) -> Result<Self, Failure> {
         let joints = match inputs::pose_network(deployment, camera)? {
             Some(joints) => joints,
@@ -39,12 +39,12 @@ impl Eyes {
         })
     }
 
-    /// The names of what is found.
+    /// Returns the names of the keypoints that the network finds.
     pub(super) fn names(&self) -> &[String] {
         self.joints.names()
     }
 
-    /// Returns true if sides follow the picture.
+    /// Returns true if left and right follow the picture.
     pub(super) fn as_seen(&self) -> bool {
         self.joints.card().keypoints.sides == Sides::Seen
     }
@@ -54,9 +54,9 @@ impl Eyes {
         format!("network {joints}, boxes by {boxes}")
     }
 
-    /// Begins to watch the pictures of a film, of one size.
+    /// Starts to follow the people in the pictures of a film, which all have the same size.
     ///
-    /// * `rate_hz`: of those that are looked at.
+    /// * `rate_hz`: rate of the pictures that are used.
     pub(super) fn watch(self, deployment: &Deployment, size: Size, rate_hz: f64) -> Watch {
         let n_keypoints = self.names().len();
         let find_every = FindEvery::new(&deployment.network, Some(rate_hz));
@@ -76,7 +76,7 @@ impl Eyes {
     }
 }
 
-/// Follows the people of one picture after another, as a run does.
+/// Follows people from picture to picture, as a run does.
 pub(super) struct Watch {
     step: NetworkStep,
     n_keypoints: usize,
@@ -84,7 +84,7 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// The people of the next picture.
+    /// Returns the people in the next picture.
     pub(super) fn people(
         &mut self,
         camera: &str,
@@ -94,7 +94,7 @@ impl Watch {
         let image = Rgb8View::new(size.width, size.height, frame.rgb).or_fail(ExitKind::Input)?;
         let looked = self.step.look(image, &mut self.memory);
         looked.map_err(|error| in_file(camera.as_ref(), &error))?;
-        // Tells the boxes of the next picture.
+        // Predicts the boxes for the next picture.
         self.step.sightings(&mut self.memory);
         let found = |maps: &JointMaps| {
             let each = (0..self.n_keypoints).map(|i| maps.keypoint(i).map(|found| found.0));

@@ -1,25 +1,25 @@
-//! Pictures that are turned until people stand upright in them, as a run turns its frames.
+//! Rotates pictures until people stand upright in them, as a run rotates its frames.
 
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::{Affine, Fill, Size, Warp};
 
 use super::eyes::Found;
 
-/// Turns by less are left alone, radians: those who find people do not mind.
+/// Smaller rotations, in radians, are not applied, because people are found without them.
 const LEAST: f64 = 0.1;
 
-/// Turns the pictures of a camera.
+/// Rotates the pictures of a camera.
 pub(super) struct Upright {
     warp: Warp,
-    /// From the turned picture to the one of the source, pixels.
+    /// Mapping from pixels of the rotated picture to pixels of the source picture.
     source_from_turned: Affine,
     pixels: Vec<u8>,
 }
 
 impl Upright {
-    /// None where there is next to nothing to turn.
+    /// Prepares the rotation. Returns `None` if the angle is too small to matter.
     ///
-    /// * `roll`: radians, clockwise as seen. All of the picture is in the turned one.
+    /// * `roll`: angle in radians, clockwise as seen. The rotated picture contains the whole source picture.
     pub(super) fn new(size: Size, roll: f64) -> Result<Option<Self>, Failure> {
         if roll.abs() < LEAST {
             return Ok(None);
@@ -46,18 +46,18 @@ impl Upright {
         }))
     }
 
-    /// The size of turned pictures.
+    /// Returns the size of rotated pictures.
     pub(super) fn size(&self) -> Size {
         self.warp.output_size()
     }
 
-    /// A picture, turned.
+    /// Rotates a picture.
     pub(super) fn turned(&mut self, rgb: &[u8]) -> &[u8] {
         self.warp.apply(rgb, &mut self.pixels);
         &self.pixels
     }
 
-    /// Keypoints of the turned picture in the one of the source.
+    /// Maps keypoints from the rotated picture back to the source picture.
     pub(super) fn back(&self, found: &mut Found) {
         for it in found.iter_mut().flatten() {
             let [x, y] = it.at;
@@ -79,7 +79,7 @@ mod tests {
         height: 121,
     };
 
-    /// A picture with a white square of 5 pixels about a point.
+    /// Returns a picture with a white square of 5 pixels around a point.
     fn picture([x, y]: [usize; 2]) -> Vec<u8> {
         let mut rgb = vec![0; 3 * SIZE.width * SIZE.height];
         for row in y - 2..=y + 2 {
@@ -89,7 +89,7 @@ mod tests {
         rgb
     }
 
-    /// The middle of what is white.
+    /// Returns the centre of the white pixels.
     fn white(rgb: &[u8], size: Size) -> [f64; 2] {
         let mut sums = [0.0; 3];
         for (nth, pixel) in rgb.chunks_exact(3).enumerate() {
@@ -113,7 +113,7 @@ mod tests {
     fn what_is_found_in_a_turned_picture_is_where_it_was() {
         for roll in [-2.5, -0.4, 0.45, FRAC_PI_2, 3.0] {
             let mut upright = Upright::new(SIZE, roll).unwrap().unwrap();
-            // Corners are not cut off.
+            // Corners are not cropped.
             for at in [[3, 3], [57, 3], [3, 117], [57, 117], [20, 80]] {
                 let size = upright.size();
                 let there = white(upright.turned(&picture(at)), size);
@@ -128,7 +128,7 @@ mod tests {
     fn pictures_turn_clockwise_as_seen() {
         let mut upright = Upright::new(SIZE, FRAC_PI_2).unwrap().unwrap();
         let size = upright.size();
-        // What is at the top comes to the right.
+        // A point at the top moves to the right.
         let [x, _] = white(upright.turned(&picture([30, 5])), size);
         assert!(x > 100.0, "{x}");
     }

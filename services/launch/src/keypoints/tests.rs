@@ -15,7 +15,7 @@ distortions = [ 0.0, 0.0, 0.0, 0.0,]\nrotation = [ 0.0, 0.0, 0.0,]\ntranslation 
 [b]\nname = 'b'\nsize = [ 320.0, 200.0,]\nmatrix = [ [ 500.0, 0.0, 160.0,], [ 0.0, 500.0, 100.0,], [ 0.0, 0.0, 1.0,],]\n\
 distortions = [ 0.0, 0.0, 0.0, 0.0,]\nrotation = [ 0.0, 1.5, 0.0,]\ntranslation = [ 0.0, 0.0, 3.0,]\nfisheye = false\n";
 
-/// A folder with a rig, and keypoints of 5 frames for camera `b`.
+/// Creates a folder with a rig, and with keypoints of 5 frames for camera `b`.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("rig.toml"), RIG).unwrap();

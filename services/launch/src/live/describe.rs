@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::snapshot::{ProcessSnapshot, Snapshot};
 
-/// A deployment and all its processes as JSON.
+/// Describes a deployment and all its processes as JSON.
 pub fn describe(snapshot: &Snapshot) -> Value {
     let processes: Vec<Value> = snapshot.processes.iter().map(process).collect();
     json!({
@@ -33,7 +33,7 @@ fn process(process: &ProcessSnapshot) -> Value {
     value
 }
 
-/// The metrics of a process since its last start, as JSON.
+/// Returns the metrics of a process since its last start, as JSON.
 pub fn measured(reading: &Reading) -> Value {
     let dropped: Map<String, Value> = Cause::ALL
         .into_iter()
@@ -80,7 +80,7 @@ fn camera(it: &CameraCounts) -> Value {
     })
 }
 
-/// A measurement of a camera, in a larger unit; null where there is none yet.
+/// Converts a measurement of a camera to a larger unit; null if there is no measurement yet.
 fn measured_value(value: i64, per: f64) -> Option<f64> {
     (value != UNMEASURED).then_some(value as f64 / per)
 }
@@ -99,7 +99,7 @@ fn timed(timed: &Timed) -> Value {
     })
 }
 
-/// A name as a JSON key: `end_to_end`.
+/// Turns a name into a JSON key, such as `end_to_end`.
 fn key(name: &str) -> String {
     name.replace(' ', "_")
 }

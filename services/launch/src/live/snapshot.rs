@@ -7,26 +7,26 @@ use runtime::metrics::{Reading, ReadingError};
 
 use crate::resolved::SERVICES;
 
-/// A live process without metrics for this long counts as silent. Metrics are due every second.
+/// A live process without metrics for this time counts as silent. Metrics are due every second.
 const SILENT_NANOS: u64 = 5_000_000_000;
 
 /// The state of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// It is alive and sends metrics.
+    /// The process is alive and sends metrics.
     Running,
-    /// It has received the end of stream and sent it on.
+    /// The process has received the end of the stream, and sent it on.
     Done,
-    /// It is alive and has not sent metrics since its last start.
+    /// The process is alive, but has not sent metrics since its last start.
     Starting,
-    /// It is alive, but has not sent metrics for several seconds.
+    /// The process is alive, but has not sent metrics for several seconds.
     Silent,
-    /// It is not running; the supervisor may restart it.
+    /// The process is not running. The supervisor may restart it.
     Dead,
 }
 
 impl State {
-    /// The name that is shown to users.
+    /// Returns the name of the state for users.
     pub fn name(self) -> &'static str {
         match self {
             Self::Running => "runs",
@@ -41,28 +41,28 @@ impl State {
 /// One process at the time of the snapshot.
 #[derive(Debug, Clone)]
 pub struct ProcessSnapshot {
-    /// Its name in the deployment.
+    /// Name of the process in the deployment.
     pub name: String,
-    /// Its process id, while it is alive.
+    /// Process id, while the process is alive.
     pub pid: Option<u32>,
-    /// Its state.
+    /// State of the process.
     pub state: State,
-    /// Its last metrics, if they are valid; kept after its death.
+    /// Last metrics of the process, if they are valid. They are kept after its death.
     pub reading: Option<Reading>,
-    /// Why its last metrics are invalid.
+    /// Reason why the last metrics are invalid.
     pub problem: Option<ReadingError>,
-    /// Age of its last metrics, nanoseconds.
+    /// Age of the last metrics, in nanoseconds.
     pub age_nanos: u64,
 }
 
 /// All processes of a deployment at one time.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
-    /// The name of the deployment.
+    /// Name of the deployment.
     pub name: String,
-    /// The process id of its supervisor.
+    /// Process id of the supervisor.
     pub supervisor: u32,
-    /// Its processes, in pipeline order.
+    /// Processes of the deployment, in pipeline order.
     pub processes: Vec<ProcessSnapshot>,
 }
 
@@ -83,7 +83,7 @@ impl Snapshot {
         }
     }
 
-    /// The names of the views, as far as the metrics contain them.
+    /// Returns the names of the views, as far as the metrics contain them.
     pub fn views(&self) -> BTreeMap<usize, &str> {
         let readings = self.processes.iter().filter_map(|process| process.reading.as_ref());
         readings
@@ -129,7 +129,7 @@ impl ProcessSnapshot {
     }
 }
 
-/// The sort key of a process: position of its service in the pipeline, index, name.
+/// Returns the sort key of a process: position of its service in the pipeline, index, name.
 fn sort_key(process: &str) -> (usize, usize, String) {
     let (service, index) = process.split_once('-').unwrap_or((process, "0"));
     let nth = SERVICES.iter().position(|name| *name == service);
@@ -146,7 +146,7 @@ pub(crate) mod tests {
 
     const SECOND: u64 = 1_000_000_000;
 
-    /// Metrics sent at 10 s by a process that was started at 4 s.
+    /// Returns metrics sent at 10 s by a process that was started at 4 s.
     pub(crate) fn metrics_of(pid: u32, view: Option<usize>) -> messages::Metrics {
         let mut meter = Meter::default();
         if let Some(view) = view {
@@ -183,7 +183,7 @@ pub(crate) mod tests {
         sent
     }
 
-    /// A snapshot at 11 s: two processes run, one is dead, one is starting.
+    /// Returns a snapshot at 11 s: two processes are running, one is dead, one is starting.
     pub(crate) fn snapshot() -> Snapshot {
         let (pose, record) = (metrics_of(17, Some(0)), metrics_of(18, None));
         let observed_process = |process, pid, metrics| ObservedProcess {

@@ -1,4 +1,4 @@
-//! A snapshot of a deployment as text: a table of the processes, and one of their times.
+//! A snapshot of a deployment as text: a table of the processes, and a table of their times.
 
 use failure::wording::Table;
 use messages::{Cause, UNMEASURED};
@@ -6,14 +6,14 @@ use runtime::metrics::{Reading, Timed};
 
 use super::snapshot::{ProcessSnapshot, Snapshot, State};
 
-/// The cell of an unknown value.
+/// Cell for an unknown value.
 const NONE: &str = "-";
 
-/// A deployment as two tables. The titles contain the units.
+/// Formats a deployment as two tables. The titles contain the units.
 pub fn table(snapshot: &Snapshot) -> String {
     let alive = snapshot.processes.iter().filter(|process| process.pid.is_some()).count();
     let mut text = format!(
-        "{}: run by process {}, {alive} of {} processes live\n\n",
+        "{}: run by process {}, {alive} of {} processes alive\n\n",
         snapshot.name,
         snapshot.supervisor,
         snapshot.processes.len()
@@ -29,7 +29,7 @@ pub fn table(snapshot: &Snapshot) -> String {
     text.push_str(&cameras(snapshot));
     let counted = snapshot.processes.iter().filter_map(|process| {
         let n = process.reading.as_ref()?.n_people?;
-        Some(format!("people in view, of whom one is followed: {n}\n\n"))
+        Some(format!("people in view: {n} (one of them is followed)\n\n"))
     });
     text.extend(counted);
     let rows = snapshot.processes.iter().flat_map(|process| time_rows(snapshot, process));
@@ -40,8 +40,8 @@ pub fn table(snapshot: &Snapshot) -> String {
 const CAMERAS: [&str; 13] = [
     "<CAMERA",
     "OPENED",
-    "MADE",
-    "LOST BY IT",
+    "TAKEN",
+    "LOST",
     "USED",
     "SURPLUS",
     "OVERTAKEN",
@@ -53,7 +53,7 @@ const CAMERAS: [&str; 13] = [
     "<TIMED BY",
 ];
 
-/// Returns the table of the pictures of live cameras; empty without any.
+/// Returns the table of live cameras' pictures; empty if there are no live cameras.
 fn cameras(snapshot: &Snapshot) -> String {
     let rows: Vec<Vec<String>> = snapshot
         .processes
@@ -161,7 +161,7 @@ fn process_row(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<String> {
     ]
 }
 
-/// The counts of dropped messages by cause, without zeros; `none` if nothing was dropped.
+/// Returns the counts of dropped messages by cause, without zeros; `none` if nothing was dropped.
 fn dropped(reading: &Reading) -> String {
     let causes: Vec<String> = Cause::ALL
         .into_iter()
@@ -179,7 +179,7 @@ const TIMES: [&str; 9] = [
     "<PROCESS", "<STAGE", "<VIEW", "COUNT", "PER s", "p50 ms", "p99 ms", "p99.9 ms", "max ms",
 ];
 
-/// One row per kind of time and view; the name of the process is in the first row only.
+/// Returns one row per kind of time and view. Only the first row has the name of the process.
 fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>> {
     let Some(reading) = &process.reading else {
         return Vec::new();
@@ -209,13 +209,13 @@ fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>>
     rows.collect()
 }
 
-/// The name of a view, or its number if the name is unknown.
+/// Returns the name of a view, or its number if the name is unknown.
 fn view(snapshot: &Snapshot, index: usize) -> String {
     let name = snapshot.views().get(&index).map(|view| (*view).to_owned());
     name.unwrap_or_else(|| format!("view {index}"))
 }
 
-/// A rate in hertz: two decimals below 10, else one.
+/// Formats a rate in hertz: two decimals below 10, otherwise one.
 fn rate(millihertz: u64) -> String {
     let hertz = millihertz as f64 / 1e3;
     if hertz < 10.0 {
@@ -225,7 +225,7 @@ fn rate(millihertz: u64) -> String {
     }
 }
 
-/// A time in milliseconds: three decimals below 10, else one.
+/// Formats a time in milliseconds: three decimals below 10, otherwise one.
 fn milliseconds(nanos: u64) -> String {
     let ms = nanos as f64 / 1e6;
     if ms < 10.0 {
@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn a_deployment_is_shown_as_two_tables() {
         let expected = "\
-walk: run by process 3, 3 of 4 processes live
+walk: run by process 3, 3 of 4 processes alive
 
 PROCESS     VIEW  STATE   UP s  SENT  SENT/s  RESTARTS  QUEUE of MOST  MEMORY MB  EVIDENCE MB  DROPPED
 capture-9   -     begins     -     -       -         -              -          -            -  -
@@ -278,7 +278,7 @@ results  waiting     all       100   20.0  ";
         snapshot.processes[3].reading.as_mut().unwrap().n_people = Some(3);
         let text = table(&snapshot);
         assert!(
-            text.contains("people in view, of whom one is followed: 3\n"),
+            text.contains("people in view: 3 (one of them is followed)\n"),
             "{text}"
         );
     }

@@ -5,13 +5,13 @@ use scene::{Address, skew_ms_of};
 
 use crate::resolved::Resolved;
 
-/// The live camera of a view, if it is one.
+/// Returns the job of a view's live camera, if the view has one.
 pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> {
     let entry = &resolved.deployment.cameras[view];
     let mut camera = crate::cameras::live_camera(entry)?;
     let footage = &resolved.footage[view];
     if matches!(camera.address, LiveAddress::Stream(_)) {
-        // What it told before: a stream is not asked again.
+        // Uses the properties determined before the run, so that a stream need not be queried again.
         let step = resolved.deployment.capture.frame_step as f64;
         camera.rate_hz = footage.frame_rate_hz.map(|frame_rate_hz| frame_rate_hz * step);
     }
@@ -29,15 +29,16 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
     })
 }
 
-/// How far pictures may be from the instants of the frames before a warning, nanoseconds: half of the time between two.
+/// Returns the largest distance of pictures from the instants of the frames without a warning, in nanoseconds: half of the time between
+/// two frames.
 fn max_skew_nanos(resolved: &Resolved) -> u64 {
     let capture = &resolved.deployment.capture;
     let period_ms = 1e3 * capture.frame_step as f64 / resolved.instants_hz();
     (0.5 * period_ms * 1e6).round() as u64
 }
 
-/// How long after the instants of the frames the pictures of footage were taken, nanoseconds: as the deployment says, or as the
-/// scene that is rendered has it.
+/// Returns the time from the instant of a frame until the picture of the footage was taken, in nanoseconds. The deployment or the
+/// rendered scene gives this time.
 pub(super) fn skew_nanos(resolved: &Resolved, view: usize) -> i64 {
     let camera = &resolved.deployment.cameras[view];
     let of_scene = || Some(skew_ms_of(&Address::parse(&camera.source).ok()?));

@@ -1,4 +1,4 @@
-//! The single-view step of a camera: by a network, by the filters, or of keypoints that another program found.
+//! The single-view step of a camera: a network or the filters search the pictures, or another program's keypoints are read.
 
 use std::sync::Arc;
 
@@ -11,12 +11,12 @@ use crate::keypoints;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 
-/// The single-view step of a camera that a network looks at, as the process of that camera has it; `None` of one that the filters
-/// look at, or whose keypoints another program found.
+/// Returns the single-view step of a camera whose pictures a network searches, as in the process of that camera. Returns `None` if the
+/// filters search the pictures, or another program found the keypoints.
 ///
 /// # Errors
 ///
-/// Model, network or rig cannot be read or used.
+/// Fails if the model, network or rig cannot be read or used.
 pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkStep>, Failure> {
     let prepared = Prepared::new(resolved)?;
     Ok(match of_view(resolved, &prepared, view)? {
@@ -25,7 +25,7 @@ pub fn network_step(resolved: &Resolved, view: usize) -> Result<Option<NetworkSt
     })
 }
 
-/// The single-view step: by the network of the deployment, or by the filters.
+/// Returns the single-view step, by the network of the deployment or by the filters.
 pub(crate) fn of_view(
     resolved: &Resolved,
     prepared: &Prepared,
@@ -77,7 +77,7 @@ pub(crate) fn of_view(
     Ok(pose::Step::Network(Box::new(step)))
 }
 
-/// Returns the number of every extra keypoint of the deployment among the names of a camera.
+/// Returns, for every extra keypoint of the deployment, its index in the names of a camera.
 fn extras(resolved: &Resolved, names: &[String]) -> Vec<Option<usize>> {
     let number = |wanted: &String| names.iter().position(|name| name == wanted);
     resolved.extra_keypoints.iter().map(number).collect()

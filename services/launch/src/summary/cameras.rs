@@ -1,51 +1,52 @@
-//! Text on cameras that contradict each other.
+//! Texts about cameras that contradict each other.
 
 use messages::{CameraCounts, TimedBy, UNMEASURED};
 use runfiles::{CameraFit, Contradicted, Exchanged};
 use runtime::metrics::Reading;
 use supervise::Outcome;
 
-/// Text on two cameras whose footage seems to be exchanged.
+/// Returns the text about two cameras whose footage seems to be exchanged.
 pub(super) fn exchanged(exchanged: &Exchanged) -> String {
     let [first, second] = &exchanged.cameras;
     format!(
-        "  calibration   {first} and {second} look exchanged: rays miss each other by {:.1} degrees, with the footage of the \
-         two exchanged by {:.1}{}; exchange their `source` in the deployment\n",
+        "  calibration   {first} and {second} look exchanged: rays miss each other by {:.1} degrees, but only by {:.1} if the footage of \
+         the two is exchanged{}; exchange their `source` in the deployment\n",
         exchanged.degrees,
         exchanged.exchanged_degrees,
         if exchanged.sure {
             ""
         } else {
-            " (it may be other two)"
+            " (or maybe of two other cameras)"
         },
     )
 }
 
-/// Text on cameras whose views contradict each other.
+/// Returns the text about cameras whose views contradict each other.
 pub(super) fn contradicted(contradicted: &Contradicted) -> String {
     let likely = contradicted.likely.as_ref().map_or_else(String::new, |[first, second]| {
         format!(" ({first} and {second} exchanged would fit best)")
     });
     format!(
         "  calibration   the cameras contradict each other: rays to the same part miss each other by {:.1} degrees, where up \
-         to {:.1} are usual; see whether every `source` is the footage of its camera{likely}, the rig is the one of this \
-         footage, the frames are of one moment, and the overlays show one person\n",
+         to {:.1} are usual; check that every `source` is the footage of its camera{likely}, the rig belongs to this \
+         footage, paired frames were taken at the same time, and the overlays show one person\n",
         contradicted.degrees, contradicted.usual_degrees,
     )
 }
 
-/// Text on a camera whose pictures were taken at other times than they say.
+/// Returns the text about a camera whose pictures were taken at other times than they state.
 pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     let [offset, error] = [fit.offset_ms, fit.offset_error_ms].map(|ms| ms.unwrap_or(f64::NAN));
     let how = if offset < 0.0 { "before" } else { "after" };
     format!(
-        "  clock         {camera} is out of step: its pictures were taken {:.0} ms {how} the time that they say, +-{error:.0}, by how \
-         people move in them\n",
+        "  clock         {camera} is out of step: according to the movement of people, its pictures were taken {:.0} ms {how} their \
+         stated times, +-{error:.0}\n",
         offset.abs(),
     )
 }
 
-/// Returns the counts of the pictures of every live camera, a line each; those of a restarted process since its restart. A warning
+/// Returns the counts of every live camera's pictures, one line per camera. The counts of a restarted process begin at its restart. A
+/// warning
 /// follows if the times of some cameras cannot be compared with those of others.
 pub(super) fn live(outcome: &Outcome) -> String {
     let readings = outcome
@@ -65,7 +66,7 @@ pub(super) fn live(outcome: &Outcome) -> String {
 /// Returns the line on the pictures of a live camera.
 fn line((name, it): &(String, CameraCounts)) -> String {
     let mut parts = vec![format!(
-        "{} pictures made, {} lost by the camera, {} used",
+        "{} pictures taken, {} lost by the camera, {} used",
         it.n_made, it.n_lost, it.n_used
     )];
     let more = [
@@ -98,23 +99,25 @@ fn line((name, it): &(String, CameraCounts)) -> String {
     format!("  live camera   {name}: {}\n", parts.join(", "))
 }
 
-/// Text on what says when the pictures of a camera were taken, unless that is the kernel.
+/// Returns the text about the source of a camera's picture times, unless the kernel gives the times.
 fn times(it: &CameraCounts) -> Option<String> {
     let ms = it.delay_nanos as f64 / 1e6;
     match it.timed_by {
-        TimedBy::CAMERA => Some(format!("{ms:.0} ms from camera to here by its own clock")),
-        TimedBy::ARRIVAL => Some("counted as taken when they came".to_owned()),
+        TimedBy::CAMERA => Some(format!(
+            "{ms:.0} ms from the camera to here by its own clock"
+        )),
+        TimedBy::ARRIVAL => Some("counted as taken when they arrived".to_owned()),
         TimedBy::DISBELIEVED => Some(format!(
-            "counted as taken when they came, since its own clock makes that {ms:.0} ms from camera to here, which is not \
-             believed (set it by the time server of this machine)"
+            "counted as taken when they arrived, because by the camera's own clock they took {ms:.0} ms to get here, which is not \
+             plausible (set that clock from the time server of this machine)"
         )),
         _ => None,
     }
 }
 
-/// Text on live cameras of which some say when their pictures were taken and others do not; none where all are alike.
+/// Returns the text about live cameras if only some of them state when their pictures were taken. Returns `None` if all cameras are alike.
 ///
-/// * `cameras`: name and counts.
+/// * `cameras`: name and counts of each camera.
 fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {
     let named = |which: fn(TimedBy) -> bool| -> Vec<&str> {
         let those = cameras.iter().filter(|(_, counts)| which(counts.timed_by));
@@ -128,15 +131,15 @@ fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {
     let own = named(|timed_by| timed_by == TimedBy::CAMERA);
     let remedy = if own.len() == told.len() {
         format!(
-            "; where their delays are alike, `clock = \"arrival\"` of {} is better",
+            "; if their delays are similar, set `clock = \"arrival\"` for {}",
             own.join(", ")
         )
     } else {
         String::new()
     };
     Some(format!(
-        "  clock         the times of {} are those of capture, the times of {} those of arrival: later by the time \
-         that a picture is on its way{remedy}\n",
+        "  clock         the times of {} are capture times, but the times of {} are arrival times: later by the time \
+         that a picture is under way{remedy}\n",
         told.join(", "),
         late.join(", "),
     ))
@@ -164,11 +167,11 @@ mod tests {
         ];
         let text = unlike_times(&streams).unwrap();
         assert!(
-            text.contains("of left, right are those of capture, the times of middle"),
+            text.contains("of left, right are capture times, but the times of middle"),
             "{text}"
         );
         assert!(
-            text.contains("`clock = \"arrival\"` of left, right"),
+            text.contains("`clock = \"arrival\"` for left, right"),
             "{text}"
         );
         let with_device = [
@@ -177,7 +180,7 @@ mod tests {
         ];
         let text = unlike_times(&with_device).unwrap();
         assert!(
-            text.contains("of usb are those of capture, the times of net"),
+            text.contains("of usb are capture times, but the times of net"),
             "{text}"
         );
         assert!(!text.contains("clock ="), "{text}");
@@ -196,7 +199,7 @@ mod tests {
         let (_, mut it) = camera("left", TimedBy::DISBELIEVED);
         it.delay_nanos = -90_000_000_000;
         let text = times(&it).unwrap();
-        assert!(text.contains("-90000 ms from camera to here"), "{text}");
+        assert!(text.contains("-90000 ms to get here"), "{text}");
         let (_, usb) = camera("usb", TimedBy::DRIVER);
         assert_eq!(times(&usb), None);
     }
@@ -212,7 +215,7 @@ mod tests {
         let text = out_of_step("left", &fit);
         assert!(text.contains("left is out of step"), "{text}");
         assert!(
-            text.contains("21 ms before the time that they say, +-1,"),
+            text.contains("21 ms before their stated times, +-1"),
             "{text}"
         );
     }

@@ -1,18 +1,18 @@
-//! Everybody of a run of several people, in a table.
+//! Table of the people in a run with several people.
 
 use core::fmt::Write as _;
 
 use runfiles::{People, PersonSummary};
 
-/// Most people of the table: those with the most frames.
+/// Maximum number of people in the table. The people with the most frames are listed.
 const MOST_ROWS: usize = 8;
 
-/// How many people there are, and the table.
+/// Returns the number of people, and the table.
 pub(super) fn text(people: &People) -> String {
     format!("  people        {}\n{}", people.text(), table(people))
 }
 
-/// A row for each person, by id; nothing for one person alone.
+/// Returns the table with a row per person, by id. Returns an empty text if there is only one person.
 fn table(people: &People) -> String {
     if people.each.len() < 2 {
         return String::new();
@@ -58,7 +58,7 @@ fn verdict(person: &PersonSummary) -> String {
     if person.trust.frames < runfiles::Trust::MIN_FRAMES {
         "too few frames to judge".to_owned()
     } else {
-        "nothing speaks against it".to_owned()
+        "no reason for doubt".to_owned()
     }
 }
 
@@ -92,8 +92,7 @@ mod tests {
         let text = table(&people(10));
         let rows: Vec<&str> = text.lines().collect();
         assert_eq!(rows.len(), 10, "{text}");
-        let one =
-            "         1       99        0      120   98.5 %        -  nothing speaks against it";
+        let one = "         1       99        0      120   98.5 %        -  no reason for doubt";
         assert_eq!(rows[1], one);
         assert!(rows[2].contains("4.2  may be wrong: "), "{text}");
         assert!(rows[9].contains("and 2 with fewer frames"), "{text}");

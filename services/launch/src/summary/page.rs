@@ -1,4 +1,4 @@
-//! The page of a run: pictures with skeletons first, then the skeleton in space, what the run reports, and its latency.
+//! The page of a run: pictures with skeletons, the skeleton in space, the report of the run, and its latency.
 
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ use skeleton::JointSet;
 
 /// Name of the page in the folder of a run.
 pub const FILE: &str = "report.html";
-/// Most skeletons that are drawn in space.
+/// Maximum number of skeletons drawn in space.
 const MOST_MOMENTS: usize = 400;
-/// Instants of which pictures are shown.
+/// Number of instants whose pictures are shown.
 const N_STRIPS: usize = 3;
 const JPEG_QUALITY: u8 = 85;
 
@@ -22,7 +22,7 @@ const JPEG_QUALITY: u8 = 85;
 pub(super) struct Content<'a> {
     pub(super) name: &'a str,
     pub(super) verdict: Verdict,
-    /// The report as text; a line becomes a row.
+    /// The report as text. Each line becomes a row.
     pub(super) text: &'a str,
     pub(super) latency: Option<&'a LatencyReport>,
     pub(super) cameras: &'a [String],
@@ -30,11 +30,11 @@ pub(super) struct Content<'a> {
     pub(super) joints: &'static JointSet,
 }
 
-/// Writes the page into the folder of the run.
+/// Writes the page to the folder of the run.
 ///
 /// # Errors
 ///
-/// The results cannot be read, or the page cannot be written.
+/// Fails if the results cannot be read, or the page cannot be written.
 pub(super) fn write(folder: &Path, content: &Content<'_>) -> Result<PathBuf, Failure> {
     let file = folder.join(FILE);
     let page = exports::report::run::html(&page(folder, content)?);
@@ -53,14 +53,14 @@ fn page(folder: &Path, content: &Content<'_>) -> Result<Page, Failure> {
         space: space(folder, content)?,
         marks: Vec::new(),
         tables,
-        legend: "Thick: the skeleton in space as the view sees it, right orange, left blue; thin and grey: what the view found by itself; pink: where the other views say that one part must lie. \
+        legend: "Thick lines: the skeleton in space as the view sees it, the right side orange, the left side blue. Thin grey lines: the pose that the view found alone. Pink: where one part must be according to the other views. \
                  All pictures are in overlays/."
             .to_owned(),
         strips: strips(folder, content.cameras),
     })
 }
 
-/// The lines of the report: a word, then what it says.
+/// Returns the lines of the report as a table: the first column has the keyword, the second the text.
 fn reported(text: &str) -> Table {
     let rows = text.lines().skip(1).map(|line| {
         let (word, rest) = line.split_at_checked(16).unwrap_or((line, ""));
@@ -111,7 +111,7 @@ fn space(folder: &Path, content: &Content<'_>) -> Result<Space, Failure> {
     })
 }
 
-/// Results at equal distances in time, as many as can be drawn, with the person who is followed.
+/// Returns results at equal distances in time, as many as can be drawn, with the followed person.
 fn moments(folder: &Path, content: &Content<'_>) -> Result<Vec<Moment>, Failure> {
     let path = folder.join(FrameLine::FILE);
     let lines = || -> Result<_, Failure> {
@@ -146,7 +146,7 @@ fn moments(folder: &Path, content: &Content<'_>) -> Result<Vec<Moment>, Failure>
     Ok(moments)
 }
 
-/// Overlays of instants at the start, in the middle, and at the end, in all views.
+/// Returns the overlays of instants at the start, in the middle and at the end, for all views.
 fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
     let overlays = folder.join("overlays");
     let mut names: Vec<String> = cameras
@@ -173,7 +173,7 @@ fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
     shown.map(strip).collect()
 }
 
-/// Returns the caption of the pictures of a file name such as `000010.png`.
+/// Returns the caption for pictures with a file name such as `000010.png`.
 fn caption(name: &str) -> String {
     let number = name.trim_end_matches(".png");
     let number = number.parse().map_or(number.to_owned(), |value: u64| value.to_string());

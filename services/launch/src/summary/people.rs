@@ -1,24 +1,24 @@
-//! Views in which people are not as high as the search is good for, and the setting that helps.
+//! Finds views in which people are too small or too large for the search, and suggests a setting.
 
 use geometry::search_size::{USABLE_PX, better_scale};
 use runfiles::RunSummary;
 use serde::Serialize;
 
-/// Views in which people are smaller or larger than the search is good for.
+/// Views in which people are too small or too large for the search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Outside {
-    /// Name of each view, and the median height of people, pixels of its frames.
+    /// Name of each view, and median height of people in pixels of its frames.
     pub views: Vec<(String, f64)>,
-    /// Scale that is good for all views: `capture.scale`.
+    /// Value of `capture.scale` that suits all views.
     pub scale: f64,
-    /// True if the deployment sets `capture.size`, which wins.
+    /// True if the deployment sets `capture.size`, which takes precedence over `capture.scale`.
     pub has_size: bool,
 }
 
 impl Outside {
-    /// `None` where people are as they should be, or nobody is.
+    /// Finds such views. Returns `None` if all people have a suitable size, or there are no people.
     ///
-    /// * `has_size`: whether the deployment sets `capture.size`.
+    /// * `has_size`: true if the deployment sets `capture.size`.
     pub(super) fn of(run: &RunSummary, has_size: bool) -> Option<Self> {
         let views = run.views.iter().filter_map(|view| {
             let px = run.summary.person_px.get(&view.name).copied().flatten()?;
@@ -38,13 +38,13 @@ impl Outside {
         })
     }
 
-    /// For people.
+    /// Returns the text for the user.
     pub(super) fn text(&self) -> String {
         let views = self.views.iter();
         let views: Vec<String> =
             views.map(|(name, px)| format!("{px:.0} px high in {name}")).collect();
         format!(
-            "people are {} ({} to {} suits the search): set capture.scale = {}{}",
+            "people are {} ({} to {} px are best for the search): set capture.scale = {}{}",
             views.join(", "),
             USABLE_PX[0],
             USABLE_PX[1],
@@ -91,7 +91,7 @@ mod tests {
         let said = outside(1.0, [Some(620.0), Some(300.0)]).unwrap();
         assert_eq!(
             said,
-            "people are 620 px high in c1 (110 to 350 suits the search): set capture.scale = 0.46"
+            "people are 620 px high in c1 (110 to 350 px are best for the search): set capture.scale = 0.46"
         );
         let said = outside(0.25, [Some(50.0), Some(50.0)]).unwrap();
         assert!(

@@ -13,17 +13,17 @@ use super::people::Outside;
 pub enum Recorded {
     /// There is no summary of this run.
     Nothing,
-    /// The file cannot be read; the reason.
+    /// The file cannot be read. Contains the reason.
     Unreadable(String),
-    /// The summary.
+    /// The summary of this run.
     Written(Box<RunSummary>),
 }
 
 impl Recorded {
     /// Reads the summary in the output folder of a run.
     ///
-    /// * `session`: the session of the run; the summary of another session counts as none.
-    /// * `cameras`: the cameras of the deployment; the summary must have counts for each of them.
+    /// * `session`: the session of the run. A summary of another session counts as missing.
+    /// * `cameras`: the cameras of the deployment. The summary must have counts for each of them.
     pub(super) fn read(folder: &Path, session: u64, cameras: &[&str]) -> Self {
         let file = folder.join(RunSummary::FILE);
         let read = match files::read_text(&file, files::SETTINGS) {
@@ -34,33 +34,35 @@ impl Recorded {
         read.unwrap_or_else(|why| Self::Unreadable(format!("{}: {why}", file.display())))
     }
 
-    /// The counts of the run, if there is a summary.
+    /// Returns the counts of the run, if there is a summary.
     pub fn summary(&self) -> Option<&Summary> {
         self.written().map(|written| &written.summary)
     }
 
-    /// Where people were too small or too large for the search.
+    /// Returns the views in which people were too small or too large for the search.
     ///
-    /// * `has_size`: whether the deployment sets `capture.size`.
+    /// * `has_size`: true if the deployment sets `capture.size`.
     pub(super) fn outside(&self, has_size: bool) -> Option<Outside> {
         Outside::of(self.written()?, has_size)
     }
 
-    /// The latency report of the run, if there is a summary.
+    /// Returns the latency report of the run, if there is a summary.
     pub fn latency(&self) -> Option<&LatencyReport> {
         self.written().map(|written| &written.latency)
     }
 
-    /// Why there is no summary; none if there is one.
+    /// Returns the reason why there is no summary; `None` if there is one.
     pub(super) fn problem(&self) -> Option<String> {
         match self {
-            Self::Nothing => Some("nothing: the process `results` wrote no summary".to_owned()),
-            Self::Unreadable(why) => Some(format!("what cannot be read: {why}")),
+            Self::Nothing => {
+                Some("nothing: the process `results` did not write a summary".to_owned())
+            }
+            Self::Unreadable(why) => Some(format!("the summary cannot be read: {why}")),
             Self::Written(_) => None,
         }
     }
 
-    /// The summary as JSON; null if there is none.
+    /// Returns the summary as JSON; null if there is none.
     pub(super) fn json(&self) -> Value {
         json!(self.written())
     }

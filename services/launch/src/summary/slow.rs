@@ -2,12 +2,14 @@
 
 use runfiles::Summary;
 
-/// A run that has a result for a smaller share of its frames says so.
+/// The warning is given if a smaller share of the frames has a result.
 const MOST: f64 = 0.8;
 
-/// A line of how many frames the machine had time for, and what helps. None where it had time for most of them, and with lossless delivery.
+/// Returns a line with the number of frames that the machine had time for, and what would help. Returns `None` if it had time for most
+/// frames, and with lossless delivery.
 ///
-/// * `n_frames`: of the footage, as far as the run got; `seconds`: how long it took.
+/// * `n_frames`: number of frames of the footage that the run reached.
+/// * `seconds`: duration of the run.
 pub(super) fn text(
     summary: &Summary,
     n_frames: u64,
@@ -18,8 +20,8 @@ pub(super) fn text(
     let is_slow = !is_lossless && n > 0 && (n as f64) < MOST * n_frames as f64;
     is_slow.then(|| {
         format!(
-            "  slow          this machine had time for {n} of {n_frames} frames, {:.1} a second: smaller pictures (capture.scale), fewer cameras, less \
-             work beside it or more cores would help; `latency` below shows which stage takes long\n",
+            "  slow          this machine had time for {n} of {n_frames} frames, {:.1} per second. Smaller pictures (capture.scale), fewer cameras, fewer \
+             other programs or more cores would help; `latency` below shows which stage takes long\n",
             n as f64 / seconds.max(1e-3)
         )
     })
@@ -39,7 +41,7 @@ mod tests {
     #[test]
     fn a_machine_that_had_time_for_few_frames_is_told() {
         let told = text(&summary(6), 60, 8.0, false).unwrap();
-        assert!(told.contains("6 of 60 frames, 0.8 a second"), "{told}");
+        assert!(told.contains("6 of 60 frames, 0.8 per second"), "{told}");
         assert_eq!(text(&summary(50), 60, 8.0, false), None);
         assert_eq!(text(&summary(6), 60, 8.0, true), None);
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Trust in the results, as text for people.
+//! Trust in the results, as text for the user.
 
 use core::fmt::Write as _;
 
@@ -12,18 +12,18 @@ pub(super) fn are_cameras_doubtful(summary: &Summary) -> bool {
         || fits.any(|fit| fit.suspected || fit.out_of_step)
 }
 
-/// The verdict on the results.
+/// Returns the verdict on the results.
 pub(super) fn verdict(summary: &Summary, doubts: &[Doubt]) -> &'static str {
     if !doubts.is_empty() || are_cameras_doubtful(summary) {
         "the results may be wrong"
     } else if summary.trust.frames < Trust::MIN_FRAMES {
         "too few frames to judge"
     } else {
-        "nothing speaks against the results"
+        "no reason to doubt the results"
     }
 }
 
-/// The reprojection error, the verdict in one line, and a line for every reason to doubt.
+/// Returns the reprojection error, the verdict in one line, and a line for every reason to doubt the results.
 pub(super) fn text(summary: &Summary, doubts: &[Doubt]) -> String {
     let trust = &summary.trust;
     let verdict = verdict(summary, doubts);

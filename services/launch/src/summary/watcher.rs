@@ -12,12 +12,12 @@ use terminal::output;
 /// Interval of progress messages if no bar can be drawn.
 const PERIOD: Duration = Duration::from_secs(5);
 
-/// Shows the progress of a run: a bar on a terminal, else a message every few seconds.
+/// Shows the progress of a run: with a bar on a terminal, otherwise with a message every few seconds.
 #[derive(Debug)]
 pub struct Watcher {
     bar: ProgressBar,
     quiet: bool,
-    /// None if it runs until it is stopped.
+    /// Number of frames; `None` if the run continues until it is stopped.
     n_frames: Option<u64>,
     start_frame: u64,
     frame_step: u64,
@@ -27,7 +27,7 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// Starts with no frame done.
+    /// Starts to show the progress, with no frame done.
     pub fn new(resolved: &Resolved, quiet: bool) -> Self {
         let n_frames = (!resolved.is_endless()).then(|| resolved.n_frames());
         let bar = if quiet || !output::is_terminal() {
@@ -58,7 +58,7 @@ impl Watcher {
     pub fn handle(&mut self, event: &Event<'_>) {
         match event {
             Event::Health { process, health } if *process == "triangulate" => {
-                // By frame number: the counts of a process start at 0 after a restart.
+                // Progress is measured by frame numbers, because the counts of a process start at 0 after a restart.
                 if health.n_sent > 0 {
                     let nth = health.last_frame.saturating_sub(self.start_frame) / self.frame_step;
                     self.n_done = self.n_done.max(nth + 1);
@@ -78,11 +78,13 @@ impl Watcher {
                 ));
             }
             Event::GivenUp { process, restarts } => {
-                self.print(&format!("{process} is given up after {restarts} restarts"));
+                self.print(&format!(
+                    "{process} is not restarted any more, after {restarts} restarts"
+                ));
             }
             Event::Dismissed { process } => {
                 self.print(&format!(
-                    "{process} is stopped: nothing is left that sends to it"
+                    "{process} is stopped, because no process sends to it any more"
                 ));
             }
             _ => {}
@@ -107,7 +109,7 @@ impl Watcher {
         let rate = self.n_done as f64 / self.begin.elapsed().as_secs_f64();
         let of = self.n_frames.map_or_else(String::new, |frame| format!(" of {frame}"));
         output::message(format_args!(
-            "{}{of} frames, {rate:.2} a second",
+            "{}{of} frames, {rate:.2} per second",
             self.n_done
         ));
     }

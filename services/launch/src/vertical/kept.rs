@@ -1,4 +1,4 @@
-//! A vertical that was found in pictures, kept beside the rig: the search takes half a minute.
+//! Stores a vertical that was found in pictures beside the rig, because the search takes half a minute.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,14 +18,14 @@ struct Kept {
     why: String,
 }
 
-/// The file beside a rig: `Calib.toml.up.json`.
+/// Returns the path of the file beside a rig, such as `Calib.toml.up.json`.
 fn file(rig: &Path) -> PathBuf {
     let mut name = rig.as_os_str().to_owned();
     name.push(".up.json");
     PathBuf::from(name)
 }
 
-/// The vertical that was found for these cameras before; none where the rig has changed since.
+/// Reads the vertical that was found for these cameras before. Returns `None` if the rig has changed since.
 pub(super) fn read(rig: &Path, cameras: &[Camera]) -> Option<Vertical> {
     let file = file(rig);
     if fs::metadata(&file).ok()?.len() > 1 << 16 {
@@ -37,14 +37,14 @@ pub(super) fn read(rig: &Path, cameras: &[Camera]) -> Option<Vertical> {
         return None;
     }
     let why = format!(
-        "{} (as an earlier run found; kept in {}: delete it to search again)",
+        "{} (found by an earlier run and stored in {}: delete this file to search again)",
         kept.why,
         file.display()
     );
     Some(Vertical { up: kept.up, why })
 }
 
-/// Keeps a vertical. Where the folder cannot be written, the next run searches again.
+/// Stores a vertical. If the folder cannot be written, the next run searches again.
 pub(super) fn write(rig: &Path, cameras: &[Camera], found: &Vertical) {
     let kept = Kept {
         cameras: digest(cameras),
@@ -56,11 +56,14 @@ pub(super) fn write(rig: &Path, cameras: &[Camera], found: &Vertical) {
     };
     let file = file(rig);
     if let Err(error) = files::replace(&file, text.as_bytes()) {
-        tracing::info!("which way is up is not kept in {}: {error}", file.display());
+        tracing::info!(
+            "the upward direction could not be stored in {}: {error}",
+            file.display()
+        );
     }
 }
 
-/// Names and poses of cameras as a short text.
+/// Returns a short hash of the names and poses of cameras.
 fn digest(cameras: &[Camera]) -> String {
     let text: Vec<String> = cameras
         .iter()

@@ -1,7 +1,7 @@
-//! The vertical by keypoints of files: people have their heads above their ankles.
+//! Finds the vertical from keypoints in files: people have their heads above their ankles.
 //!
-//! In a picture the head and the ankles of a person span a plane with the camera, and the vertical lies in it: a person
-//! who leans does so one way in one picture and another way in the next. No person has to be known in two pictures.
+//! In a picture, the head and the ankles of a person define a plane with the camera, and the vertical is in this plane. People
+//! who lean do so in different directions, so the errors cancel over many pictures. No person has to be recognised in two pictures.
 
 use ::keypoints::Keypoint;
 use deployment::Deployment;
@@ -12,28 +12,28 @@ use nalgebra::{Point2, UnitVector3, Vector3};
 use super::{Vertical, common_normal, snapped, text};
 use crate::keypoints as keypoint_files;
 
-/// Most frames of a camera that are read, evenly over its keypoints.
+/// Maximum number of frames per camera that are read, spread evenly over its keypoints.
 const MOST_FRAMES: u64 = 60;
-/// Least score of a keypoint.
+/// Minimum score of a keypoint.
 const LEAST_SCORE: f64 = 0.2;
-/// Least people of all frames and cameras.
+/// Minimum number of people in all frames and cameras.
 const LEAST_PEOPLE: usize = 5;
-/// Least share of people whose heads are above their ankles.
+/// Minimum share of people whose heads are above their ankles.
 const LEAST_AGREEING: f64 = 0.7;
-/// How far half of the people may lean from the vertical, degrees.
+/// Limit on the median angle between people and the vertical, in degrees.
 const MOST_LEAN: f64 = 25.0;
 
-/// How one person stands in one picture.
+/// Direction of one person in one picture.
 struct Standing {
-    /// Perpendicular to the plane of the camera, the head and the ankles, in the world.
+    /// Normal of the plane through the camera, the head and the ankles, in the world.
     normal: Vector3<f64>,
-    /// From the ankles to the head, in that plane and perpendicular to the ray to the ankles.
+    /// Direction from the ankles to the head, in this plane and perpendicular to the ray to the ankles.
     upward: Vector3<f64>,
 }
 
-/// The vertical; none where too few people have heads and ankles, or where they do not agree.
+/// Finds the vertical. Returns `None` if too few people have heads and ankles, or if they do not agree.
 ///
-/// * `cameras`: those of the deployment that are in its rig.
+/// * `cameras`: the cameras of the deployment that are in its rig.
 pub(super) fn find(
     deployment: &Deployment,
     cameras: &[Camera],
@@ -71,7 +71,9 @@ pub(super) fn find(
 }
 
 impl Standing {
-    /// * Directions of rays in the world.
+    /// Computes the direction of a person from rays.
+    ///
+    /// * `head`, `ankles`: directions of the rays in the world.
     fn from_rays(head: UnitVector3<f64>, ankles: UnitVector3<f64>) -> Option<Self> {
         let normal = head.cross(&ankles).try_normalize(1e-3)?;
         let upward = ankles.cross(&normal);
@@ -96,8 +98,8 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     }
     let up = snapped(up);
     let why = format!(
-        "the calibration does not say which way is up; up = {} is used: there {:.0} % of {} people in the keypoints have their heads above \
-         their ankles, and half of them lean by less than {lean:.0} degrees; give `up` in the deployment if it is wrong",
+        "the calibration does not give the upward direction; up = {} is used: with it, {:.0} % of {} people in the keypoints have their heads above \
+         their ankles, and half of them lean by less than {lean:.0} degrees; set `up` in the deployment if this is wrong",
         text(&up),
         100.0 * share,
         all.len()
@@ -108,7 +110,7 @@ fn vertical(all: &[Standing]) -> Option<Vertical> {
     })
 }
 
-/// A weighted sum of keypoints that were all found.
+/// Returns a weighted sum of keypoints, if all of them were found.
 fn weighted(row: &[(usize, f64)], found: impl Fn(usize) -> Option<Keypoint>) -> Option<[f64; 2]> {
     let mut sum = [0.0; 2];
     for &(nth, weight) in row {
@@ -133,7 +135,7 @@ mod tests {
     use super::super::tests::ring;
     use super::*;
 
-    /// People of 1.7 m who stand at several places and lean by some degrees, as cameras see them.
+    /// Returns people of 1.7 m who stand at several places and lean by some degrees, as cameras see them.
     fn seen(rolls: &[f64], up: UnitVector3<f64>, lean_degrees: f64) -> Vec<Standing> {
         let world = Rotation3::rotation_between(&Vector3::z(), &up).unwrap();
         let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! Tables of corners, in the columns of Caliscope: `sync_index, cam_id, ..., keypoint_id, img_loc_x, img_loc_y, board_loc_x, board_loc_y`.
+//! Tables of corners with the columns of Caliscope: `sync_index, cam_id, ..., keypoint_id, img_loc_x, img_loc_y, board_loc_x, board_loc_y`.
 
 use core::fmt::Write as _;
 use std::collections::BTreeMap;
@@ -8,34 +8,34 @@ use calibration::board::Sight;
 use failure::{ExitKind, Failure};
 use nalgebra::Point2;
 
-/// The largest number of a corner that is accepted.
+/// Limit on the number of a corner.
 const MOST_CORNERS: usize = 100_000;
 
-/// Sights by camera, and the points of the board.
+/// Sights of all cameras, and the points of the board.
 type Read = (Vec<Sight>, Vec<Point2<f64>>);
 
-/// Corners with their numbers.
+/// Corners with their numbers on the board.
 type Corners = Vec<(usize, Point2<f64>)>;
 
-/// Reads a table of corners that were found by another program, or by this one.
+/// Reads a table of corners that this or another program has found.
 ///
-/// * `names`: the cameras; a `cam_id` is one of them, or the number that one of them ends with.
-/// * Returns the sights, and the points of the board by their numbers (metres); numbers that do not occur have (0, 0).
+/// * `names`: the names of the cameras. A `cam_id` is one of these names, or the number at the end of one.
+/// * Returns the sights, and the points of the board by their numbers, in metres. A number that does not occur has the point (0, 0).
 ///
 /// # Errors
 ///
-/// A file that cannot be read, lacks a column, or has a row that makes no sense; each names it.
+/// Fails if the file cannot be read, lacks a column, or has an invalid row. The message names the column or row.
 pub fn read_corners(path: &Path, names: &[String]) -> Result<Read, Failure> {
     let text = failure::read_text(path)?;
     parse_corners(&text, names)
         .map_err(|error| Failure::new(ExitKind::Input, format!("{}: {error}", path.display())))
 }
 
-/// The text of such a table, as [`read_corners`].
+/// Parses the text of a table of corners, like [`read_corners`].
 ///
 /// # Errors
 ///
-/// A description of the mistake in the table.
+/// Fails with a description of the mistake in the table.
 pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
@@ -57,7 +57,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     for (nth, row) in reader.records().enumerate() {
         let row = row.map_err(|error| error.to_string())?;
         let cell = |which: usize| row.get(columns[which]).unwrap_or_default().trim();
-        let wrong = |which: usize| format!("row {}: {:?} is no number", nth + 2, cell(which));
+        let wrong = |which: usize| format!("row {}: {:?} is not a number", nth + 2, cell(which));
         let whole = |which: usize| {
             without_fraction(cell(which))
                 .parse::<usize>()
@@ -72,10 +72,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         };
         let (frame, id) = (whole(0)?, whole(2)?);
         if id >= MOST_CORNERS {
-            return Err(format!(
-                "row {}: {id} is not the number of a corner",
-                nth + 2
-            ));
+            return Err(format!("row {}: {id} is not a corner number", nth + 2));
         }
         if board.len() <= id {
             board.resize(id + 1, Point2::origin());
@@ -85,7 +82,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         groups.entry((camera, frame)).or_default().push((id, at));
     }
     if groups.is_empty() {
-        return Err(format!("no corner of the cameras {}", names.join(", ")));
+        return Err(format!("no corners of the cameras {}", names.join(", ")));
     }
     let sights = groups
         .into_iter()
@@ -93,7 +90,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     Ok((sights.collect(), board))
 }
 
-/// A whole number without the fraction that tables of floating-point numbers give it: `3` of `3.0`.
+/// Removes the zero fraction of a whole number in a floating-point column: `3.0` becomes `3`.
 pub(super) fn without_fraction(number: &str) -> &str {
     match number.split_once('.') {
         Some((whole, zeros)) if is_digits(whole) && zeros.bytes().all(|byte| byte == b'0') => whole,
@@ -117,21 +114,21 @@ fn camera_named(names: &[String], id: &str) -> Option<usize> {
     })
 }
 
-/// Writes sights as a table.
+/// Writes sights as a table of corners.
 ///
 /// # Errors
 ///
-/// The file cannot be written.
+/// Fails if the file cannot be written.
 pub fn write_corners(path: &Path, sights: &[Sight], names: &[String]) -> Result<(), Failure> {
     let text = corners_text(sights, names);
     files::replace(path, text.as_bytes()).map_err(|error| failure::in_file(path, &error))
 }
 
-/// The text of such a table.
+/// Returns the text of a table of corners.
 ///
 /// # Panics
 ///
-/// If a sight is of a camera beyond the names.
+/// Panics if the camera index of a sight has no name in `names`.
 pub fn corners_text(sights: &[Sight], names: &[String]) -> String {
     let mut text =
         "sync_index,cam_id,keypoint_id,img_loc_x,img_loc_y,board_loc_x,board_loc_y\n".to_owned();
@@ -139,7 +136,7 @@ pub fn corners_text(sights: &[Sight], names: &[String]) -> String {
         for ((id, at), on_board) in sight.points.iter().zip(&sight.on_board) {
             let (frame, camera) = (sight.frame, &names[sight.camera]);
             let [x, y] = [on_board.x, on_board.y];
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             writeln!(
                 text,
                 "{frame},{camera},{id},{:.4},{:.4},{x},{y}",
@@ -167,7 +164,7 @@ mod tests {
         assert_eq!(read_corners(&path, &names).unwrap(), (sights, board));
         let text = std::fs::read_to_string(&path).unwrap();
         parse_corners(&text.replace("cam_7", "7"), &names).unwrap();
-        // As pandas writes columns that had a gap.
+        // Pandas writes whole numbers like this if the column has a gap.
         let floats = text.replace("35,cam_7,0,", "35.0,7.0,0.00,");
         assert_ne!(floats, text);
         let floats = parse_corners(&floats.replace("cam_7", "7.0"), &names).unwrap();

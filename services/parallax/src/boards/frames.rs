@@ -1,4 +1,4 @@
-//! Which pictures of different cameras were taken at the same time.
+//! Assignment of pictures to frames: pictures of different cameras with the same frame were taken at the same time.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,17 +6,17 @@ use std::path::Path;
 use super::corners::without_fraction;
 use failure::{ExitKind, Failure, OrFail as _};
 
-/// The most rows of a table.
+/// Limit on the rows of a table.
 const MOST_ROWS: usize = 10_000_000;
 
-/// For each camera of a table the frame that its n-th picture belongs to.
+/// For each camera of a table, the frame of its n-th picture.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FrameTable {
     frames: BTreeMap<String, Vec<usize>>,
 }
 
 impl FrameTable {
-    /// The frames of a camera: of its name, or of a number that its name ends with.
+    /// Returns the frames of a camera. The table has its name, or the number at the end of its name.
     pub fn of(&self, camera: &str) -> Option<&[usize]> {
         let digits =
             camera.len() - camera.trim_end_matches(|letter: char| letter.is_ascii_digit()).len();
@@ -25,18 +25,18 @@ impl FrameTable {
         found.map(Vec::as_slice)
     }
 
-    /// The cameras that it knows.
+    /// Returns the cameras of the table.
     pub fn cameras(&self) -> impl Iterator<Item = &str> {
         self.frames.keys().map(String::as_str)
     }
 }
 
-/// Reads a table with the columns `sync_index` and `cam_id`, as Caliscope writes it: the n-th row of a camera is the n-th
+/// Reads a table with the columns `sync_index` and `cam_id`, as Caliscope writes it. The n-th row of a camera belongs to the n-th
 /// picture of its video.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, without these columns, or with a row that has no whole numbers.
+/// Fails if the file cannot be read, lacks these columns, or has a row without whole numbers.
 pub fn read_frames(path: &Path) -> Result<FrameTable, Failure> {
     let text = failure::read_text(path)?;
     table(&text)
@@ -60,14 +60,15 @@ fn table(text: &str) -> Result<FrameTable, String> {
             .map_err(|error| format!("row {}: sync_index {:?}: {error}", nth + 2, cell(sync)))?;
         frames.entry(without_fraction(cell(camera)).to_owned()).or_default().push(frame);
     }
-    // The pictures of a video are in the order of time, whatever the order of the rows.
+    // Pictures of a video are ordered by time, but the rows may be in any order.
     for list in frames.values_mut() {
         list.sort_unstable();
     }
     Ok(FrameTable { frames })
 }
 
-/// The frame of a picture without a table: its time in steps of the slowest camera's rate if rates differ, else its number.
+/// Returns the frame of a picture if there is no table. If the frame rates differ, this is the picture's time, counted in intervals of the
+/// slowest camera; otherwise it is the picture's number.
 pub(crate) fn by_clock(index: u64, time_s: Option<f64>, slowest_hz: Option<f64>) -> usize {
     match (time_s, slowest_hz) {
         (Some(time_s), Some(rate_hz)) => (time_s * rate_hz).round().max(0.0) as usize,
@@ -75,7 +76,7 @@ pub(crate) fn by_clock(index: u64, time_s: Option<f64>, slowest_hz: Option<f64>)
     }
 }
 
-/// The rate by which frames are counted, if the cameras' rates are known and differ.
+/// Returns the lowest frame rate, if all rates are known and not all are equal.
 pub(crate) fn slowest(rates_hz: &[Option<f64>]) -> Option<f64> {
     let known: Option<Vec<f64>> = rates_hz.iter().copied().collect();
     let known = known.filter(|rates| rates.len() > 1)?;
@@ -84,18 +85,18 @@ pub(crate) fn slowest(rates_hz: &[Option<f64>]) -> Option<f64> {
     (most > 1.001 * least).then_some(least)
 }
 
-/// The table beside the first camera's file, if it has one.
+/// Reads the table in the folder of the first camera's file, if there is one.
 ///
 /// # Errors
 ///
-/// As [`read_frames`].
+/// Fails like [`read_frames`].
 pub(crate) fn beside(path: &str) -> Result<Option<FrameTable>, Failure> {
     let table = Path::new(path).with_file_name("timestamps.csv");
     if !table.is_file() {
         return Ok(None);
     }
     let text = files::read_text(&table, files::SETTINGS).or_fail(ExitKind::Input)?;
-    // One of another kind is not for us.
+    // A table with other columns is ignored: another program wrote it.
     Ok(self::table(&text).ok())
 }
 

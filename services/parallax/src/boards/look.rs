@@ -1,4 +1,4 @@
-//! The board looked for in the pictures of every camera.
+//! Search for the board in the pictures of every camera.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,31 +12,31 @@ use rayon::prelude::*;
 use super::frames::{beside, by_clock, slowest};
 use super::{CameraFootage, FrameTable, Looked, Seen, footage_failure};
 
-/// Number of pictures in which the board must be read in one way before this is assumed of the camera.
+/// A property of a camera's pictures (mirrored, inverted) is assumed for all of them after this many pictures agree.
 const SURE: usize = 3;
 
-/// How footage is looked at.
+/// Settings of the search.
 #[derive(Debug, Clone, Default)]
 pub struct LookSettings {
-    /// Every n-th frame; chosen by `most` if not set.
+    /// Search every n-th frame. If not set, chosen so that at most `most` pictures are searched.
     pub every: Option<usize>,
-    /// The most pictures of a camera that are looked at.
+    /// Maximum number of pictures to search, per camera.
     pub most: usize,
-    /// The number of pictures of each path that are looked at, from the first; all if not set.
+    /// Number of pictures to search in each path, from the first. If not set, all of them.
     pub first: Option<u64>,
-    /// Which pictures belong together; the table beside the first video if not set.
+    /// Assignment of pictures to frames. If not set, the table beside the first video is used.
     pub frames: Option<FrameTable>,
 }
 
-/// A picture with the board.
+/// A picture in which the board was found.
 struct Sighting {
     frame: usize,
-    /// The path, and the picture of it.
+    /// Index of the path, and index of the picture in that path.
     picture: [usize; 2],
     found: Found,
 }
 
-/// Search result of one camera's footage.
+/// Result of the search in one camera's footage.
 struct Raw {
     size: [u32; 2],
     n_pictures: usize,
@@ -44,11 +44,11 @@ struct Raw {
     nothing: BTreeMap<Nothing, usize>,
 }
 
-/// Looks for a board in all footage.
+/// Searches all footage for a board.
 ///
 /// # Errors
 ///
-/// Footage that cannot be read, tables that do not fit it; [`ExitKind::Interrupted`].
+/// Fails if footage cannot be read, or a table does not fit the footage. Fails with [`ExitKind::Interrupted`] on a stop request.
 pub fn look(
     board: &Board,
     cameras: &[CameraFootage],
@@ -112,7 +112,7 @@ pub fn look(
     Ok(agreed(&finder, raw))
 }
 
-/// Pictures that belong together, if a table says so.
+/// Returns the table that assigns pictures to frames, if there is one.
 fn frame_table(
     cameras: &[CameraFootage],
     settings: &LookSettings,
@@ -123,7 +123,9 @@ fn frame_table(
         (None, Some(first)) if cameras.len() > 1 => {
             let table = beside(&first.paths[0])?;
             if table.is_some() {
-                console.message("frames by timestamps.csv beside the footage");
+                console.message(
+                    "pictures are assigned to frames by timestamps.csv beside the footage",
+                );
             }
             table
         }
@@ -140,7 +142,7 @@ fn unknown(table: &FrameTable, camera: &str) -> Failure {
             known.join(", ")
         ),
     )
-    .with_hint("name the footage as NAME=PATH, with the name or number from the table")
+    .with_hint("pass the footage as NAME=PATH, with the name or number from the table")
 }
 
 struct CameraTask<'a> {
@@ -173,7 +175,7 @@ impl CameraTask<'_> {
                 return Err(Failure::new(
                     ExitKind::Input,
                     format!(
-                        "{path}: {}x{}, other pictures of {} have {}x{}",
+                        "{path}: {}x{} pixels, but other pictures of {} have {}x{}",
                         size[0], size[1], self.camera.name, raw.size[0], raw.size[1]
                     ),
                 ));
@@ -222,7 +224,7 @@ impl CameraTask<'_> {
     }
 }
 
-/// Returns the properties that the pictures of a camera so far agree about.
+/// Returns the properties on which all pictures of a camera agree so far.
 fn hints(found: &[Sighting]) -> Hints {
     let all_same = |property: &dyn Fn(&Found) -> usize| {
         let first = property(&found.first()?.found);
@@ -235,13 +237,13 @@ fn hints(found: &[Sighting]) -> Hints {
     }
 }
 
-/// The board that most pictures have, and what each camera saw of it.
+/// Chooses the variant of the board that most pictures show, and collects what each camera saw of it.
 fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
     let mut votes = vec![0; finder.variants().len()];
     for it in raw.iter().flat_map(|camera| &camera.found) {
         votes[it.found.variant] += it.found.corners.len();
     }
-    // The first of the best: the board as it was said to be.
+    // With equal votes the first variant wins: the board as the user named it.
     let best = (0..votes.len()).rev().max_by_key(|i| votes[*i]).unwrap_or(0);
     let variant = &finder.variants()[best];
     let cameras = raw.into_iter().enumerate().map(|(camera, raw)| {

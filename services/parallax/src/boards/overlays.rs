@@ -1,4 +1,4 @@
-//! The pictures whose corners fit worst, with what was seen and what was expected drawn into them.
+//! The pictures with the largest residuals. Detected and expected corners are drawn into them.
 
 use calibration::board::{Outcome, Residual};
 use failure::Failure;
@@ -6,30 +6,30 @@ use footage::{ACCENT, Canvas, LEFT, RIGHT, Size, Source, SourceSpec};
 
 use super::{CameraFootage, Seen, footage_failure};
 
-/// Room around the corners, pixels.
+/// Margin around the corners, in pixels.
 const MARGIN: f64 = 40.0;
-/// How much longer residuals are drawn than they are.
+/// Magnification of the drawn residuals.
 const LONGER: f64 = 20.0;
 const JPEG_QUALITY: u8 = 80;
 
 /// A picture of a board with its residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overlay {
-    /// The camera.
+    /// Index of the camera.
     pub camera: usize,
-    /// The frame.
+    /// Number of the frame.
     pub frame: usize,
-    /// Root mean square of its residuals, pixels.
+    /// Root mean square of the picture's residuals, in pixels.
     pub rms_px: f64,
     /// The part of the picture around the board.
     pub jpeg: Vec<u8>,
 }
 
-/// The worst pictures, at most `most`, not more than a third of them of one camera.
+/// Returns the pictures with the largest residuals: at most `most`, and at most a third of them from one camera.
 ///
 /// # Errors
 ///
-/// Footage that cannot be read again.
+/// Fails if the footage cannot be read again.
 pub fn worst(
     outcome: &Outcome,
     cameras: &[CameraFootage],
@@ -75,7 +75,7 @@ pub fn worst(
     Ok(overlays)
 }
 
-/// The part of a picture around its corners, with the residuals.
+/// Returns the part of a picture around its corners, with the residuals drawn in.
 fn drawn(
     camera: &CameraFootage,
     [path, nth]: [usize; 2],

@@ -1,4 +1,4 @@
-//! From footage of a board to a rig: look, calibrate, judge.
+//! From footage of a board to a rig: search the pictures, calibrate the cameras, judge the result.
 
 use std::path::PathBuf;
 
@@ -13,68 +13,69 @@ use nalgebra::Point2;
 
 use super::{CameraFootage, LookSettings, Looked, Overlay, look, read_corners, worst};
 
-/// The pictures that fit worst and are shown.
+/// Number of worst-fitting pictures in the report.
 const WORST: usize = 8;
-/// Pictures of a camera in which other boards are looked for, if none of the one that was named is found.
+/// Number of pictures per camera that are searched for other boards if the named board is not found.
 const GUESSED_PICTURES: usize = 6;
 
-/// The fewest pictures of each side of a board by which one camera shows that it has two, or two cameras that they stand on both.
+/// Number of pictures of each side of a board that prove a board with two sides. One camera sees both sides, or two cameras see one side
+/// each.
 const LEAST_OF_EACH: usize = 3;
 
 /// Settings of a calibration from a board.
 #[derive(Debug, Clone)]
 pub struct BoardSettings {
-    /// The board.
+    /// The board that the user named.
     pub board: Board,
-    /// The cameras.
+    /// Footage of the cameras.
     pub cameras: Vec<CameraFootage>,
-    /// How footage is looked at.
+    /// Settings of the search for the board.
     pub look: LookSettings,
-    /// A table of corners that is read instead.
+    /// Table of corners to read instead of searching the pictures.
     pub corners: Option<PathBuf>,
-    /// Cameras whose intrinsics are kept, by name.
+    /// Cameras whose intrinsics are kept. Cameras are matched by name.
     pub known: Option<Rig>,
-    /// Kind of lens that is determined.
+    /// Lens model to estimate.
     pub lens: LensKind,
-    /// True if the poses are wanted.
+    /// True if camera poses are estimated, not only intrinsics.
     pub wants_rig: bool,
-    /// The most frames that are used.
+    /// Maximum number of frames to use.
     pub most_frames: usize,
-    /// Mirrored pictures are meant to be.
+    /// True if the user knows that all footage is mirrored.
     pub is_mirrored: bool,
-    /// Back of the board, where it is known.
+    /// Back of the board, if the user names it.
     pub back: Option<Back>,
 }
 
 /// The back of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Back {
-    /// The mirror image of the front, corner on corner: from behind, every corner is where it is.
+    /// The mirror image of the front: each corner is at the same place on both sides.
     Mirrored,
-    /// Nothing: mirrored codes are those of mirrored pictures.
+    /// Blank: if codes look mirrored, the picture is mirrored.
     Blank,
 }
 
-/// Origin of mirrored codes.
+/// Explanation of mirrored codes.
 enum Mirrored {
-    /// No mirrored codes were seen, or the option says it, or a camera saw both sides.
+    /// Nothing is open: no mirrored codes were seen, an option explains them, or a camera saw both sides.
     Known,
-    /// A board with two sides, or the pictures of these cameras: the adjustment decides.
+    /// The board has two sides, or these cameras have mirrored pictures. The adjustment decides.
     Asked(Vec<usize>),
 }
 
-/// A calibration, with what it is of.
+/// A calibration with its inputs.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
-    /// Task of the adjustment.
+    /// Input of the adjustment.
     pub task: Task,
-    /// Sights of the board; `None` where corners were read.
+    /// Sights of the board; `None` if the corners were read from a table.
     pub looked: Option<Looked>,
-    /// Outcome of the adjustment.
+    /// Result of the adjustment.
     pub outcome: Outcome,
-    /// The board.
+    /// The board that was found.
     pub board: Board,
-    /// Remarks for the user: how the board differs from the given one, inverted pictures.
+    /// Notes for the user, for example about inverted pictures, or a board that differs from the named one.
     pub notes: Vec<String>,
 }
 
@@ -82,7 +83,7 @@ pub struct Calibrated {
 ///
 /// # Errors
 ///
-/// Inputs that cannot be read or do not fit one another, and what [`adjust`] refuses; each with what to try.
+/// Fails if inputs cannot be read or do not fit one another, or if [`adjust`] refuses them. Each message says what to try.
 pub fn calibrate(
     settings: &BoardSettings,
     stop: &Stop,
@@ -110,7 +111,7 @@ pub fn calibrate(
         for (name, seen) in task.names.iter().zip(&looked.cameras) {
             if 2 * seen.n_inverted > seen.sights.len() {
                 notes.push(format!(
-                    "{name}: black and white are exchanged in its pictures"
+                    "{name}: black and white are exchanged in the pictures"
                 ));
             }
         }
@@ -128,8 +129,8 @@ pub fn calibrate(
     let outcome = outcome.map_err(|error| refused(&error, looked.as_ref(), &task))?;
     if let Some(it) = outcome.out_of_step {
         notes.push(format!(
-            "boards fit each camera alone to {:.2} px, all together to {:.2} px with focal lengths changed by up to {:.1} %: the pictures of a frame \
-             were not taken at the same time. The lens of each camera follows from its own pictures, and the places of \
+            "boards fit each camera alone to {:.2} px, but all cameras together to {:.2} px, with focal lengths changed by up to {:.1} %: the pictures of a frame \
+             were not taken at the same time. The lens of each camera was found from its own pictures, and the poses of \
              the cameras from the frames in which the board moves least",
             it.alone_px,
             it.together_px,
@@ -147,23 +148,23 @@ pub fn calibrate(
     })
 }
 
-/// Cameras of one name are refused.
+/// Fails if two cameras have the same name.
 fn refuse_twins(names: &[String]) -> Result<(), Failure> {
     for (nth, name) in names.iter().enumerate() {
         if names[..nth].contains(name) {
             return Err(
                 Failure::new(ExitKind::Usage, format!("two cameras are named {name}"))
-                    .with_hint("name them: NAME=PATH"),
+                    .with_hint("give them different names: NAME=PATH"),
             );
         }
     }
     Ok(())
 }
 
-/// Footage that was looked at, sights, the points of the board, the sizes of the pictures.
+/// Result of the search, sights, points of the board, and picture size of each camera.
 type Sighted = (Option<Looked>, Vec<Sight>, Vec<Point2<f64>>, Vec<[u32; 2]>);
 
-/// Returns the sights of the board: read from a table, or looked for.
+/// Returns the sights of the board, read from a table or found in the pictures.
 fn sighted(
     settings: &BoardSettings,
     names: &[String],
@@ -187,8 +188,9 @@ fn sighted(
     Ok((Some(looked), sights, points, sizes))
 }
 
-/// Mirrored codes. Of a board with the mirror image on its back they are right: a camera behind it sees every corner where it is. In mirrored
-/// footage they are an error, unless it is meant to be mirrored; then the board is one in a mirror.
+/// Explains mirrored codes. They are right if the back of the board has the mirror image of the front: a camera behind the board sees
+/// every corner at its place. In mirrored footage they are an error, unless the user says that the footage is mirrored. Then the board
+/// is replaced by its mirror image.
 fn mirrored(
     settings: &BoardSettings,
     looked: &Looked,
@@ -207,7 +209,7 @@ fn mirrored(
     if settings.back.is_none() && !settings.is_mirrored {
         if looked.cameras.iter().any(|seen| sees_both(&seen)) {
             notes.push(
-                "a camera saw codes both ways round: the back of the board has the mirror image of its front".to_owned(),
+                "a camera saw both normal and mirrored codes: the back of the board has the mirror image of its front".to_owned(),
             );
             return Ok(Mirrored::Known);
         }
@@ -226,14 +228,13 @@ fn mirrored(
     turned(&mut task.board);
     task.sights.iter_mut().for_each(|sight| turned(&mut sight.on_board));
     notes.push(
-        "all footage is mirrored: left and right of what is found with this rig are exchanged"
-            .to_owned(),
+        "all footage is mirrored: this rig exchanges left and right in its results".to_owned(),
     );
     Ok(Mirrored::Known)
 }
 
-/// Returns true if cameras that see the back of a board stand behind it, by those that see the front. Where the pictures are mirrored and
-/// the board has one side, every picture puts the camera elsewhere.
+/// Returns true if the cameras that see the back of the board are behind it, according to the cameras that see the front. If instead the
+/// pictures are mirrored and the board has one side, every picture gives another camera position.
 fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
     let crosses = |pair: &&Together| {
         pair.cameras.iter().filter(|camera| behind.contains(camera)).count() == 1
@@ -249,12 +250,12 @@ fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
 fn two_sided(names: &[String], behind: &[usize]) -> String {
     let names: Vec<&str> = behind.iter().map(|behind| names[*behind].as_str()).collect();
     format!(
-        "{} saw the back of the board: it has the mirror image of the front, and the cameras agree about that",
+        "{} saw the back of the board: it has the mirror image of the front, and the positions of the cameras confirm this",
         names.join(", ")
     )
 }
 
-/// Mirrored codes that no board with two sides explains.
+/// Returns the failure for mirrored codes that a board with two sides does not explain.
 fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
     let is_all = cameras.len() == names.len();
     let named: Vec<&str> = cameras.iter().map(|camera| names[*camera].as_str()).collect();
@@ -264,19 +265,19 @@ fn left_is_right(names: &[String], cameras: &[usize]) -> Failure {
         named.join(", ")
     };
     let message = format!(
-        "{which} saw the codes of the board mirrored: its back has the mirror image of the front, or the pictures are mirrored"
+        "{which} saw mirrored codes: either the back of the board has the mirror image of the front, or the pictures are mirrored"
     );
     let more = if is_all {
-        "; or pass --mirrored, which calibrates mirrored footage as it is, if all recordings are mirrored"
+        "; or, if all recordings are mirrored, pass --mirrored to calibrate mirrored footage"
     } else {
         ""
     };
     Failure::new(ExitKind::Input, message).with_hint(format!(
-        "for a board with two sides pass --back mirrored; if the pictures are mirrored (a preview of a webcam), switch mirroring off in the camera and record again{more}"
+        "for a board with two sides, pass --back mirrored; if the pictures are mirrored (as in a webcam preview), switch mirroring off in the camera and record again{more}"
     ))
 }
 
-/// The intrinsics that are kept.
+/// Returns the intrinsics to keep, by camera.
 fn known(
     rig: Option<&Rig>,
     names: &[String],
@@ -290,7 +291,7 @@ fn known(
                 Err(Failure::new(
                     ExitKind::Calibration,
                     format!(
-                        "camera {name}: its intrinsics are for {}x{} pixels, its footage has {}x{}",
+                        "camera {name}: the intrinsics are for {}x{} pixels, but the footage has {}x{}",
                         known[0], known[1], size[0], size[1]
                     ),
                 ))
@@ -306,18 +307,18 @@ fn known(
             Err(Failure::new(
                 ExitKind::Usage,
                 format!(
-                    "--known has the cameras {}, none of {}",
+                    "--known has the cameras {}, but none of {}",
                     there.join(", "),
                     names.join(", ")
                 ),
             )
-            .with_hint("name the footage as the calibration names its cameras: NAME=PATH"))
+            .with_hint("pass the footage as NAME=PATH, with the names from the calibration"))
         }
         _ => Ok(known),
     }
 }
 
-/// Nothing at all was found: what may be there instead.
+/// Returns the failure if no picture shows the board, with a hint about what the pictures may show instead.
 fn nowhere(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Failure {
     let pictures: usize = looked.cameras.iter().map(|camera| camera.n_pictures).sum();
     let failure = Failure::new(
@@ -328,7 +329,7 @@ fn nowhere(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Failure {
     failure.with_hint(guess.unwrap_or_else(|| reasons(looked)))
 }
 
-/// Markers of another dictionary.
+/// Looks for markers of another dictionary, and describes them.
 fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<String> {
     if settings.board.kind == Kind::Chessboard {
         return None;
@@ -339,7 +340,7 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
         every: Some(most.div_ceil(GUESSED_PICTURES).max(1)),
         ..settings.look.clone()
     };
-    // The largest of each family has the codes of the smaller ones.
+    // The largest dictionary of each family contains the codes of the smaller ones.
     let largest = dictionary_names().filter(|dictionary_name| {
         !["_50", "_100", "_250"].iter().any(|small| dictionary_name.ends_with(small))
     });
@@ -353,7 +354,7 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
         let found = look(&board, &settings.cameras[..1], &settings_of, stop, &quiet).ok()?;
         if !found.sights().is_empty() {
             return Some(format!(
-                "there are markers of {name}: --board {}",
+                "the pictures show markers of {name}: try --board {}",
                 found.board
             ));
         }
@@ -361,26 +362,26 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
     None
 }
 
-/// Why pictures had no board, as a hint.
+/// Returns a hint that explains why the board was not found.
 fn reasons(looked: &Looked) -> String {
     use calibration::boards::Nothing;
 
     let most = looked.cameras.iter().flat_map(|camera| &camera.nothing).max_by_key(|reason| {
-        // What says more goes first.
+        // More informative reasons come first.
         let says = !matches!(reason.0, Nothing::NoGrid | Nothing::NoMarkers);
         (says, reason.1)
     });
     match most.map(|most| most.0) {
         Some(Nothing::OtherGrid { columns, rows }) => format!(
-            "a chessboard of {columns}x{rows} inner corners is there: inner corners are counted, not squares"
+            "the pictures show a chessboard with {columns}x{rows} inner corners: give the number of inner corners, not of squares"
         ),
         Some(Nothing::Elsewhere { n_markers }) => format!(
-            "markers are there (up to {n_markers} in a picture), but not where this board has them: are its counts and dictionary right?"
+            "there are markers (up to {n_markers} in a picture), but in other places than on this board: are its numbers of squares and its dictionary right?"
         ),
         Some(Nothing::NoCorners) => {
-            "the board is there, but its corners are not sharp: move it more slowly, with more light".to_owned()
+            "there is a board, but its corners are not sharp: move it more slowly, or use more light".to_owned()
         }
-        _ => "is it the right kind of board, and large enough in the pictures (squares of 15 px and more)?".to_owned(),
+        _ => "is this the right kind of board, and is it large enough in the pictures (squares of at least 15 px)?".to_owned(),
     }
 }
 
@@ -391,12 +392,12 @@ fn refused(error: &BoardError, looked: Option<&Looked>, task: &Task) -> Failure 
             let seen = nth.and_then(|nth| looked?.cameras.get(nth));
             seen.map_or_else(String::new, |seen| {
                 let n = seen.sights.len();
-                format!("{n} of its {} pictures show some of the board; {}", seen.n_pictures, looked.map_or_else(String::new, reasons))
+                format!("{n} of {} pictures show a part of the board; {}", seen.n_pictures, looked.map_or_else(String::new, reasons))
             })
         }
-        BoardError::NoStart { .. } => "try --lens fisheye for a wide lens".to_owned(),
+        BoardError::NoStart { .. } => "for a wide lens, try --lens fisheye".to_owned(),
         BoardError::Apart { .. } => {
-            "if boards were seen together, the frames do not belong together: --timestamps, or start the videos at the same time".to_owned()
+            "if two cameras saw the board at the same time, their pictures are assigned to wrong frames: pass --timestamps, or start the videos at the same time".to_owned()
         }
         BoardError::NotFinite => "try fewer coefficients (--lens five), or known intrinsics (--known)".to_owned(),
     };
@@ -415,30 +416,30 @@ impl Calibrated {
         each.map(|doubt| doubt.text(&self.task.names)).collect()
     }
 
-    /// The cameras as a rig; all at the origin where poses were not wanted.
+    /// Returns the cameras as a rig. If poses were not estimated, all cameras are at the origin.
     ///
     /// # Errors
     ///
-    /// Numbers that no camera has.
+    /// Fails if the calibration has numbers that no camera can have.
     pub fn rig(&self) -> Result<Rig, Failure> {
         let cameras: Vec<Camera> =
             self.outcome.cameras.iter().map(|camera| camera.camera.clone()).collect();
         let mut source = format!("calibrate board {}", self.board);
         if !self.task.wants_rig {
-            source += "; intrinsics alone: the poses are not known";
+            source += "; intrinsics only, without poses";
         }
         if !self.outcome.doubts.is_empty() {
-            source += "; not to be trusted: ";
+            source += "; doubtful: ";
             source += &self.doubts().join("; ");
         }
         Rig::new(cameras, None, source).or_fail(ExitKind::Calibration)
     }
 
-    /// The report.
+    /// Returns the report as a page.
     ///
     /// # Errors
     ///
-    /// Footage that cannot be read again for the worst pictures.
+    /// Fails if the footage of the worst pictures cannot be read again.
     pub fn page(
         &self,
         cameras: &[CameraFootage],

@@ -18,23 +18,23 @@ use trials::bench::{self, Kind, Report};
 pub(crate) enum Command {
     /// Measure one hop between two processes, without a deployment.
     Transport(transport::Arguments),
-    /// Measure the latency of a deployment from picture to result, stage by stage, also with a dead camera.
+    /// Measure the latency of a deployment from picture to result, stage by stage, also after a camera has died.
     Latency(load::Arguments),
-    /// Measure how many frames per second a deployment processes when none is dropped.
+    /// Measure how many frames per second a deployment processes if no frame is dropped.
     Throughput(load::Arguments),
     /// Measure the latency with one camera, with two, and so on.
     Scale(load::Arguments),
-    /// Measure the search of frames by the filters, on the GPU and on the processor.
+    /// Measure how fast the filters search frames, on the GPU and on the processor.
     Gpu(gpu::Arguments),
     /// Run the receiving process of `transport`.
     #[command(hide = true)]
     Receive(Receiver),
 }
 
-/// The arguments of the receiving process.
+/// Arguments of the receiving process.
 #[derive(Debug, Args)]
 pub(crate) struct Receiver {
-    /// The launch arguments, from the sending process.
+    /// Launch arguments, passed by the sending process.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     rest: Vec<OsString>,
 }
@@ -45,15 +45,15 @@ struct Output {
     /// Print the numbers as JSON.
     #[arg(long)]
     json: bool,
-    /// Append the numbers with date, machine, commit and settings to a file, as Markdown.
+    /// Append the numbers to a Markdown file, with date, machine, commit and settings.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
 }
 
 /// The exit codes of all benchmarks.
 const EXITS: &str = "\
-Exit codes: 0 measured, and every limit that was asked for held; 6 a limit was missed (the report says which); 1 it \
-could not be measured; 2 the command line is wrong; 3, 4, 5 the deployment or its inputs are wrong, as for `run`; \
+Exit codes: 0 measured, and within all given limits; 6 a limit was exceeded (the report says which); 1 the measurement \
+failed; 2 the command line is wrong; 3, 4, 5 the deployment or its inputs are wrong, as for `run`; \
 130 stopped by Ctrl-C.";
 
 /// Runs the benchmark.
@@ -79,12 +79,12 @@ pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failu
     }
 }
 
-/// Prints the report, and appends it to the record. Returns the exit code.
+/// Prints the report, appends it to the file of measurements, and returns the exit code.
 ///
-/// * `report`: none if the benchmark was interrupted.
+/// * `report`: `None` if the benchmark was interrupted.
 fn publish(report: Option<Report>, to: &Output, globals: Globals) -> Result<ExitCode, Failure> {
     let Some(report) = report else {
-        output::message("stopped: nothing is reported");
+        output::message("stopped: there is no report");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if let Some(file) = &to.record {

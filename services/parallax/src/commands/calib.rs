@@ -24,13 +24,14 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Check units, handedness and image sizes; with detections, check that each view's own poses agree with the rig.
-    #[command(after_help = "Ends with 5 if something is probably wrong.")]
+    /// Check units, handedness and image sizes. With --detections, also check that each view's own poses agree with the rig.
+    #[command(after_help = "The exit code is 5 if something is probably wrong.")]
     Check {
         #[command(flatten)]
         input: Input,
-        /// Each view's own poses of one person: `pose2d.jsonl` of a run on uncropped footage. Poses after fusion are not used:
-        /// they are projections of one solution, and agree with any rig.
+        /// Poses that each view found alone: `pose2d.jsonl` of a run with one person and uncropped footage. Poses after fusion are not
+        /// used,
+        /// because they are projections of one solution and agree with any rig.
         #[arg(long, value_name = "FILE")]
         detections: Option<PathBuf>,
         /// Print JSON.
@@ -47,7 +48,7 @@ Examples:
     Convert {
         #[command(flatten)]
         input: Input,
-        /// The file to write; for `humaneva` and `umpm` a folder that exists.
+        /// The file to write, or an existing folder for `humaneva` and `umpm`.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
         /// Format of the file to write.
@@ -56,16 +57,18 @@ Examples:
     },
 }
 
-/// The files to read, and values that may be missing in them.
+/// The files to read, and values that the files may lack.
 #[derive(Debug, Args)]
 pub(crate) struct Input {
     /// The calibration file, or one file per camera.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Unit of lengths, if the format does not define it: m, cm, mm, ft, in, or a length such as 30mm, of a calibration in squares.
+    /// Unit of length, if the format does not define it: m, cm, mm, ft, or in. For a calibration in squares of a board, the size of a
+    /// square,
+    /// such as 30mm.
     #[arg(long)]
     unit: Option<Unit>,
-    /// Direction against gravity in the world, if the file does not give it.
+    /// Upward direction in the world, if the file does not give it.
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_hyphen_values = true)]
     up: Option<Vec<f64>>,
     /// Image size in pixels, if the file does not give it.
@@ -78,11 +81,11 @@ pub(crate) struct Input {
 pub(crate) enum To {
     /// Parallax's own.
     Rig,
-    /// Pose2Sim, Caliscope and similar programs.
+    /// Parallax's own rig file.
     Pose2sim,
-    /// anipose and `FreeMoCap`: the same in millimetres.
+    /// TOML of Pose2Sim, Caliscope and similar programs.
     Anipose,
-    /// OpenCV YAML.
+    /// TOML of anipose and `FreeMoCap`: as `pose2sim`, but in millimetres.
     Opencv,
     /// One `.cal` file per camera.
     Humaneva,
@@ -91,7 +94,7 @@ pub(crate) enum To {
 }
 
 impl To {
-    /// As `geometry` has it.
+    /// Returns the format of the crate `geometry`.
     pub(crate) fn format(self) -> Format {
         match self {
             Self::Rig => Format::Own,
@@ -105,12 +108,14 @@ impl To {
 }
 
 impl Input {
-    /// * `lenses_suffice`: whether cameras without a place are read, too.
+    /// Reads the calibration.
+    ///
+    /// * `lenses_suffice`: true to accept cameras without a position.
     fn read(&self, lenses_suffice: bool) -> Result<Rig, Failure> {
         let up = match self.up.as_deref() {
             Some(&[x, y, z]) => {
                 let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
-                let message = format!("--up {x} {y} {z} is no direction");
+                let message = format!("--up {x} {y} {z} is not a direction");
                 Some(up.ok_or(message).or_fail(ExitKind::Usage)?)
             }
             _ => None,
@@ -164,7 +169,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             up.x, up.y, up.z
         ))?,
         None => output::line(
-            "which way is up is not known: a run finds it, or `up` in its deployment sets it",
+            "the upward direction is not known: a run finds it, unless `up` in its deployment sets it",
         )?,
     }
     for camera in rig.cameras() {
@@ -179,7 +184,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
                 centre.x, centre.y, centre.z
             )
         } else {
-            "place not known".to_owned()
+            "position not known".to_owned()
         };
         output::line(format_args!(
             "  {:<10} {}x{} px, f ({:.1}, {:.1}), c ({:.1}, {:.1}), {place}",
@@ -249,7 +254,7 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
         }
         output::line(survey_text(&geometry::survey(rig)))?;
         if findings.is_empty() {
-            output::line("OK: nothing odd was found; compare these numbers with a tape measure")?;
+            output::line("OK: no problems were found; check these numbers with a tape measure")?;
         }
         for camera in report.iter().flat_map(|report| &report.errors.cameras) {
             output::line(format_args!(
@@ -270,7 +275,7 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
     })
 }
 
-/// The numbers of a rig that can be compared with a tape measure.
+/// Formats the numbers of a rig that can be compared with a tape measure.
 fn survey_text(survey: &Survey) -> String {
     let mut lines = vec![format!("{} cameras", survey.cameras.len())];
     for place in &survey.cameras {
@@ -282,18 +287,18 @@ fn survey_text(survey: &Survey) -> String {
     }
     if let Some([least, most]) = survey.apart_m {
         lines.push(format!(
-            "distance of two cameras: {least:.2} to {most:.2} m"
+            "distances between cameras: {least:.2} to {most:.2} m"
         ));
     }
     lines.push(match survey.shared {
         Some(Shared { sides_m: [x, y, z], volume_m3 }) => format!(
-            "space that all cameras see: {volume_m3:.1} m3 in a box of {x:.1} x {y:.1} x {z:.1} m around the middle"
+            "volume that all cameras see: {volume_m3:.1} m3, in a box of {x:.1} x {y:.1} x {z:.1} m around the middle"
         ),
-        None => "space that all cameras see: none".to_owned(),
+        None => "volume that all cameras see: none".to_owned(),
     });
     if let Some(mm) = survey.error_mm {
         lines.push(format!(
-            "a point in the middle that is off by 1 px in every view is off by {mm:.1} mm in space"
+            "an error of 1 px in every view moves a point in the middle by {mm:.1} mm"
         ));
     }
     lines.join("\n")

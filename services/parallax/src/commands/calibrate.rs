@@ -1,4 +1,4 @@
-//! `parallax calibrate`: cameras calibrated from what they see. One file a subcommand.
+//! `parallax calibrate`: calibrates cameras from their footage. Each subcommand has its own file.
 
 mod board;
 mod misfits;
@@ -18,13 +18,13 @@ use terminal::Globals;
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Find lenses and places of cameras from a board that is moved about; draw boards to print.
+    /// Find lenses and poses of cameras from a board that is moved around, or draw a board to print.
     Board(Box<board::Arguments>),
-    /// Put the origin of a rig on the floor, by a board, three points, or people who stand.
+    /// Move the origin of a rig to the floor, using a board, three points, or people who stand on it.
     Origin(Box<origin::Arguments>),
-    /// Find the places of a deployment's cameras from people who walk about.
+    /// Find the poses of a deployment's cameras from people walking about.
     People(Box<people::Arguments>),
-    /// Improve a rig by a recording, or correct it after a camera was moved.
+    /// Improve a rig with footage of a person, or correct it after a camera was moved.
     Refine(Box<refine::Arguments>),
 }
 

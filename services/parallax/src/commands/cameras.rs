@@ -1,4 +1,4 @@
-//! `parallax cameras`: the video devices of this machine, and pictures of live cameras.
+//! `parallax cameras`: lists the video devices of this machine, and takes pictures with live cameras.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,22 +27,22 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Take a picture of a live camera.
+    /// Take a picture with a live camera.
     View(ViewArguments),
 }
 
 /// Options of `parallax cameras view`.
 #[derive(Debug, Args)]
 struct ViewArguments {
-    /// The camera: a source such as `/dev/video0` or `rtsp://...`, or with --deployment its name there.
+    /// The camera: a source such as `/dev/video0` or `rtsp://...`, or its name in the deployment of --deployment.
     camera: String,
-    /// The deployment file of the camera, with its format, size, rate and controls.
+    /// Deployment file that describes the camera: format, size, rate and controls.
     #[arg(long, value_name = "FILE")]
     deployment: Option<PathBuf>,
     /// The PNG file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Number of pictures to skip first, so that exposure settles.
+    /// Number of pictures to skip first, so that the exposure can settle.
     #[arg(long, value_name = "N", default_value_t = 5)]
     skip: usize,
 }
@@ -68,15 +68,15 @@ fn view(arguments: &ViewArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The camera that is asked for.
+/// Returns the camera that the arguments name.
 fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
     let name = &arguments.camera;
     let Some(file) = &arguments.deployment else {
         let address = LiveAddress::parse(name).ok_or_else(|| {
-            let message = format!("{name:?} is no live camera");
+            let message = format!("{name:?} is not a live camera");
             Failure::new(ExitKind::Usage, message).with_hint(
-                "a live camera is /dev/video0, rtsp://..., udp://... or http://...; for the name of a camera give its \
-                 deployment too: --deployment my.toml",
+                "a live camera is /dev/video0, rtsp://..., udp://... or http://...; to name a camera of a deployment, \
+                 also pass --deployment my.toml",
             )
         })?;
         return Ok(LiveCamera::new(address));
@@ -92,7 +92,7 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
         let names: Vec<&str> = live.map(|camera| camera.name.as_str()).collect();
         let message = format!("{} has no live camera {name:?}", file.display());
         let hint = if names.is_empty() {
-            "it has none".to_owned()
+            "it has no live cameras".to_owned()
         } else {
             format!("it has {}", names.join(", "))
         };
@@ -100,7 +100,7 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
     })
 }
 
-/// A video device with what it offers.
+/// A video device with its formats and controls.
 struct Found {
     path: PathBuf,
     stable: Vec<PathBuf>,
@@ -128,8 +128,8 @@ fn list(as_json: bool) -> Result<ExitCode, Failure> {
     }
     if found.is_empty() {
         output::line(
-            "no video devices here (/dev/video*): plug in a camera; in a container, pass its device in. Cameras of a network \
-             are not listed: `parallax cameras view rtsp://... --out shot.png` takes a picture of one",
+            "no video devices (/dev/video*): plug in a camera; in a container, pass its device in. Network cameras \
+             are not listed: `parallax cameras view rtsp://... --out shot.png` takes a picture with one",
         )?;
     }
     for it in &found {
@@ -153,7 +153,7 @@ fn look(path: &Path) -> Result<Found, VideoError> {
     })
 }
 
-/// The names of a device that stay when it is plugged in again.
+/// Returns the names of a device that do not change when it is plugged in again.
 fn stable_names(path: &Path) -> Vec<PathBuf> {
     let folders = ["/dev/v4l/by-id", "/dev/v4l/by-path"];
     let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
@@ -201,7 +201,7 @@ fn text(it: &Found) -> String {
     let rate = it
         .mode
         .rate_hz
-        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} a second"));
+        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} per second"));
     let about = &it.about;
     let mut lines = vec![
         format!(
@@ -225,7 +225,7 @@ fn text(it: &Found) -> String {
             let rates: Vec<String> =
                 size.rates_hz.iter().map(|rates_hz| format!("{rates_hz:.2}")).collect();
             lines.push(format!(
-                "    {} at {} a second",
+                "    {} at {} per second",
                 size.text(),
                 rates.join(", ")
             ));

@@ -9,51 +9,52 @@ use terminal::{Globals, output};
 use trials::chaos::{self, Options, Scenario};
 
 const HELP: &str = "\
-Every scenario is a separate run with real processes and a real fault; --list names them. Without a DEPLOYMENT the \
-cameras are the four synthetic ones of `parallax demo`. A DEPLOYMENT keeps its mode, pace, deadline and hang limit. \
-Its own results stay: those of a scenario go to OUT/<scenario>. It may run at the same time, because its \
-name becomes <name>-chaos.
+Each scenario is a separate run with real processes and a real fault. --list lists the scenarios. Without a DEPLOYMENT, \
+the four synthetic cameras of `parallax demo` are used. A DEPLOYMENT keeps its mode, pace, deadline and hang limit. \
+Its own results are not touched: each scenario writes to OUT/<scenario>. The DEPLOYMENT itself may run at the same time, \
+because the trial uses the name <name>-chaos.
 
-Limits when a process is killed: its death is noticed within a second; it is back within --max-return-ms; if the others \
-do not depend on it, no pause between two results is longer than --max-pause-ms; every frame of every view is accounted \
-for, except two that the process may have held; no other process failed; the run ends without help; nothing is left in \
-shared memory.
+When a process is killed, the following limits apply. Its death is noticed within a second. The process is back within \
+--max-return-ms. If the other processes do not depend on it, no pause between two results is longer than --max-pause-ms. \
+Every frame of every view is accounted for, except two frames that the process may have been processing. No other process \
+fails. The run ends on its own. Nothing is left in shared memory.
 
-hang-...: a stopped process is noticed within three heartbeats (450 ms, or \
-supervise.missed_beats of the deployment) plus a second; the time of the heartbeats is added to --max-return-ms.
+hang-...: a process is stopped. This is noticed within three heartbeats (450 ms, or \
+supervise.missed_beats of the deployment) plus a second. The time of the heartbeats is added to --max-return-ms.
 
-spin-...: a process in an endless loop sends heartbeats but makes no progress. With realtime delivery it is noticed once an iteration has \
-taken as much processor time as that limit, and three times as much as any frame before; with lossless delivery, once its main loop \
-has made no progress for three seconds, which the scenario sets (supervise.hang_limit_s).
+spin-...: a process enters an endless loop. It sends heartbeats, but makes no progress. With realtime delivery, this is noticed \
+when an iteration has taken as much processor time as three heartbeats (450 ms), and three times as much as any earlier frame. With lossless \
+delivery, it is noticed when the main loop has made no progress for three seconds. The scenario sets this limit (supervise.hang_limit_s).
 
-kill-random: every killed \
-process comes back (--max-return-ms for 99 of 100). In a long run (one with nine samples, a second apart, at which all \
-processes worked), memory may grow from start to end by a tenth and 32 MB, compared at equal ages of the processes; \
-descriptors and files may grow by a tenth and 8. A run longer than --part-seconds is also reported in parts.
+kill-random: processes chosen at random are killed. Every killed process comes back, and 99 of 100 do so within --max-return-ms. \
+In a long run, memory may grow from start to end by a tenth plus 32 MB, compared at equal ages of the processes. Descriptors \
+and files may grow by a tenth plus 8. A run is long if it has nine samples, a second apart, at which all processes worked. \
+A run longer than --part-seconds is also reported in parts.
 
-kill-supervisor: its processes end \
-within a second, and the next start of the same deployment removes the leftovers, and works.
+kill-supervisor: the supervisor is killed. Its processes end within a second. The next start of the same deployment removes \
+the leftovers, and succeeds.
 
-camera-...: a camera fails for a fifth of the footage (as by `fault` in a deployment): its \
-frames have the status of the fault, the results of the other cameras go on (--max-pause-ms), and the camera is used in \
-results again within --max-return-ms. camera-moved: one camera of the rig is turned by two degrees: it must be \
-identified, and no other, which takes four cameras and some seconds of results.
+camera-...: a camera fails for a fifth of the footage, like with `fault` in a deployment. The camera's frames have the status of \
+the fault, and results from the other cameras continue (--max-pause-ms). The camera is used in results again within --max-return-ms.
 
-stall-results: the process `results` \
-is stopped for three seconds and then resumed: with realtime delivery, results continue at half the rate at least; with \
-lossless delivery, nothing is lost.
+camera-moved: one camera of the rig is rotated by two degrees. This camera must be identified, and no other. \
+The scenario needs four cameras and some seconds of results.
 
-cut-link and kill-host (builds with the feature hosts): the deployment runs as two hosts on this machine, each with half of the cameras, and a relay \
-between them. The relay is cut for three seconds, or the host with cameras is killed and restarted. The other host must notice it, use the views again \
-within --max-return-ms, and account for every frame of them. They need a DEPLOYMENT in real time with a rate, and four cameras.
+stall-results: the process `results` is stopped for three seconds, then resumed. With realtime delivery, results continue at half \
+the rate or more. With lossless delivery, nothing is lost.
 
-A process is back when it has sent its first message that contributes to a result. Results do not name fuse, quality and \
-results; these are back when they report that they have worked. The number of restarts is not limited here \
+cut-link and kill-host (only in builds with the feature hosts): the deployment runs as two hosts on this machine, connected by a relay. \
+Each host has half of the cameras. The relay is cut for three seconds, or the host with cameras is killed and restarted. The other host \
+must notice this, use the views again within --max-return-ms, and account for every frame of these views. Both scenarios need a \
+DEPLOYMENT in real time with a rate and four cameras.
+
+A process is back when it has sent its first message that contributes to a result. Results do not name the processes fuse, quality and \
+results. These are back when they report that they have worked. During the trial, the number of restarts is not limited \
 (supervise.max_restarts), and no overlays are drawn.
 
-The report is written to OUT/chaos.json; --json prints it too.
+The report is written to OUT/chaos.json. --json also prints it.
 
-Exit codes: 0 all limits held; 6 a limit was missed (the table names it); 1 the trial failed; 2 the command line is \
+Exit codes: 0 all limits were met; 6 a limit was exceeded (the table says which); 1 the trial failed; 2 the command line is \
 wrong; 130 stopped by Ctrl-C.
 
 Examples:
@@ -66,27 +67,27 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The deployment file; four synthetic cameras if not given.
+    /// The deployment file. If not given, four synthetic cameras are used.
     deployment: Option<PathBuf>,
-    /// The scenarios, separated by commas; if not given, all that the deployment's processes allow.
+    /// The scenarios, separated by commas. If not given, all that the processes of the deployment allow.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Scenario::by_name)]
     scenario: Vec<Scenario>,
     /// List the scenarios and exit.
     #[arg(long)]
     list: bool,
-    /// Seed of the choice of processes and cameras, and of the synthetic scene.
+    /// Seed for the synthetic scene, and for the random choice of processes and cameras.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Length of the footage of every run, seconds; on a busy machine the start uses up some of it.
+    /// Length of the footage of every run, in seconds. On a busy machine, starting the processes uses up some of it.
     #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u32).range(4..=36_000))]
     seconds: u32,
-    /// Length of the parts in which a run of kill-random is reported, seconds.
+    /// Length of the parts into which the report of kill-random divides a long run, in seconds.
     #[arg(long, value_name = "S", default_value_t = 600, value_parser = clap::value_parser!(u32).range(1..))]
     part_seconds: u32,
-    /// The folder for the report and the results.
+    /// Folder for the report and the results.
     #[arg(long, value_name = "DIR", default_value = "out/chaos")]
     out: PathBuf,
-    /// Name of the deployment during the trial, unique among those that run at the same time.
+    /// Name of the deployment during the trial. It must be unique among running deployments.
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Configurable limits.
@@ -101,11 +102,11 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, milliseconds; for a process that results do
-    /// not name, until it reports work.
+    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For processes that results do
+    /// not name, the time until the process reports work.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while a process that the others do not need is missing, milliseconds.
+    /// Longest pause between results while a process is missing that the other processes do not need, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }
@@ -137,7 +138,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Ok(ExitCode::SUCCESS);
     }
     let Some(outcome) = chaos::run(&arguments.options(), globals.verbosity())? else {
-        output::message("stopped: nothing is judged, and no report written");
+        output::message("stopped: no limits were checked, and no report was written");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if arguments.json {

@@ -13,20 +13,20 @@ use terminal::output;
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Print every value with its meaning and its origin.
+    /// Print every setting with its value, meaning and origin.
     Show(Arguments),
-    /// Check the file, and that its inputs can be read.
+    /// Check the file, and check that its inputs can be read.
     Check(Arguments),
     /// Print the JSON schema of deployment files, for editors.
     #[command(after_help = SCHEMA_HELP)]
     Schema,
-    /// Print every key with its type and its meaning.
+    /// Print every key with its type and meaning.
     Keys(Keys),
 }
 
 const SCHEMA_HELP: &str = "\
 The schema (JSON Schema, draft 2020-12) lets an editor complete and explain the keys of a deployment file, and mark unknown
-ones. `config check` finds the rest, such as values that contradict each other.
+keys. `config check` finds other mistakes, such as values that contradict each other.
 
 For VS Code with \"Even Better TOML\", and other editors that use taplo:
     parallax config schema > parallax.schema.json
@@ -36,7 +36,7 @@ and as the first line of the deployment file:
 /// Options of `config keys`.
 #[derive(Debug, Args)]
 pub(crate) struct Keys {
-    /// Print the settings reference: Markdown, one table per section.
+    /// Print the settings reference in Markdown, with one table per section.
     #[arg(long)]
     markdown: bool,
 }
@@ -103,7 +103,7 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The entries as the lines of a complete deployment file, with the origin of every value.
+/// Returns the lines of a complete deployment file, with the origin of every value.
 fn document(entries: &[Entry]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut section = "";
@@ -119,7 +119,7 @@ fn document(entries: &[Entry]) -> Vec<String> {
         lines.push(match &entry.value {
             Some(value) => format!("{name} = {value}  # {}", entry.origin.name()),
             None if entry.key == "capture.scale" && is_by_itself => {
-                format!("# {name} is chosen by the run: `run --dry-run` shows it")
+                format!("# the run chooses {name}: `run --dry-run` shows it")
             }
             None => format!("# {name} is not set"),
         });

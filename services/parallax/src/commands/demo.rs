@@ -1,4 +1,4 @@
-//! `parallax demo`: a whole deployment of four synthetic cameras, one of whose processes is killed, and a report.
+//! `parallax demo`: runs a deployment of four synthetic cameras, kills one of its processes, and writes a report.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,31 +12,34 @@ use trials::demo::{self, Options};
 use super::view;
 
 const HELP: &str = "\
-The demo needs nothing but this program: the capture processes render pictures of a synthetic person during the run (see \
-`parallax-lab synth --help`), and the network that ships finds the joints. Four cameras around the person, 320x240 pixels, capture in \
-real time. A measurement of about two seconds chooses the frame rate: frames are rendered and searched on all \
-cores, beside any other load. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
-or busy machine is reported with numbers. Below 2.5 frames a second every frame is searched for the person, which takes \
-longer. Every stage and camera is a separate process, as in `parallax run`. After two \
-fifths of the frames, the process of camera c3 is killed (SIGKILL), as in a crash: the other three go on, the \
-supervisor restarts it, and it continues with the current frame.
+The demo needs only this program. The capture processes render pictures of a synthetic person during the run (see \
+`parallax-lab synth --help`), and the shipped network finds the joints. Four cameras around the person capture 320x240 pixels in \
+real time. Every stage and camera is a separate process, as in `parallax run`. After two fifths of the frames, the process of \
+camera c3 is killed (SIGKILL), as in a crash. The other three cameras continue. The supervisor restarts the process, which continues with \
+the current frame.
 
-OUT holds report.html (open it in a browser: the skeleton in space, beside the truth; the views of every \
-result; the cost of the kill; latency of every stage; the account of all frames; pictures with skeletons), report.json \
-(the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs them again), and run/ with the \
-results of the run. Files of an earlier demo are replaced.
+The frame rate is chosen by a measurement of about two seconds, in which frames are rendered and searched on all cores. Other \
+programs that run at that time slow the measurement down. The rate is at most 5 frames per second, and computing takes at most half of the time between \
+two frames. If the machine is slow or busy, the demo says so, with numbers. Below 2.5 frames per second, every frame is searched for the person, which takes \
+longer.
 
-The demo checks limits that a broken pipeline would miss: --min-results of the frames have a result, --min-skeletons of \
-these a skeleton, and PCP3D over all of them is at least --min-pcp3d; the killed camera is back within --max-return-ms; \
-meanwhile there are results of the others, if it was away for longer than the interval of results and the deadline of a \
-stage, with no pause longer than --max-pause-ms; every frame of every view is accounted for, except two that the killed \
-process may have held; no other process failed; all results were written.
-Limits on times are for a machine that keeps up with 5 frames a second. At a lower frame rate --max-return-ms grows in \
-proportion to the interval of frames (by 20 at most). The time that one frame takes on all cores is measured before \
-and after the run; if the longer one is above 100 ms, --max-pause-ms (20 times 100 ms) grows in proportion. A stage waits for \
-1.5 intervals of frames, at least 500 ms. With --rate nothing is measured or scaled.
+OUT contains report.html, report.json with the same numbers, deployment.toml and rig.toml, and run/ with the \
+results of the run. Open report.html in a browser. It shows the skeleton in space beside the truth, the views of every \
+result, the cost of the kill, the latency of every stage, the account of all frames, and pictures with skeletons. \
+`parallax run OUT/deployment.toml` runs the deployment again. Files of an earlier demo are replaced.
 
-Exit codes: 0 all limits held; 6 a limit was missed (the report says which); 1 the run failed; 2 the command line is \
+The demo checks limits that a broken pipeline would exceed. At least --min-results of the frames have a result, at least --min-skeletons of \
+the results have a skeleton, and PCP3D over all results is at least --min-pcp3d. The killed camera is back within --max-return-ms. \
+Meanwhile there are results from the other cameras, with no pause longer than --max-pause-ms. This is checked only if the camera was away for \
+longer than the interval of results and the deadline of a stage. Every frame of every view is accounted for, except two frames that the killed \
+process may have been processing. No other process fails, and all results are written.
+
+Limits on times are for a machine that keeps up with 5 frames per second. At a lower frame rate, --max-return-ms grows in \
+proportion to the interval between frames, at most by a factor of 20. The time for one frame on all cores is measured before \
+and after the run. If the longer of the two is above 100 ms, --max-pause-ms (20 times 100 ms) grows in proportion. A stage waits for \
+1.5 frame intervals, at least 500 ms. With --rate, nothing is measured or scaled.
+
+Exit codes: 0 all limits were met; 6 a limit was exceeded (the report says which); 1 the run failed; 2 the command line is \
 wrong; 130 stopped by Ctrl-C.
 
 Examples:
@@ -49,40 +52,40 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The folder for the report and the run.
+    /// Folder for the report and the run.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     out: PathBuf,
-    /// Frames per camera; if not given, those of twenty seconds, at least 30.
+    /// Frames per camera. If not given, the frames of twenty seconds, at least 30.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     frames: Option<u64>,
-    /// Duration of the run, seconds; instead of --frames.
+    /// Duration of the run in seconds, instead of --frames.
     #[arg(long, value_name = "S", conflicts_with = "frames", value_parser = clap::value_parser!(u32).range(2..=36_000))]
     seconds: Option<u32>,
-    /// Frames per second; if not given, as many as this machine can process, at most 5.
+    /// Frames per second. If not given, as many as this machine can process, at most 5.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// The action of the person; `parallax-lab synth --help` lists them.
+    /// Action of the person. `parallax-lab synth --help` lists the actions.
     #[arg(long, value_name = "NAME", default_value = "walking", value_parser = action)]
     action: Action,
-    /// Number of the person: shape, clothes, way of moving.
+    /// Number of the person, which determines shape, clothes and style of movement.
     #[arg(long, value_name = "N", default_value_t = 1)]
     subject: u64,
     /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// How long a stage waits for a late view, milliseconds; if not given, 500, or more on a slow machine.
+    /// Time that a stage waits for a late view, in milliseconds. If not given, 500, or more on a slow machine.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     deadline_ms: Option<u64>,
-    /// Kill no process.
+    /// Do not kill a process.
     #[arg(long)]
     no_kill: bool,
     /// Configurable limits.
     #[command(flatten)]
     limits: Limits,
-    /// Name of the deployment, unique among those that run at the same time.
+    /// Name of the deployment. It must be unique among running deployments.
     #[arg(long, value_name = "NAME", default_value = "demo")]
     name: String,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
+    /// Serve a page about the run while it runs, on this machine only. `parallax view --help` describes the page.
     #[arg(long)]
     view: bool,
     /// Print the report as JSON.
@@ -94,20 +97,20 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Least share of frames with a result, percent; slow machines drop frames, which are counted.
+    /// Minimum share of frames with a result, in percent. Slow machines drop frames, and dropped frames count as frames without a result.
     #[arg(long, value_name = "PERCENT", default_value_t = 10.0)]
     min_results: f64,
-    /// Least share of results with a skeleton, percent.
+    /// Minimum share of results with a skeleton, in percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 90.0)]
     min_skeletons: f64,
-    /// Least PCP3D at gamma 0.5 over all results, percent.
+    /// Minimum PCP3D at gamma 0.5 over all results, in percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
     min_pcp3d: f64,
-    /// Longest time until a frame of the killed camera is used in a result again, milliseconds, on a machine that keeps
+    /// Longest time until a frame of the killed camera is used in a result again, in milliseconds. The limit is for a machine that keeps
     /// up with 5 frames per second.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while the killed camera is away, milliseconds, on a machine that keeps up with
+    /// Longest pause between results while the killed camera is away, in milliseconds. The limit is for a machine that keeps up with
     /// 5 frames per second.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
@@ -151,7 +154,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let outcome = demo::run(&arguments.options(), globals.verbosity());
     drop(page);
     let Some(outcome) = outcome? else {
-        output::message("stopped: nothing is judged, and no report written");
+        output::message("stopped: no limits were checked, and no report was written");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if arguments.json {

@@ -1,4 +1,4 @@
-//! `parallax status` and `parallax clean`: running deployments, and the remains of dead ones in shared memory.
+//! `parallax status` and `parallax clean`: list running deployments, and the shared memory that dead ones left behind.
 
 use std::process::ExitCode;
 
@@ -9,16 +9,16 @@ use runtime::{Namespace, Remains, deployments};
 use serde_json::{Value, json};
 use terminal::output;
 
-/// The status of a directory that does not belong to a deployment.
-const UNMARKED: &str = "not a deployment: left alone";
+/// Shown for a directory that does not belong to a deployment.
+const UNMARKED: &str = "not a deployment: ignored";
 
 /// Options of `parallax status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-With a DEPLOYMENT it prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages
-(`parallax top --help` explains them). Times are in milliseconds, memory in bytes with --json.")]
+With a DEPLOYMENT, prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages. \
+`parallax top --help` explains the table. With --json, times are in milliseconds, and memory is in bytes.")]
 pub(crate) struct StatusArguments {
-    /// Name of a running deployment, or its file: show its processes and their times.
+    /// Name or file of a running deployment whose processes and times are shown.
     deployment: Option<String>,
     /// Print JSON.
     #[arg(long)]
@@ -28,14 +28,14 @@ pub(crate) struct StatusArguments {
 /// Options of `parallax clean`.
 #[derive(Debug, Args)]
 pub(crate) struct CleanArguments {
-    /// Names of dead deployments; all if none is given.
+    /// Names of dead deployments. If none is given, all dead deployments.
     names: Vec<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Lists the deployments of this user, or shows the processes of one.
+/// Lists the deployments of this user, or shows the processes of one deployment.
 pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     if let Some(named) = &arguments.deployment {
         return status_of(named, arguments.json);
@@ -47,20 +47,20 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     if found.is_empty() {
-        output::message("no deployment runs, and none has left anything behind");
+        output::message("no deployment is running, and no dead one has left shared memory behind");
     }
     for deployment in &found {
         let name = deployment.namespace.name();
         let how = match deployment.supervisor {
             _ if !deployment.is_marked => UNMARKED.to_owned(),
             Some(pid) => format!(
-                "runs (process {pid}), {} processes",
+                "running (process {pid}), {} processes",
                 deployment.processes.len()
             ),
             None if deployment.processes.is_empty() => {
                 "dead: `parallax clean` removes it".to_owned()
             }
-            None => format!("dead, but for {}", deployment.processes.join(", ")),
+            None => format!("dead, except for {}", deployment.processes.join(", ")),
         };
         output::line(format_args!("{name:<32} {:>10}  {how}", size(deployment)))?;
     }
@@ -79,12 +79,12 @@ fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Removes the remains of dead deployments of this user; running ones are not touched.
+/// Removes the shared memory of this user's dead deployments. Running deployments are not touched.
 pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
     let found = deployments(&Namespace::usual_base())?;
     for name in &arguments.names {
         if !found.iter().any(|remains| remains.namespace.name() == name) {
-            let message = format!("there is nothing of a deployment {name:?}");
+            let message = format!("there is no shared memory of a deployment {name:?}");
             return Err(Failure::new(ExitKind::Usage, message));
         }
     }

@@ -26,38 +26,39 @@ const SIZE: usize = 1280;
 /// Default of `--overlap`.
 const OVERLAP: f64 = 0.1;
 
-/// The default detection threshold of the shipped model if its parts are printed, chosen by measurement; see [`Arguments`].
+/// Default threshold of the shipped model, if its parts are printed. The value was chosen by measurement.
 const SHIPPED_THRESHOLD: f64 = -0.5;
 
-/// The least heat where the detector that ships finds boxes.
+/// Default of `--heat` if the shipped detector finds the boxes.
 const LEAST_HEAT: f64 = 0.5;
 
 /// Options of `parallax detect`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Pictures are turned as their orientation tag (EXIF) says. Of a video every \
-frame is searched, or every n-th with --every. Unreadable pictures are named, the others are searched, and the exit code is 7 \
-(4 if nothing could be read).
+Pictures are rotated according to their orientation tag (EXIF). In a video every frame is searched, or every n-th frame with \
+--every. Pictures that cannot be read are listed, and the other pictures are searched. The exit code is then 7, or 4 if no picture \
+could be read.
 
-The detector that ships finds boxes, at most --max, and the network that ships finds the joints in them, as in a deployment. \
-People with less heat than --heat (mean over the joints) are left out. \
-Each person is printed once, in order of heat. --network and --detector name your own (docs/networks.md); --box gives the box.
+As in a deployment, the shipped detector finds boxes, and the shipped network finds the joints in each box. At most --max boxes are used. \
+A person's heat is the mean over the joints. People with less heat than --heat are left out. \
+Each person is printed once, in order of heat. Use --network and --detector for your own networks (docs/networks.md), and --box for \
+your own box.
 
-The detector that ships did not learn people who are less than an eighth of the picture high: crop the picture, or give --box.
+The shipped detector was not trained on people smaller than an eighth of the picture's height. For such people, crop the picture, or give --box.
 
-With --network none, and with --model, --joints or --joint-map, the parts of the filters are printed. A picture with a \
-side longer than --size is then reduced to that size, and the line says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
-about 150 pixels there are not found; --full searches all pixels, with about 460 bytes of memory for each. \
-The card configs/models/person.md has the false alarms for each --threshold.
+With --network none, --model, --joints or --joint-map, the filters find parts, and these are printed. A picture with a \
+side longer than --size is then scaled down to that size. The output says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
+about 150 pixels in the scaled picture are not found. --full searches all pixels, and needs about 460 bytes of memory per pixel. \
+The card configs/models/person.md lists the false alarms for each --threshold.
 
-With --json one line per image, best detection first:
-    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"detections\": [{\"score\": the
-     mean of its joints', \"box\": [x1, y1, x2, y2], \"box_from\": \"given\" or \"detector\", \"box_score\" (of a detector),
+With --json, one line per image, with the best detection first:
+    {\"image\", \"frame\" (of videos), \"width\", \"height\", \"network\", \"detections\": [{\"score\": mean
+     over the joints, \"box\": [x1, y1, x2, y2], \"box_from\": \"given\" or \"detector\", \"box_score\" (with a detector),
      \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}]}
-and by the filters alone
+and with the filters:
     {\"image\", \"frame\", \"width\", \"height\", \"searched\": [width, height], \"detections\": [{\"score\", \"level\", \"scale\",
      \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
-Coordinates are pixels of the whole image, turned as its tag says; the centre of its top-left pixel is (0, 0). Types and levels count from 1.
+Coordinates are pixels of the whole image, rotated according to its tag. The centre of its top-left pixel is (0, 0). Types and levels are counted from 1.
 
 Examples:
     parallax detect photo.jpg
@@ -71,28 +72,28 @@ pub(crate) struct Arguments {
     /// Images, folders of images, or videos.
     #[arg(required = true)]
     images: Vec<PathBuf>,
-    /// The model file; the person model that ships with Parallax if not given.
+    /// The model file. If not given, the person model that ships with Parallax.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Least heat of a person in a box of a detector: the mean over the joints, from 0 to 1; if not given, 0.5 with the detector that
-    /// ships, and 0 with --detector.
+    /// Minimum heat of a person in a box of a detector: the mean heat of the joints, from 0 to 1. If not given, 0.5 with the shipped
+    /// detector, and 0 with --detector.
     #[arg(long, value_name = "HEAT", value_parser = heat)]
     heat: Option<f64>,
-    /// Lowest score of a detection of the filters; if not given: -0.5 for the model that ships, for another model the trained
+    /// Minimum score of a detection by the filters. If not given, -0.5 for the shipped model. Other models use their trained
     /// threshold, but at most -1.
     #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
     threshold: Option<f64>,
-    /// Non-maximum suppression of the filters: the largest share of a better detection's boxes that a worse one may cover; if not
+    /// Non-maximum suppression of the filters: largest share of a better detection's boxes that a worse detection may cover. If not
     /// given, 0.1.
     #[arg(long, value_name = "SHARE")]
     overlap: Option<f64>,
-    /// Maximal number of detections per image.
+    /// Maximum number of detections per image.
     #[arg(long, value_name = "N", default_value_t = 100)]
     max: usize,
-    /// Longest side of an image that the filters search, pixels; larger images are scaled down. If not given, 1280.
+    /// Longest side of an image that the filters search, in pixels. Larger images are scaled down. If not given, 1280.
     #[arg(long, value_name = "PIXELS", value_parser = side)]
     size: Option<usize>,
-    /// The filters search all pixels, whatever the size of the image.
+    /// Let the filters search all pixels, however large the image is.
     #[arg(long, conflicts_with = "size")]
     full: bool,
     /// Search every n-th frame of a video.
@@ -104,49 +105,49 @@ pub(crate) struct Arguments {
     /// Print one line of JSON per image.
     #[arg(long)]
     json: bool,
-    /// Draw the detections into this folder, as PNG.
+    /// Draw the detections, and write the drawings to this folder as PNG files.
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
-    /// Draw thumbnails with the best detection of every image into this file, as PNG; for more than 40 images several
-    /// files, numbered before the extension.
+    /// Draw thumbnails with the best detection of every image into this PNG file. For more than 40 images, several
+    /// files are written, with numbers before the extension.
     #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
-    /// Joints of the filters: parse14 (if not given), umpm15 or humaneva20.
+    /// Joint set of the filters: parse14 (if not given), umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", value_parser = describe::joint_set)]
     joints: Option<&'static JointSet>,
-    /// Places of joints among the filters' parts: a file of `train joints`; "shipped" (if not given): the one for the model that
-    /// ships; "none": a joint is the centre of its part, as for other models.
+    /// Mapping from the filters' parts to joints: a file of `train joints`, "shipped" or "none". If not given, "shipped": the mapping for
+    /// the shipped model. With "none", and for other models, each joint is the centre of its part.
     #[arg(long, value_name = "FILE")]
     joint_map: Option<PathBuf>,
-    /// Find keypoints by this network (.onnx); "shipped": the one that ships; "none": parts by the filters. If not given, the one that
-    /// ships, unless --model, --joints or --joint-map is given.
+    /// Network (.onnx) that finds the keypoints, "shipped" or "none". With "none" the filters find parts instead. If not given, the
+    /// shipped network, unless --model, --joints or --joint-map is given.
     #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,
-    /// The card of the network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
+    /// Card of the network. If not given, the file beside the network with the ending .toml, or the network's entry `parallax.card`.
     #[arg(long, value_name = "CARD", requires = "network")]
     card: Option<PathBuf>,
-    /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the detector finds it.
+    /// Box around the person, in pixels of the picture: left, top, right, bottom. If not given, the detector finds the box.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, allow_hyphen_values = true)]
     outline: Option<Outline>,
-    /// Also show the mirror image of every person to the network, and use the mean: more exact, twice the time.
+    /// Also show the network the mirror image of every person, and use the mean. This is more exact, and takes twice the time.
     #[arg(long)]
     mirror: bool,
-    /// Find boxes by this detector of people (.onnx), in place of the one that ships.
+    /// Detector of people (.onnx) that finds the boxes, in place of the shipped one.
     #[arg(long, value_name = "FILE", conflicts_with = "outline")]
     detector: Option<PathBuf>,
-    /// The card of the detector; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
+    /// Card of the detector. If not given, the file beside the detector with the ending .toml, or the detector's entry `parallax.card`.
     #[arg(long, value_name = "CARD", requires = "detector")]
     detector_card: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// The network that finds the keypoints; none: the filters do.
+    /// Returns the network that finds the keypoints, or `None` if the filters find parts.
     ///
     /// # Errors
     ///
-    /// An option of the one, where the other does it.
+    /// Fails if an option of the filters is given with a network, or the other way round.
     fn network(&self) -> Result<Option<&Path>, Failure> {
-        /// Number of the options, from the first, that also choose the filters.
+        /// The first options of the list, this many, also choose the filters.
         const N_IMPLY: usize = 3;
         let of_filters = [
             (self.joints.is_some(), "--joints"),
@@ -182,14 +183,15 @@ impl Arguments {
         match wrong {
             None => Ok(network),
             Some((option, of, by, other)) => {
-                let message = format!("{option} is about {of}, but {by} finds the keypoints here");
+                let message =
+                    format!("{option} is an option of {of}, but {by} would find the keypoints");
                 let hint = format!("leave {option} out, or give --network {other}");
                 Err(Failure::new(ExitKind::Usage, message).with_hint(hint))
             }
         }
     }
 
-    /// The network, unless the filters find the parts, and the detector.
+    /// Loads the network and the detector. Returns `None` if the filters find the parts.
     fn eyes(&self, network: Option<&Path>) -> Result<Option<Eyes>, Failure> {
         let Some(file) = network else {
             return Ok(None);
@@ -211,7 +213,7 @@ impl Arguments {
         }))
     }
 
-    /// The frames of a video to search.
+    /// Returns the frames of a video to search.
     fn wanted(&self) -> Frames {
         Frames {
             every: self.every,
@@ -261,7 +263,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         0 => Ok(ExitCode::SUCCESS),
         n => {
             let message = format!(
-                "{n} of {} files could not be searched to their end",
+                "{n} of {} files could not be searched completely",
                 files.len()
             );
             let kind = if n_searched == 0 {
@@ -269,7 +271,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             } else {
                 ExitKind::Degraded
             };
-            Err(Failure::new(kind, message).with_hint("each is named above, with the cause"))
+            Err(Failure::new(kind, message).with_hint("the messages above say why"))
         }
     }
 }
@@ -317,7 +319,7 @@ impl Detector<'_> {
     ///
     /// # Errors
     ///
-    /// The inner failure concerns the file: the other files can still be searched. The outer one ends the command.
+    /// The inner failure concerns only this file: the other files can still be searched. The outer failure ends the command.
     fn file(
         &self,
         path: &Path,
@@ -357,7 +359,7 @@ impl Detector<'_> {
         }
     }
 
-    /// The longest side that is searched; none: all pixels.
+    /// Returns the longest side to search, in pixels, or `None` to search all pixels.
     fn longest(&self) -> Option<usize> {
         (!self.arguments.full).then(|| self.arguments.size.unwrap_or(SIZE))
     }
@@ -433,7 +435,7 @@ impl Detector<'_> {
         }
     }
 
-    /// Draws the detections if overlays are requested; the best one last, on top.
+    /// Draws the detections if overlays are requested. The best detection is drawn last, on top.
     fn draw(&self, picture: &Picture, searched: &Searched, found: &[Pose]) -> Result<(), Failure> {
         let Some(folder) = &self.arguments.overlay else {
             return Ok(());

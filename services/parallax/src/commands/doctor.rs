@@ -1,4 +1,4 @@
-//! `parallax doctor`: whether this machine has what Parallax needs, and what to do where it has not.
+//! `parallax doctor`: checks that this machine has what Parallax needs, and advises on what is missing.
 
 use std::process::{Command, ExitCode};
 
@@ -10,17 +10,17 @@ use rustix::process::{Resource, getrlimit};
 use serde_json::json;
 use terminal::output;
 
-/// Shared memory of four cameras of 640x480 pixels with the network that ships, and as much again, bytes.
+/// Recommended shared memory, in bytes: twice that of four cameras of 640x480 pixels with the shipped network.
 const SHARED_MEMORY: u64 = 512 << 20;
-/// Open files of a deployment of eight cameras in the process that has most.
+/// Open files of the process that has most, in a deployment of eight cameras.
 const OPEN_FILES: u64 = 1024;
-/// Stack of the main thread, bytes.
+/// Stack size of the main thread, in bytes.
 const STACK: u64 = 1 << 20;
 
 /// Options of `parallax doctor`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit code 0 if everything needed is there, 3 if something is missing; optional things do not count.
+The exit code is 0 if nothing is missing that Parallax needs, otherwise 3. Optional items do not affect the exit code.
 
 Examples:
     parallax doctor
@@ -31,7 +31,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// How much a finding matters.
+/// Importance of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Good,
@@ -49,7 +49,7 @@ impl State {
     }
 }
 
-/// One thing that was looked at.
+/// Result of one check.
 #[derive(Debug)]
 struct Finding {
     what: &'static str,
@@ -79,7 +79,7 @@ impl Finding {
     }
 }
 
-/// Looks at the machine.
+/// Checks the machine, and prints the findings.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut findings = vec![
         Finding::good("version", env!("PARALLAX_VERSION")),
@@ -120,19 +120,21 @@ fn processor() -> Finding {
     let isa = Isa::best().name();
     let found = Finding::good("processor", format!("{cores} cores, {isa}"));
     if isa == "portable" {
-        let advice = "without AVX2 everything is several times slower";
+        let advice = "without AVX2, Parallax is several times slower";
         return found.but(State::Note, advice);
     }
     if cores < 2 {
         return found.but(
             State::Note,
-            "one core: a camera or two at a few frames a second",
+            "one core is enough for one or two cameras at a few frames per second",
         );
     }
     found
 }
 
-/// * `without`: how much it matters that it is not there.
+/// Checks that a program can be run.
+///
+/// * `without`: state of the finding if the program is missing.
 fn program(name: &'static str, without: State) -> Finding {
     let run = Command::new(name).arg("-version").output();
     match run {
@@ -143,10 +145,10 @@ fn program(name: &'static str, without: State) -> Finding {
             Finding::good(name, words.unwrap_or_default())
         }
         Ok(output) => Finding::good(name, format!("ends with {}", output.status))
-            .but(without, "install it anew: Debian's package is `ffmpeg`"),
+            .but(without, "reinstall it: Debian's package is `ffmpeg`"),
         Err(error) => Finding::good(name, format!("cannot be run: {error}")).but(
             without,
-            "videos and live cameras need it: `apt install ffmpeg`; folders of pictures do not",
+            "needed for videos and live cameras, but not for folders of pictures: `apt install ffmpeg`",
         ),
     }
 }
@@ -159,8 +161,8 @@ fn shared_memory() -> Finding {
             if bytes >= SHARED_MEMORY {
                 return found;
             }
-            let advice = "four cameras need 100 to 500 MB (`parallax run FILE --dry-run` says how much): \
-                          `mount -o remount,size=1g /dev/shm`, in Docker --shm-size=1g";
+            let advice = "four cameras need 100 to 500 MB (`parallax run FILE --dry-run` shows how much): run \
+                          `mount -o remount,size=1g /dev/shm`, or in Docker pass --shm-size=1g";
             found.but(State::Note, advice)
         }
         Err(error) => Finding::good(what, error.to_string()).but(
@@ -174,8 +176,8 @@ fn limit(what: &'static str, resource: Resource, needed: u64, advice: &str) -> F
     match getrlimit(resource).current {
         None => Finding::good(what, "no limit"),
         Some(limit) if limit >= needed => Finding::good(what, format!("limit {limit}")),
-        Some(limit) => Finding::good(what, format!("limit {limit}, {needed} are needed"))
-            .but(State::Missing, format!("allow more: `{advice}`")),
+        Some(limit) => Finding::good(what, format!("limit {limit}, but {needed} are needed"))
+            .but(State::Missing, format!("raise the limit: `{advice}`")),
     }
 }
 
@@ -192,30 +194,33 @@ fn cameras() -> Vec<Finding> {
         Ok(_) => Finding::good(what, path.display().to_string()),
         Err(error) => Finding::good(what, format!("{}: {error}", path.display())).but(
             State::Note,
-            "`parallax cameras` says more; members of the group `video` may open it",
+            "`parallax cameras` shows the reason; often the user must be a member of the group `video`",
         ),
     });
     looked.collect()
 }
 
-/// Graphics cards, best first.
+/// Returns a finding per graphics card, best card first.
 fn adapters() -> Vec<Finding> {
     let what = "GPU";
     if !gpu::IS_BUILT {
         return vec![Finding::good(
             what,
-            "none is used: this build has no GPU support",
+            "not used: this build has no GPU support",
         )];
     }
     let all = gpu::adapters();
     if all.is_empty() {
-        let advice = "for a card install its driver and Vulkan: Debian's package is `libvulkan1`";
+        let advice = "to use a graphics card, install its driver and Vulkan (Debian's package is `libvulkan1`)";
         return vec![Finding::good(what, "no Vulkan adapter").but(State::Note, advice)];
     }
     let found = |adapter: &gpu::Adapter| {
         let found = Finding::good(what, adapter.to_string());
         if adapter.kind == gpu::Kind::Software {
-            return found.but(State::Note, "computes on the processor: for tests only");
+            return found.but(
+                State::Note,
+                "software rendering on the processor, for tests only",
+            );
         }
         found
     };
@@ -235,7 +240,10 @@ fn remains() -> Finding {
         format!("{running} running, {dead} left by dead processes"),
     );
     if dead > 0 {
-        return found.but(State::Note, "`parallax clean` removes what dead ones left");
+        return found.but(
+            State::Note,
+            "`parallax clean` removes the leftovers of dead deployments",
+        );
     }
     found
 }

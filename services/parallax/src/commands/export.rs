@@ -1,4 +1,4 @@
-//! `parallax export`: a finished run in the files of other tools.
+//! `parallax export`: exports a finished run to the formats of other tools.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,8 +9,9 @@ use launch::export::{Format, Given, Job, Lines, Naming, Origin, Trial, Written, 
 use nalgebra::{UnitVector3, Vector3};
 use terminal::{Globals, Terminal, output};
 
-/// Remark where the format is not in the build.
-const NO_PARQUET: &str = "this build writes none: cargo build --release --features parquet";
+/// Note for a build without the format.
+const NO_PARQUET: &str =
+    "this build cannot write parquet: cargo build --release --features parquet";
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 
@@ -21,28 +22,28 @@ Formats, their use and content:
     c3d        motion capture        points, mm, z up; residual: standard deviation, mm; a gap: residual -1
     trc        OpenSim               points, m, y up; a gap: NaN
     glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a missing bone
-    bvh        animation             bones of fixed length (medians), cm, y up; in a gap the last rotation stays
+    bvh        animation             bones of fixed length (medians), cm, y up; a gap: the last rotation is kept
     csv        tables                a row for each frame, m, axes of the rig; standard deviations
     csv-long   tables                a row for each joint of each frame: covariance, views, the reason for a gap
-    parquet    tables                the same; needs a build with `--features parquet`
+    parquet    tables                like csv-long; needs a build with `--features parquet`
     openpose   other pipelines       BODY_25 of the reprojected pose: a JSON file for each view and frame
     mp4        video players         every camera's pictures with the pose and its uncertainty; needs ffmpeg
     all        all of these
 
-With --from raw nothing is filled or smoothed: a joint that was not found or was refused is a gap. BVH has no gaps, and the command names the frames in which it \
-holds a bone. Frames are on the grid of the frame rate; dropped frames are gaps. NAME.export.json describes the \
-files, with the gaps of every joint. Files get their names when they are complete.
+With --from raw, nothing is filled or smoothed: a joint that was not found, or was refused, is a gap. BVH cannot represent gaps, so the command \
+lists the frames in which a bone keeps its last rotation. Frames are on the grid of the frame rate, and dropped frames are gaps. NAME.export.json describes the \
+files and the gaps of every joint. Each file gets its final name when it is complete.
 
-For several people every format that writes one file writes one for each person: NAME-person2.trc for the person with id 2. Keypoints and videos \
-hold all people. If no frame has two people, the files hold the followed person, and `ids` says who.
+If several people were found, most formats write one file per person, for example NAME-person2.trc for the person with id 2. Keypoints and videos \
+contain all people in one file. If no frame has two people, the files contain the followed person, whose ids are listed as `ids`.
 
-With --json one object, that of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"first_frame\", \
+With --json, prints one object, the content of NAME.export.json: {\"schema_version\", \"source\", \"trajectories\", \"frames\", \"first_frame\", \
 \"frame_step\", \"rate_hz\", \"irregular_times\", \"repeated_frames\", \"up_in_world\", \"points\", \"people\": [{\"ids\", \
 \"frames_with_points\", \"gaps\", \"filled\"}], \"flaws\", \"files\": [{\"format\", \"path\", \"unit\", \"axes\", \"gaps\", \"uncertainty\", \"notes\"}]}.
 
 Exit codes: 0 done; 2 the command line is wrong, or a file exists; 4 the run cannot be read, lacks data that a format needs, \
 or the folder cannot be written; 5 the calibration does not fit; 7 no frame has a joint, or the run is truncated, \
-damaged or not ended; 130 stopped by Ctrl-C.
+damaged or still running; 130 stopped by Ctrl-C.
 
 Examples:
     parallax export out/my --to c3d,glb
@@ -51,41 +52,41 @@ Examples:
     parallax export run.mcap --to glb,mp4
     parallax export out/photos --to bvh --rate 25 --up 0,0,1")]
 pub(crate) struct Arguments {
-    /// The folder that a run has written, or a recording (MCAP).
+    /// Folder of a finished run, or a recording (MCAP).
     source: PathBuf,
     /// The formats, separated by commas, or `all`.
     #[arg(long, value_name = "LIST", value_parser = formats)]
     to: Formats,
-    /// Trajectories of the run: as found, or as smoothed by `parallax smooth`.
+    /// Trajectories to export: as found, or as smoothed by `parallax smooth`.
     #[arg(long, value_enum, default_value_t = Trajectories::Raw)]
     from: Trajectories,
-    /// The folder for the files; if not given, `export` in the folder of the run, or the name of the recording with `-export` appended.
+    /// Folder for the files. If not given, `export` in the folder of the run. For a recording, its name with `-export` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Name of the files.
+    /// Base name of the files.
     #[arg(long, default_value = "pose3d", value_parser = name)]
     name: String,
-    /// Names of the joints in the files: `right_ankle` as in the run, or `RAnkle` as in Pose2Sim's OpenSim models.
+    /// Names of the joints in the files: `own` as in the run (`right_ankle`), or `opensim` as in Pose2Sim's OpenSim models (`RAnkle`).
     #[arg(long, value_enum, default_value_t = Names::Own)]
     names: Names,
-    /// Frames of the footage per second, for a run without a frame rate.
+    /// Frames of the footage per second, if the run has no frame rate.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// Upward direction in the world of the rig, in place of the calibration's: 0,0,1.
+    /// Upward direction in the world of the rig, for example 0,0,1, in place of the one in the calibration.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = up)]
     up: Option<UnitVector3<f64>>,
-    /// Replace files that exist.
+    /// Replace existing files.
     #[arg(long)]
     force: bool,
-    /// Print the written files as JSON.
+    /// Print the list of written files as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Which trajectories.
+/// Choice of trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Trajectories {
-    /// As found.
+    /// As found by the run.
     Raw,
     /// Smoothed: pose3d-smooth.jsonl.
     Smooth,
@@ -100,7 +101,7 @@ enum Names {
     Opensim,
 }
 
-/// A list, as clap takes it from one argument.
+/// A list of formats. The alias lets clap parse it from one argument.
 type Formats = Vec<Format>;
 
 fn formats(text: &str) -> Result<Formats, String> {
@@ -132,13 +133,13 @@ fn name(text: &str) -> Result<String, String> {
     let is_plain = !text.is_empty()
         && !text.starts_with('.')
         && !text.contains(|letter: char| letter == '/' || letter.is_control());
-    let expected = "expected the name of a file, without a folder";
+    let expected = "expected a file name without a folder";
     is_plain.then(|| text.to_owned()).ok_or_else(|| expected.to_owned())
 }
 
 fn rate(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|value| (0.001..=1e5).contains(value));
-    number.ok_or_else(|| format!("expected 0.001 to 100000 frames a second, got {text:?}"))
+    number.ok_or_else(|| format!("expected 0.001 to 100000 frames per second, got {text:?}"))
 }
 
 pub(crate) fn up(text: &str) -> Result<UnitVector3<f64>, String> {
@@ -176,7 +177,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     };
     let has_parquet = Format::all().iter().any(|format| format.name() == "parquet");
     if !has_parquet && job.formats.len() == Format::all().len() && !globals.quiet {
-        output::message(format_args!("without parquet: {NO_PARQUET}"));
+        output::message(NO_PARQUET);
     }
     let terminal = Terminal::with_bar(globals.quiet, false, BAR);
     let written = export(&origin, &job, &stop, &terminal)?;
@@ -192,7 +193,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// Folder of the files if `--out` is not given.
+/// Returns the folder of the files if `--out` is not given.
 fn beside(source: &Path) -> PathBuf {
     if source.is_dir() {
         return source.join("export");
@@ -201,13 +202,15 @@ fn beside(source: &Path) -> PathBuf {
     source.with_file_name(format!("{name}-export"))
 }
 
-/// Who has joints in how many frames.
+/// Describes the people that have joints, each with its number of frames.
 fn found(trials: &[Trial]) -> String {
     if let [only] = trials {
         let found = format!("{} of them have joints", only.n_with_points());
         return match &only.ids[..] {
             [_] => found,
-            ids => format!("{found}, of the people who were followed one after the other: {ids:?}"),
+            ids => format!(
+                "{found}, which belong to people followed one after the other, with ids {ids:?}"
+            ),
         };
     }
     let one = |trial: &Trial| format!("person {} in {}", trial.id(), trial.n_with_points());
@@ -218,11 +221,11 @@ fn found(trials: &[Trial]) -> String {
 fn report(origin: &Origin, written: &[Written]) -> Result<(), Failure> {
     let (trials, trial) = (&origin.trials, &origin.trials[0]);
     let rate = trial.rate_hz.map_or_else(
-        || "of no known rate".to_owned(),
+        || "at an unknown rate".to_owned(),
         |rate_hz| format!("at {rate_hz} Hz"),
     );
     output::line(format_args!(
-        "{} frames {rate}, the first is number {}; {}",
+        "{} frames {rate}, starting with frame {}; {}",
         trial.slots.len(),
         trial.first_frame,
         found(trials)
@@ -230,7 +233,7 @@ fn report(origin: &Origin, written: &[Written]) -> Result<(), Failure> {
     let turned = written.iter().any(|file| file.about[1].ends_with(" up"));
     if turned && trial.up_in_world.is_none() {
         output::line(
-            "the rig does not say which way is up: axes are those of the rig; --up 0,0,1 turns them",
+            "the rig does not define the upward direction, so the files have the axes of the rig; use --up 0,0,1 to set the direction",
         )?;
     }
     for it in written {

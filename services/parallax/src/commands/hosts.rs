@@ -1,4 +1,4 @@
-//! `parallax hosts`: the machines of a deployment of several: their state, and their keys.
+//! `parallax hosts`: shows the state of a deployment on several machines, and creates its keys.
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -13,24 +13,24 @@ use launch::{Resolved, hosts, load, plan};
 use serde_json::Value;
 use terminal::output;
 
-/// How long `status` waits for the host that fuses.
+/// Time that `status` waits for the host that fuses.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// The commands.
+/// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show the hosts of a running deployment: which of them answer, how well their clocks are known, and what became of every view.
+    /// Show the hosts of a running deployment: which of them answer, the accuracy of their clocks, and the fate of every view's frames.
     Status(StatusArguments),
-    /// Make the keys of all hosts: an authority, and a certificate with its key for each.
+    /// Create the keys of all hosts: a certificate authority, and a certificate with its key for each host.
     Keys(KeysArguments),
 }
 
 /// Options of `parallax hosts status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Asks the fusing host over the link, so it works from every host that has keys.
+The command asks the fusing host over the network, so it works on every host that has keys.
 
-Exit codes: 0 all hosts answer; 7 some do not; 4 the fusing host does not answer.
+Exit codes: 0 all hosts answer; 7 some hosts do not answer; 4 the fusing host does not answer.
 
 Examples:
     parallax hosts status my.toml
@@ -38,7 +38,7 @@ Examples:
 pub(crate) struct StatusArguments {
     /// The deployment file.
     config: PathBuf,
-    /// The host of this machine; if not given, the one with the machine's name.
+    /// Name of this machine in the deployment. If not given, the host with this machine's own name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the state as JSON.
@@ -49,8 +49,9 @@ pub(crate) struct StatusArguments {
 /// Options of `parallax hosts keys`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Writes ca.pem, ca.key, and HOST.pem and HOST.key of every host into `link.keys` of the deployment. Every host needs ca.pem and its
-own two files there. ca.key is needed only to add hosts; keep it off all of them. Nothing is replaced.
+Writes ca.pem, ca.key, and HOST.pem and HOST.key for every host into the folder `link.keys` of the deployment. In that folder, every \
+host needs ca.pem and its own two files. ca.key is only needed to add hosts later; do not copy it to any host. Existing files are not \
+replaced.
 
 Example:
     parallax hosts keys my.toml")]
@@ -67,10 +68,10 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Resolves what this machine runs: a whole deployment, or the part of one of its hosts; and when the run began, where another host
-/// says so. A host with cameras waits for the one that fuses; none on a stop request.
+/// Resolves what this machine runs: a whole deployment, or the part of one host. A host with cameras waits for the host that fuses,
+/// which also gives the time at which the run began. Returns `None` on a stop request.
 ///
-/// * `chosen`: the host that was asked for, and whether nothing is to be started.
+/// * `chosen`: the host that the user named, and true if nothing is to be started.
 pub(crate) fn resolve(
     deployment: &Deployment,
     (named, is_dry): (Option<&str>, bool),
@@ -99,8 +100,8 @@ pub(crate) fn resolve(
     Ok(Some((resolved, session)))
 }
 
-/// Starts this program anew, in the same process, with what makes its link run in one thread ([`bridge::ONE_THREAD`]); processes that it starts
-/// inherit that.
+/// Restarts this program in the same process, with the environment variable that makes its link run in one thread
+/// ([`bridge::ONE_THREAD`]). Child processes inherit the variable.
 fn in_one_thread() -> Result<(), Failure> {
     if bridge::has_one_thread() {
         return Ok(());
@@ -108,15 +109,15 @@ fn in_one_thread() -> Result<(), Failure> {
     let (name, value) = bridge::ONE_THREAD;
     let program = std::env::current_exe().or_fail(ExitKind::Run)?;
     let arguments = std::env::args_os().skip(1);
-    // Returns only if it fails.
+    // `exec` returns only if it fails.
     let error = Program::new(program).args(arguments).env(name, value).exec();
     Err(Failure::new(
         ExitKind::Run,
-        format!("this program cannot be started anew: {error}"),
+        format!("this program cannot restart itself: {error}"),
     ))
 }
 
-/// The name of this machine.
+/// Returns the name of this machine.
 fn machine() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname");
     name.unwrap_or_default().trim().to_owned()
@@ -130,12 +131,12 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     let host = host.ok_or("the deployment has no [[host]]").or_fail(ExitKind::Usage)?;
     in_one_thread()?;
     let mut address = hosts::address(deployment, host)?;
-    // The host that fuses asks itself: its bridge listens already.
+    // On the host that fuses, the bridge listens already, so this command connects to it.
     address.listens = false;
     let text = bridge::status(&address, PATIENCE).or_fail(ExitKind::Run)?;
     let Some(text) = text else {
         let message = format!(
-            "{} does not answer: does the deployment run there?",
+            "{} does not answer: is the deployment running there?",
             address.address
         );
         return Err(Failure::new(ExitKind::Input, message));
@@ -159,7 +160,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(status))
 }
 
-/// A host in words, with a line for every view.
+/// Describes a host, with a line for every view.
 fn line(host: &Value, deployment: &Deployment) -> String {
     let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     let name = host["name"].as_str().unwrap_or_default();
@@ -168,7 +169,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
     } else if host["refused"].is_null() {
         "does not answer"
     } else {
-        "is refused: it has other files"
+        "is refused: its files differ"
     };
     let clock = &host["clock"];
     let clock = if clock.is_null() {
@@ -188,7 +189,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
         // Writing to a string cannot fail.
         let _infallible = writeln!(
             text,
-            "    {camera}: {} used, {} late, {} gone, {} left out; from there to here {:.1} ms (99 of 100 within {:.1})",
+            "    {camera}: {} used, {} late, {} lost, {} left out; transfer {:.1} ms (99 of 100 within {:.1} ms)",
             view["used"],
             view["late"],
             view["gone"],
@@ -222,6 +223,8 @@ fn keys(arguments: &KeysArguments) -> Result<ExitCode, Failure> {
     for file in made {
         output::line(file.display())?;
     }
-    output::message("give every host ca.pem and its own two files; keep ca.key elsewhere");
+    output::message(
+        "copy ca.pem and the host's own two files to every host; keep ca.key elsewhere",
+    );
     Ok(ExitCode::SUCCESS)
 }

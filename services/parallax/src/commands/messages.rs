@@ -1,4 +1,4 @@
-//! `parallax messages`: the layout of messages, for programs in other languages.
+//! `parallax messages`: prints the layout of messages, for programs in other languages.
 
 mod json;
 mod table;
@@ -12,11 +12,11 @@ use terminal::output;
 /// Options of `parallax messages`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Messages are these structs in shared memory and in recordings. Python users do not need the layout: see python/README.md.
+Shared memory and recordings contain messages as these structs. Python users do not need the layout: see python/README.md.
 
 Examples:
-    parallax messages --json                        structs, topics, versions, limits: for programs in other languages
-    parallax messages                               topics and their versions")]
+    parallax messages --json                        print structs, topics, versions and limits
+    parallax messages                               print topics and their versions")]
 pub(crate) struct Arguments {
     /// Print JSON.
     #[arg(long)]

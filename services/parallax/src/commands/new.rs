@@ -1,4 +1,4 @@
-//! `parallax new`: from footage to a deployment, one command after the other, each of which can be run alone.
+//! `parallax new`: creates a deployment from footage. It runs a sequence of commands, each of which can also be run alone.
 
 use std::fs;
 use std::path::{Path, PathBuf, absolute};
@@ -16,17 +16,20 @@ use crate::commands::calibrate::height;
 /// Options of `parallax new`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every step is a command, which is printed before it runs. Files of finished steps are kept, so
-that `new`, started again, continues after them; delete a file to have it made anew. A step that
-fails ends it, with its exit code; an answer with doubts (7) also ends it, unless --go-on is given.
+Each step is a command, which is printed before it runs. Files of finished steps are kept. If `new` is run \
+again, it continues after these steps; delete a file to repeat its step. If a step fails, `new` ends with the \
+exit code of the step. It also ends after a doubtful result (exit code 7), unless --go-on is given.
 
-    1  the rig: --rig converts one; --board with --show finds it (`parallax calibrate board`)
-    2  the floor: --floor puts the rig on it (`parallax calibrate origin`)
-    3  ROOM/deployment.toml, which is yours from then on (`parallax config check`)
-    4  with --people: the places of the cameras from the person who walks about in their footage (`parallax calibrate people`),
-       and the floor; only the lenses of --rig, or of the board, are used, and no board is needed on the floor
-    5  clocks: --sync finds offsets of recorded cameras from people (`parallax sync estimate --write`)
-    6  a first run: --run (`parallax run`)
+    1  Get the rig: --rig converts a calibration, --board with --show finds one (`parallax calibrate board`).
+    2  Move the origin of the rig to the floor: --floor (`parallax calibrate origin`).
+    3  Write ROOM/deployment.toml. You may edit this file: `new` does not replace it
+       (`parallax config check`).
+    4  With --people, find the poses of the cameras, and the floor, from a person who walks about
+       in their footage (`parallax calibrate people`). Only the lenses of --rig or of the board are
+       used. No board on the floor is needed.
+    5  With --sync, find the clock offsets of recorded cameras from people
+       (`parallax sync estimate --write`).
+    6  With --run, start a first run (`parallax run`).
 
 Examples:
     parallax new room --camera a=walk/a.mp4 --camera b=walk/b.mp4 --rig Calib.toml --run
@@ -39,52 +42,53 @@ Examples:
     reason = "each is a flag of the command line"
 )]
 pub(crate) struct Arguments {
-    /// The folder to make.
+    /// The folder to create.
     room: PathBuf,
-    /// A camera: its name, and a video, a folder or pattern of pictures, or a live address; once for each. `parallax cameras`
+    /// A camera: its name, and a video, a folder or pattern of pictures, or a live address. Give the option once per camera. `parallax
+    /// cameras`
     /// lists video devices.
     #[arg(long, value_name = "NAME=SOURCE", required = true)]
     camera: Vec<String>,
-    /// A calibration of any format that has these cameras.
+    /// A calibration of these cameras, in any format.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["board", "show"], required_unless_present = "board")]
     rig: Option<PathBuf>,
-    /// The board in the footage.
+    /// The board in the footage of --show and --floor.
     #[arg(long, value_name = "BOARD", requires = "show")]
     board: Option<Board>,
-    /// Footage of a camera with the board moved about; once for each.
+    /// Footage of a camera in which the board is moved about. Give the option once per camera.
     #[arg(long, value_name = "NAME=PATH", requires = "board")]
     show: Vec<String>,
-    /// Footage of a camera with the board lying on the floor.
+    /// Footage of a camera in which the board is on the floor.
     #[arg(long, value_name = "NAME=PATH", requires = "board")]
     floor: Vec<String>,
-    /// Find the places of the cameras from a person of this height, metres, who walks about in their footage.
+    /// Find the poses of the cameras from a person who walks about in their footage, and whose height is METRES.
     #[arg(long, value_name = "METRES", conflicts_with = "floor", value_parser = height)]
     people: Option<f64>,
-    /// Place of the upper left pixel of a camera's footage in the calibrated picture (`source_offset_px`), for cropped footage;
-    /// once for each.
+    /// For cropped footage: position of its upper left pixel in the calibrated picture (`source_offset_px`). Give the option once per
+    /// camera.
     #[arg(long, value_name = "NAME=X,Y", value_parser = offset)]
     offset: Vec<Offset>,
     /// Upward direction in the world of the rig, for example 0,0,1.
     #[arg(long, value_name = "X,Y,Z", value_parser = super::export::up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
-    /// Find offset and drift of the cameras' clocks.
+    /// Find the offset and drift of the cameras' clocks.
     #[arg(long)]
     sync: bool,
-    /// Run the deployment.
+    /// Run the deployment at the end.
     #[arg(long)]
     run: bool,
-    /// Continue after an answer with doubts.
+    /// Continue after a step whose result is doubtful.
     #[arg(long)]
     go_on: bool,
-    /// Print the commands only.
+    /// Only print the commands.
     #[arg(long)]
     dry_run: bool,
 }
 
-/// The file with the lenses alone.
+/// Name of the rig file that has only lenses.
 const LENSES: &str = "lenses.toml";
 
-/// A command, and the file that shows that it has been done.
+/// A command, and the file that exists once the command has succeeded.
 struct Step {
     words: Vec<String>,
     done: Option<PathBuf>,
@@ -106,7 +110,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if deployment.exists() {
         let is_other = fs::read_to_string(&deployment).is_ok_and(|kept| kept != text);
         let differs = if is_other {
-            ", which differs from what these options would make: edit it, or delete it to have it made anew"
+            ", which differs from the file that these options would create: edit it, or delete it to create it again"
         } else {
             ""
         };
@@ -136,7 +140,7 @@ impl Step {
         Self { words, done }
     }
 
-    /// The exit code that ends everything, if it does.
+    /// Runs the step. Returns an exit code if `parallax new` must end.
     fn run(&self, arguments: &Arguments, globals: Globals) -> Result<Option<ExitCode>, Failure> {
         let line: Vec<String> = self.words.iter().map(failure::wording::shell).collect();
         if let Some(file) = self.done.as_ref().filter(|file| file.exists()) {
@@ -163,7 +167,7 @@ impl Step {
         }
         if let Some(file) = self.done.as_ref().filter(|file| is_doubt && file.exists()) {
             output::message(format_args!(
-                "{} is written: the same command again goes on with it",
+                "{} is written: run the same command again to continue with it",
                 file.display()
             ));
         }
@@ -171,7 +175,7 @@ impl Step {
     }
 }
 
-/// The rig, in the room, and on the floor.
+/// Returns the steps that create the rig in the folder and move its origin to the floor.
 fn rig_steps(arguments: &Arguments) -> Vec<Step> {
     let room = &arguments.room;
     let rig = room.join("rig.toml");
@@ -220,7 +224,7 @@ fn later_steps(arguments: &Arguments, deployment: &Path) -> Vec<Step> {
         let in_room = |name: &str| arguments.room.join(name).display().to_string();
         let rig = arguments.room.join("rig.toml");
         let (height, out, page) = (metres.to_string(), in_room("rig.toml"), in_room("rig.html"));
-        // Paths in the file are those of its folder.
+        // Paths in the deployment file are relative to its folder.
         let lenses = format!("rig={LENSES}");
         let mut words = vec!["calibrate", "people", &file, "--set", &lenses];
         words.extend(["--height-m", &height, "--out", &out, "--report", &page]);
@@ -242,7 +246,7 @@ fn later_steps(arguments: &Arguments, deployment: &Path) -> Vec<Step> {
     steps
 }
 
-/// The deployment file: the cameras, the rig, and where results go.
+/// Returns the text of the deployment file: the cameras, the rig and the output folder.
 fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
     let stem = arguments.room.file_name().unwrap_or_default().to_string_lossy();
     let plain = |letter: char| {
@@ -259,7 +263,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         "room".to_owned()
     };
     let mut text = format!(
-        "# Made by `parallax new`. Everything that is not said here has a default: `parallax config show` prints it.\n\n\
+        "# Created by `parallax new`. All other settings have defaults: `parallax config show` prints them.\n\n\
          name = {name:?}\nrig = \"rig.toml\"\noutput = \"out\"\n"
     );
     if let Some(up) = arguments.up {
@@ -270,7 +274,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
         names.into_iter().any(|camera| camera == name)
     };
     if let Some(stray) = arguments.offset.iter().find(|offset| !is_camera(&offset.camera)) {
-        let message = format!("--offset {}: no --camera has that name", stray.camera);
+        let message = format!("--offset {}: no --camera has this name", stray.camera);
         return Err(Failure::new(ExitKind::Usage, message));
     }
     for camera in &arguments.camera {
@@ -287,7 +291,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
     Ok(text)
 }
 
-/// Where the footage of a camera lies in the picture that was calibrated.
+/// Position of a camera's footage in the calibrated picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Offset {
     camera: String,
@@ -302,10 +306,10 @@ fn offset(text: &str) -> Result<Offset, String> {
         let camera = camera.to_owned();
         Some(Offset { camera, px })
     };
-    parsed().ok_or_else(|| "not NAME=X,Y with whole pixels, for example left=0,240".to_owned())
+    parsed().ok_or_else(|| "expected NAME=X,Y in whole pixels, for example left=0,240".to_owned())
 }
 
-/// A path as it is from the room; addresses and devices as they are.
+/// Returns an absolute path for a file. Addresses and devices are returned unchanged.
 fn source(path: &str) -> std::io::Result<String> {
     if footage::is_address(path) {
         return Ok(path.to_owned());

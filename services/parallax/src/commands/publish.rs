@@ -1,4 +1,4 @@
-//! `parallax publish`: the skeletons of a running deployment as datagrams.
+//! `parallax publish`: sends the skeletons of a running deployment as datagrams.
 
 use std::process::ExitCode;
 
@@ -11,9 +11,9 @@ use terminal::{Globals, output};
 /// Options of `parallax publish`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Reads the deployment like any other program: no process of the deployment waits for this command, which may come and go at any time. Every person of
-a frame is one datagram of at most 1400 bytes, JSON on one line, or OSC bundles. A joint without a position is sent with the reason,
-never as zeros. Datagrams that nobody receives are lost. docs/guide/programs.md describes both formats.
+No process of the deployment waits for this command, so it may be started and stopped at any time. Each person of \
+a frame is sent in a datagram of at most 1400 bytes, as JSON on one line or as OSC bundles. A joint without a position is sent with the \
+reason, never as zeros. Datagrams that no program receives are lost. docs/guide/programs.md describes both formats.
 
 Examples:
     parallax publish demo udp://127.0.0.1:9000
@@ -21,12 +21,12 @@ Examples:
     parallax publish demo udp://192.168.1.20:9000 --beyond-this-machine
     nc -klu 127.0.0.1 9000                              print the datagrams")]
 pub(crate) struct Arguments {
-    /// Name of the deployment, or its file. It need not run yet.
+    /// Name or file of the deployment. It need not run yet.
     deployment: String,
-    /// The target: udp://HOST:PORT (JSON lines), udp://HOST:PORT?format=osc, osc://HOST:PORT.
+    /// The target: udp://HOST:PORT for JSON lines, or osc://HOST:PORT (or udp://HOST:PORT?format=osc) for OSC.
     #[arg(required = true, value_name = "TARGET")]
     targets: Vec<String>,
-    /// Allow targets that are not this machine: skeletons leave it unencrypted.
+    /// Allow targets on other machines. Skeletons are sent unencrypted.
     #[arg(long)]
     beyond_this_machine: bool,
     /// End when the deployment ends, instead of waiting for its next run.
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Publishes until Ctrl-C, or the end of the deployment.
+/// Publishes until Ctrl-C or the end of the deployment.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let targets = targets(&arguments.targets, arguments.beyond_this_machine)?;
     let namespace = live::namespace(Some(&arguments.deployment))?;
@@ -58,14 +58,14 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }))?;
     } else if !globals.quiet {
         output::message(format_args!(
-            "{} frames in {} datagrams, {} not taken, {} frames too large, {} missed",
+            "{} frames in {} datagrams, {} datagrams not sent, {} frames too large, {} frames missed",
             counts.frames, counts.sent, counts.unsent, counts.too_large, counts.missed
         ));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Reads targets, and says which of them are other machines, or refuses those.
+/// Parses the targets. Targets on other machines are refused, or reported if `beyond` is true.
 fn targets(texts: &[String], beyond: bool) -> Result<Vec<Target>, Failure> {
     let mut targets = Vec::new();
     for text in texts {
@@ -74,7 +74,7 @@ fn targets(texts: &[String], beyond: bool) -> Result<Vec<Target>, Failure> {
             Ok(()) => {}
             Err(error) if beyond => output::message(error),
             Err(error) => {
-                return Err(usage(&error).with_hint("allow it with --beyond-this-machine"));
+                return Err(usage(&error).with_hint("pass --beyond-this-machine to allow it"));
             }
         }
         targets.push(target);
@@ -86,7 +86,7 @@ fn usage(error: &client::publish::TargetError) -> Failure {
     Failure::new(ExitKind::Usage, error.to_string())
 }
 
-/// Waits for the end of what was started by [`beside`], and shows what it said.
+/// Waits for the process that [`beside`] started, and prints its messages.
 pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
     let said = companion.map(Companion::finish).unwrap_or_default();
     let first = "publishing the skeletons";
@@ -95,10 +95,10 @@ pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
     }
 }
 
-/// Starts publishing beside a run of a deployment, as `--publish` asks; nothing without targets.
+/// Starts publishing beside a run of a deployment, for the option `--publish`. Returns `None` if there are no targets.
 ///
-/// * `name`: of the deployment.
-/// * `beyond`: whether targets may be other machines.
+/// * `name`: name of the deployment.
+/// * `beyond`: true to allow targets on other machines.
 pub(crate) fn beside(
     name: &str,
     texts: &[String],

@@ -15,36 +15,36 @@ use terminal::{Globals, output};
 use super::hosts;
 use disk_space::{Forecast, Growth, PerFrame};
 
-/// The maximal number of epochs of the recording process whose files are looked for.
+/// Number of epochs of the recording process for which files of an earlier recording are looked up.
 const MAX_EPOCHS: u32 = 64;
 
 /// Options of `parallax record`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The file is MCAP: chunked, indexed, not compressed, with messages as CDR with ROS 2 schemas. Its metadata holds
-the settings of the run and fingerprints of the files that it read. The run leaves its results like `run`.
+The file is MCAP: chunked, indexed and not compressed. Messages are CDR with ROS 2 schemas. The metadata contains \
+the settings of the run, and fingerprints of the files that it read. The run also writes its results, like `run`.
 
-With lossless delivery (capture.mode = \"lossless\") a slow disk makes the run slower. With realtime delivery it does
-not: messages that do not fit into the queue are left out, counted by topic in the file, and reported at the end.
-A file whose end is missing, because of a full disk or a crash, is valid up to there; a restarted recording
+With lossless delivery (capture.mode = \"lossless\"), a slow disk slows down the run. With realtime delivery it does \
+not: messages that do not fit into the queue are left out. They are counted by topic in the file, and reported at the end. \
+A file whose end is missing, because of a full disk or a crash, is valid up to that point. A restarted recording \
 process continues in FILE.1.mcap. If anything was lost, the exit code is 7.
 
-For live cameras the file also holds the pictures as they came, at the full rate of the camera: JPEG files, raw pixels,
-or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches
-them later. No camera waits for the disk. Results go to the deployment's `output`; `--set output=DIR` names another folder.
+For live cameras, the file also contains the original pictures at the full rate of the camera: JPEG files, raw pixels, \
+or the packets of a stream. `parallax replay FILE --from capture`, or `source = \"FILE#NAME\"` in a deployment, searches \
+these pictures later. No camera waits for the disk. Results go to the deployment's `output`; `--set output=DIR` sets another folder.
 
-Foxglove opens the file as it is, and shows skeletons with their uncertainty, cameras and pictures: beside its own topics it
-holds `foxglove.SceneUpdate`, `foxglove.FrameTransforms`, `foxglove.CameraCalibration` and `foxglove.CompressedImage`.
+Foxglove opens the file directly, and shows skeletons with their uncertainty, cameras and pictures. Besides Parallax's topics, the file \
+contains `foxglove.SceneUpdate`, `foxglove.FrameTransforms`, `foxglove.CameraCalibration` and `foxglove.CompressedImage`.
 
-With several hosts (`[[host]]`) the fusing one records what arrives: all messages but frames that are not sent. One with
-cameras records the output of its own cameras and processes, for `source = \"FILE#NAME\"` of a deployment.
+With several hosts (`[[host]]`), the fusing host records all messages that arrive. Frames that other hosts do not send are missing. A \
+host with cameras records the output of its own cameras and processes. A deployment can use such a file as `source = \"FILE#NAME\"`.
 
-Before the run it prints the largest size of a frame and of a second, and the free space; it does not start
-without room for ten frames (or for all, if they are fewer).
+Before the run, the command prints the maximum size of one frame and of one second, and the free space. It does not start \
+without space for ten frames, or for all frames if there are fewer.
 
 Examples:
     parallax record my.toml --out run.mcap
-    parallax record my.toml --out run.mcap --without pixels --without evidence   small: poses, results,
+    parallax record my.toml --out run.mcap --without pixels --without evidence   a small file: only poses, results,
                                                                                  and pictures of live cameras")]
 pub(crate) struct Arguments {
     /// The deployment file.
@@ -52,22 +52,22 @@ pub(crate) struct Arguments {
     /// The file to record to.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Replace FILE if it exists, and the results of an earlier run.
+    /// Replace FILE if it exists, and also the results of an earlier run.
     #[arg(long)]
     force: bool,
-    /// Leave out the largest messages; may be given twice.
+    /// Leave out a kind of large messages. May be given several times.
     #[arg(long, value_name = "WHAT")]
     without: Vec<Bulk>,
-    /// Memory for messages that wait to be written, millions of bytes.
+    /// Memory for messages that wait to be written, in megabytes.
     #[arg(long, value_name = "MB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..=65_536))]
     queue_mb: u64,
-    /// Folder for the results, instead of the file's `output`.
+    /// Folder for the results, in place of `output` in the deployment file.
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
+    /// Replace a value, for example `--set capture.scale=0.5`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
+    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host with this machine's own name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the summary as JSON.
@@ -78,11 +78,11 @@ pub(crate) struct Arguments {
 /// The kinds of large messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Bulk {
-    /// The pixels of frames; without them a replay from pose is impossible.
+    /// The pixels of frames. Without them, a replay from pose is impossible.
     Pixels,
-    /// The response maps; without them a replay from fuse is impossible.
+    /// The response maps. Without them, a replay from fuse is impossible.
     Evidence,
-    /// The pictures of live cameras as they came; without them a replay from capture is impossible.
+    /// The original pictures of live cameras. Without them, a replay from capture is impossible.
     Camera,
     /// The topics for Foxglove: skeletons, cameras, and their pictures as JPEG.
     Foxglove,
@@ -144,7 +144,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         output::line(report.text())?;
         output::line(recorded::text(&file, &recording))?;
         for file in &later {
-            output::line(format_args!("  goes on in {}", file.display()))?;
+            output::line(format_args!("  continues in {}", file.display()))?;
         }
     }
     let is_flawed = !recorded::is_whole(&recording) || !later.is_empty();
@@ -152,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// The disk space that the recording will take.
+/// Estimates the disk space of the recording.
 fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<Forecast, Failure> {
     let resolved = planned.resolved();
     let replaced = if arguments.force {
@@ -176,28 +176,28 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
 ///
 /// # Errors
 ///
-/// A file exists and `force` is not set, is a folder, or is being recorded to.
+/// Fails if a file exists and `force` is not set. Also fails if it is a folder, or another run is recording to it.
 fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
     let files = (0..MAX_EPOCHS).map(|i| record::file_of_life(file, i));
     for file in files.filter(|file| file.exists()) {
         if file.is_dir() {
             let message = format!("{} is a folder", file.display());
             let failure = Failure::new(ExitKind::Usage, message);
-            return Err(
-                failure.with_hint("name the file that the recording goes to, such as run.mcap")
-            );
+            return Err(failure.with_hint("give the name of the recording file, such as run.mcap"));
         }
         if !force {
-            let message = format!("{} is there already", file.display());
+            let message = format!("{} already exists", file.display());
             let failure = Failure::new(ExitKind::Usage, message);
-            return Err(failure.with_hint("choose another name, or replace it with --force"));
+            return Err(
+                failure.with_hint("choose another name, or pass --force to replace the file")
+            );
         }
         let is_busy = files::open(&file)
             .is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));
         if is_busy {
-            let message = format!("{} is being recorded to by another run", file.display());
+            let message = format!("another run is recording to {}", file.display());
             let failure = Failure::new(ExitKind::Config, message);
-            return Err(failure.with_hint("wait until it ends, or take another name"));
+            return Err(failure.with_hint("wait until that run ends, or choose another name"));
         }
         std::fs::remove_file(&file).map_err(|error| failure::in_file(&file, &error))?;
     }

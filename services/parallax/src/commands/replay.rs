@@ -22,34 +22,34 @@ use crate::stage;
 /// Options of `parallax replay`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The stages before --from are not run: processes with their names send the recorded messages instead. The other
-stages run with the settings of the recorded run, except those that --set replaces. With lossless delivery, and with
-the same settings and files, their results are those of the recorded run, bit for bit.
+The stages before --from are not run. Instead, processes with their names send the recorded messages. The other \
+stages run with the settings of the recorded run, except settings that --set replaces. With lossless delivery, and with \
+the same settings and files, the results are equal to the recorded ones, bit for bit.
 
-A truncated file is replayed up to its end. Every chunk, a frame or 4 MiB, has a checksum; the messages of a damaged
-one are named, counted and left out. In both cases the exit code is 7. End-to-end latency is meaningful at --speed 1 only; the times of the
-stages that run are always meaningful.
+A truncated file is replayed up to its end. Every chunk (a frame or 4 MiB) has a checksum. The messages of a damaged \
+chunk are listed, counted and left out. In both cases the exit code is 7. End-to-end latency is only meaningful at --speed 1. The times \
+of the stages that are run are always meaningful.
 
 Examples:
-    parallax replay run.mcap                                         from pose on, with the recorded frames
-    parallax replay run.mcap --from fuse --set paper.alpha=2          without the frames
+    parallax replay run.mcap                                         run pose and later stages on the recorded frames
+    parallax replay run.mcap --from fuse --set paper.alpha=2          run fuse and later stages, which need no frames
     parallax replay run.mcap --speed 2 --set capture.mode=realtime   twice as fast, with realtime delivery")]
 pub(crate) struct Arguments {
     /// The recording.
     file: PathBuf,
-    /// The first stage that runs.
+    /// The first stage that is run.
     #[arg(long, value_name = "STAGE", value_parser = stage::parser(), default_value = "pose")]
     from: Stage,
-    /// Speed relative to the recording, or `max`; if not given, `max` with lossless delivery, else 1.
+    /// Speed relative to the recording, or `max`. If not given, `max` with lossless delivery, otherwise 1.
     #[arg(long, value_name = "X", value_parser = speed)]
     speed: Option<Speed>,
-    /// Folder for the results; if not given, the name of the recording with `-replay` appended.
+    /// Folder for the results. If not given, the name of the recording with `-replay` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace the results of an earlier run or replay in that folder.
     #[arg(long)]
     force: bool,
-    /// Replace a value of the stages that run, or capture.mode; may be given several times.
+    /// Replace a setting of the stages that are run, or capture.mode. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Print the summary as JSON.
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         output::message(recorded::text(&file, &recording));
     }
     let mut settings = recorded::settings(&file, &recording)?;
-    // On one machine, whatever it was recorded on.
+    // A replay runs on one machine, even if several hosts recorded the run.
     settings.resolved.deployment.hosts.clear();
     let from = arguments.from;
     live::settle(
@@ -129,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// Returns the settings of the stages that run.
+/// Returns the settings of the stages that are run.
 ///
 /// * `recorded`: the settings of the recorded run.
 fn resolve(
@@ -143,7 +143,7 @@ fn resolve(
         capture.mode,
         capture.size.is_some() || capture.scale.is_some(),
     );
-    // The size is part of what was recorded, unless another is asked for.
+    // The recorded size is used, unless the user sets another one.
     let search_size = recorded.search_size.filter(|_| !is_sized);
     if from == Stage::Capture {
         return Ok(Resolved {
@@ -172,14 +172,15 @@ fn resolve(
     })
 }
 
-/// Why a value may not be replaced: its stage is replaced by the recording. None if it may.
+/// Returns the reason why a setting may not be replaced, or `None` if it may. Settings of stages that the recording replaces are
+/// refused.
 fn refused(key: &str, from: Stage) -> Option<String> {
     let is_given = stage_of(key).is_some_and(|stage| stage < from);
     let from = from.name();
-    is_given.then(|| format!("this is given by the recording with --from {from}"))
+    is_given.then(|| format!("with --from {from}, the recording determines this value"))
 }
 
-/// The first stage that a setting is for; none if the recording says nothing about it.
+/// Returns the first stage that a setting affects, or `None` if the recording does not depend on it.
 fn stage_of(key: &str) -> Option<Stage> {
     let (section, name) = key.split_once('.').unwrap_or((key, ""));
     match (section, name) {
@@ -205,7 +206,7 @@ fn warn_of_changed_files(settings: &Settings) {
         };
         if now != Some(*recorded) {
             let file = file.display();
-            output::message(format_args!("{file} is not the file of the recorded run"));
+            output::message(format_args!("{file} has changed since the recorded run"));
         }
     }
 }
@@ -255,15 +256,15 @@ fn check(
     let failure = Failure::new(ExitKind::Input, message);
     Err(match recording.counts.keys().find(|key| kind.is_of_another_version(key)) {
         Some(topic) => failure.with_hint(format!(
-            "its messages of {topic} have another layout than those of this Parallax: replay it with the one that recorded it"
+            "its messages of {topic} have another layout than in this version of Parallax: replay the file with the version that recorded it"
         )),
         None => failure,
     })
 }
 
-/// Checks that the recording has the frames, evidence or poses of every view: one of a host of several has not.
+/// Checks that the recording has the frames, evidence or poses of every view. A recording by one of several hosts may lack some of them.
 ///
-/// * `needs`: whether pixels and evidence are needed.
+/// * `needs`: true if pixels are needed, and true if evidence is needed.
 fn check_views(
     file: &Path,
     recording: &Recording,
@@ -297,15 +298,15 @@ fn check_views(
             );
             let failure = Failure::new(ExitKind::Input, message);
             return Err(failure.with_hint(
-                "the recording of one host of several has only what reached this host: if poses were sent, use `--from fuse`, which needs \
-                 no frames; pictures of live cameras are in the recordings of their own hosts",
+                "with several hosts, a recording has only the messages that reached its host: if poses were sent, use `--from fuse`, which needs \
+                 no frames; pictures of live cameras are in the recordings of the hosts with these cameras",
             ));
         }
     }
     Ok(())
 }
 
-/// The kinds of messages that the stages before `from` send, with their names for the user.
+/// Returns the kinds of messages that the stages before `from` send, each with its name for the user.
 fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'static str)> {
     let has_maps = resolved.deployment.has_maps();
     let all = [

@@ -15,13 +15,16 @@ use super::{hosts, publish, view};
 /// Options of `parallax run`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
-pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
-overlays/. Only the user can read them; they are called *.part until they are complete. --force replaces the results of an earlier run
-when the new ones are complete; a file that no run has written is never replaced. Every frame has one line of pose3d.jsonl,
-in order: its result, or status \"no result\" and the reason. pose3d.trc has a row of NaN for a frame without a result; it is written only if
-the frame rate is known. The folder belongs to one run at a time. A run without
-any result is degraded, and says why.
+Ctrl-C stops the run. A second Ctrl-C, at least half a second after the first, ends it at once.
+
+The output folder contains pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, \
+deployment.json and overlays/. Only the user who started the run can read these files. They are called *.part until they are \
+complete. With --force, the results of an earlier run are replaced when the new ones are complete. A file that no run has \
+written is never replaced. Only one run at a time can use the folder.
+
+pose3d.jsonl has one line per frame, in order: the result, or the status \"no result\" with the reason. pose3d.trc has a row of NaN \
+for a frame without a result. It is written only if the frame rate is known. A run without any result is degraded, and the \
+summary says why.
 
 Examples:
     parallax run my.toml
@@ -29,11 +32,11 @@ Examples:
     parallax run my.toml --latency-budget-ms 150
     parallax run my.toml --publish udp://127.0.0.1:9000
     parallax run my.toml --dry-run
-    parallax run my.toml --host left        one of several machines
+    parallax run my.toml --host left        run the part of one of several machines
 
-During the run, `parallax top` and `parallax status NAME --json` show every process and its times. With a
-latency budget the run ends with exit code 6 if the 99th percentile from capture to result exceeds it, or if no frame
-was measured (unless it was stopped by Ctrl-C before any was).")]
+During the run, `parallax top` and `parallax status NAME --json` show every process and its times. With a \
+latency budget, the run ends with exit code 6 if the 99th percentile from capture to result exceeds the budget. It also does so \
+if no frame was measured, unless Ctrl-C stopped the run before the first measurement.")]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a flag of the command line"
@@ -41,33 +44,33 @@ was measured (unless it was stopped by Ctrl-C before any was).")]
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
-    /// Folder for the results, instead of the file's `output`.
+    /// Folder for the results, in place of `output` in the deployment file.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace the results of an earlier run in the output folder.
     #[arg(long, conflicts_with = "dry_run")]
     force: bool,
-    /// Replace a value, for example `--set capture.scale=0.5`; may be given several times.
+    /// Replace a value, for example `--set capture.scale=0.5`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The host of this machine, in a deployment with several `[[host]]`; if not given, the one with the machine's name.
+    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host with this machine's own name.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
-    /// Fail with exit code 6 if 1 frame in 100 takes longer than this from capture to result, milliseconds; the same
+    /// Fail with exit code 6 if more than 1 frame in 100 takes longer than this from capture to result, in milliseconds. The same
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     latency_budget_ms: Option<f64>,
-    /// Serve a page about the run on the loopback while it runs; `parallax view --help` describes it.
+    /// Serve a page about the run while it runs, on this machine only. `parallax view --help` describes the page.
     #[arg(long, conflicts_with = "dry_run")]
     view: bool,
-    /// Send the skeletons as datagrams to udp://HOST:PORT (JSON lines) or osc://HOST:PORT while it runs; may be given several
-    /// times; `parallax publish --help` describes the datagrams.
+    /// Send the skeletons as datagrams during the run, to udp://HOST:PORT (JSON lines) or osc://HOST:PORT. May be given several
+    /// times. `parallax publish --help` describes the datagrams.
     #[arg(long, value_name = "TARGET", conflicts_with = "dry_run")]
     publish: Vec<String>,
-    /// Allow --publish to other machines than this: skeletons leave it unencrypted.
+    /// Allow --publish to send to other machines. Skeletons are sent unencrypted.
     #[arg(long, requires = "publish")]
     beyond_this_machine: bool,
-    /// Show the processes and the shared memory that they need, and start nothing; fails if the run could not start.
+    /// Show the processes and the shared memory that they need, but start nothing. Fails if the run could not start.
     #[arg(long)]
     dry_run: bool,
     /// Print the summary as JSON.
@@ -94,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if resolved.is_far() && (arguments.view || !arguments.publish.is_empty()) {
-        let message = "--view and --publish are for the host that fuses: this one has no skeletons";
+        let message = "--view and --publish only work on the host that fuses, because this host has no skeletons";
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let device = launch::device(&loaded.deployment)?;
@@ -160,7 +163,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
             mb(topic.pool_bytes())
         ))?;
     }
-    // The same check as before a run.
+    // The check is the same as before a run.
     preflight(&plan.topics)?;
     Ok(ExitCode::SUCCESS)
 }

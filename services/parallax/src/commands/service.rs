@@ -19,30 +19,30 @@ pub(crate) struct Arguments {
     /// The process to run.
     #[arg(value_parser = names())]
     name: Name,
-    /// Arguments from the supervisor: --plan, --index, and those of the launch.
+    /// Arguments from the supervisor: --plan, --index, and the launch arguments.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     rest: Vec<OsString>,
 }
 
-/// The arguments of the process itself.
+/// Arguments of the process itself.
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true)]
 struct ServiceArguments {
-    /// The file of the resolved deployment, read if standard input is empty.
+    /// File of the resolved deployment. It is read if standard input is empty.
     #[arg(long)]
     plan: PathBuf,
-    /// View or worker, from 0.
+    /// Index of the view or worker, counted from 0.
     #[arg(long, default_value_t = 0)]
     index: usize,
     /// The stage that a replay process replaces.
     #[arg(long, value_parser = stage::parser())]
     stage: Option<Stage>,
-    /// Enter an endless loop in epoch 0, once a message about a later frame has been sent; for tests.
+    /// For tests: in epoch 0, enter an endless loop after a message about a later frame has been sent.
     #[arg(long)]
     spin_after: Option<u64>,
 }
 
-/// A parser of the names of processes, with their description in `--help`.
+/// Returns a parser for the names of processes, with their descriptions for `--help`.
 fn names() -> impl TypedValueParser<Value = Name> {
     let values = Name::ALL.map(|name| PossibleValue::new(name.name()).help(name.help()));
     PossibleValuesParser::new(values)

@@ -16,21 +16,22 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} motions{left} {prefix}
 /// Options of `parallax smooth`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-FOLDER holds the results of a run, which stay unchanged. The command adds
-    pose3d-smooth.jsonl   like pose3d.jsonl; `states` says whether a joint is measured, exchanged, filled or rejected
-    angles.csv            hips, knees, ankles, shoulders, elbows and trunk, degrees, with standard deviations
-    smooth.json           the method and its numbers, and counts of measurements by their fate
+FOLDER contains the results of a run. They are not changed. The command adds the files
+    pose3d-smooth.jsonl   like pose3d.jsonl, with the state of each joint in `states`
+    angles.csv            angles of hips, knees, ankles, shoulders, elbows and trunk, in degrees
+    smooth.json           the method, its parameters, and the number of measurements by state
 
-Everything has a default: process noise and scale of the covariances of each joint are estimated from the measurements.
-docs/guide/smooth.md explains.
+A joint is measured, exchanged, filled or rejected. Angles have standard deviations. \
+No options are needed: the process noise and the scale of the covariances of each joint are estimated from the measurements. \
+See docs/guide/smooth.md.
 
-`parallax-lab smooth` compares the result with the truth, if you have it.
+If you have ground truth, `parallax-lab smooth` compares the result with it.
 
-Exit codes: 0 done; 7 done with doubts (`doubts`: the file is truncated, nothing was measured, many
-measurements contradict each other); 2 an option is wrong, or a cutoff too high for the rate; 4 the folder cannot be read, a line is
-wrong, times do not ascend.
+Exit codes: 0 done; 7 done, but with doubts (`doubts`: the file is truncated, nothing was measured, or many \
+measurements contradict each other); 2 an option is wrong, or the cutoff is too high for the rate; 4 the folder cannot be read, a line \
+is wrong, or times do not ascend.
 
-With --json one object:
+With --json, prints one object:
     {\"report\": the content of smooth.json, \"files\": [path], \"has_up\"}
 
 Examples:
@@ -38,25 +39,25 @@ Examples:
     parallax smooth out/run --constant-bones --fill-s 0.5
     parallax smooth out/run --method butterworth --cutoff-hz 6")]
 pub(crate) struct Arguments {
-    /// The results of a run.
+    /// Folder with the results of a run.
     folder: PathBuf,
-    /// The method: `rts` looks ahead, and uses the measured covariances; `butterworth` is a zero-phase low-pass filter;
-    /// `kalman` is the live method; `none` only computes angles.
+    /// The method. `rts` looks ahead, and uses the measured covariances. `butterworth` is a zero-phase low-pass filter.
+    /// `kalman` is the method of live runs. `none` only computes angles.
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,
-    /// Cutoff of `butterworth`, Hz; 6 if not given.
+    /// Cutoff frequency of `butterworth`, in Hz. If not given, 6.
     #[arg(long, value_name = "HZ", value_parser = cutoff)]
     cutoff_hz: Option<f64>,
-    /// Longest gap to fill, seconds; 0.25 if not given.
+    /// Longest gap to fill, in seconds. If not given, 0.25.
     #[arg(long, value_name = "SECONDS", value_parser = fill)]
     fill_s: Option<f64>,
-    /// Keep the lengths of the limbs' bones constant (`rts`).
+    /// Keep the bones of the limbs at constant lengths (with `rts`).
     #[arg(long)]
     constant_bones: bool,
     /// Frames per second, in place of the times in the file.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
-    /// Direction against gravity in the world of the run, in place of that of its calibration.
+    /// Upward direction in the world of the run, in place of the one in its calibration.
     #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
     /// Print JSON.
@@ -95,7 +96,7 @@ fn up(text: &str) -> Result<UnitVector3<f64>, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     let direction = numbers.filter(|number| number.len() == 3).map(Vector3::from_vec);
     let direction = direction.and_then(|direction| UnitVector3::try_new(direction, 1e-9));
-    direction.ok_or_else(|| "expected three numbers, not all 0, as 0,0,1".to_owned())
+    direction.ok_or_else(|| "expected three numbers, not all 0, such as 0,0,1".to_owned())
 }
 
 /// Runs the command.
@@ -124,7 +125,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
 }
 
-/// The defaults, replaced by what the command line says.
+/// Returns the default settings, with the values of the command line in their place.
 fn settings(arguments: &Arguments) -> Settings {
     let defaults = Settings::default();
     Settings {
@@ -153,7 +154,7 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
         n => format!(" of {n} people"),
     };
     output::line(format_args!(
-        "{} over {} frames{of} of {n_joints} joints, {:.0} ms late",
+        "{} over {} frames{of} with {n_joints} joints, delay {:.0} ms",
         report.method, report.n_frames, report.delay_ms
     ))?;
     let counts: Vec<String> =
@@ -165,19 +166,19 @@ fn tell(request: &Request, outcome: &Outcome) -> Result<(), Failure> {
     if let Some(scale) = scale {
         let sd = scale.sqrt();
         output::line(format_args!(
-            "errors from frame to frame are {sd:.2} times what the covariances say (median of the joints)"
+            "errors from frame to frame are {sd:.2} times as large as the covariances predict (median of the joints)"
         ))?;
     }
     let breaks = report.people.iter().map(|person| &person.frames_of_breaks);
     for frames in breaks.filter(|frames| !frames.is_empty()) {
         output::line(format_args!(
-            "another person begins in {} frames: {frames:?}",
+            "the followed person changes in {} frames: {frames:?}",
             frames.len()
         ))?;
     }
     if !outcome.has_up {
         output::line(
-            "angles with the vertical are missing: the calibration does not say which way is up; --up X,Y,Z does",
+            "angles with the vertical are missing, because the calibration does not define the upward direction; use --up X,Y,Z",
         )?;
     }
     for name in finished::FILES {

@@ -1,4 +1,4 @@
-//! `parallax sync`: the clocks of the cameras of recorded footage.
+//! `parallax sync`: finds the clock offsets between the cameras of recorded footage.
 
 mod heard;
 
@@ -21,27 +21,28 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{le
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Estimate offset and drift of every camera from the movement of people, or from sounds.
+    /// Estimate the clock offset and drift of every camera, from the movement of people or from sounds.
     Estimate(Box<Arguments>),
 }
 
 /// Options of `parallax sync estimate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-People come from the `keypoints` of a camera, otherwise from its network; with the paper's method, from the network that ships. \
-The calibration must fit; identities are not needed. A joint that two cameras see at one instant satisfies their epipolar constraint: the offset of a pair is where this holds best, and all cameras must \
-agree. Offsets are against the first camera (--reference), and do not depend on `offset_ms` and `drift_ppm` in the file.
+People are read from the `keypoints` of a camera. If it has none, the camera's network finds them, or the shipped network with the \
+paper's method. The calibration must be right; identities of people are not needed. If two cameras see a joint at the same instant, the \
+two pixels satisfy the epipolar constraint. The offset of a pair is the one that satisfies this constraint best, and the offsets of all pairs must \
+agree. Offsets are relative to the first camera, or to --reference. They do not depend on `offset_ms` and `drift_ppm` in the file.
 
-An answer is refused, with exit code 7 and the reason, if another offset is nearly as good (people on a treadmill), the minimum \
+A result is refused, with exit code 7 and the reason, in these cases: another offset is nearly as good (people on a treadmill), the minimum \
 is flat (nobody moves), a pair or a part of the footage contradicts the rest, the views do not fit each other, or a camera sees \
-nobody. Nothing is written then. Short footage gives no drift; the table says so.
+nobody. Nothing is written then. If the footage is too short to find the drift, the table says so.
 
---by sound compares the times at which sounds begin instead: steps, voices, doors, claps. Nobody needs to be visible. Sound \
-travels a metre in 2.9 ms, so offsets are uncertain by the distance of two cameras divided by 343 m/s: +- includes this. \
-In JSON `joints` then counts sounds, and pixels are null. These are refused: too few sounds, sounds that only one camera has, a \
-regular beat, and pairs or parts that contradict each other.
+With --by sound, the times are compared at which sounds begin: steps, voices, doors, claps. Nobody needs to be visible. Sound \
+travels a metre in 2.9 ms, so an offset is uncertain by the distance of the two cameras divided by 343 m/s. The printed uncertainties include this. \
+In JSON, `joints` then counts sounds, and pixels are null. A result is refused if there are too few sounds, sounds that only one camera recorded, a \
+regular beat, or pairs or parts that contradict each other.
 
-With --json one object:
+With --json, prints one object:
     {\"is_determined\", \"doubts\": [text], \"reference\", \"length_s\", \"second_best\",
      \"cameras\": [{\"name\", \"offset_ms\", \"error_ms\", \"drift_ppm\", \"drift_error_ppm\", \"joints\", \"before_px\", \"after_px\",
                   \"found_by\"}],
@@ -55,31 +56,31 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
-    /// The signal to compare.
+    /// Signal by which the clocks are compared.
     #[arg(long, value_enum, default_value_t = By::Movement)]
     by: By,
-    /// Largest clock offset of two cameras, seconds; use 10 for footage that was started by hand.
+    /// Largest clock offset between two cameras, in seconds. Use 10 if the recordings were started by hand.
     #[arg(long, value_name = "SECONDS", default_value_t = 2.0, value_parser = window)]
     window: f64,
-    /// The camera with the reference clock; the first of the deployment if not given.
+    /// Camera with the reference clock. If not given, the first camera of the deployment.
     #[arg(long, value_name = "CAMERA")]
     reference: Option<String>,
-    /// Look at every n-th picture.
+    /// Use every n-th picture.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     every: u64,
-    /// Start in the footage of each camera, seconds.
+    /// Start at this time in the footage of each camera, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     from: f64,
-    /// Length of the footage to look at, seconds; all of it if not given.
+    /// Length of the footage to use, in seconds. If not given, all of it.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
-    /// Write a page with the costs of all pairs over their offset.
+    /// Write a page that plots the cost of each pair of cameras against its offset.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write `offset_ms` and `drift_ppm` into the deployment file, and change nothing else there.
+    /// Write `offset_ms` and `drift_ppm` into the deployment file. The rest of the file is not changed.
     #[arg(long)]
     write: bool,
-    /// Replace a value of the deployment, for example `--set network.file=other.onnx`; may be given several times.
+    /// Replace a value of the deployment, for example `--set network.file=other.onnx`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Print JSON.
@@ -92,7 +93,7 @@ pub(crate) struct Arguments {
 enum By {
     /// The movement of people.
     Movement,
-    /// The beginnings of sounds.
+    /// The times at which sounds begin.
     Sound,
 }
 
@@ -161,7 +162,7 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
     Ok(ExitCode::SUCCESS)
 }
 
-/// The number of the reference camera.
+/// Returns the index of the reference camera.
 fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Failure> {
     if let [_] | [] = &deployment.cameras[..] {
         let message = "the deployment has one camera: there is no other clock to compare with";
@@ -182,7 +183,7 @@ fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Fa
     })
 }
 
-/// Compares the clocks, which Ctrl-C ends.
+/// Compares the clocks. Ctrl-C ends the comparison.
 fn compared(
     found: Films,
     reference: usize,
@@ -218,7 +219,7 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
         By::Sound => "sounds",
     };
     output::line(format_args!(
-        "offsets against {} from {:.1} s of footage, to be added to a camera's times to get common times",
+        "offsets relative to {} from {:.1} s of footage; add them to a camera's times to get common times",
         names[reference], outcome.length_s
     ))?;
     let mut table = Table::new([
@@ -248,9 +249,9 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     }
     output::line(table)?;
     if outcome.cameras.iter().all(|camera| camera.drift_error.is_none()) {
-        output::line("drift: the footage does not determine it, 0 is used")?;
+        output::line("drift: not determined by the footage, so 0 is used")?;
     } else if outcome.cameras.iter().any(|camera| camera.drift == 0.0) {
-        output::line("drift: 0 if it is not significant")?;
+        output::line("drift: 0 if not significant")?;
     }
     output::line(format_args!(
         "{:<25} {:>9} {:>15} {:>12} {:>8}",
@@ -270,7 +271,7 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     Ok(())
 }
 
-/// A residual, where there is one.
+/// Formats a residual, if there is one.
 fn pixels(it: f64) -> String {
     if it.is_finite() {
         format!("{it:.2}")
@@ -352,7 +353,7 @@ fn write_page(
     files::replace(file, page.as_bytes()).map_err(|error| in_file(file, &error))
 }
 
-/// A failure where the answer is not to be used.
+/// Fails if the clocks are not determined.
 fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     if outcome.doubts.is_empty() {
         return Ok(());
@@ -362,11 +363,11 @@ fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     let failure = Failure::new(ExitKind::Degraded, message);
     Err(failure.with_hint(match by {
         By::Movement => {
-            "footage in which people walk through the view of all cameras helps most; --window searches further; --by sound compares \
-             what the cameras heard; `parallax calib check` looks at the calibration"
+            "best is footage in which people walk through the view of all cameras; --window sets a larger range of offsets; --by sound compares \
+             recorded sounds; `parallax calib check` checks the calibration"
         }
         By::Sound => {
-            "sounds that all cameras hear help most: clap a few times, unevenly; --window searches further; without --by sound the \
+            "best are sounds that all cameras record: clap a few times, unevenly; --window sets a larger range of offsets; without --by sound, the \
              movement of people is compared"
         }
     }))
@@ -388,7 +389,7 @@ fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> 
             format!("{}: offset_ms = {:.3}{drift}", key.name, key.offset_ms)
         });
         let hint = format!(
-            "write them by hand: {}",
+            "write the offsets by hand: {}",
             lines.collect::<Vec<_>>().join("; ")
         );
         Failure::new(ExitKind::Config, format!("{}: {error}", file.display())).with_hint(hint)

@@ -15,24 +15,31 @@ use launch::live::{self, Live};
 /// Options of `parallax top`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Keys: space, j or page down shows the next page, k or page up the one before, the arrows move by one line; q, Escape
-or Ctrl-C quits. `top` ends with the deployment.
+Keys: space, j or page down shows the next page, k or page up shows the previous page, and the arrows move by one line. q, Escape \
+or Ctrl-C quits. `top` ends when the deployment ends.
 
-States: runs; done (has sent the end of its footage, and waits for the stop request); begins (no message yet); silent
-(alive, but no message for five seconds: stopped, or without processor time); dead (no process; the supervisor may
-start it again). The last values of a dead process stay in the table.
+States:
+    runs     the process works
+    done     the process has sent the end of its footage, and waits for the stop request
+    begins   the process has not sent a message yet
+    silent   the process is alive, but has sent no message for five seconds (it may be stopped)
+    dead     there is no process; the supervisor may start it again
+The last values of a dead process stay in the table.
 
-Stages: waiting, from the sending of a message until work on it begins (transport, a busy receiver, other views);
-computing; publishing, until the result is sent (with lossless delivery including slow receivers); since capture, from the
-capture of the frame to this process's message; end to end, from the capture to the result. Percentiles are over the
-lifetime of the process; rates are over the last five seconds.")]
+Stages:
+    waiting         until work on a message begins: transport, a busy receiver, other views
+    computing       from the beginning of the work to its end
+    publishing      until the result is sent; with lossless delivery, includes slow receivers
+    since capture   from the capture of the frame to the message of this process
+    end to end      from the capture to the result
+Percentiles are over the lifetime of the process. Rates are over the last five seconds.")]
 pub(crate) struct Arguments {
-    /// Name of the deployment, or its file; may be left out if only one is running.
+    /// Name or file of the deployment. May be left out if only one deployment is running.
     deployment: Option<String>,
-    /// Print one table and exit; the default if standard output is not a terminal.
+    /// Print one table and exit. This is the default if standard output is not a terminal.
     #[arg(long)]
     once: bool,
-    /// Interval of updates, seconds.
+    /// Interval between updates, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = pause)]
     every: f64,
 }
@@ -58,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn pause(text: &str) -> Result<f64, String> {
     let seconds: f64 = text.parse().ok().ok_or("not a number")?;
     let fits = (0.1..=3600.0).contains(&seconds);
-    fits.then_some(seconds).ok_or_else(|| "not from 0.1 to 3600".to_owned())
+    fits.then_some(seconds).ok_or_else(|| "expected 0.1 to 3600".to_owned())
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! `parallax view`: a page in the browser about a running deployment, a finished run, or a recording.
+//! `parallax view`: serves a web page about a running deployment, a finished run, or a recording.
 
 use core::net::{IpAddr, SocketAddr};
 use std::fs::File;
@@ -14,58 +14,58 @@ use serde_json::json;
 use terminal::{Globals, output};
 use view::{Listen, Options, Subject};
 
-/// Shortest token that is accepted, characters.
+/// Minimum length of a token, in characters.
 const SHORTEST_TOKEN: usize = 16;
 
 /// Options of `parallax view`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The page shows the skeleton in space with its uncertainty, every camera's picture with the pose found in it, epipolar \
-lines of a joint or a point, rates and latency, missing processes, and events; a button records into the \
-results folder. It only listens: no process of the deployment waits for it, and it skips frames when it is slow. \
-Open and close it at any time, also several at once. It waits for a deployment that does not run yet, and \
-for the next run when one ends. A finished run has a time line.
+The page shows the skeleton in space with its uncertainty, every camera's picture with the detected pose, epipolar \
+lines of a joint or a point, rates and latency, missing processes, and events. A button records into the \
+results folder. No process of the deployment waits for the page, which skips frames when it is slow. \
+You can open and close pages at any time, also several at once. A page waits for a deployment that does not run yet, and \
+for the next run when a run ends. For a finished run, the page has a time line.
 
-The page is served on the loopback only, and pages of other sites cannot read it. Other users of this machine can, unless you ask \
-for a token. Only your own pages, or those with the token, can record, and a recording ends with the page that began it. With \
---listen 0.0.0.0 other machines can read the page too; they need a token, which is made if you give none. Nothing is encrypted: \
+By default, the page is only available on this machine (on the loopback), and pages of other sites cannot read it. Other users of this machine can read it, \
+unless --token or --token-file is given. Only your own pages, or pages with the token, can record. A recording ends when the page that started it is closed. With \
+--listen 0.0.0.0, other machines can also read the page. They need a token, which is created if you give none. Nothing is encrypted: \
 over a shared network, prefer a tunnel (`ssh -L 7878:localhost:7878 HOST`).
 
-Keys in the page: ? lists them. Ctrl-C ends the view only.
+Press ? in the page for a list of its keys. Ctrl-C ends the view, but not the deployment.
 
 Examples:
-    parallax view                        the deployment that runs
-    parallax view my.toml                the one of that file, now or when it runs
+    parallax view                        the only running deployment
+    parallax view my.toml                the deployment of this file, now or when it runs
     parallax view out/                   a finished run, by its folder
     parallax view run.mcap               a recording
     parallax run my.toml --view          a run and its page together
     parallax view --port 0 --json        any free port; the address as JSON")]
 pub(crate) struct Arguments {
-    /// Name of a deployment or its file (.toml), the folder of a finished run, or a recording (.mcap); may be left out if
-    /// only one deployment runs.
+    /// A deployment (name or .toml file), the folder of a finished run, or a recording (.mcap). May be left out if
+    /// only one deployment is running.
     subject: Option<String>,
-    /// Name of a deployment, even if there is a folder of that name.
+    /// Name of a deployment, even if a folder has the same name.
     #[arg(long, value_name = "NAME", conflicts_with = "subject")]
     deployment: Option<String>,
-    /// Port of the page, 0 for any free one; if not given, 7878, or a free one if that is in use.
+    /// Port of the page, or 0 for any free port. If not given, 7878, or a free port if 7878 is in use.
     #[arg(long, value_name = "N")]
     port: Option<u16>,
-    /// Address to listen on; any but the loopback needs a token.
+    /// Address to listen on. Any address except the loopback needs a token.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     listen: IpAddr,
-    /// Ask pages for a random token, which is part of the address.
+    /// Require a random token from browsers. The printed address of the page contains it.
     #[arg(long, conflicts_with = "token_file")]
     token: bool,
-    /// File with the token that pages must know: at least 16 letters, digits, '-' or '_'.
+    /// File with the token that browsers must send: at least 16 letters, digits, '-' or '_'.
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
-    /// Most pictures of a camera in a second.
+    /// Maximum number of pictures per camera and second.
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=60))]
     pictures: u32,
     /// Print the address of the page as JSON.
     #[arg(long)]
     json: bool,
-    /// End with the process that has started this one, which holds the other end of standard input.
+    /// End when the parent process ends, which has the other end of standard input.
     #[arg(long, hide = true)]
     with_parent: bool,
 }
@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     view::run(&options, &stop, &mut |url| {
         if arguments.port.is_none() && !url.contains(&format!(":{}/", Listen::PORT)) {
             let usual = Listen::PORT;
-            output::message(format_args!("port {usual} is in use: another one is taken"));
+            output::message(format_args!("port {usual} is in use: using another port"));
         }
         if arguments.with_parent {
             output::message(format_args!("the page: {url}"));
@@ -114,15 +114,15 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Starts a view beside a run of a deployment, as `--view` asks.
+/// Starts a view beside a run of a deployment, for the option `--view`.
 ///
-/// * `name`: of the deployment.
+/// * `name`: name of the deployment.
 pub(crate) fn beside(name: &str) -> Result<view::Companion, Failure> {
     let executable = std::env::current_exe().or_fail(ExitKind::Run)?;
     view::Companion::start(&executable, name)
 }
 
-/// Returns the meaning of a word on the command line.
+/// Returns what an argument names: a deployment, a folder or a recording.
 fn subject(named: Option<&str>) -> Result<Subject, Failure> {
     let Some(named) = named else {
         return Ok(Subject::Deployment(None));
@@ -150,7 +150,7 @@ fn subject(named: Option<&str>) -> Result<Subject, Failure> {
     Namespace::new(named).or_fail(ExitKind::Usage)?;
     if !path.exists() && !runs(named)? {
         output::message(format_args!(
-            "no folder, no file and no running deployment is called {named}: waiting for a deployment of that name"
+            "no folder, file or running deployment has the name {named}: waiting for a deployment with this name"
         ));
     }
     Ok(Subject::Deployment(Some(named.to_owned())))
@@ -163,7 +163,7 @@ fn runs(name: &str) -> Result<bool, Failure> {
     Ok(running.any(|deployment| deployment.namespace.name() == name))
 }
 
-/// The token in a file, without space around it.
+/// Reads a token from a file, and removes white space around it.
 fn token_in(file: &Path) -> Result<String, Failure> {
     let text = failure::read_text(file)?;
     let token = text.trim();
@@ -178,7 +178,7 @@ fn token_in(file: &Path) -> Result<String, Failure> {
     Ok(token.to_owned())
 }
 
-/// 128 random bits, as hexadecimal digits.
+/// Returns 128 random bits as hexadecimal digits.
 fn random_token() -> Result<String, Failure> {
     let mut bytes = [0; 16];
     let source = Path::new("/dev/urandom");
@@ -189,11 +189,11 @@ fn random_token() -> Result<String, Failure> {
     Ok(digits.collect())
 }
 
-/// Requests the stop when standard input ends.
+/// Requests a stop when standard input ends.
 fn end_with_parent(stop: &Stop) -> Result<(), Failure> {
     let stop = stop.clone();
     let wait = move || {
-        // Whatever ends the pipe, its other end is gone.
+        // An error also means that the parent is gone.
         let _ended = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
         stop.request();
     };

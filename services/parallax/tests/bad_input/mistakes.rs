@@ -1,11 +1,11 @@
-//! Mistakes of new users, and the error messages: what is wrong, where, and what to try.
+//! Tests with mistakes of new users. Error messages must say what is wrong, where, and what to try.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
 use crate::common::{Case, Ended, PLAIN};
 
-/// Internal words that no user should have to read.
+/// Internal terms that must not appear in messages for users.
 const NEVER: &[&str] = &[
     "u64",
     "usize",
@@ -19,14 +19,14 @@ const NEVER: &[&str] = &[
     "stream did not contain",
 ];
 
-/// One mistake in a valid deployment of two views, `a` and `b`, with two frames each.
+/// A mistake in a valid deployment of two views, `a` and `b`, with two frames each.
 pub(crate) struct Mistake {
     pub(crate) what: &'static str,
     pub(crate) made: fn(&Case),
     /// The arguments of the program, as shell text.
     pub(crate) command: &'static str,
     pub(crate) code: i32,
-    /// Words of the message that name the mistake and its place.
+    /// Words of the message that name the mistake and its location.
     pub(crate) says: &'static [&'static str],
     /// Words of the hint.
     pub(crate) tries: &'static [&'static str],
@@ -65,7 +65,7 @@ fn permit(case: &Case) {
     }
 }
 
-/// A script; text without the program's name is its arguments.
+/// Returns a shell script. If the text lacks the program's name, it has the arguments.
 fn in_shell(command: &str) -> String {
     if command.contains("$PARALLAX") {
         return command.to_owned();
@@ -208,7 +208,7 @@ const FOOTAGE: &[Mistake] = &[
         "text",
         |case| source(case, "rig.toml"),
         &["cannot decode", "rig.toml", "camera \"b\""],
-        &["shows whether the file is whole"],
+        &["check that the file is complete"],
     ),
     footage(
         "pattern without a match",
@@ -248,7 +248,7 @@ fn footage_with_a_misleading_name() {
     check(FOOTAGE);
 }
 
-/// The superuser may read everything, but not from a user namespace of its own.
+/// The superuser may read everything, so the command runs in a user namespace of its own.
 const FORBIDDEN: &str = "test $(id -u) = 0 || exec \"$PARALLAX\" config check deployment.toml\n\
                          exec unshare -U \"$PARALLAX\" config check deployment.toml";
 
@@ -273,7 +273,7 @@ const MAY_NOT: &[Mistake] = &[
         "folder of images",
         |case| forbid(case, "b"),
         &["cannot read", "/b", "Permission denied"],
-        &["camera \"b\"", "must be able to read it"],
+        &["camera \"b\"", "you need permission to read it"],
     ),
     forbidden(
         "rig",

@@ -1,4 +1,4 @@
-//! Notices before a run begins, and the origin of data.
+//! Tests of notices before a run begins, and of the origin of data.
 
 use std::fs;
 use std::path::Path;
@@ -26,7 +26,7 @@ fn a_file_reports_the_origin_of_its_data() {
 
 #[test]
 fn shipped_files_report_the_origin_of_their_data() {
-    // In a folder of their own, as in a fresh clone.
+    // The files are in a folder of their own, as in a fresh clone.
     let case = Case::new("oops-clone", &[2; 2], PLAIN);
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
     fs::create_dir(case.path("configs")).unwrap();
@@ -73,7 +73,7 @@ fn shipped_files_are_found_from_any_program_location() {
     let check = ["config", "check", "deployment.toml"];
     let ended = case.start(&check).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    // A path is used as a path.
+    // A path is used as a path, even if it looks like a name.
     for (from, to) in [
         ("errors = \"shipped\"", "errors = \"./shipped\""),
         ("\"./shipped\"", "\"a/shipped\""),
@@ -98,7 +98,7 @@ fn padding_is_reported_with_a_size_that_needs_none() {
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
         ended.stderr
     };
-    // The pictures are 96x128.
+    // The pictures have 96x128 pixels.
     let landscape = said("[160, 120]");
     for words in [
         "44 % of every 160x120 frame of a, b is padding",
@@ -123,7 +123,7 @@ fn the_announced_size_of_a_recording_is_right() {
         ended.stderr
     );
     assert!(line.contains(" for all 4 frames; "), "{line}");
-    // The announced size is not smaller than the actual one, and not many times larger.
+    // The predicted size is not smaller than the actual size, and not many times larger.
     let number = |before: &str| -> f64 {
         let at = line.find(before).unwrap() + before.len();
         let mut words = line[at..].split(' ');
@@ -133,7 +133,7 @@ fn the_announced_size_of_a_recording_is_right() {
     };
     let said = number("up to ") * 4.0;
     let took = fs::metadata(case.path("run.mcap")).unwrap().len() as f64;
-    // Heartbeats, schemas and settings add some hundred kilobytes.
+    // Heartbeats, schemas and settings need some hundred kilobytes.
     assert!(
         took < said + 1e6 && said < 4.0 * took,
         "said {said}, took {took}: {line}"

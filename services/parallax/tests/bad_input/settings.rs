@@ -1,4 +1,4 @@
-//! Mistakes in deployment files, on command lines, and in the files that go with footage.
+//! Tests with mistakes in deployment files, on command lines, and in files that accompany footage.
 
 use std::fs;
 
@@ -47,7 +47,7 @@ const FILES: &[Mistake] = &[
         command: "config check a",
         code: 4,
         says: &["deployment file a", "is a folder"],
-        tries: &["name the .toml file in it"],
+        tries: &["pass the .toml file in it"],
     },
     Mistake {
         what: "a picture",
@@ -140,14 +140,14 @@ const LINES: &[Mistake] = &[
         command: "record deployment.toml --out none/run.mcap",
         code: 4,
         says: &["run.mcap cannot be written", "there is no folder"],
-        tries: &["make the folder first"],
+        tries: &["create the folder first"],
     },
     Mistake {
         what: "results in the place of a file",
         made: |fixture| fixture.write("out", ""),
         command: "run deployment.toml",
         code: 4,
-        says: &["cannot make the folder", "out is a file"],
+        says: &["cannot create the folder", "out is a file"],
         tries: &["--out"],
     },
     Mistake {
@@ -205,13 +205,13 @@ const fn rig(
     }
 }
 
-/// Names a network that predicts errors.
+/// Sets a network that predicts errors.
 fn errors(case: &Case, file: &str) {
     let named = format!("workers = 2\nerrors = {file:?}");
     case.edit("deployment.toml", "workers = 2", &named);
 }
 
-/// Names a file of joints.
+/// Sets a file of joints.
 fn joints(case: &Case, file: &str) {
     let named = format!("bodies = false\njoint_map = {file:?}");
     case.edit("deployment.toml", "bodies = false", &named);

@@ -3,23 +3,23 @@
 /// A fenced block.
 #[derive(Debug)]
 pub(crate) struct Block {
-    /// Line of its first fence, from 1.
+    /// Line of the first fence, counted from 1.
     pub(crate) line: usize,
-    /// Words of its info string: language, then marks.
+    /// Words of the info string: the language, then marks.
     pub(crate) info: Vec<String>,
     /// Text between the fences.
     pub(crate) text: String,
 }
 
 impl Block {
-    /// Returns true if the block is of a language and carries a mark.
+    /// Returns true if the block has a language and a mark.
     pub(crate) fn is(&self, language: &str, mark: &str) -> bool {
         self.info.first().is_some_and(|info| info == language)
             && self.info.iter().any(|word| word == mark)
     }
 }
 
-/// All fenced blocks of a text.
+/// Returns all fenced blocks of a text.
 pub(crate) fn blocks(text: &str) -> Vec<Block> {
     let mut found: Vec<Block> = Vec::new();
     let mut is_open = false;
@@ -45,7 +45,7 @@ pub(crate) fn blocks(text: &str) -> Vec<Block> {
     found
 }
 
-/// A text without its fenced blocks: their lines are empty.
+/// Returns a text in which the lines of fenced blocks are empty.
 pub(crate) fn prose(text: &str) -> String {
     let mut is_open = false;
     let mut prose = String::new();

@@ -1,4 +1,4 @@
-//! Command lines of the book, and whether the executable takes them.
+//! Checks that the executables accept the command lines of the book.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ pub(crate) enum Program {
 }
 
 impl Program {
-    /// Where it is built.
+    /// Returns the path of the executable.
     pub(crate) fn file(self) -> PathBuf {
         built(match self {
             Self::Parallax => "parallax",
@@ -49,7 +49,7 @@ impl fmt::Display for Line {
 }
 
 impl Line {
-    /// The executable and its arguments, if it is a command of one of ours.
+    /// Returns the executable and its arguments, if the command runs one of Parallax's executables.
     pub(crate) fn ours(&self) -> Option<(Program, &[String])> {
         match self.0.first()?.as_str() {
             "parallax" | "target/release/parallax" => Some((Program::Parallax, &self.0[1..])),
@@ -68,7 +68,7 @@ impl Line {
         }
     }
 
-    /// Returns the package or feature that the command asks of cargo and that is not there.
+    /// Returns the package or feature that the command passes to cargo and that does not exist.
     pub(crate) fn cargo_problem(&self) -> Option<String> {
         if self.0.first()? != "cargo" {
             return None;
@@ -106,7 +106,8 @@ impl Line {
     }
 }
 
-/// The commands of a block: without remarks, joined where a line goes on, apart at `&&`, up to a pipe or a file.
+/// Returns the commands of a block. Comments are removed, continued lines are joined, and lines are split at `&&`. A command ends at a pipe
+/// or a redirection.
 pub(crate) fn lines(text: &str) -> Vec<Line> {
     let joined = text.replace("\\\n", " ");
     let commands = joined.lines().flat_map(|line| {
@@ -120,7 +121,7 @@ pub(crate) fn lines(text: &str) -> Vec<Line> {
     commands.filter(|line| !line.0.is_empty()).collect()
 }
 
-/// Words of a line as a shell has them, up to a remark.
+/// Splits a line into words like a shell, up to a comment.
 fn words(line: &str) -> Vec<String> {
     let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None);
     for letter in line.chars() {
@@ -139,10 +140,10 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// Checks that the executable takes these arguments.
+/// Checks that the executable accepts these arguments.
 ///
-/// It parses them itself, `--help` behind them: what it does not know, and values of another kind, it refuses
-/// before it comes to that. What is missing it would not notice; that is compared with its usage line.
+/// The executable parses them itself, followed by `--help`. It refuses unknown arguments and wrong values before it prints the help.
+/// Missing arguments are not refused in this case, so they are compared with the usage line.
 pub(crate) fn check((program, arguments): (Program, &[String])) -> Result<(), String> {
     let mut asked = arguments.to_vec();
     asked.push("--help".to_owned());
@@ -158,7 +159,7 @@ pub(crate) fn check((program, arguments): (Program, &[String])) -> Result<(), St
     let mut rest = arguments;
     while help.lines().any(|line| line == "Commands:") {
         let Some((name, others)) = rest.split_first() else {
-            // One that may be left out stands on a line of its own.
+            // An optional subcommand is on a separate line.
             let asks = |text: &str| text.starts_with("Usage: ") && text.ends_with("<COMMAND>");
             let is_optional = !path.is_empty() && !help.lines().any(asks);
             return if is_optional {
@@ -177,10 +178,10 @@ pub(crate) fn check((program, arguments): (Program, &[String])) -> Result<(), St
     usage.compare(rest)
 }
 
-/// Arguments that the usage line of a command asks for.
+/// Arguments that the usage line of a command requires.
 struct Usage<'a> {
     help: &'a str,
-    /// Fewest arguments that are no options, and most.
+    /// Minimum and maximum number of positional arguments.
     n_arguments: [usize; 2],
     required: Vec<&'a str>,
 }
@@ -240,7 +241,7 @@ impl<'a> Usage<'a> {
         }
     }
 
-    /// How many values an option takes, as the help shows it.
+    /// Returns the number of values of an option, according to the help.
     fn n_values(&self, option: &str) -> usize {
         let shown = self.help.lines().find_map(|line| {
             let line = line.trim_start();
@@ -254,7 +255,7 @@ impl<'a> Usage<'a> {
     }
 }
 
-/// The short help of a command; asked for once.
+/// Returns the short help of a command. Each help is only requested once.
 fn help_of(program: Program, path: &[String]) -> Result<String, String> {
     static KNOWN: Mutex<BTreeMap<(Program, Vec<String>), String>> = Mutex::new(BTreeMap::new());
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -269,7 +270,7 @@ fn help_of(program: Program, path: &[String]) -> Result<String, String> {
     Ok(said)
 }
 
-/// Runs a program. Returns true on success, and the text that it printed: standard output on success, else standard error.
+/// Runs a program. Returns true on success, and the printed text: standard output on success, otherwise standard error.
 fn run(program: Program, arguments: &[String]) -> (bool, String) {
     let ended = Command::new(program.file()).args(arguments).output().unwrap();
     let said = if ended.status.success() {

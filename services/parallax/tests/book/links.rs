@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::blocks::prose;
 
-/// Links of files that lead nowhere, with their places.
+/// Returns the broken links in files, with their locations.
 pub(crate) fn broken(root: &Path, files: &[PathBuf]) -> Vec<String> {
     let mut problems = Vec::new();
     for file in files {
@@ -19,7 +19,7 @@ pub(crate) fn broken(root: &Path, files: &[PathBuf]) -> Vec<String> {
     problems
 }
 
-/// Where the links of a text lead, but for the web.
+/// Returns the targets of a text's links, except web addresses.
 fn targets(text: &str) -> Vec<String> {
     let prose = prose(text);
     let without_code: String = prose.split('`').step_by(2).collect();
@@ -58,7 +58,7 @@ fn follow(root: &Path, file: &Path, target: &str) -> Result<(), String> {
     }
 }
 
-/// The anchor that a heading gets: lower case, without punctuation, a hyphen for a space.
+/// Returns the anchor of a heading: lower case, without punctuation, with a hyphen for each space.
 fn anchor_of(heading: &str) -> String {
     let heading = heading.trim_start_matches('#').trim();
     let letters = heading.to_lowercase();

@@ -1,4 +1,4 @@
-//! Names such as `multiview::estimate_pair` in the pages.
+//! Finds names such as `multiview::estimate_pair` in the pages, and checks them.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use super::files_below;
 /// Keywords that declare a name.
 const KEYWORDS: [&str; 7] = ["fn", "struct", "enum", "trait", "mod", "const", "type"];
 
-/// All code spans that are a path in a crate.
+/// Returns all code spans that are a path in a crate.
 pub(crate) fn paths(text: &str) -> Vec<String> {
     let is_path = |span: &&str| {
         let mut letters = span.chars();
@@ -23,7 +23,7 @@ pub(crate) fn paths(text: &str) -> Vec<String> {
     spans.filter(is_path).map(str::to_owned).collect()
 }
 
-/// Returns true if the crate is there, and declares everything that the path names.
+/// Returns true if the crate exists and declares everything that the path names.
 pub(crate) fn exists(root: &Path, path: &str) -> bool {
     let mut segments = path.split("::");
     let name = segments.next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! A small deployment with a synthetic figure in a folder of its own, run with the program as a user would.
+//! A small deployment with a synthetic figure in its own folder. The program is run as a user would run it.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -20,15 +20,15 @@ use tempfile::TempDir;
 
 pub(crate) use started::{Ended, Started};
 
-/// No overlays and no rotation, so that frames equal the generated pictures.
+/// Settings without overlays and rotation, so that frames equal the generated pictures.
 pub(crate) const PLAIN: &str =
     "[capture]\nupright = false\n[results]\noverlay_every = 0\n[paper]\nworkers = 2\n";
 
-/// The same at 20 frames per second, which leaves time to interfere.
+/// Settings like [`PLAIN`], with 20 frames per second, which leaves time to interfere.
 pub(crate) const PACED: &str = "[capture]\nupright = false\nmode = \"paced\"\n\
      frame_rate_hz = 20\n[results]\noverlay_every = 0\n[paper]\nworkers = 2\n";
 
-/// The last line of a frame that every view took: on a loaded machine a view takes every second frame, or fourth, and drops the
+/// Returns the last line of a frame that every view used. On a loaded machine, a view uses every second or fourth frame and drops the
 /// others.
 pub(crate) fn last_taken(lines: &[Value]) -> &Value {
     let is_taken = |value: &&Value| {
@@ -38,23 +38,23 @@ pub(crate) fn last_taken(lines: &[Value]) -> &Value {
     lines.iter().rev().find(is_taken).unwrap()
 }
 
-/// Footage, rig, model and deployment file in a folder.
+/// A folder with footage, rig, model and deployment file.
 pub(crate) struct Case {
     folder: TempDir,
     pub(crate) name: String,
 }
 
 impl Case {
-    /// A deployment with generated footage.
+    /// Creates a deployment with generated footage.
     ///
-    /// * `name`: beginning of the deployment's name, which is unique.
+    /// * `name`: beginning of the deployment's name, which must be unique.
     /// * `n_frames`: number of frames by view.
-    /// * `more`: appended to the deployment file.
+    /// * `more`: text that is appended to the deployment file.
     pub(crate) fn new(name: &str, n_frames: &[usize], more: &str) -> Self {
         Self::with_rig(&planted::rig(n_frames.len()), name, n_frames, more)
     }
 
-    /// The same with another rig.
+    /// Creates a deployment like [`Self::new`], with another rig.
     pub(crate) fn with_rig(rig: &Rig, name: &str, n_frames: &[usize], more: &str) -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let nth = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -78,7 +78,7 @@ impl Case {
             let name = &camera.name;
             writeln!(text, "\n[[camera]]\nname = {name:?}\nsource = {name:?}").unwrap();
         }
-        // The planted figure has the bones of nobody.
+        // The bones of the planted figure do not have human proportions.
         let own = "[paper]\nmodel = \"model.plx\"\nbodies = false";
         let more = if more.contains("[paper]") {
             more.replace("[paper]", own)
@@ -89,12 +89,12 @@ impl Case {
         case
     }
 
-    /// Path of a file in the folder.
+    /// Returns the path of a file in the folder.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// The folder.
+    /// Returns the path of the folder.
     pub(crate) fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -104,7 +104,7 @@ impl Case {
         fs::write(self.path(name), content).unwrap();
     }
 
-    /// Replaces text in a file in the folder; the text must occur.
+    /// Replaces text in a file in the folder. The text must occur.
     pub(crate) fn edit(&self, name: &str, from: &str, to: &str) {
         let text = fs::read_to_string(self.path(name)).unwrap();
         assert!(
@@ -114,7 +114,7 @@ impl Case {
         self.write(name, text.replace(from, to));
     }
 
-    /// Sets the network's method, with these keys of its section, in place of the paper's.
+    /// Sets the method of networks with these keys of its section, in place of the paper's method.
     pub(crate) fn set_network(&self, keys: &str) {
         let text = fs::read_to_string(self.path("deployment.toml")).unwrap();
         let mut table: toml::Table = toml::from_str(&text).unwrap();
@@ -125,16 +125,16 @@ impl Case {
         self.write("deployment.toml", toml::to_string(&table).unwrap());
     }
 
-    /// Starts `parallax` with arguments, in the folder.
+    /// Starts `parallax` with arguments, in the folder of the case.
     pub(crate) fn start(&self, arguments: &[&str]) -> Started {
-        // Results of the run before may be replaced.
+        // Results of an earlier run may be replaced.
         let may_force = matches!(arguments.first(), Some(&"run" | &"replay"));
         let force = (may_force && !arguments.contains(&"--dry-run")).then_some("--force");
         let arguments: Vec<&str> = arguments.iter().copied().chain(force).collect();
         Started::new(self.folder(), &arguments)
     }
 
-    /// Starts a shell script in the folder; `$PARALLAX` is the program.
+    /// Starts a shell script in the folder. `$PARALLAX` is the program.
     pub(crate) fn start_in_shell(&self, script: &str) -> Started {
         Started::in_shell(self.folder(), script)
     }
@@ -162,7 +162,7 @@ impl Case {
         );
     }
 
-    /// The complete lines of a results file, also while the run is writing it.
+    /// Returns the complete lines of a results file, even if the run is still writing it.
     pub(crate) fn lines(&self, name: &str) -> Vec<Value> {
         let whole = self.path("out").join(name);
         let part = self.path("out").join(format!("{name}.part"));

@@ -1,8 +1,8 @@
-//! Networks small enough to be written here.
+//! Networks that are small enough to be defined in tests.
 
 use inference::onnx::{Attribute, Network, Side};
 
-/// Card of [`detector_of`].
+/// Card for [`detector_of`].
 pub(crate) const DETECTOR: &str = r#"
 format = "parallax-detector"
 version = 1
@@ -11,13 +11,14 @@ input = { width = 64, height = 64, scale = 0.00392156862745098 }
 output = { codec = "list", boxes = "dets" }
 "#;
 
-/// Sides of a port.
+/// Returns the sides of a port.
 pub(crate) fn sides(n: [usize; 4]) -> Vec<Side> {
     n.map(Side::Fixed).to_vec()
 }
 
-/// A detector of one box of a picture, whatever it shows: left, top, right, bottom, pixels of its input of 64 by 64. Its score is
-/// `score` and a ten-thousandth of the mean colour.
+/// Returns a detector that finds the same box in every picture: left, top, right and bottom, in pixels of its input of 64 by 64. The score
+/// is
+/// `score` plus a ten-thousandth of the mean colour.
 pub(crate) fn detector_of([left, top, right, bottom]: [f32; 4], score: f32) -> Network {
     let mut net = Network::default();
     net.inputs.push(("picture".to_owned(), sides([1, 3, 64, 64])));

@@ -8,17 +8,17 @@ use geometry::{Camera, Intrinsics, Lens, LensModel, Rig};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
 
-/// Width and height of every picture, pixels.
+/// Width and height of every picture, in pixels.
 pub(crate) const SIZE: [u32; 2] = [96, 128];
 const CELL_PX: usize = 4;
 
-/// Cameras named `a`, `b`, `c`, ... on an arc of 3 m around the origin, z up.
+/// Returns cameras named `a`, `b`, `c`, ... on an arc of 3 m around the origin, with z up.
 pub(crate) fn rig(n_views: usize) -> Rig {
     let cameras = (0..n_views).map(|view| {
         let angle = 0.6 * view as f64 - 0.5;
         let eye = Point3::new(3.0 * angle.sin(), -3.0 * angle.cos(), 0.2);
         let looking = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-        // From y up, z backward to y down, z forward.
+        // Converts axes with y up and z backward to axes with y down and z forward.
         let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);
         Camera {
             name: name(view),
@@ -36,7 +36,7 @@ pub(crate) fn rig(n_views: usize) -> Rig {
     Rig::new(cameras.collect(), Some(Vector3::z_axis()), "planted").unwrap()
 }
 
-/// The same cameras with lens distortion, each with another roll angle.
+/// Returns the same cameras with lens distortion, each with another roll angle.
 pub(crate) fn tilted_rig(n_views: usize) -> Rig {
     let tilted = rig(n_views).cameras().to_vec().into_iter().enumerate();
     let cameras = tilted.map(|(view, camera)| {
@@ -59,12 +59,12 @@ pub(crate) fn tilted_rig(n_views: usize) -> Rig {
     Rig::new(cameras.collect(), Some(Vector3::z_axis()), "planted").unwrap()
 }
 
-/// The name of a view.
+/// Returns the name of a view.
 pub(crate) fn name(view: usize) -> String {
     char::from(b'a' + view as u8).to_string()
 }
 
-/// The picture of a camera in a frame.
+/// Returns the picture of a camera in a frame.
 pub(crate) fn picture(camera: &Camera, frame: usize) -> Canvas {
     let [width, height] = SIZE.map(|size| size as usize);
     let mut canvas = Canvas::new(Size::new(width, height), [90, 96, 102]);
@@ -83,7 +83,7 @@ pub(crate) fn picture(camera: &Camera, frame: usize) -> Canvas {
     canvas
 }
 
-/// The parts of a figure that walks and turns, metres.
+/// Returns the parts of a figure that walks and turns, in metres.
 fn figure(frame: usize) -> [Point3<f64>; N_PARTS] {
     let time = frame as f64;
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.3 * (0.2 * time).sin());
@@ -91,13 +91,13 @@ fn figure(frame: usize) -> [Point3<f64>; N_PARTS] {
     core::array::from_fn(|part| turn * standing(part) + walk)
 }
 
-/// The 14 joints of the figure, metres.
+/// Returns the 14 joints of the figure, in metres.
 pub(crate) fn joints(frame: usize) -> Vec<[f64; 3]> {
     let parts = figure(frame).map(|point| point.coords.into());
     skeleton::PARSE14.from_parts(&parts)
 }
 
-/// Position of a part of the standing figure: lower with its depth in the tree, and displaced to its side.
+/// Returns the position of a part of the standing figure. Parts deeper in the tree are lower, and parts are displaced to their side.
 fn standing(part: usize) -> Point3<f64> {
     let depth = core::iter::successors(PARENT[part], |i| PARENT[*i]).count() as f64;
     let side = (MIRROR[part] as f64 - part as f64).signum();
@@ -110,7 +110,7 @@ fn standing(part: usize) -> Point3<f64> {
     )
 }
 
-/// A model of 26 parts of two types with four filters of 3x3 cells that respond to edges.
+/// Returns a model of 26 parts of two types, with four filters of 3x3 cells that respond to edges.
 pub(crate) fn model() -> Arc<Model> {
     Arc::new(Model::new(spec()).unwrap())
 }

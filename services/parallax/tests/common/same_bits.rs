@@ -16,13 +16,13 @@ use super::{Case, planted};
 /// The computation in one process.
 #[derive(Debug, Default)]
 pub(crate) struct OneProcess {
-    /// The settings of its steps.
+    /// Settings of the steps.
     pub(crate) settings: EstimatorSettings,
-    /// Size of the upright frames; without it, frames equal the pictures.
+    /// Size of the upright frames. If not set, frames equal the pictures.
     pub(crate) upright_size: Option<[u32; 2]>,
     /// Expected errors of the parts in a frame of a view, if there are any.
     pub(crate) sigma_px: Option<fn(frame: usize, view: usize) -> Vec<f32>>,
-    /// Predicate: true if a view is missing in a frame; without it, none is.
+    /// Returns true if a view is missing in a frame. If not set, no view is missing.
     pub(crate) is_missing: Option<fn(frame: usize, view: usize) -> bool>,
 }
 
@@ -77,7 +77,7 @@ impl OneProcess {
     }
 }
 
-/// From the pictures of a camera to the frames of the pipeline.
+/// Mapping from the pictures of a camera to the frames of the pipeline.
 struct View {
     framing: Framing,
     warp: Warp,
@@ -107,7 +107,7 @@ impl View {
         rgb
     }
 
-    /// A point of the frame in pixels of the picture.
+    /// Converts a point of the frame to pixels of the picture.
     fn in_picture(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let map = self.framing.source_from_output();
         map.map(|row| row[0] * x + row[1] * y + row[2])

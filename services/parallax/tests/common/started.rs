@@ -8,7 +8,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Anything that takes longer is stuck, also on a slow machine that does much else.
+/// If a process takes longer than this, it is stuck, even on a slow and busy machine.
 pub(crate) const WATCHDOG: Duration = Duration::from_mins(15);
 
 /// A running `parallax`.
@@ -18,12 +18,12 @@ pub(crate) struct Started {
     log: PathBuf,
 }
 
-/// The executable that ships.
+/// Returns the path of the executable `parallax`.
 pub(crate) fn parallax() -> PathBuf {
     built("parallax")
 }
 
-/// The executable whose command the arguments begin with.
+/// Returns the executable that has the command in the first argument.
 fn program(arguments: &[&str]) -> PathBuf {
     const LAB: [&str; 6] = ["eval", "judge", "model", "simulate", "synth", "train"];
     let is_lab = arguments.first().is_some_and(|command| LAB.contains(command))
@@ -31,7 +31,7 @@ fn program(arguments: &[&str]) -> PathBuf {
     built(if is_lab { "parallax-lab" } else { "parallax" })
 }
 
-/// A program of the workspace, beside the folder of this test.
+/// Returns the path of a program of the workspace, beside the folder of this test.
 pub(crate) fn built(name: &str) -> PathBuf {
     let test = std::env::current_exe().unwrap();
     let file = test.ancestors().nth(2).unwrap().join(name);
@@ -52,14 +52,14 @@ pub(crate) struct Ended {
 }
 
 impl Started {
-    /// Starts it in a folder, and in a process group of its own.
+    /// Starts the program in a folder and in its own process group.
     pub(crate) fn new(folder: &Path, arguments: &[&str]) -> Self {
         let mut command = Command::new(program(arguments));
         command.args(arguments);
         Self::from_command(folder, command)
     }
 
-    /// Starts a shell script in its own mount namespace; `$PARALLAX` is the program. `None` without the permission for that.
+    /// Starts a shell script in its own mount namespace. `$PARALLAX` is the program. Returns `None` if this is not permitted.
     pub(crate) fn in_mount_namespace(folder: &Path, script: &str) -> Option<Self> {
         let allowed = Command::new("unshare")
             .args(["-m", "sh", "-c", "mount -t tmpfs tmpfs /mnt"])
@@ -73,7 +73,7 @@ impl Started {
         Some(Self::from_command(folder, command))
     }
 
-    /// Starts a shell script; `$PARALLAX` is the program.
+    /// Starts a shell script. `$PARALLAX` is the program.
     pub(crate) fn in_shell(folder: &Path, script: &str) -> Self {
         let mut command = Command::new("sh");
         command.args(["-ec", script]).env("PARALLAX", parallax());
@@ -98,7 +98,7 @@ impl Started {
         }
     }
 
-    /// Waits for its end, and checks that no process of it is left.
+    /// Waits for the end of the program, and checks that none of its processes is left.
     pub(crate) fn wait(self) -> Ended {
         let folder = self.folder.clone();
         let ended = self.wait_among_others();
@@ -111,14 +111,14 @@ impl Started {
         ended
     }
 
-    /// Waits for its end, while others may run in the same folder.
+    /// Waits for the end of the program, while other programs may run in the same folder.
     pub(crate) fn wait_among_others(mut self) -> Ended {
         let begin = Instant::now();
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;
             }
-            // A process that still runs is killed when this is dropped.
+            // If the program is still running, dropping the value kills it.
             assert!(begin.elapsed() < WATCHDOG, "stuck:\n{}", self.output("err"));
             std::thread::sleep(Duration::from_millis(10));
         };
@@ -131,9 +131,9 @@ impl Started {
         ended
     }
 
-    /// The process of a service, once there is one.
+    /// Returns the process id of a service, once it exists.
     ///
-    /// * `service`: as on its command line, for example `pose --index 1`.
+    /// * `service`: the service as on its command line, for example `pose --index 1`.
     pub(crate) fn pid_of(&mut self, service: &str) -> u32 {
         let words: Vec<&str> = service.split(' ').collect();
         let mut found = None;
@@ -147,7 +147,7 @@ impl Started {
         found.unwrap()
     }
 
-    /// Waits until something holds while it runs.
+    /// Waits until a condition is true, while the program runs.
     pub(crate) fn until(&mut self, what: &str, mut holds: impl FnMut(&Path) -> bool) {
         let folder = self.folder.clone();
         wait_until(what, || {
@@ -161,19 +161,19 @@ impl Started {
         });
     }
 
-    /// Waits until it has said something on standard error while it runs.
+    /// Waits until the program has printed a text on standard error.
     pub(crate) fn until_said(&mut self, words: &str) {
         let file = self.log.with_extension("err");
         let said = || fs::read_to_string(&file).is_ok_and(|text| text.contains(words));
         self.until(words, |_| said());
     }
 
-    /// Its process id, which is that of its group too.
+    /// Returns the process id, which is also that of the process group.
     pub(crate) fn id(&self) -> i64 {
         i64::from(self.child.id())
     }
 
-    /// The file of what it says on standard output.
+    /// Returns the file that has the standard output.
     pub(crate) fn out_file(&self) -> PathBuf {
         self.log.with_extension("out")
     }
@@ -197,7 +197,7 @@ pub(crate) fn signal(name: &str, id: i64) {
     assert!(status.unwrap().success(), "kill -s {name} {id}");
 }
 
-/// Waits until something holds.
+/// Waits until a condition is true.
 fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     let begin = Instant::now();
     while !holds() {
@@ -206,7 +206,7 @@ fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// Processes whose command line contains a folder, with their arguments.
+/// Returns the processes whose command line contains a folder, with their arguments.
 pub(crate) fn processes(folder: &Path) -> Vec<(u32, Vec<String>)> {
     let folder = folder.to_str().unwrap();
     let entries = fs::read_dir("/proc").unwrap();
@@ -214,7 +214,7 @@ pub(crate) fn processes(folder: &Path) -> Vec<(u32, Vec<String>)> {
         .filter_map(|entry| {
             let entry = entry.ok()?;
             let pid = entry.file_name().to_str()?.parse().ok()?;
-            // A process that has ended meanwhile has no command line.
+            // A process that has ended in the meantime has no command line.
             let line = fs::read_to_string(entry.path().join("cmdline")).ok()?;
             let arguments = line.split('\0').map(str::to_owned).collect();
             line.contains(folder).then_some((pid, arguments))

@@ -1,4 +1,4 @@
-//! Messages of Foxglove against its schemas, of nobody, one and two people.
+//! Checks the Foxglove messages against their schemas, with nobody, one person and two people.
 
 use bytemuck::bytes_of;
 use geometry::{Intrinsics, Lens};
@@ -33,7 +33,7 @@ fn foxglove() -> Foxglove {
     })
 }
 
-/// A frame with one person.
+/// Returns a frame with one person.
 fn one(id: u64) -> Box<Skeletons> {
     let mut frame = Box::<Skeletons>::default();
     frame.n_people = 1;
@@ -55,7 +55,7 @@ fn shown(foxglove: &mut Foxglove, frame: &Skeletons) -> Vec<(usize, Value)> {
     made(foxglove, Kind::Skeletons, head, people)
 }
 
-/// Returns the Foxglove messages of one of our messages.
+/// Returns the Foxglove messages for one of Parallax's messages.
 fn made(foxglove: &mut Foxglove, kind: Kind, head: &[u8], elements: &[u8]) -> Vec<(usize, Value)> {
     let mut data = Vec::new();
     encode(kind, head, elements, &mut data);
@@ -64,7 +64,7 @@ fn made(foxglove: &mut Foxglove, kind: Kind, head: &[u8], elements: &[u8]) -> Ve
         .collect()
 }
 
-/// Why a value is not as a schema says: types, and what is required.
+/// Returns the reason why a value does not match a schema, if it does not. Checks types and required fields.
 fn problem(schema: &Value, value: &Value) -> Option<String> {
     let fits = match schema["type"].as_str() {
         Some("object") => value.is_object(),
@@ -150,7 +150,7 @@ fn a_skeleton_is_its_joints_with_a_place_their_spread_and_the_lines_between_them
     let mut foxglove = foxglove();
     let all = shown(&mut foxglove, &one(1));
     let entity = &all[3].1["entities"][0];
-    // Two of the joints have no place or spread that is a number.
+    // Two joints have a position or covariance that is not a number.
     let n = PARSE14.joints.len() - 2;
     assert_eq!(entity["spheres"].as_array().map(Vec::len), Some(2 * n));
     let has_both =

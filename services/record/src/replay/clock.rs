@@ -3,60 +3,60 @@
 use messages::{Stamp, Timing};
 use recording::Envelope;
 
-/// How fast a recording is replayed.
+/// Speed of a replay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pace {
-    /// As fast as it can be read and received.
+    /// As fast as messages can be read and received.
     Max,
-    /// A multiple of the recorded speed; above 0.
+    /// A multiple of the recorded speed, above 0.
     Times(f64),
 }
 
-/// The clock of the recording and the clock of the run.
+/// Relation between the clock of the recording and the clock of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clock {
-    /// Send time of the first message, by the clock of the recording, nanoseconds.
+    /// Send time of the first message, by the clock of the recording, in nanoseconds.
     pub recorded: u64,
-    /// Time from the first message to the last, nanoseconds.
+    /// Time from the first message to the last, in nanoseconds.
     pub length: u64,
-    /// When the run was planned, by this machine's clock, nanoseconds.
+    /// Time at which the run was planned, by this machine's clock, in nanoseconds.
     pub planned: u64,
     /// Replay speed.
     pub pace: Pace,
 }
 
-/// At a given speed, the first message is sent this long after the run was planned.
+/// Time from the planning of the run to the first message, at a given speed.
 const LEAD_NANOS: u64 = 2_000_000_000;
 
 impl Clock {
-    /// When the first message is to be sent, by this machine's clock, at a given speed.
+    /// Returns the time at which the first message is sent, by this machine's clock, at a given speed.
     fn begin(&self) -> u64 {
         self.planned.saturating_add(LEAD_NANOS)
     }
 
-    /// When a message is to be sent, by this machine's clock; 0 at [`Pace::Max`].
+    /// Returns the time at which a message is due, by this machine's clock; 0 at [`Pace::Max`].
     ///
-    /// * `sent_at`: when it was sent, by the clock of the recording.
+    /// * `sent_at`: send time by the clock of the recording.
     pub(crate) fn due(&self, sent_at: u64) -> u64 {
         match self.pace {
             Pace::Max => 0,
             Pace::Times(times) => {
                 let since = sent_at.saturating_sub(self.recorded) as f64 / times;
-                // The conversion saturates; NaN becomes 0.
+                // The conversion saturates, and turns NaN into 0.
                 self.begin().saturating_add(since as u64)
             }
         }
     }
 
-    /// The envelope of a message in this run.
+    /// Returns the envelope of a message in this run.
     ///
-    /// All capture times are shifted by the same amount, so that the times between frames stay the same. The shift is such
-    /// that no message is sent before its frame was captured, even if it is replayed faster than it was recorded. The send
-    /// time is `now`; the computing time stays.
+    /// All capture times are shifted by the same amount, so the times between frames stay the same. The shift is chosen so
+    /// that no message is sent before its frame was captured, even if the replay is faster than the recording. The send
+    /// time is `now`. The computing time is not changed.
     ///
-    /// * `session`: of this run.
-    /// * `epoch`: restarts of this process; added to the recorded epoch.
-    /// * `now`: this machine's clock, nanoseconds.
+    /// * `session`: session of this run.
+    /// * `epoch`: number of restarts of this process, which is added to the recorded epoch.
+    /// * `now`: time by this machine's clock, in nanoseconds.
     pub(crate) fn rebase(&self, recorded: &Envelope, [session, epoch, now]: [u64; 3]) -> Envelope {
         let timing = recorded.timing;
         let computing = timing.sent_at_nanos.saturating_sub(timing.received_at_nanos);
@@ -163,7 +163,7 @@ mod tests {
             let clock = Clock { recorded, length, planned, pace };
             let sent_at = recorded + at;
             let captured = clock.rebase(&envelope(sent_at - ago, [0, 0]), [0; 3]).stamp;
-            // A float of 2^40 is exact to less than a microsecond.
+            // A float near 2^40 is exact to less than a microsecond.
             let sent_now = clock.due(sent_at).max(planned);
             prop_assert!(captured.captured_at_nanos <= sent_now + 1000);
         }

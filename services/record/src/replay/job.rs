@@ -1,30 +1,30 @@
-//! Task of the process.
+//! The job of the process.
 
 use core::time::Duration;
 use std::path::PathBuf;
 
 use crate::replay::Pace;
 
-/// Task of the process.
+/// The job of the process.
 #[derive(Debug)]
 pub struct Job {
-    /// The recording.
+    /// Path of the recording.
     pub file: PathBuf,
     /// The topics that the replaced process publishes. The first one determines the end of the stream.
     pub outputs: Vec<Output>,
     /// Replay speed.
     pub pace: Pace,
-    /// Distance between the frames used, for a recording without an end of stream.
+    /// Distance between used frames, for a recording without an end of stream.
     pub frame_step: u64,
-    /// How long the process waits for receivers.
+    /// Time that the process waits for receivers.
     pub patience: Duration,
 }
 
 /// A topic that is replayed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Output {
-    /// Its name.
+    /// Name of the topic.
     pub topic: String,
-    /// Processes that subscribe to it; with none, nothing is sent on it.
+    /// Number of processes that subscribe to the topic. If there are none, nothing is sent on it.
     pub n_receivers: usize,
 }

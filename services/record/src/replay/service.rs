@@ -1,4 +1,4 @@
-//! The loop: read a message, wait until it is due, send it with an envelope of this run.
+//! The replay loop: reads a message, waits until it is due, and sends it with an envelope of this run.
 
 use core::time::Duration;
 use std::fs::File;
@@ -15,11 +15,11 @@ use crate::replay::job::{Job, Output};
 
 /// Sends the recorded messages of some topics in the order in which they were sent, then the end of the stream.
 ///
-/// A damaged message is left out: the command that starts a replay has reported it.
+/// Damaged messages are left out. The command that starts a replay has reported them.
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the recording cannot be read, or lacks a topic; and what the transport reports.
+/// Fails with [`ExitKind::Input`] if the recording cannot be read or lacks a topic, and with errors of the transport.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut file = files::open(&job.file).or_fail(ExitKind::Input)?;
     let recording = recording::scan(&mut file).or_fail(ExitKind::Input)?;
@@ -63,30 +63,30 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         }
         playback.send(*output, &message, &envelope)?;
         if let Err(error) = place.note([nth + 1]) {
-            tracing::debug!(%error, "cannot note the place in the recording");
+            tracing::debug!(%error, "cannot save the position in the recording");
         }
     }
     let end = end.unwrap_or_else(|| end_after(&order, &tracks, &mut file, job, recorded_session));
     playback.end(&end)
 }
 
-/// The outputs that have receivers.
+/// Returns the outputs that have receivers.
 fn received(job: &Job) -> impl Iterator<Item = &Output> {
     job.outputs.iter().filter(|output| output.n_receivers > 0)
 }
 
-/// The tracks of the outputs that have receivers, in their order.
+/// Returns the tracks of the outputs that have receivers, in the order of the outputs.
 fn tracks<'a>(job: &Job, recording: &'a Recording) -> Result<Vec<&'a Track>, Failure> {
     let tracks = received(job).map(|output| {
         recording.tracks.get(&output.topic).ok_or_else(|| {
-            let message = format!("{} holds nothing of {}", job.file.display(), output.topic);
+            let message = format!("{} has no messages of {}", job.file.display(), output.topic);
             Failure::new(ExitKind::Input, message)
         })
     });
     tracks.collect()
 }
 
-/// The end of stream for a recording in which it is missing or damaged: one frame step after the last frame.
+/// Returns the end of stream for a recording in which it is missing or damaged: one frame step after the last frame.
 fn end_after(
     order: &[(usize, Entry)],
     tracks: &[&Track],
@@ -109,13 +109,13 @@ fn end_after(
     }
 }
 
-/// The last frame of a track; none if the track holds no message of the session.
+/// Returns the last frame of a track; `None` if the track has no message of the session.
 ///
-/// It is that of the last message that can be read, or of a damaged one after it: most numbers in a damaged chunk are right, and
-/// without them the last frames of a run would be missing. A number counts only if that many frames fit into the damaged
+/// This is the frame of the last readable message, or of a damaged one after it. Most frame numbers in a damaged chunk are right, and
+/// without them the last frames of a run would be missing. A number is only used if that many frames fit into the damaged
 /// messages.
 ///
-/// * `recorded`: the session, and the distance of two frames.
+/// * `recorded`: the session, and the distance between two frames.
 fn last_of(file: &mut File, kind: Kind, entries: &[Entry], recorded: [u64; 2]) -> Option<Stamp> {
     let [session, frame_step] = recorded;
     let mut buffer = Buffer::default();
@@ -145,18 +145,18 @@ fn last_of(file: &mut File, kind: Kind, entries: &[Entry], recorded: [u64; 2]) -
     believed.chain([known]).max_by_key(|stamp| stamp.frame)
 }
 
-/// Index of the view, or of the worker, at the end of the name of a topic; 0 for a topic of all views.
+/// Returns the index of the view or worker at the end of a topic's name; 0 for a topic of all views.
 fn view_in(topic: &str) -> u32 {
     let last = topic.rsplit('/').next();
     last.and_then(|text| text.parse().ok()).unwrap_or_default()
 }
 
-/// The outputs of the process, and the clock that they are replayed by.
+/// The outputs of the process, and the clock of the replay.
 struct Playback<'a> {
     service: &'a Service,
     job: &'a Job,
     stage: Stage<'a, ()>,
-    /// By output that has receivers.
+    /// One sender for each output that has receivers.
     senders: Vec<Sender>,
     clock: Clock,
 }
@@ -201,13 +201,13 @@ impl<'a> Playback<'a> {
                     topic = output.topic,
                     n,
                     expected,
-                    "beginning without all receivers"
+                    "starting before all receivers are connected"
                 );
             }
         }
     }
 
-    /// Waits until a message is due; `false` on a stop request.
+    /// Waits until a message is due. Returns `false` on a stop request.
     fn wait_until_due(&self, entry: &Entry) -> Result<bool, Failure> {
         let due = self.clock.due(entry.publish_time);
         loop {

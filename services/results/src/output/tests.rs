@@ -138,7 +138,7 @@ fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
     };
     output.absent(&[absent(0)]);
     output.frame(&record(2));
-    // 4 was handed on and not taken: the queue was full.
+    // Frame 4 was not taken, because the queue was full.
     output.absent(&[absent(6)]);
     output.frame(&record(8));
     output.absent(&[absent(10)]);
@@ -195,7 +195,7 @@ fn files_of_everybody_have_everybody_and_those_of_one_who_is_followed() {
     let folder = Folder::open(dir.path(), false).unwrap();
     let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
     output.smooth().unwrap();
-    // In the third frame another one is followed; in the last one nobody is there.
+    // In the third frame another person is followed, and in the last frame there is nobody.
     for (frame, ids) in [(0, &[3, 8][..]), (2, &[3, 8]), (4, &[8, 3]), (6, &[])] {
         let mut record = record(frame);
         let result = &mut record.skeletons;
@@ -226,7 +226,7 @@ fn files_of_everybody_have_everybody_and_those_of_one_who_is_followed() {
     assert!(rows.contains("\n4,0.066667,3,right ankle,3.0"), "{rows}");
     assert!(rows.contains("\n6,0.100000,,right ankle,,"), "{rows}");
     let trc = formats::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
-    // z is up in the scene: (y, z, x).
+    // z is up in the scene, so the axes are (y, z, x).
     let x = trc.frames.iter().map(|frame| frame[0].map(|place| place[2]));
     assert_eq!(
         x.collect::<Vec<_>>(),

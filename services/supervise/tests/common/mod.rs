@@ -13,7 +13,7 @@ use runtime::{Delivery, Limits, Namespace, Scheduling, TopicPlan, process_topics
 use supervise::{Death, Event, Outcome, Plan, Policy, ProcessSpec, Role, SuperviseError};
 use tracing::Level;
 
-/// A run that takes longer is stuck.
+/// If a run takes longer than this, it is stuck.
 const WATCHDOG: Duration = Duration::from_mins(2);
 
 /// A recorded event.
@@ -42,7 +42,9 @@ pub(crate) struct Run {
 }
 
 impl Case {
-    /// * `processes`: name, behaviour, role.
+    /// Creates a deployment.
+    ///
+    /// * `processes`: name, behaviour and role of each process.
     pub(crate) fn new(delivery: Delivery, processes: &[(&str, &str, Role)]) -> Self {
         let base = tempfile::Builder::new().prefix("px").tempdir_in("/dev/shm").unwrap();
         let frames = TopicPlan::slices::<u8, FrameHeader>(
@@ -83,7 +85,7 @@ impl Case {
         Self { plan, base }
     }
 
-    /// Runs to the end. `react` is called for every event, and may stop the run.
+    /// Runs the deployment to the end. `react` is called for every event, and may stop the run.
     pub(crate) fn run(&self, mut react: impl FnMut(&Recorded, &Stop)) -> Run {
         let stop = Stop::new().unwrap();
         let watchdog = Watchdog::new(&stop);
@@ -99,7 +101,7 @@ impl Case {
         Run { events, result }
     }
 
-    /// The parent directory of the deployment's root.
+    /// Returns the parent directory of the deployment's root.
     pub(crate) fn base(&self) -> &Path {
         self.base.path()
     }
@@ -130,7 +132,7 @@ impl Run {
         self.result.as_ref().unwrap()
     }
 
-    /// Frames that a receiver received, with the epoch of their sender.
+    /// Returns the frames that a receiver received, each with the epoch of its sender.
     pub(crate) fn got(&self, receiver: &str) -> Vec<(u32, u64)> {
         self.lines(receiver)
             .filter_map(|line| {
@@ -170,7 +172,7 @@ pub(crate) fn kill(signal: &str, pid: u32) {
     assert!(status.unwrap().success(), "kill {signal} {pid}");
 }
 
-/// Returns true if a process runs: it exists, and is not a zombie.
+/// Returns true if a process is running: it exists and is not a zombie.
 pub(crate) fn is_alive(pid: u32) -> bool {
     let line = std::fs::read(Path::new("/proc").join(pid.to_string()).join("cmdline"));
     line.is_ok_and(|line| !line.is_empty())

@@ -1,4 +1,4 @@
-//! Dummy processes that are not services: a supervisor to be killed, and a process that fills shared memory.
+//! Dummy processes that are not services: a supervisor that is killed, and a process that fills shared memory.
 
 use std::io::Write as _;
 use std::path::Path;

@@ -69,9 +69,9 @@ fn failure(status: u64) -> Failure {
     Failure::new(kind, "model.bin: byte 17 is wrong").with_hint("take another")
 }
 
-/// Sends `n` frames, then the end of stream, and repeats it.
+/// Sends `n` frames, then the end of the stream several times.
 ///
-/// * `leaves`: whether it exits after the first end of stream.
+/// * `leaves`: true to exit after the first end of the stream.
 fn send(
     service: &Service,
     n: u64,
@@ -111,9 +111,9 @@ fn send(
     Ok(())
 }
 
-/// Receives until the end of stream, and prints every frame.
+/// Receives frames until the end of the stream, and prints every frame.
 ///
-/// * `dies`: whether it is killed at the end of stream.
+/// * `dies`: true to be killed at the end of the stream.
 fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let subscriber = service.bus().slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
@@ -142,11 +142,11 @@ fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Subscribes and never reads.
+/// Subscribes, but never reads.
 fn hold(service: &Service) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let subscriber = service.bus().slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
-    // Connected, like a process that dies during its work.
+    // Waits until it is connected, like a process that dies during its work.
     while subscriber.receive()?.is_none() {
         waiter.wait(SOON)?;
     }
@@ -154,7 +154,7 @@ fn hold(service: &Service) -> Result<(), Failure> {
     idle(service)
 }
 
-/// At its first start it is killed while it holds a loan; after the restart it sends three frames and
+/// At its first start, is killed while it has a loan. After the restart, sends three frames and
 /// finishes.
 fn die_in_loan(service: &Service) -> Result<(), Failure> {
     if service.epoch() > 0 {
@@ -167,7 +167,7 @@ fn die_in_loan(service: &Service) -> Result<(), Failure> {
         loan.payload_mut().fill(frame as u8);
         loan.header_mut().stamp.frame = frame;
         loan.send()?;
-        // One at a time, so that no frame is replaced.
+        // Frames are sent one at a time, so that none is replaced.
         std::thread::sleep(SOON);
     }
     let mut loan = publisher.loan(publisher.max_len())?;
@@ -183,7 +183,7 @@ fn die() -> Result<(), Failure> {
     Err(Failure::new(ExitKind::Run, "survived kill -9"))
 }
 
-/// At its first start its main loop makes one iteration and then hangs.
+/// At its first start, makes one iteration of its main loop and then hangs.
 fn hang_once(service: &Service) -> Result<(), Failure> {
     service.progress().tick();
     while service.epoch() == 0 {
@@ -202,8 +202,8 @@ fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
     idle(service)
 }
 
-/// Computes for three seconds, `usual` milliseconds per iteration, without waiting; then once, at its first
-/// start, for `long` milliseconds.
+/// Computes for three seconds without waiting, with `usual` milliseconds per iteration. Then, only at its first
+/// start, computes for `long` milliseconds.
 fn compute(service: &Service, usual: u64, long: u64) -> Result<(), Failure> {
     let burn = |millis: u64| {
         let begin = Instant::now();
@@ -240,7 +240,7 @@ fn wrong_type(service: &Service) -> Result<(), Failure> {
     Ok(())
 }
 
-/// At its first start it exits with status 0 before it has finished.
+/// At its first start, exits with status 0 before it has finished.
 fn leave(service: &Service) -> Result<(), Failure> {
     service.progress().tick();
     if service.epoch() > 0 {
@@ -258,7 +258,7 @@ fn stubborn(service: &Service) -> Result<(), Failure> {
     }
 }
 
-/// Starts a child process and does not end it.
+/// Starts a child process, and does not end it.
 fn orphan(service: &Service) -> Result<(), Failure> {
     let child = Command::new("sleep").arg("600").spawn().or_fail(ExitKind::Run)?;
     print_line(&format!("child {}", child.id()))?;

@@ -1,4 +1,4 @@
-//! Made-up clocks and delays.
+//! Tests with simulated clocks and delays.
 
 use fastrand::Rng;
 use proptest::prelude::*;
@@ -8,13 +8,13 @@ use super::*;
 const MS: f64 = 1e6;
 const S: u64 = 1_000_000_000;
 
-/// Another host: what its clock says, and how long messages take, milliseconds there and back.
+/// Another host: the state of its clock, and the delays of messages in both directions, in milliseconds.
 struct Other {
     offset: i64,
     drift: f64,
     there: f64,
     back: f64,
-    /// Mean of what is added to either way at random.
+    /// Mean of the random delay that is added in either direction.
     noise: f64,
     random: Rng,
 }
@@ -42,7 +42,7 @@ impl Other {
     }
 }
 
-/// After exchanges at so many seconds, one a second, the estimate a second later and the true offset.
+/// Returns the estimate and the true offset a second after the last exchange. There is one exchange per second, for some seconds.
 fn after(seconds: u64, other: &mut Other) -> (Estimate, i64) {
     let mut clock = Clock::default();
     let start = 1000 * S;
@@ -83,7 +83,8 @@ fn a_quiet_network_gives_the_offset_within_microseconds_and_the_drift() {
 fn noise_is_filtered_by_the_shortest_round_trips() {
     let (got, truth) = after(60, &mut other(0.1, 0.1, 5.0, 20.0));
     let off = (got.offset_nanos - truth).abs();
-    // The mean of all would be off by milliseconds' noise over the root of 60; a single one by up to tens of them.
+    // The mean of all exchanges would be off by milliseconds divided by the root of 60. A single exchange would be off by up to tens of
+    // milliseconds.
     assert!(off < 1_500_000, "{off} ns");
     assert!(got.bound_nanos as i64 >= off, "{} {off}", got.bound_nanos);
 }
@@ -189,7 +190,7 @@ fn times_translate_there_and_back() {
     assert_eq!(got.ours(0), 0, "before our clock began");
 }
 
-/// Three exchanges of six seconds whose line is far from the one through the first and the last.
+/// Three exchanges over six seconds whose fitted line is far from the line through the first and the last.
 #[test]
 fn a_line_that_leaves_its_ends_has_a_bound_that_says_so() {
     let random = Rng::with_seed(10_865_627_331_665_547_518);

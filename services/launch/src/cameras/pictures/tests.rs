@@ -1,11 +1,11 @@
-//! Which turn a calibration asks for, and which frames pictures are.
+//! Tests of the rotation that a calibration asks for, and of the frame numbers of pictures.
 
 use geometry::{Camera, Intrinsics, Lens};
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::*;
 
-/// A camera that looks along y, z up; rolled by so many degrees to the right.
+/// Returns a rig with one camera that looks along y, with z up, rolled to the right by `roll` degrees.
 fn rig(size: [u32; 2], roll: f64, up: Option<UnitVector3<f64>>) -> Rig {
     let level = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::FRAC_PI_2);
     let rolled = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -roll.to_radians());
@@ -42,7 +42,7 @@ fn the_calibration_tells_whether_a_tag_is_to_be_followed() {
     for degrees in [90, 270] {
         assert!(turns(rig([480, 640], 0.0, up), [640, 480], degrees));
         assert!(!turns(rig([640, 480], 0.0, up), [640, 480], degrees));
-        // Cut, or of another size: by its shape.
+        // If the calibrated picture is cropped or has another size, its aspect ratio decides.
         assert!(turns(rig([480, 600], 0.0, up), [640, 480], degrees));
         assert!(turns(rig([480, 480], 0.0, up), [480, 480], degrees));
         assert!(!turns(rig([480, 480], 90.0, up), [480, 480], degrees));

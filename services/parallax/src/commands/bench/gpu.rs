@@ -1,4 +1,4 @@
-//! `parallax bench gpu`: the search of frames by the filters, on the GPU and on the processor.
+//! `parallax bench gpu`: measures how fast the filters search frames, on the GPU and on the processor.
 
 use clap::Args;
 use trials::bench::Gpu;
@@ -6,24 +6,24 @@ use trials::bench::Gpu;
 use super::{EXITS, Output};
 
 const HELP: &str = "\
-Searches frames with the model that ships, and measures the time from the picture to poses and evidence: at rates of cameras, where a \
-card may slow its clock between frames, and as fast as possible (0). All views of a frame are searched at once, by threads of one \
-process, which share the GPU. The picture is artificial.";
+Searches frames with the shipped model, and measures the time from the picture to poses and evidence. Frames are searched at the rates of \
+cameras, and as fast as possible (0). At a camera's rate, a graphics card may lower its clock between frames. All views of a frame are searched \
+at the same time, by threads of one process, which share the GPU. The picture is artificial.";
 
-/// Options of the benchmark of the GPU.
+/// Options of the GPU benchmark.
 #[derive(Debug, Args)]
 #[command(after_help = EXITS, after_long_help = format!("{HELP}\n\n{EXITS}"))]
 pub(crate) struct Arguments {
-    /// Sizes of the frames, pixels.
+    /// Sizes of the frames, in pixels.
     #[arg(long, value_name = "WxH,..", value_delimiter = ',', default_value = "172x224,640x480", value_parser = size)]
     sizes: Vec<[usize; 2]>,
     /// Numbers of views.
     #[arg(long, value_name = "N,..", value_delimiter = ',', default_value = "1,4", value_parser = clap::value_parser!(u64).range(1..=64))]
     views: Vec<u64>,
-    /// Frames per second; 0 for as fast as possible.
+    /// Frame rates in frames per second, or 0 for as fast as possible.
     #[arg(long, value_name = "HZ,..", value_delimiter = ',', default_value = "0,60,30,10", value_parser = rate)]
     rates: Vec<f64>,
-    /// Frames to measure for every row of the table.
+    /// Number of frames to measure for every row of the table.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     frames: u64,
     /// Use software Vulkan if there is no GPU, to check that the search works.
@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// The options of the benchmark.
+    /// Returns the options of the benchmark.
     pub(super) fn options(&self) -> Gpu {
         Gpu {
             sizes: self.sizes.clone(),

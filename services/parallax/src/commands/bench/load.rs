@@ -10,62 +10,63 @@ use super::{EXITS, Output};
 use terminal::rate;
 
 const HELP: &str = "\
-Every run is a deployment of real processes, started like `parallax run`. Without a deployment file its cameras are \
-synthetic, 320x240 pixels, `--rate` frames a second. Their pictures are rendered in advance into OUT/pictures; \
-with --live the capture processes render them during the run, and compete with the others for the cores. The pictures \
-are searched near the last pose (`--set paper.search=full`: everywhere).
+Each run is a deployment of real processes, started like with `parallax run`. Without a deployment file, the cameras are \
+synthetic, with 320x240 pixels and `--rate` frames per second. Their pictures are rendered in advance into OUT/pictures. \
+With --live, the capture processes render the pictures during the run, and compete with the other processes for the cores. The pictures \
+are searched near the last pose, or everywhere with `--set paper.search=full`.
 
-latency     --views cameras in real time; then the same with the process of the last camera killed
+latency     --views cameras in real time; then a second run in which the last camera's process is killed
 throughput  --views cameras, every frame, as fast as possible
-scale       as latency with 1, 2, ... --views cameras; then all of them with the last one killed
+scale       as latency, with 1, 2, ... --views cameras; then a run with all cameras in which the last one is killed
 
-The table shows for every run the number of results and their rate, the latency from the capture of \
-the first picture to the result (end to end) and that of every stage, milliseconds, and the processor \
-time per result, all processes together. The camera is killed at the first result and not restarted; only results \
-after its death are measured.
+For every run, the table shows the number of results and their rate, the latency from the capture of \
+the first picture to the result (end to end), the latency of every stage, and the processor \
+time per result of all processes together. Times are in milliseconds. The last camera is killed at the first result, and is not \
+restarted. Only results after its death are measured.
 
-The results of a run are in its folder, OUT/<run>.";
+The results of each run are in the folder OUT/<run>.";
 
 /// Options of the load benchmarks.
 #[derive(Debug, Args)]
 #[command(after_help = EXITS, after_long_help = format!("{HELP}\n\n{EXITS}"))]
 pub(crate) struct Arguments {
-    /// The deployment file; synthetic cameras if not given.
+    /// The deployment file. If not given, synthetic cameras are used.
     deployment: Option<PathBuf>,
-    /// Number of cameras: the first ones of the deployment file, all if not given; 4 if they are synthetic.
+    /// Number of cameras. The first cameras of the deployment file are used; if not given, all of them. If not given for synthetic cameras,
+    /// 4.
     #[arg(long, value_name = "N", value_parser = views)]
     views: Option<usize>,
-    /// Length of the footage of every run, seconds.
+    /// Length of the footage of every run, in seconds.
     #[arg(long, value_name = "S", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=36_000))]
     seconds: u32,
-    /// Frames per second of synthetic cameras.
+    /// Frames per second of the synthetic cameras.
     #[arg(long, value_name = "HZ", default_value_t = 5.0, value_parser = rate)]
     rate: f64,
     /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Let capture processes render their pictures during the run.
+    /// Let the capture processes render their pictures during the run.
     #[arg(long, conflicts_with = "deployment")]
     live: bool,
-    /// Let stages poll for messages: `--set runtime.spin=true`.
+    /// Let stages poll for messages, like `--set runtime.spin=true`.
     #[arg(long)]
     spin: bool,
-    /// Replace a value of the deployment, for example `--set capture.scale=0.5`; may be given several times.
+    /// Replace a value of the deployment, for example `--set capture.scale=0.5`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The folder for pictures and results.
+    /// Folder for pictures and results.
     #[arg(long, value_name = "DIR", default_value = "out/bench")]
     out: PathBuf,
-    /// Name of the deployment, unique among those that run at the same time.
+    /// Name of the deployment. It must be unique among running deployments.
     #[arg(long, value_name = "NAME", default_value = "bench")]
     name: String,
-    /// Limit on the median end-to-end latency, in the run with all cameras, milliseconds.
+    /// Limit on the median end-to-end latency of the run with all cameras, in milliseconds.
     #[arg(long, value_name = "MS")]
     max_p50_ms: Option<f64>,
-    /// Largest 99th percentile of that latency, milliseconds.
+    /// Limit on the 99th percentile of the end-to-end latency of the run with all cameras, in milliseconds.
     #[arg(long, value_name = "MS")]
     max_p99_ms: Option<f64>,
-    /// Least rate of results of the same run, per second.
+    /// Minimum rate of results of the run with all cameras, per second.
     #[arg(long, value_name = "HZ")]
     min_rate: Option<f64>,
     /// Output options.
@@ -80,7 +81,7 @@ fn views(text: &str) -> Result<usize, String> {
 }
 
 impl Arguments {
-    /// The options of the benchmark.
+    /// Returns the options of the benchmark.
     pub(super) fn options(&self) -> Options {
         Options {
             deployment: self.deployment.clone(),

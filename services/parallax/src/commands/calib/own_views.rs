@@ -1,4 +1,4 @@
-//! Comparison of a rig with the poses that every view of a run found alone.
+//! Compares a rig with the poses that each view of a run found alone.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,31 +9,31 @@ use geometry::{Framing, OutSize, Rig, RigWatch, SwapWatch};
 use nalgebra::Point2;
 use runfiles::{Facing, ViewLine};
 
-/// The points that one camera found in a frame, pixels.
+/// The points that one camera found in a frame, in pixels.
 type Points = Vec<[f64; 2]>;
 
-/// How a rig agrees with what views found.
+/// Agreement of a rig with the poses of single views.
 pub(super) struct Agreement {
     /// Epipolar errors of the cameras.
     pub(super) errors: EpipolarReport,
-    /// Contradictions of the rig, for people.
+    /// Descriptions of contradictions between the rig and the poses, for the user.
     pub(super) disagreements: Vec<String>,
 }
 
-/// Compares the poses that every view found alone.
+/// Compares the rig with the poses that each view found alone.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or no two views of a frame found a person by themselves.
+/// Fails if the file cannot be read, or in no frame two views found a person independently of each other.
 pub(super) fn agreement(rig: &Rig, file: &Path) -> Result<Agreement, Failure> {
     let frames = frames(rig, file)?;
     let n_seen = |views: &&Vec<Option<Points>>| views.iter().flatten().count();
     if !frames.iter().any(|views| n_seen(&views) > 1) {
         let message = format!(
-            "{}: no frame has own poses (`single`) of two cameras of the rig, and poses after fusion agree with any rig",
+            "{}: no frame has single-view poses (`single`) of two cameras of the rig, and poses after fusion agree with any rig",
             file.display()
         );
-        let hint = "name `pose2d.jsonl` of a run whose cameras have the names of the rig";
+        let hint = "pass `pose2d.jsonl` of a run whose cameras have the same names as in the rig";
         return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
     }
     let cameras = rig.cameras();
@@ -74,11 +74,11 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
         let sure = if swap.is_sure {
             ""
         } else {
-            "; it may be other two"
+            "; it may also be two other cameras"
         };
         return vec![format!(
-            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, with the footage of the two exchanged by \
-             {:.1}{sure}",
+            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, but only by \
+             {:.1} if the footage of these two is exchanged{sure}",
             name(swap.views[0]),
             name(swap.views[1]),
             swap.degrees,
@@ -99,7 +99,7 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
     let text = |view: usize| {
         let pixels = |px: Option<f64>| px.map_or_else(|| "?".to_owned(), |px| format!("{px:.1}"));
         format!(
-            "{} does not stand where the rig says: cameras differ by {} px with it, by {} px without it",
+            "{} is not where the rig says: the cameras differ by {} px with this camera, and by {} px without it",
             name(view),
             pixels(moved.residual_px(view)),
             pixels(moved.without_px(view))
@@ -108,7 +108,8 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
     reported.map(text).collect()
 }
 
-/// The parts that every camera of the rig found alone, frame by frame, named by the side of the body where the run knew it.
+/// Returns the parts that every camera of the rig found alone, frame by frame. Left and right are those of the body if the run knew which
+/// way the person faced.
 fn frames(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Points>>>, Failure> {
     let cameras = rig.cameras();
     let mut frames = BTreeMap::<u64, Vec<Option<Points>>>::new();
@@ -139,7 +140,7 @@ mod tests {
 
     use super::*;
 
-    /// Four cameras about a room, z up.
+    /// Returns four cameras around a room, with z up.
     fn rig() -> Rig {
         let camera = |nth: usize| {
             let bearing = 0.3 + 1.3 * nth as f64;
@@ -163,9 +164,9 @@ mod tests {
         Rig::new((0..4).map(camera).collect(), None, "test").unwrap()
     }
 
-    /// Returns the poses of a person who walks about, as the cameras see them; one that sees the back names sides as it sees them.
+    /// Returns the poses of a walking person as the cameras see them. A camera that sees the person's back exchanges left and right.
     ///
-    /// * `shown`: for every camera the one whose pictures it has.
+    /// * `shown`: for every camera, the index of the camera whose pictures it shows.
     fn seen(rig: &Rig, shown: [usize; 4]) -> String {
         let mut text = String::new();
         let random = &mut fastrand::Rng::with_seed(5);

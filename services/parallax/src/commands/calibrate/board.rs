@@ -1,4 +1,4 @@
-//! `parallax calibrate board`: cameras from a board that is moved around, and boards to print.
+//! `parallax calibrate board`: calibrates cameras from a board that is moved around, and draws boards to print.
 
 mod print;
 mod words;
@@ -27,20 +27,20 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{le
 #[command(after_help = "\
 A board is KIND:COLUMNSxROWS:SIDE, with options after further colons:
     charuco:7x5:40mm                  7 x 5 squares; markers of 4x4_1000 (4x4_50 has the same first markers), 0.75 of a square
-    charuco:4x5:5.4cm:5x5_250:marker=0.8:legacy      another dictionary, larger markers, drawn as OpenCV before 4.6 did
+    charuco:4x5:5.4cm:5x5_250:marker=0.8:legacy      another dictionary, larger markers, the layout of OpenCV before 4.6
     chessboard:9x6:25mm               9 x 6 inner corners
     aprilgrid:6x6:88mm:36h11:gap=0.3  6 x 6 tags with gaps of 0.3 of a tag
 
-Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, into the corners of every picture. At least two \
-cameras at a time must see it. Pictures that were taken together are named by timestamps.csv beside the first video (Caliscope's: \
-the n-th row of a camera is its n-th picture) or by --timestamps. Without such a table, pictures with the same number \
-belong together, or with the same time if frame rates differ.
+Move the board through the whole volume, tilted by 30 to 45 degrees, near and far, and into the corners of every picture. At least two \
+cameras at a time must see the board. A table says which pictures were taken together: --timestamps, or timestamps.csv beside the first video. \
+It has the format of Caliscope: the n-th row of a camera is its n-th picture. Without a table, pictures with the same number \
+belong together; if frame rates differ, pictures with the same time.
 
-The world is the frame of the first camera; `parallax calibrate origin` puts it on the floor. If there are doubts,
-the files are written, the report and the rig state the doubts, and the exit code is 7. If there is no answer, the exit code is 5,
+The world has the axes and origin of the first camera. `parallax calibrate origin` moves its origin to the floor. If the result is doubtful, \
+the files are written, the report and the rig state the doubts, and the exit code is 7. Without a result, the exit code is 5, \
 or 4 if no picture shows the board.
 
-With --json one object:
+With --json, prints one object:
     {\"is_trusted\", \"doubts\", \"notes\", \"board\", \"sigma_px\",
      \"cameras\": [{\"name\", \"size_px\", \"pictures\", \"boards\", \"boards_used\", \"corners\", \"left_out\", \"rms_px\", \"rms_of_all_px\",
                   \"coverage\", \"numbers\": {NAME: {\"value\", \"sd\"}}}],
@@ -52,60 +52,60 @@ Examples:
     parallax calibrate board --board chessboard:9x6:25mm left*.jpg --intrinsics --out left.toml
     parallax calibrate board --board charuco:7x5:40mm wide=a.mp4 b=b.mp4 --known lenses.toml --out rig.toml")]
 pub(crate) struct Arguments {
-    /// One video, folder of pictures or pattern for each camera, in the order of the rig; NAME=PATH names it. With --intrinsics, several
-    /// pictures are taken as those of one camera.
+    /// One video, folder of pictures or pattern per camera, in the order of the rig. NAME=PATH names the camera. With --intrinsics, several
+    /// pictures may be given, all of one camera.
     #[arg(value_name = "FOOTAGE", required_unless_present = "print", num_args = 1..)]
     footage: Vec<String>,
     /// The board.
     #[arg(long, value_name = "BOARD", required_unless_present = "print")]
     board: Option<Board>,
-    /// Find only the intrinsics, for each camera separately.
+    /// Find only the intrinsics, separately for each camera.
     #[arg(long)]
     intrinsics: bool,
-    /// Intrinsics to keep: a calibration of any format that has cameras of these names.
+    /// Calibration with intrinsics to keep, in any format. Its cameras must have the same names.
     #[arg(long, value_name = "FILE")]
     known: Option<PathBuf>,
     /// The lens model.
     #[arg(long, value_enum, default_value_t = Lens::Five)]
     lens: Lens,
-    /// Table of the pictures that were taken together, with the columns `sync_index` and `cam_id`.
+    /// Table that says which pictures were taken together, with the columns `sync_index` and `cam_id`.
     #[arg(long, value_name = "FILE")]
     timestamps: Option<PathBuf>,
-    /// Look at every n-th frame; chosen by the length of the footage if not given.
+    /// Search every n-th frame. If not given, chosen by the length of the footage.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
-    /// Most pictures of a camera to search for the board.
+    /// Maximum number of pictures per camera that are searched for the board.
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..))]
     most_pictures: u32,
-    /// Most frames to use; those that cover most are chosen.
+    /// Maximum number of frames to use. Frames that cover most of the pictures are preferred.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(3..=2000))]
     most_frames: u32,
     /// Read the corners from a table with the columns of Caliscope, instead of searching the pictures.
     #[arg(long, value_name = "FILE")]
     corners: Option<PathBuf>,
-    /// Write the corners into a table with these columns.
+    /// Write the corners to a table with the columns of Caliscope.
     #[arg(long, value_name = "FILE")]
     save_corners: Option<PathBuf>,
     /// Treat all footage as mirrored.
     #[arg(long)]
     mirrored: bool,
-    /// The back of the board: `mirrored`, the mirror image of the front, corner on corner, for cameras on both sides; or `blank`.
-    /// If not given, found from the pictures where possible.
+    /// Back of the board: `mirrored` or `blank`. If not given, found from the pictures where possible. A mirrored back has the mirror image
+    /// of the front, corner on corner, for cameras on both sides.
     #[arg(long, value_enum, conflicts_with = "mirrored")]
     back: Option<BackName>,
-    /// File to write the calibration to; with --print, the board (.pdf or .svg; without --out both are written).
+    /// File for the calibration. With --print, file for the board (.pdf or .svg); if not given, both kinds are written.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Format of the calibration to write.
+    /// Format of the calibration file.
     #[arg(long, value_enum, default_value_t = To::Rig)]
     to: To,
-    /// Write a page with residuals and coverage, every number with its uncertainty, the rig, the worst pictures.
+    /// Write a page with residuals, coverage, estimates with their uncertainty, the rig, and the worst pictures.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Draw a board to print.
     #[arg(long, value_name = "BOARD", conflicts_with_all = ["footage", "board", "corners"])]
     print: Option<Board>,
-    /// The page: a4, a3, a2, a1, a0, letter, legal, tabloid, `WIDTHxHEIGHT` in mm, or fit (the smallest of A4 to A0).
+    /// Page size: a4, a3, a2, a1, a0, letter, legal, tabloid, `WIDTHxHEIGHT` in mm, or fit (the smallest of A4 to A0 that holds the board).
     #[arg(long, value_name = "PAGE", default_value = "fit", requires = "print")]
     paper: Paper,
     /// Print JSON.
@@ -118,7 +118,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Lens {
     /// Pinhole with k1, k2, k3, p1, p2.
     Five,
-    /// Pinhole with k1 to k6, p1, p2: wide lenses, with many pictures.
+    /// Pinhole with k1 to k6, p1, p2: for wide lenses, if there are many pictures.
     Eight,
     /// Fisheye with k1 to k4.
     Fisheye,
@@ -129,7 +129,7 @@ pub(crate) enum Lens {
 pub(crate) enum BackName {
     /// The mirror image of the front.
     Mirrored,
-    /// Nothing.
+    /// No pattern.
     Blank,
 }
 
@@ -156,10 +156,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if doubts.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    let message = format!(
-        "the calibration is not to be trusted as it is:\n  {}",
-        doubts.join("\n  ")
-    );
+    let message = format!("the calibration is doubtful:\n  {}", doubts.join("\n  "));
     Err(Failure::new(ExitKind::Degraded, message))
 }
 
@@ -202,7 +199,7 @@ fn settings(arguments: &Arguments) -> Result<BoardSettings, Failure> {
     })
 }
 
-/// One camera for each path; several pictures are one camera where intrinsics alone are wanted.
+/// Returns one camera per path. For intrinsics alone, several single pictures are one camera.
 fn cameras(arguments: &Arguments) -> Vec<CameraFootage> {
     let each: Vec<CameraFootage> =
         arguments.footage.iter().map(|footage| CameraFootage::of(footage)).collect();

@@ -1,4 +1,4 @@
-//! The pictures in which people fit a rig worst, with what was seen and where the rig has it drawn into them.
+//! The pictures in which people fit a rig worst. Seen and expected joints are drawn into them.
 
 use calibration::people::Skeletons;
 use calibration::people::misfit::{Fitted, Misfit};
@@ -9,17 +9,17 @@ use terminal::output;
 
 use super::walk::Walk;
 
-/// Pictures of a camera, and of all.
+/// Maximum number of pictures per camera, and of all cameras together.
 const MOST: [usize; 2] = [2, 9];
-/// Room around the person, as a share of its size.
+/// Margin around the person, as a share of the person's size.
 const MARGIN: f64 = 0.25;
 const JPEG_QUALITY: u8 = 80;
 
-/// The worst pictures, with captions; none of cameras that have keypoints alone.
+/// Returns the worst pictures, with captions. Cameras that have only keypoints are left out, because they have no pictures.
 ///
-/// * `offsets_s`: what is added to the times of each camera; as many as there are cameras where there is a rig.
-/// * `skeletons`: instants, and the skeleton at each.
-/// * A picture that cannot be read again is left out, and named.
+/// * `offsets_s`: seconds to add to the times of each camera. If there is a rig, there is one entry per camera.
+/// * `skeletons`: instants, with the skeleton at each.
+/// * A picture that cannot be read again is left out, and reported.
 pub(super) fn of(
     walk: &Walk,
     (cameras, offsets_s): (&[Camera], &[f64]),
@@ -34,7 +34,7 @@ pub(super) fn of(
     };
     let mut pictures = Vec::new();
     if offsets_s.len() != cameras.len() {
-        // There is no rig.
+        // Without a rig there is nothing to draw.
         return pictures;
     }
     for misfit in fitted.worst(MOST[0]).iter().take(MOST[1]) {
@@ -43,7 +43,7 @@ pub(super) fn of(
             Ok(None) => {}
             Ok(Some(jpeg)) => {
                 let (time_s, off_px) = (misfit.time_s, misfit.residual_px);
-                let caption = format!("{name} at {time_s:.2} s: {off_px:.1} px off");
+                let caption = format!("{name} at {time_s:.2} s: off by {off_px:.1} px");
                 pictures.push((caption, jpeg));
             }
             Err(why) => output::message(format_args!("a picture of {name} is left out: {why}")),
@@ -88,7 +88,7 @@ fn drawn(walk: &Walk, misfit: &Misfit) -> Result<Option<Vec<u8>>, Failure> {
     Ok(around(size, picture.rgb, &joints))
 }
 
-/// The part of a picture around its person, with the joints.
+/// Returns the part of a picture around its person, with the joints drawn in.
 fn around(size: Size, rgb: &[u8], joints: &[[[f64; 2]; 2]]) -> Option<Vec<u8>> {
     let ends = |axis: usize| {
         let values = joints.iter().map(|joint| joint[0][axis]);

@@ -1,4 +1,4 @@
-//! `parallax calibrate origin`: a rig put on the floor.
+//! `parallax calibrate origin`: moves the origin of a rig to the floor.
 
 mod stood;
 
@@ -19,11 +19,17 @@ use terminal::{Globals, Terminal, output};
 /// Options of `parallax calibrate origin`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-With a board on the floor, its printed side up: the origin is its upper left corner, x runs along its rows, y against its columns, z up.
-With three points on the floor: the origin, one along x, and any other; each as pixels of at least two cameras.
-With --people the floor is below the feet of people who stand, in a finished run of this rig. The origin is in the \
-middle of the places where they stood, and x is as near to the old x as possible. If a person walked about, the plane of the standing feet \
-gives the vertical. Otherwise upright people do, less surely: the file is written, and the exit code is 7.
+The floor can be found from a board, three points, or people.
+
+With --board, a board is on the floor, with its printed side up. The origin is the upper left corner of the board. x runs along its rows, \
+y against its columns, and z is up.
+
+With --at, --x and --floor, three points on the floor are given: the origin, a point on the x axis, and any other point. Give each point as pixels of \
+at least two cameras.
+
+With --people, the floor is below the feet of people who stand in a finished run of this rig. The origin is in the \
+middle of the places where they stood, and x is as close to the old x as possible. If a person walked about, the vertical is perpendicular to \
+the plane of the standing feet. Otherwise it is the direction of upright bodies. This is less certain: the file is written, but the exit code is 7.
 
 Examples:
     parallax calibrate origin rig.toml --board charuco:7x5:40mm cam0.mp4 cam1.mp4 --frames 1 --out room.toml
@@ -31,30 +37,30 @@ Examples:
         --x cam0=700,610 --x cam1=1010,566 --floor cam0=500,480 --floor cam1=700,500
     parallax calibrate origin rig.toml --people out/walk --out room.toml")]
 pub(crate) struct Arguments {
-    /// The rig, a calibration of any format.
+    /// The rig: a calibration in any format.
     rig: PathBuf,
-    /// Footage of cameras of the rig, NAME=PATH or named as the camera, with the board on the floor.
+    /// Footage of the board on the floor, one per camera of the rig: NAME=PATH, or a file with the name of the camera.
     #[arg(value_name = "FOOTAGE", requires = "board")]
     footage: Vec<String>,
     /// The board.
     #[arg(long, value_name = "BOARD", requires = "footage")]
     board: Option<Board>,
-    /// Number of frames, from the first, in which the board lies still.
+    /// Number of frames, from the first, in which the board does not move.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     frames: u64,
-    /// The origin, as a camera sees it; once for each camera.
+    /// Pixel at which a camera sees the origin. Give the option once per camera.
     #[arg(long, value_name = "CAMERA=X,Y", conflicts_with = "board", requires_all = ["x", "floor"])]
     at: Vec<String>,
-    /// A point along x.
+    /// Pixel at which a camera sees a point on the x axis.
     #[arg(long, value_name = "CAMERA=X,Y")]
     x: Vec<String>,
-    /// Any other point of the floor.
+    /// Pixel at which a camera sees any other point of the floor.
     #[arg(long, value_name = "CAMERA=X,Y")]
     floor: Vec<String>,
-    /// The folder of a finished run of this rig in which a person walks about.
+    /// Folder of a finished run of this rig in which a person walks about.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["board", "at"])]
     people: Option<PathBuf>,
-    /// Frames per second, for a run without a frame rate.
+    /// Frames per second, if the run has no frame rate.
     #[arg(long, value_name = "HZ", requires = "people", value_parser = rate)]
     rate: Option<f64>,
     /// The rig file to write.
@@ -64,7 +70,7 @@ pub(crate) struct Arguments {
 
 fn rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|value| (0.1..=1000.0).contains(value));
-    rate.ok_or_else(|| format!("expected 0.1 to 1000 frames a second, got {text:?}"))
+    rate.ok_or_else(|| format!("expected 0.1 to 1000 frames per second, got {text:?}"))
 }
 
 /// Runs the subcommand.
@@ -80,7 +86,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             let floor = stood::find(&rig, run, arguments.rate)?;
             by_bodies = floor.vertical != Vertical::Feet;
             output::message(format_args!(
-                "the floor is below {} feet that stood, whose heights are {:.0} mm apart (median)",
+                "found the floor below {} standing feet, whose heights differ by {:.0} mm (median)",
                 floor.n,
                 1e3 * floor.spread_m
             ));
@@ -89,7 +95,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         (None, None) if arguments.at.is_empty() => {
             return Err(Failure::new(
                 ExitKind::Usage,
-                "neither a board, nor points on the floor, nor people",
+                "no board, points on the floor or people are given",
             )
             .with_hint(
                 "pass --board BOARD FOOTAGE..., or --at, --x and --floor, or --people RUN",
@@ -116,15 +122,15 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let below = new.cameras().iter().find(|camera| camera.centre_in_world().z < 0.0);
     match below {
         None if by_bodies => {
-            let message = "the vertical is that of people who stand upright, known to some degrees: their feet stood on one spot";
-            let hint = "a run in which a person walks about gives it by the feet";
+            let message = "all feet stood on one spot, so the vertical was found from upright bodies, and is only exact to some degrees";
+            let hint = "to find it from the feet, use a run in which a person walks about";
             Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
         }
         None => Ok(ExitCode::SUCCESS),
         Some(camera) => Err(Failure::new(
             ExitKind::Degraded,
             format!(
-                "camera {} is now below the floor: is what was given the floor?",
+                "camera {} is now below the floor: was the board, the point or the person really on the floor?",
                 camera.name
             ),
         )),
@@ -157,8 +163,10 @@ fn by_board(
     }
     from_board(rig, &looked.layout.points, &sights).map_err(|error| {
         let hint = match error {
-            OriginError::BoardApart { .. } => "--frames says how many frames show it lying still",
-            _ => "does it lie flat, in view of a camera, in the first frames?",
+            OriginError::BoardApart { .. } => {
+                "use --frames for the number of frames in which the board does not move"
+            }
+            _ => "is the board flat on the floor and in view of a camera in the first frames?",
         };
         Failure::new(ExitKind::Calibration, error).with_hint(hint)
     })
@@ -175,7 +183,7 @@ fn camera_named(rig: &Rig, name: &str) -> Result<usize, Failure> {
     })
 }
 
-/// `CAMERA=X,Y`, several times.
+/// Parses several `CAMERA=X,Y`.
 fn clicks_of(rig: &Rig, texts: &[String]) -> Result<Vec<Click>, Failure> {
     let each = texts.iter().map(|text| {
         let parts = text.split_once('=').and_then(|(name, at)| {

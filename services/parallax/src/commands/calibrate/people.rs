@@ -1,4 +1,4 @@
-//! `parallax calibrate people`: where cameras stand, from people walking about.
+//! `parallax calibrate people`: finds the poses of cameras from people walking about.
 
 use std::process::ExitCode;
 
@@ -14,35 +14,35 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// Hint where the answer is refused.
-const HINT: &str = "let one person walk through the whole volume, in view of at least two cameras at every moment, for half a minute, \
-with arms and turns; check that the intrinsics are those of the pictures (`parallax calib show`); if the cameras were not started \
-together, search their clocks with --window 2; if there is no telling, calibrate with a board";
+/// Hint for a refused result.
+const HINT: &str = "let one person walk through the whole volume for half a minute, in view of at least two cameras at every moment, \
+moving the arms and turning; check that the intrinsics fit the pictures (`parallax calib show`); if the cameras were not started \
+together, search for clock offsets with --window 2; if nothing helps, calibrate with a board";
 
-/// Hint where the answer is not known well.
-const CAUTION_HINT: &str = "longer footage, with more of the volume walked through in all directions, makes it better; how much joints in \
-space are off on account of it, a run with this rig tells by its residuals";
+/// Hint for a result that is too uncertain.
+const CAUTION_HINT: &str = "to improve it, use longer footage in which the person walks through more of the volume, in all directions; the residuals \
+of a run with this rig show how large the errors of joints are";
 
 /// Options of `parallax calibrate people`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-People come from the `keypoints` of a camera, otherwise from its network, as in `parallax sync estimate`. \
-The person whom the cameras see longest together is used; one person alone is better. The deployment's rig gives intrinsics and \
-names; its poses are used only with `--scale rig`.
+People are read from the `keypoints` of a camera, or found by its network, as in `parallax sync estimate`. \
+It is best if only one person walks about. Of several people, the person is used whom the cameras see together for the longest time. The \
+deployment's rig supplies intrinsics and names. Its poses are only used with `--scale rig`.
 
-Pictures have no scale. Give the person's standing height (--height-m), which is compared with the lengths of the bones: right to 2 \
-or 3 percent for usual proportions. Or give the distance of two cameras (--distance), or keep scale and world of the given rig \
-(--scale rig). Otherwise the world has its floor at z = 0, its origin under the middle of the walk, and z against \
-gravity: by the standing feet, or else by upright bodies.
+Pictures do not show the scale. Give the person's standing height (--height-m), which is compared with the lengths of the bones. The scale is then \
+right to 2 or 3 percent for usual proportions. Or give the distance between two cameras (--distance), or keep the scale and the world of the given rig \
+(--scale rig). Without `--scale rig`, the world has its floor at z = 0, its origin under the middle of the walk, and z pointing \
+up. The vertical is found from the standing feet, or else from upright bodies.
 
-An answer is refused, with exit code 7 and every reason, if two halves of the recording give different rigs, a camera has too \
-little in common with the others, its pose is too uncertain, or no person was found. Nothing is written then. If the pose of a camera is \
-uncertain by more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written with a \
-note, every such camera is printed, and the exit code is 6.
+A result is refused if two halves of the recording give different rigs, a camera has too \
+little in common with the others, its pose is too uncertain, or no person was found. All reasons are printed, nothing is written, and the exit code is 7. \
+If the pose of a camera is uncertain by more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written with a \
+note. Every such camera is printed, and the exit code is 6.
 
-The clocks of the deployment are used unless joints fit clearly better with others, or --window is given.
+The clock offsets of the deployment are used, unless --window is given, or joints fit clearly better with other offsets.
 
-With --json one object:
+With --json, prints one object:
     {\"is_determined\", \"doubts\": [text], \"cautions\": [text], \"clocks_are_found\", \"instants\", \"span_s\", \"vertical\", \"scale_error\", \"stature_metres\", \"exchanged\",
      \"cameras\": [{\"name\", \"found_by\", \"centre_metres\", \"joints\", \"residual_px\", \"inliers\", \"rotation_sd_degrees\",
                   \"centre_sd_metres\", \"focal_px\", \"focal_sd_px\", \"halves_degrees\", \"halves_metres\", \"offset_ms\",
@@ -55,27 +55,27 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     walk: WalkArguments,
-    /// Standing height of the person, metres.
+    /// Standing height of the person, in metres.
     #[arg(long, value_name = "METRES", value_parser = height, conflicts_with_all = ["distance", "scale"])]
     height_m: Option<f64>,
-    /// The distance of two cameras, metres: `cam01:cam03=4.27`.
+    /// Distance between two cameras in metres, for example `cam01:cam03=4.27`.
     #[arg(long, value_name = "A:B=METRES", value_parser = distance, conflicts_with = "scale")]
     distance: Option<(String, String, f64)>,
-    /// Take scale and world from the rig of the deployment.
+    /// Keep the scale and the world of the deployment's rig.
     #[arg(long, value_name = "rig", value_parser = ["rig"])]
     scale: Option<String>,
-    /// Also estimate focal lengths; the result is less certain.
+    /// Also estimate focal lengths, which makes the result less certain.
     #[arg(long)]
     focal: bool,
-    /// Largest clock offset of two cameras, seconds. Offsets of a few pictures are found without it.
+    /// Largest clock offset between two cameras, in seconds. Offsets of a few pictures are found without this option.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = window)]
     window: f64,
-    /// Seed of the random samples; another seed shows their influence.
+    /// Seed of the random samples. Try another seed to see their influence.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
-/// The standing height of a person, metres.
+/// Parses the standing height of a person, in metres.
 pub(crate) fn height(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|value| (0.8..=2.4).contains(value));
     number.ok_or_else(|| format!("expected 0.8 to 2.4 metres, got {text:?}"))
@@ -94,7 +94,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
     Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
 }
 
-/// Refuses to keep the scale of a rig that has lenses alone.
+/// Fails if the scale of a rig is to be kept that has only lenses.
 fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let rig = inputs::rig_of(&deployment)?;
@@ -108,14 +108,15 @@ fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
         rig.lacks(&camera.name)
     );
     let failure = Failure::new(ExitKind::Calibration, message);
-    Err(failure
-        .with_hint("without places there is no scale to keep: give --height-m or --distance"))
+    Err(failure.with_hint(
+        "the rig has no camera poses, so it has no scale to keep: give --height-m or --distance",
+    ))
 }
 
 pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     if arguments.height_m.is_none() && arguments.distance.is_none() && arguments.scale.is_none() {
-        let message = "pictures have no scale: say how tall the person is (--height-m), how far apart two cameras are (--distance), \
-                       or that the rig of the deployment is to be kept (--scale rig)";
+        let message = "pictures do not show the scale: give the height of the person (--height-m), the distance between two cameras (--distance), \
+                       or keep the scale of the deployment's rig (--scale rig)";
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
@@ -158,20 +159,20 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// A failure where the answer is known less well than is good: it is written all the same.
+/// Fails if the result is too uncertain. The rig file has been written nevertheless.
 fn warn(cautions: &[Doubt], names: &[&str]) -> Result<(), Failure> {
     if cautions.is_empty() {
         return Ok(());
     }
     let texts: Vec<String> = cautions.iter().map(|caution| caution.text(names)).collect();
     let message = format!(
-        "the rig is usable, but not known well:\n  {}",
+        "the rig is usable, but uncertain:\n  {}",
         texts.join("\n  ")
     );
     Err(Failure::new(ExitKind::Limit, message).with_hint(CAUTION_HINT))
 }
 
-/// How well the worst camera is known.
+/// Describes the uncertainty of the least certain camera.
 fn how_sure(outcome: &Outcome) -> String {
     let worst =
         |axis: usize| outcome.reports.iter().map(|report| report.sd[axis]).fold(0.0, f64::max);
@@ -184,9 +185,9 @@ fn how_sure(outcome: &Outcome) -> String {
 
 fn source_of_scale(arguments: &Arguments) -> String {
     match (&arguments.height_m, &arguments.distance) {
-        (Some(metres), _) => format!(", scale by a height of {metres} m"),
-        (None, Some((a, b, metres))) => format!(", scale by {metres} m from {a} to {b}"),
-        (None, None) => ", scale and world of the rig before".to_owned(),
+        (Some(metres), _) => format!(", scale from a height of {metres} m"),
+        (None, Some((a, b, metres))) => format!(", scale from {metres} m between {a} and {b}"),
+        (None, None) => ", scale and world of the previous rig".to_owned(),
     }
 }
 
@@ -206,7 +207,7 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
         (None, Some((a, b, metres))) => {
             let (a, b) = (number(a)?, number(b)?);
             if a == b {
-                let message = "--distance: of a camera to itself";
+                let message = "--distance names the same camera twice";
                 return Err(Failure::new(ExitKind::Usage, message));
             }
             Scale::Distance(a, b, *metres)
@@ -226,22 +227,22 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
     })
 }
 
-/// Where the vertical comes from.
+/// Describes the origin of the vertical.
 fn vertical(outcome: &Outcome) -> &'static str {
     match outcome.vertical {
-        Vertical::Feet => "the feet that stand",
-        Vertical::Bodies => "bodies that stand upright",
+        Vertical::Feet => "standing feet",
+        Vertical::Bodies => "upright bodies",
         Vertical::Leaning => {
-            "the mean of all bodies: nobody stood upright, so it may be off by many degrees"
+            "the mean of all bodies (nobody stood upright, so the vertical may be off by many degrees)"
         }
-        Vertical::Rig => "the rig before",
+        Vertical::Rig => "the previous rig",
     }
 }
 
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     let [from, to] = outcome.span_s;
     output::line(format_args!(
-        "{} instants over {:.1} s; vertical by {}; scale to {:.1} %; a person of {:.3} m by the bones; sides of {} views exchanged; clocks {}",
+        "{} instants over {:.1} s; vertical from {}; scale known to {:.1} %; height of the person from the bones {:.3} m; sides of {} views exchanged; clocks {}",
         outcome.n_instants,
         to - from,
         vertical(outcome),

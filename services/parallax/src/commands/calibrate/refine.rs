@@ -1,4 +1,4 @@
-//! `parallax calibrate refine`: an existing rig made better by a recording.
+//! `parallax calibrate refine`: improves an existing rig with recorded footage.
 
 use std::process::ExitCode;
 
@@ -14,22 +14,22 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// Hint where the answer is refused.
+/// Hint for a refused result.
 const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \
-or the rig is not that of these cameras, begin anew: parallax calibrate people";
+or the rig belongs to other cameras, make a new rig: parallax calibrate people";
 
 /// Options of `parallax calibrate refine`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The rig of the deployment is trusted to within --sd-degrees and --sd-mm. Only cameras whose poses the joints determine better than that are moved; \
-the others stay. Time offsets are estimated too, within --sd-ms of those of the deployment.
+The rig of the deployment is assumed to be correct to within --sd-degrees and --sd-mm. A camera is moved only if the joints determine its pose better than \
+that. Clock offsets are also estimated, within --sd-ms of those in the deployment.
 
-The new rig is judged by data that it was not fitted to: each half of the recording judges the rig of the other one, \
+The new rig is judged with data that it was not fitted to. Each half of the recording judges the rig that was fitted to the other half, \
 by the distance of each camera's joints from where the other cameras see them.
 
-Exit codes: 0 better, and --out is written; 6 not better, keep the rig; 7 refused, with every reason.
+Exit codes: 0 better, and --out is written; 6 not better, keep the rig; 7 refused, with all reasons.
 
-With --json one object:
+With --json, prints one object:
     {\"verdict\": \"better\" | \"no better\" | \"refused\", \"doubts\": [text], \"instants\", \"before_px\", \"after_px\", \"certainty\",
      \"blocks\", \"blocks_better\",
      \"cameras\": [{\"name\", \"moved_degrees\", \"moved_metres\", \"rotation_sd_degrees\", \"centre_sd_metres\", \"is_told\",
@@ -41,16 +41,16 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     walk: WalkArguments,
-    /// Standard deviation of the rotations of the given rig, degrees.
+    /// Standard deviation of the camera rotations in the given rig, in degrees.
     #[arg(long, value_name = "DEGREES", default_value_t = 1.0, value_parser = deviation)]
     sd_degrees: f64,
-    /// Standard deviation of the places of its cameras, millimetres.
+    /// Standard deviation of the camera positions in the given rig, in millimetres.
     #[arg(long, value_name = "MM", default_value_t = 30.0, value_parser = deviation)]
     sd_mm: f64,
-    /// Standard deviation of the clocks, milliseconds; 0 keeps them fixed.
+    /// Standard deviation of the clocks, in milliseconds. 0 keeps the clocks fixed.
     #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = clock)]
     sd_ms: f64,
-    /// Also estimate focal lengths; the result is less certain.
+    /// Also estimate focal lengths, which makes the result less certain.
     #[arg(long)]
     focal: bool,
 }
@@ -104,8 +104,8 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     refuse(&outcome.doubts, &names, HINT)?;
     if !outcome.is_better {
         let message = format!(
-            "no better: held-out joints are {:.2} px from where the other cameras see them with the present rig, and {:.2} px \
-             with the new one; keep the rig",
+            "not better: held-out joints are {:.2} px from where the other cameras see them with the old rig, and {:.2} px \
+             with the new rig; keep the old rig",
             outcome.held_out_px[0], outcome.held_out_px[1]
         );
         return Err(Failure::new(ExitKind::Limit, message));
@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if let Some(file) = &arguments.walk.out {
         let before = inputs::rig_of(&walk.deployment)?;
         let source = format!(
-            "{}; refined on a person, {} instants",
+            "{}; refined with a person, {} instants",
             before.source(),
             outcome.n_instants
         );
@@ -136,7 +136,7 @@ fn about(arguments: &Arguments, walk: &Walk) -> Vec<(String, String)> {
         (
             "believed".to_owned(),
             format!(
-                "rotations to {} degrees, places to {} mm, clocks to {} ms",
+                "rotations to {} degrees, positions to {} mm, clocks to {} ms",
                 arguments.sd_degrees, arguments.sd_mm, arguments.sd_ms
             ),
         ),
@@ -148,7 +148,7 @@ fn about(arguments: &Arguments, walk: &Walk) -> Vec<(String, String)> {
 
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     output::line(format_args!(
-        "{} instants; held-out joints are {:.2} px from where the other cameras see them before, {:.2} px after; {} of {} blocks \
+        "{} instants; held-out joints are {:.2} px from where the other cameras see them with the old rig, {:.2} px with the new rig; {} of {} blocks \
          became better ({:.1} standard errors)",
         outcome.n_instants,
         outcome.held_out_px[0],

@@ -1,4 +1,4 @@
-//! Common part of `calibrate people` and `calibrate refine`: people seen by all cameras, and a rig file at the end.
+//! Common part of `calibrate people` and `calibrate refine`: reads what all cameras saw of people, and writes a rig file.
 
 use std::path::{Path, PathBuf};
 
@@ -17,30 +17,30 @@ use terminal::{Globals, Terminal};
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{left} {prefix} {msg}";
 
-/// Options of both.
+/// Options of both commands.
 #[derive(Debug, Args)]
 pub(super) struct WalkArguments {
-    /// The deployment file, with a rig that has the intrinsics.
+    /// The deployment file. Its rig must have the intrinsics.
     pub(super) config: PathBuf,
-    /// Write the rig file; nothing is written if the answer is refused.
+    /// Rig file to write. Nothing is written if the result is refused.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Write a page: residuals, places of people in the pictures, uncertainties, the rig in space, the worst pictures.
+    /// Write a page with residuals, positions of people in the pictures, uncertainties, the rig in space, and the worst pictures.
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
-    /// Look at every n-th picture.
+    /// Use every n-th picture.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub(super) every: u64,
-    /// Start in the footage of each camera, seconds.
+    /// Start at this time in the footage of each camera, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub(super) from: f64,
-    /// Length of the footage to look at, seconds; all of it if not given.
+    /// Length of the footage to use, in seconds. If not given, all of it.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) seconds: Option<f64>,
-    /// Most instants to use, spread evenly over the footage.
+    /// Maximum number of instants to use, spread evenly over the footage.
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(12..=5000))]
     pub(super) instants: u64,
-    /// Replace a value of the deployment, for example `--set rig=lab.toml`; may be given several times.
+    /// Replace a value of the deployment, for example `--set rig=lab.toml`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     pub(super) set: Vec<String>,
     /// Print JSON.
@@ -53,22 +53,22 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("expected 0 to 1000000 seconds, got {text:?}"))
 }
 
-/// People seen by all cameras.
+/// People in the footage of all cameras.
 pub(super) struct Walk {
     pub(super) deployment: Deployment,
     pub(super) found: Films,
-    /// Offsets that are added to the times of each camera, by the deployment, seconds.
+    /// Clock offsets from the deployment, in seconds, which are added to the times of each camera.
     pub(super) offsets_s: Vec<f64>,
 }
 
 impl Walk {
-    /// The names of the cameras.
+    /// Returns the names of the cameras.
     pub(super) fn names(&self) -> Vec<&str> {
         self.found.cameras.iter().map(|camera| camera.name.as_str()).collect()
     }
 }
 
-/// Reads or finds the people.
+/// Reads the people from keypoint files, or finds them in the pictures.
 pub(super) fn walk(
     arguments: &WalkArguments,
     poses: Poses,
@@ -78,7 +78,8 @@ pub(super) fn walk(
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let deployment = launch::cameras::settled(&deployment)?;
     if deployment.cameras.len() < 2 {
-        let message = "the deployment has one camera: its place can only be found from others";
+        let message =
+            "the deployment has one camera: at least two are needed to find the pose of a camera";
         return Err(Failure::new(ExitKind::Config, message));
     }
     let terminal = Terminal::with_bar(globals.quiet, false, BAR)
@@ -107,7 +108,7 @@ pub(super) fn walk(
     })
 }
 
-/// Runs what takes long, which Ctrl-C ends.
+/// Runs a long computation. Ctrl-C ends it.
 pub(super) fn computed<T: Send + 'static>(
     stop: &Stop,
     compute: impl FnOnce() -> T + Send + 'static,
@@ -131,7 +132,7 @@ pub(super) fn write_rig(
     geometry::files::write(file, Format::Own, &rig).or_fail(ExitKind::Input)
 }
 
-/// A failure where the answer is not to be used.
+/// Fails if the result is refused.
 pub(super) fn refuse(doubts: &[Doubt], names: &[&str], hint: &str) -> Result<(), Failure> {
     if doubts.is_empty() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! People in boxes, by a network that finds keypoints. The boxes are given, or found by a detector.
+//! Finds people with a network that detects keypoints in boxes. The user gives the boxes, or a detector finds them.
 
 use std::path::PathBuf;
 
@@ -18,34 +18,34 @@ use terminal::output;
 use super::Detector;
 use inputs::network::keypoints_json;
 
-/// Boxes that overlap by more are of one person.
+/// Boxes that overlap by more than this share belong to the same person.
 const SAME: f64 = 0.5;
 
 /// The network that finds keypoints, and the detector of the boxes.
 pub(super) struct Eyes {
-    /// As it is named on the command line.
+    /// The network's file, as named on the command line.
     pub(super) file: PathBuf,
     pub(super) network: PoseNetwork,
     pub(super) detector: BoxDetector,
-    /// Least heat of a person in a box of the detector, 0 to 1.
+    /// Minimum heat of a person in a box of the detector, from 0 to 1.
     pub(super) least_heat: f64,
 }
 
-/// Where boxes come from.
+/// Origin of a box.
 #[derive(Clone, Copy)]
 enum From {
-    /// From the user.
+    /// The user gave the box.
     Given,
-    /// From the detector.
+    /// The detector found the box.
     Detector,
 }
 
-/// A box to look into.
+/// A box in which the network looks for a person.
 #[derive(Clone, Copy)]
 struct Outline {
-    /// Left, top, right, bottom, pixels of the picture.
+    /// Left, top, right and bottom side, in pixels of the picture.
     sides: [f64; 4],
-    /// By the detector.
+    /// Score by the detector, if the detector found the box.
     score: Option<f64>,
 }
 
@@ -53,17 +53,17 @@ struct Outline {
 struct Person {
     outline: Outline,
     keypoints: Vec<Value>,
-    /// By number in `skeleton::PARSE14`, pixels of the picture; not finite if it does not follow from the keypoints.
+    /// Joints by their numbers in `skeleton::PARSE14`, in pixels of the picture. A joint that the keypoints do not determine is not finite.
     joints: Vec<[f64; 2]>,
     score: f64,
 }
 
 impl Detector<'_> {
-    /// Looks at the people of a picture, and reports them.
+    /// Finds the people in a picture, and reports them.
     ///
     /// # Errors
     ///
-    /// As for the search: the inner one concerns the picture.
+    /// As for the search: the inner failure concerns only the picture.
     pub(super) fn look(
         &self,
         eyes: &Eyes,
@@ -83,7 +83,7 @@ impl Detector<'_> {
         Ok(Ok(()))
     }
 
-    /// The people in the box that is given, or in those of the detector: who is seen best first, each once.
+    /// Returns the people in the given box or in the detector's boxes, each person once. The person who is seen best comes first.
     fn people(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Person>, From), Failure> {
         let mut memory = LookMemory::default();
         if let Some(outline) = self.arguments.outline {
@@ -208,7 +208,7 @@ impl Detector<'_> {
 }
 
 impl Person {
-    /// The only box is left for one that fits better, as in a deployment.
+    /// If there is only one box, replaces it by one that fits the person better, as a deployment does.
     fn seen_closer(
         eyes: &Eyes,
         picture: &Picture,
@@ -222,7 +222,8 @@ impl Person {
         Ok(person)
     }
 
-    /// Looks at the picture once more, turned, if a person lies or stands on the hands; returns the sight with the better score.
+    /// Looks at the person. If the person lies or stands on the hands, also looks at the rotated picture, and returns the result with the
+    /// better score.
     fn seen(
         network: &PoseNetwork,
         picture: &Picture,
@@ -241,7 +242,7 @@ impl Person {
         })
     }
 
-    /// Also returns how the picture should be turned.
+    /// Also returns how the picture should be rotated.
     fn turned(
         network: &PoseNetwork,
         picture: &Picture,
@@ -293,11 +294,11 @@ impl Person {
     }
 }
 
-/// Why nobody is found.
+/// Explains why nobody was found.
 fn nobody(eyes: &Eyes) -> String {
     let card = eyes.detector.card();
     format!(
-        "{} finds nobody (no box scores `least_score` = {} of its card), or the network sees nobody with a heat of {}; --box says where to look",
+        "{} finds nobody (no box reaches `least_score` = {} of its card), or the network finds nobody with a heat of {}; use --box to give a box",
         card.name, card.least_score, eyes.least_heat
     )
 }

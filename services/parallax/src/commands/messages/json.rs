@@ -1,4 +1,4 @@
-//! The layouts as JSON, for languages that build types as they run.
+//! The message layouts as JSON, for languages that build types at run time.
 
 use messages::{
     Kept, MAX_CANDIDATES, MAX_JOINTS, MAX_KEYPOINTS, MAX_LEVELS, MAX_NAME, MAX_PARTS, MAX_PEOPLE,
@@ -9,7 +9,7 @@ use skeleton::JointSet;
 
 use super::table::{Field, Kind, Layout, layouts, topics};
 
-/// Structs with sizes, offsets and types, topics with versions, statuses, limits, and the names of joints.
+/// Returns the JSON: structs with sizes, offsets and types; topics with versions; statuses, limits, and the names of joints.
 pub(super) fn json() -> String {
     let structs: Map<String, Value> = layouts().iter().map(structure).collect();
     let topics: Map<String, Value> = topics()
@@ -59,7 +59,7 @@ fn entry(field: &Field) -> Value {
     ])
 }
 
-/// A number as `NumPy` names it, a struct by its name.
+/// Returns the type's name: that of `NumPy` for a number, the struct's own for a struct.
 fn type_name(kind: Kind) -> &'static str {
     match kind {
         Kind::Number(numpy) => numpy,

@@ -1,4 +1,4 @@
-//! The layouts as a table.
+//! The message layouts as a table.
 
 use core::mem::offset_of;
 
@@ -12,23 +12,23 @@ use messages::{
 /// The type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// A number, by its name in `NumPy`, little-endian: `<u4`.
+    /// A little-endian number, by its `NumPy` name, such as `<u4`.
     Number(&'static str),
-    /// One of the structs.
+    /// One of the structs, by its name.
     Struct(&'static str),
 }
 
 /// A field of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Field {
-    /// Its name.
+    /// Name of the field.
     pub(super) name: &'static str,
-    /// Where it begins in its struct, bytes.
+    /// Offset of the field in its struct, in bytes.
     pub(super) offset: usize,
-    /// Bytes of the whole field.
+    /// Size of the whole field, in bytes.
     #[cfg(test)]
     size: usize,
-    /// Type of its elements.
+    /// Type of the field's elements.
     pub(super) kind: Kind,
     /// Lengths of the array, outermost first; empty for a single value.
     pub(super) lengths: Vec<usize>,
@@ -37,36 +37,36 @@ pub(super) struct Field {
 /// The layout of a struct.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Layout {
-    /// Its name in the crate `messages`.
+    /// Name of the struct in the crate `messages`.
     pub(super) name: &'static str,
-    /// Its name for the transport, with its version.
+    /// Name of the type in the transport, which includes its version.
     pub(super) type_name: &'static str,
-    /// Its size, bytes.
+    /// Size of the struct, in bytes.
     pub(super) size: usize,
-    /// Its alignment, bytes.
+    /// Alignment of the struct, in bytes.
     pub(super) align: usize,
-    /// Its fields, in order.
+    /// Fields of the struct, in order.
     pub(super) fields: Vec<Field>,
 }
 
-/// Topics of one kind, and their messages.
+/// Topics of one kind, with their messages.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Topic {
-    /// Its name, with `{}` in place of the view, worker or process.
+    /// Name of the topics, with `{}` in place of the view, worker or process.
     pub(super) name: String,
-    /// Subject of the messages: `frame`.
+    /// Subject of the messages, such as `frame`.
     pub(super) about: String,
-    /// The version in its name.
+    /// Version in the name of the topics.
     pub(super) version: u32,
-    /// The message, or the header of an array.
+    /// The message type, or the type of the header before an array.
     pub(super) message: &'static str,
-    /// The elements of the array behind the header; none for a message alone.
+    /// Type of the array elements after the header; `None` if there is no array.
     pub(super) elements: Option<Kind>,
 }
 
 /// A type that a field may have.
 trait Shape {
-    /// The type of its elements, and the lengths of the array.
+    /// Returns the type of the elements, and the lengths of the array.
     fn shape() -> (Kind, Vec<usize>);
 }
 
@@ -98,7 +98,7 @@ impl<T: Shape, const N: usize> Shape for [T; N] {
     }
 }
 
-/// Numbers with a name of their own are numbers in other languages.
+/// Types that wrap a number are plain numbers in other languages.
 macro_rules! names_of_numbers {
     ($number:ty: $($name:ty),*) => {
         $(impl Shape for $name {
@@ -112,7 +112,7 @@ macro_rules! names_of_numbers {
 names_of_numbers!(u32: Status, Searched, Sides, Kept, Span);
 names_of_numbers!(u64: TimedBy);
 
-/// The field that `_place` leads to; the type is the compiler's.
+/// Returns the field that `_place` selects. The compiler infers the type.
 fn field<S, T: Shape>(name: &'static str, offset: usize, _place: fn(&S) -> &T) -> Field {
     let (kind, lengths) = T::shape();
     Field {
@@ -133,7 +133,7 @@ macro_rules! structs {
             }
         })*
 
-        /// The layouts of all structs, each after those that it consists of.
+        /// Returns the layouts of all structs. Each struct comes after the structs that it contains.
         pub(super) fn layouts() -> Vec<Layout> {
             vec![$(Layout {
                 name: stringify!($name),
@@ -192,7 +192,7 @@ structs! {
         memory_bytes peak_memory_bytes queue longest_queue view finished name n_rows n_people camera rows;
 }
 
-/// Replaces the view, worker or process in the name of a topic.
+/// Placeholder for the view, worker or process in the name of a topic.
 const ANY: usize = 7_777_777;
 
 /// Returns the topics of all kinds, with their messages.

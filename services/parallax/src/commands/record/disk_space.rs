@@ -1,4 +1,4 @@
-//! The disk space that a recording takes, and that is free.
+//! The disk space that a recording needs, and the free disk space.
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -11,28 +11,28 @@ use runtime::{TopicPlan, free_space};
 
 /// A recording starts only if there is space for this many frames.
 const MIN_FRAMES: u64 = 10;
-/// A skeleton for Foxglove.
+/// Size of a skeleton for Foxglove, in bytes.
 const SCENE_BYTES: u64 = 24_000;
-/// Interval of messages about the size of the file.
+/// Interval between messages about the size of the file.
 const PERIOD: Duration = Duration::from_secs(10);
 
-/// The largest size of one instant of all views in the file, bytes.
+/// Maximum size of the messages of one instant, over all views, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PerFrame {
     pub pixels: u64,
     pub evidence: u64,
-    /// The same pixels as JPEG for Foxglove, in text.
+    /// The frames' pixels as JPEG for Foxglove, encoded as text.
     pub foxglove: u64,
-    /// Pictures of live cameras as they came, if they came raw.
+    /// Original pictures of live cameras, if the cameras send raw pixels.
     pub camera: u64,
     /// All other messages.
     pub rest: u64,
 }
 
 impl PerFrame {
-    /// The sizes for the topics of a deployment.
+    /// Computes the sizes for the topics of a deployment.
     ///
-    /// * `has_foxglove`: whether the recording holds what Foxglove shows.
+    /// * `has_foxglove`: true if the recording contains the topics for Foxglove.
     pub(super) fn new(topics: &[TopicPlan], has_foxglove: bool) -> Self {
         let mut sum = Self::default();
         for topic in topics {
@@ -43,7 +43,7 @@ impl PerFrame {
                     sum.foxglove += if has_foxglove { bytes / 2 } else { 0 };
                 }
                 Some(Kind::Skeletons) => {
-                    // Of the room for eight people a recording holds what is used: a run follows one.
+                    // The topic has space for eight people, but the recording contains only those in use. A run follows one person.
                     let person = Kind::Skeletons.element_bytes().unwrap_or(0);
                     sum.rest += (Kind::Skeletons.head_bytes() + person) as u64;
                     sum.rest += if has_foxglove { SCENE_BYTES } else { 0 };
@@ -58,7 +58,7 @@ impl PerFrame {
         sum
     }
 
-    /// The sum without pixels or evidence, if they are left out.
+    /// Returns the total size, without pixels or evidence if these are left out.
     fn bytes(self, without: [bool; 2]) -> u64 {
         let [pixels, evidence] = without;
         let pixels = if pixels {
@@ -75,30 +75,30 @@ impl PerFrame {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Forecast {
     pub per_frame: PerFrame,
-    /// True if pixels are left out, and true if evidence is.
+    /// True if pixels are left out, and true if evidence is left out.
     pub without: [bool; 2],
-    /// None for a run until it is stopped.
+    /// Number of frames; `None` for a run without an end.
     pub n_frames: Option<u64>,
-    /// Used frames of the footage per second, if it is known.
+    /// Rate of the frames that are used, per second, if known.
     pub rate_hz: Option<f64>,
     pub free_bytes: u64,
 }
 
 impl Forecast {
-    /// The size of an instant, bytes.
+    /// Returns the size of one instant, in bytes.
     fn frame_bytes(&self) -> u64 {
         self.per_frame.bytes(self.without)
     }
 
-    /// The number of frames that fit on the disk.
+    /// Returns the number of frames that fit on the disk.
     fn n_that_fit(&self) -> u64 {
         self.free_bytes / self.frame_bytes().max(1)
     }
 
-    /// The forecast as text.
+    /// Returns the forecast as text.
     pub(super) fn text(&self, file: &Path) -> String {
         let mut text = format!(
-            "recording {}: up to {} a frame",
+            "recording {}: up to {} per frame",
             file.display(),
             size(self.frame_bytes())
         );
@@ -110,7 +110,7 @@ impl Forecast {
     fn write(&self, text: &mut String) -> core::fmt::Result {
         if let Some(rate) = self.rate_hz {
             let second = (self.frame_bytes() as f64 * rate) as u64;
-            write!(text, ", {} for a second of {rate:.0} frames", size(second))?;
+            write!(text, ", {} per second of {rate:.0} frames", size(second))?;
         }
         if let Some(n_frames) = self.n_frames {
             let all = size(self.frame_bytes().saturating_mul(n_frames));
@@ -118,28 +118,24 @@ impl Forecast {
         }
         write!(text, "; {} are free", size(self.free_bytes))?;
         if self.n_frames.is_none_or(|frame| self.n_that_fit() < frame) {
-            write!(
-                text,
-                ", which may be full after {} frames",
-                self.n_that_fit()
-            )?;
+            write!(text, ", enough for at least {} frames", self.n_that_fit())?;
         }
         self.write_smaller(text)
     }
 
-    /// Writes how much smaller the recording would be without evidence and pixels.
+    /// Adds how small the recording would be without evidence, and without pixels.
     fn write_smaller(&self, text: &mut String) -> core::fmt::Result {
         let [pixels, evidence] = self.without;
         if !evidence {
             let left = self.per_frame.bytes([pixels, true]);
-            write!(text, "\n  --without evidence: {} a frame", size(left))?;
+            write!(text, "\n  --without evidence: {} per frame", size(left))?;
         }
         if !evidence && !pixels {
             let left = self.per_frame.bytes([true, true]);
             write!(text, "; and --without pixels: {}", size(left))?;
         } else if !pixels {
             let left = self.per_frame.bytes([true, true]);
-            write!(text, "\n  --without pixels too: {} a frame", size(left))?;
+            write!(text, "\n  also --without pixels: {} per frame", size(left))?;
         }
         Ok(())
     }
@@ -151,20 +147,20 @@ impl Forecast {
             return Ok(());
         }
         let message = format!(
-            "there is no room for {}: {n} frames of {} take {}, {} are free",
+            "not enough disk space for {}: {n} frames of {} need {}, but only {} are free",
             file.display(),
             size(self.frame_bytes()),
             size(self.frame_bytes().saturating_mul(n)),
             size(self.free_bytes)
         );
-        let mut hint = "make room, or name a file on another disk".to_owned();
+        let mut hint = "free some space, or choose a file on another disk".to_owned();
         // Writing to a string cannot fail.
         let _infallible = self.write_smaller(&mut hint);
         Err(Failure::new(ExitKind::Input, message).with_hint(hint))
     }
 }
 
-/// The free space on the disk of a file that will be written, bytes.
+/// Returns the free space on the disk of a file that will be written, in bytes.
 pub(super) fn free_beside(file: &Path) -> Result<u64, Failure> {
     let folder = file.parent().unwrap_or(Path::new("/"));
     if !folder.is_dir() {
@@ -174,7 +170,7 @@ pub(super) fn free_beside(file: &Path) -> Result<u64, Failure> {
             folder.display()
         );
         let failure = Failure::new(ExitKind::Input, message);
-        return Err(failure.with_hint("make the folder first, or name another file"));
+        return Err(failure.with_hint("create the folder first, or choose another file"));
     }
     free_space(folder).or_fail(ExitKind::Input)
 }
@@ -196,7 +192,7 @@ impl Growth {
         }
     }
 
-    /// The next message, if it is due; called on every event of the run.
+    /// Returns the next message if it is due. Called on every event of the run.
     pub(super) fn message(&mut self) -> Option<String> {
         if self.reported_at.elapsed() < PERIOD {
             return None;
@@ -206,7 +202,7 @@ impl Growth {
         let free = free_space(&self.file).ok()?;
         let n = free / self.frame_bytes;
         Some(format!(
-            "recorded {}; {} are free, for {n} frames or more",
+            "recorded {}; {} are free, enough for at least {n} frames",
             size(bytes),
             size(free)
         ))
@@ -249,12 +245,12 @@ mod tests {
         let text = forecast(70_000_000_000, [false; 2]).text(Path::new("run.mcap"));
         assert_eq!(
             text,
-            "recording run.mcap: up to 172.4 MB a frame, 10.3 GB for a second of 60 frames, 17.2 GB for all 100 frames; \
-             70.0 GB are free\n  --without evidence: 4.4 MB a frame; and --without pixels: 400.0 kB"
+            "recording run.mcap: up to 172.4 MB per frame, 10.3 GB per second of 60 frames, 17.2 GB for all 100 frames; \
+             70.0 GB are free\n  --without evidence: 4.4 MB per frame; and --without pixels: 400.0 kB"
         );
         let text = forecast(70_000_000_000, [false, true]).text(Path::new("run.mcap"));
         assert!(
-            text.ends_with("\n  --without pixels too: 400.0 kB a frame"),
+            text.ends_with("\n  also --without pixels: 400.0 kB per frame"),
             "{text}"
         );
         let text = forecast(70_000_000_000, [true; 2]).text(Path::new("run.mcap"));
@@ -267,7 +263,7 @@ mod tests {
         assert!(
             small
                 .text(Path::new("a"))
-                .contains("5.0 GB are free, which may be full after 29 frames")
+                .contains("5.0 GB are free, enough for at least 29 frames")
         );
         let endless = Forecast {
             n_frames: None,
@@ -275,7 +271,7 @@ mod tests {
         };
         let text = endless.text(Path::new("a"));
         assert!(
-            text.contains("frames; 5.0 GB are free, which may be full after 29 frames"),
+            text.contains("frames; 5.0 GB are free, enough for at least 29 frames"),
             "{text}"
         );
         small.check(Path::new("a")).unwrap();
@@ -286,7 +282,7 @@ mod tests {
         let refused = forecast(1_723_999_999, [false; 2]).check(Path::new("a")).unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "there is no room for a: 10 frames of 172.4 MB take 1.7 GB, 1.7 GB are free"
+            "not enough disk space for a: 10 frames of 172.4 MB need 1.7 GB, but only 1.7 GB are free"
         );
         forecast(1_724_000_000, [false; 2]).check(Path::new("a")).unwrap();
         forecast(1_723_999_999, [false, true]).check(Path::new("a")).unwrap();

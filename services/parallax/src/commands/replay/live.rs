@@ -1,4 +1,4 @@
-//! A recorded run of live cameras: they are not asked again, their pictures are in the recording.
+//! Replay of a run with live cameras. The cameras are not used: their pictures are read from the recording.
 
 use std::path::Path;
 
@@ -10,15 +10,15 @@ use launch::Resolved;
 use messages::topic;
 use recording::Recording;
 
-/// Puts the recording in the place of live cameras.
+/// Replaces live cameras by the recording.
 ///
-/// From capture on nothing is lost by default, because nothing is live any more.
+/// In a replay from capture, no frame is dropped by default, because nothing is live any more.
 ///
-/// * `set`: values that the user replaces.
+/// * `set`: the user's replacements of values.
 ///
 /// # Errors
 ///
-/// The replay begins with capture, and the recording lacks the pictures of a camera.
+/// Fails if the replay begins with capture, and the recording lacks the pictures of a camera.
 pub(super) fn settle(
     recorded: &mut Resolved,
     file: &Path,
@@ -43,7 +43,7 @@ pub(super) fn settle(
             );
             let failure = Failure::new(ExitKind::Input, message);
             return Err(failure.with_hint(
-                "`--from pose` replays the frames that the run used; `parallax record` keeps the pictures unless it has `--without camera`",
+                "use `--from pose` to replay the frames that the run used; `parallax record` keeps the pictures, except with `--without camera`",
             ));
         }
         camera.source = Recorded::address(file, &camera.name);

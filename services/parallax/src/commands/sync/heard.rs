@@ -1,4 +1,4 @@
-//! Synchronisation of the cameras of a deployment by sound.
+//! Synchronisation of a deployment's cameras by sound.
 
 use calibration::synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
 use deployment::Deployment;
@@ -7,10 +7,10 @@ use footage::{RecordedSound, SourceSpec, read_sound};
 use geometry::Camera;
 use launch::films::{Part, cameras};
 
-/// Samples a second: most of what is heard of a room lies below half of it.
+/// Sampling rate in Hz. Most sounds in a room have frequencies below half of it.
 const RATE_HZ: u32 = 8000;
 
-/// Reads the sound of every camera and compares the beginnings of sounds, which Ctrl-C ends.
+/// Reads the sound of every camera, and compares the times at which sounds begin. Ctrl-C ends the comparison.
 ///
 /// * `reference` and `window_s`: as in [`SoundSettings`].
 pub(super) fn compared(
@@ -62,6 +62,6 @@ fn sound(name: &str, spec: &SourceSpec, part: Part) -> Result<Sound, Failure> {
 
 fn silent(name: &str, why: &str) -> Failure {
     let message = format!("camera {name:?}: {why}");
-    let hint = "without --by sound the movement of people is compared";
+    let hint = "leave out --by sound to compare the movement of people";
     Failure::new(ExitKind::Input, message).with_hint(hint)
 }

@@ -1,4 +1,4 @@
-//! The table of `top` on a terminal: updated continuously, scrolled by keys.
+//! The table of `top` on a terminal: updated continuously, scrolled with keys.
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -10,16 +10,16 @@ use runtime::Namespace;
 
 use super::terminal::{Key, Size, Terminal};
 
-/// How often a stop request, the size of the terminal and the end of the deployment are checked.
+/// Interval at which a stop request, the terminal size and the end of the deployment are checked.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Shows a deployment until it ends, the user quits, or a stop is requested. Returns whether the deployment has ended.
+/// Shows a deployment until it ends, the user quits, or a stop is requested. Returns true if the deployment has ended.
 ///
-/// * `pause`: the interval of updates.
+/// * `pause`: the interval between updates.
 ///
 /// # Errors
 ///
-/// The terminal cannot be used, or the metrics cannot be received.
+/// Fails if the terminal cannot be used, or the metrics cannot be received.
 pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Result<bool, Failure> {
     let mut live = Live::open(namespace)?;
     let terminal = Terminal::open().or_fail(ExitKind::Run)?;
@@ -64,13 +64,13 @@ pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Resul
     Ok(false)
 }
 
-/// The lines that are shown: some of a text, above a line that lists the keys.
+/// The visible lines of a text, above a line that lists the keys.
 #[derive(Debug)]
 struct Page<'t> {
     lines: Vec<&'t str>,
-    /// First line that is shown. Near the end it is less than asked for, so that the last page is full.
+    /// Index of the first visible line. Near the end of the text it is lower than requested, so that the last page is full.
     first: usize,
-    /// Number of lines that fit.
+    /// Number of lines that fit on the screen.
     len: usize,
     keys: String,
 }
@@ -97,7 +97,7 @@ impl<'t> Page<'t> {
         }
     }
 
-    /// Returns the sequences that draw the page over another one.
+    /// Returns the escape sequences that draw this page over the previous one.
     fn escaped(&self, size: Size) -> String {
         const DIM: &str = "2";
         let empty = self.len - self.lines.len();
@@ -109,14 +109,14 @@ impl<'t> Page<'t> {
             let end_of_last = if nth == 0 { "" } else { "\r\n" };
             let shown = line.chars().filter(|letter| !letter.is_control());
             let shown: String = shown.take(size.columns).collect();
-            // A write to a text does not fail.
+            // Writing to a string cannot fail.
             let _ok = write!(drawn, "{end_of_last}\x1b[{style}m{shown}\x1b[0m\x1b[K");
         }
         drawn
     }
 }
 
-/// Returns the style of a line (ECMA-48, 8.3.117): titles are bold, dead processes red, silent ones yellow.
+/// Returns the style of a line (ECMA-48, 8.3.117): bold for titles, red for dead processes, yellow for silent ones.
 fn style(line: &str) -> &'static str {
     let has = |word: &str| line.split_whitespace().any(|found| found == word);
     if line.starts_with("PROCESS") {
@@ -134,7 +134,7 @@ fn style(line: &str) -> &'static str {
 mod tests {
     use super::*;
 
-    /// Draws on a terminal and returns its rows, and the page.
+    /// Draws on a terminal, and returns the rows of the terminal and the page.
     fn drawn(text: &str, first: usize, [columns, rows]: [usize; 2]) -> (Vec<String>, [usize; 2]) {
         let size = Size { columns, rows };
         let page = Page::new(text, first, size);

@@ -1,4 +1,4 @@
-//! A terminal in raw mode: keys arrive one by one, a screen of its own is drawn, and both end when this is dropped.
+//! A terminal in raw mode with an alternate screen. Keys arrive one by one. Dropping the value restores the terminal.
 
 use core::time::Duration;
 use std::fs::File;
@@ -9,14 +9,14 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetattr};
 
-/// Other screen, no cursor, no wrapping of long lines.
+/// Switches to the alternate screen, hides the cursor, and turns off line wrapping.
 const ENTER: &[u8] = b"\x1b[?1049h\x1b[?25l\x1b[?7l";
-/// The same back.
+/// Undoes [`ENTER`].
 const LEAVE: &[u8] = b"\x1b[?7h\x1b[?25h\x1b[?1049l";
-/// How long the rest of a sequence may take to arrive: slow connections cut it behind the escape.
+/// Time within which the rest of an escape sequence must arrive. Slow connections may split a sequence after the escape character.
 const REST_OF_SEQUENCE: Duration = Duration::from_millis(50);
 
-/// A key that does something.
+/// A key with a function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Key {
     NextPage,
@@ -36,14 +36,14 @@ pub(super) struct Size {
 /// Standard output in raw mode, and the keys that are pressed.
 #[derive(Debug)]
 pub(super) struct Terminal {
-    /// Opened where standard input is no terminal.
+    /// The terminal device, opened if standard input is not a terminal.
     keyboard: Option<File>,
-    /// Settings before.
+    /// Settings of the terminal before raw mode.
     before: Termios,
 }
 
 impl Terminal {
-    /// Takes the terminal.
+    /// Switches the terminal to raw mode and the alternate screen.
     pub(super) fn open() -> io::Result<Self> {
         let keyboard = if io::stdin().is_terminal() {
             None
@@ -59,7 +59,7 @@ impl Terminal {
         Ok(terminal)
     }
 
-    /// Returns the size, or that of a usual terminal where it is unknown.
+    /// Returns the size of the terminal, or a usual size if it is unknown.
     pub(super) fn size() -> Size {
         let size = tcgetwinsize(io::stdout()).ok();
         let [columns, rows] =
@@ -78,7 +78,7 @@ impl Terminal {
         out.flush()
     }
 
-    /// Returns whether the terminal has been closed.
+    /// Returns true if the terminal has been closed.
     pub(super) fn is_gone(&self) -> bool {
         let out = io::stdout();
         [out.as_fd(), input(self.keyboard.as_ref())].into_iter().any(|side| {
@@ -96,7 +96,7 @@ impl Terminal {
         Ok(keys_in(&bytes))
     }
 
-    /// Waits for bytes and returns those that are there; none after a signal.
+    /// Waits for bytes, and returns the available ones. Returns no bytes after a signal.
     fn read(&self, wait: Duration) -> io::Result<Vec<u8>> {
         let input = input(self.keyboard.as_ref());
         if !events(input, PollFlags::IN, wait)?.contains(PollFlags::IN) {
@@ -122,7 +122,7 @@ impl Drop for Terminal {
     }
 }
 
-/// Returns where keys are read.
+/// Returns the file from which keys are read.
 fn input(keyboard: Option<&File>) -> BorrowedFd<'_> {
     match keyboard {
         Some(file) => file.as_fd(),
@@ -130,7 +130,7 @@ fn input(keyboard: Option<&File>) -> BorrowedFd<'_> {
     }
 }
 
-/// Waits for events of a file and returns them; none after a signal.
+/// Waits for events of a file, and returns them. Returns no events after a signal.
 fn events(file: BorrowedFd<'_>, flags: PollFlags, wait: Duration) -> io::Result<PollFlags> {
     let mut watched = [PollFd::new(&file, flags)];
     let wait = Timespec::try_from(wait).map_err(io::Error::other)?;
@@ -144,7 +144,7 @@ fn events(file: BorrowedFd<'_>, flags: PollFlags, wait: Duration) -> io::Result<
 const ESCAPE: u8 = 0x1b;
 const CONTROL_C: u8 = 0x03;
 
-/// Returns the keys whose bytes these are; other bytes and sequences are passed over (ECMA-48, 5.4).
+/// Returns the keys that the bytes encode. Unknown bytes and sequences are skipped (ECMA-48, 5.4).
 fn keys_in(mut bytes: &[u8]) -> Vec<Key> {
     let mut keys = Vec::new();
     while let Some((&first, rest)) = bytes.split_first() {
@@ -160,7 +160,7 @@ fn keys_in(mut bytes: &[u8]) -> Vec<Key> {
                     bytes = &rest[n_bytes..];
                     in_sequence(&rest[..n_bytes])
                 }
-                // Alt and a key.
+                // Alt with a key.
                 [_, rest @ ..] => {
                     bytes = rest;
                     None
@@ -174,7 +174,7 @@ fn keys_in(mut bytes: &[u8]) -> Vec<Key> {
     keys
 }
 
-/// Returns the key of a sequence, without its introducer.
+/// Returns the key of an escape sequence, given without its introducer.
 fn in_sequence(sequence: &[u8]) -> Option<Key> {
     match sequence {
         b"A" => Some(Key::PreviousLine),
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn keys_without_an_action_are_passed_over_completely() {
-        // Home, F5, control and right, Alt and q, a, umlaut, a sequence that is cut off.
+        // Home, F5, Control with right arrow, Alt with q, a, umlaut, a truncated sequence.
         for bytes in [
             &b"\x1b[H"[..],
             b"\x1b[15~",

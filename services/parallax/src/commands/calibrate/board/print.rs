@@ -1,4 +1,4 @@
-//! `--print`: a board as PDF or SVG.
+//! `--print`: draws a board as PDF or SVG.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -29,19 +29,22 @@ pub(super) fn run(board: &Board, paper: Paper, out: Option<&Path>) -> Result<Exi
             _ => {
                 return Err(Failure::new(
                     ExitKind::Usage,
-                    format!("{}: a board is written as .pdf or .svg", file.display()),
+                    format!(
+                        "{}: a board can only be written as .pdf or .svg",
+                        file.display()
+                    ),
                 ));
             }
         };
         files::replace(&file, &bytes).map_err(|error| in_file(&file, &error))?;
         output::message(format_args!(
-            "wrote {}: {board} on {page}; print at 100 %, and measure the ruler",
+            "wrote {}: {board} on {page}; print at 100 %, and check the printed ruler",
             file.display()
         ));
     }
     if paper == Paper::Fitting {
         output::message(
-            "this is the smallest page that holds the board: smaller squares fit a smaller page, --paper names another (a4, letter, 300x400mm)",
+            "this is the smallest page that holds the board; use smaller squares for a smaller page, or --paper for another page (a4, letter, 300x400mm)",
         );
     }
     Ok(ExitCode::SUCCESS)

@@ -1,4 +1,4 @@
-//! Outcome of a calibration from a board, as a table and as JSON.
+//! Prints the result of a calibration from a board, as a table or as JSON.
 
 use calibration::board::CameraOutcome;
 use failure::Failure;
@@ -9,7 +9,7 @@ use terminal::output;
 
 use super::Arguments;
 
-/// The table.
+/// Prints the table.
 pub(super) fn table(calibrated: &Calibrated) -> Result<(), Failure> {
     for note in &calibrated.notes {
         output::line(format_args!("note: {note}"))?;
@@ -71,7 +71,7 @@ fn distance(calibrated: &Calibrated, [a, b]: [usize; 2]) -> f64 {
     (centre(a) - centre(b)).norm()
 }
 
-/// One object.
+/// Returns the result as one JSON object.
 pub(super) fn json(calibrated: &Calibrated) -> Value {
     let doubts = calibrated.doubts();
     let finite = |value: f64| value.is_finite().then_some(value);
@@ -116,7 +116,7 @@ pub(super) fn json(calibrated: &Calibrated) -> Value {
     })
 }
 
-/// Returns the facts about the command for the report.
+/// Returns facts about the command for the report.
 pub(super) fn about(arguments: &Arguments, calibrated: &Calibrated) -> Vec<(String, String)> {
     let mut about = vec![
         ("board".to_owned(), calibrated.board.to_string()),
@@ -126,7 +126,10 @@ pub(super) fn about(arguments: &Arguments, calibrated: &Calibrated) -> Vec<(Stri
         about.push(("corners of".to_owned(), corners.display().to_string()));
     }
     if let Some(known) = &arguments.known {
-        about.push(("intrinsics kept of".to_owned(), known.display().to_string()));
+        about.push((
+            "intrinsics kept for".to_owned(),
+            known.display().to_string(),
+        ));
     }
     about.extend(calibrated.notes.iter().map(|note| ("note".to_owned(), note.clone())));
     about

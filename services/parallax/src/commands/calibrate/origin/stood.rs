@@ -1,4 +1,4 @@
-//! The floor that people stood on in a finished run.
+//! Finds the floor below people who stood in a finished run.
 
 use std::path::Path;
 
@@ -12,15 +12,15 @@ use skeleton::PARSE14;
 use statistics::Sorted;
 use terminal::output;
 
-/// How far the skeletons of a run may be from what its cameras saw, as a share of the size of the person in the picture.
+/// Largest distance of the run's skeletons from the joints that its cameras saw, as a share of the person's size in the picture.
 const MOST_OFF: f64 = 0.15;
-/// The fewest joints in pictures for this check.
+/// Minimum number of joints seen in pictures for this check.
 const LEAST_SEEN: usize = 50;
 
-/// Finds the floor, after checking that the run was made with this rig. Of several people it uses the followed person,
-/// who may change: all of them stand on the same floor.
+/// Finds the floor, after checking that the run was made with this rig. If the run has several people, only the followed person is used.
+/// The followed person may change, because all of them stand on the same floor.
 ///
-/// * `rate_hz`: frames a second, for a run that does not know.
+/// * `rate_hz`: frames per second, if the run has no frame rate.
 pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
     let mut times_s: Vec<f64> = Vec::new();
     let mut skeletons: Skeletons = Vec::new();
@@ -29,7 +29,8 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
         let time_s = rate_hz.map_or(line.time_s, |rate_hz| Some(line.frame as f64 / rate_hz));
         let time_s = time_s.ok_or_else(|| {
             let message = format!("{}: the frames of the run have no times", run.display());
-            Failure::new(ExitKind::Input, message).with_hint("pass the frames per second by --rate")
+            Failure::new(ExitKind::Input, message)
+                .with_hint("pass the frames per second with --rate")
         })?;
         let person = line.followed();
         let joints = PARSE14.joints.iter().map(|joint| {
@@ -49,22 +50,23 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
     check(rig, run, &frames, &skeletons)?;
     let found = floor(&times_s, &skeletons).ok_or_else(|| {
         let message = format!(
-            "{}: no person stands on a foot in its {} frames",
+            "{}: in its {} frames, no person stands on a foot",
             run.display(),
             frames.len()
         );
-        Failure::new(ExitKind::Degraded, message).with_hint("let a person walk about, or stand")
+        Failure::new(ExitKind::Degraded, message)
+            .with_hint("use a run in which a person walks about, or stands")
     })?;
     if found.vertical == Vertical::Leaning {
         let message =
-            "nobody stands upright, and feet stand on one spot: the vertical is not known";
+            "the vertical is not known: nobody stands upright, and all feet are on one spot";
         let hint = "use a run in which a person walks about";
         return Err(Failure::new(ExitKind::Degraded, message).with_hint(hint));
     }
     Ok(found)
 }
 
-/// A failure where the skeletons are not where the cameras of the rig saw them: the run was made with another rig.
+/// Fails if the skeletons are not where the cameras of this rig saw them, because the run was made with another rig.
 fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result<(), Failure> {
     let file = run.join(ViewLine::FILE);
     let text = failure::read_text(&file)?;
@@ -107,21 +109,21 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
     match median {
         None => {
             let message = format!(
-                "{}: {n} joints were seen, at least {LEAST_SEEN} are needed",
+                "{}: only {n} joints were seen, but {LEAST_SEEN} are needed",
                 run.display()
             );
             Err(Failure::new(ExitKind::Degraded, message))
         }
         Some(share) if share > MOST_OFF => {
             let message = format!(
-                "{}: the distance of its joints from where the cameras of this rig saw them is {:.0} % of the person's size (median; \
-                 allowed: {:.0} %): it is not a run of this rig",
+                "{}: this is not a run of this rig: its joints are off from where the cameras saw them by {:.0} % of the person's size (median; \
+                 allowed: {:.0} %)",
                 run.display(),
                 100.0 * share,
                 100.0 * MOST_OFF
             );
             Err(Failure::new(ExitKind::Degraded, message)
-                .with_hint("run a deployment with the rig as it is now, and give that run"))
+                .with_hint("run a deployment with the current rig, and pass that run"))
         }
         Some(_) => Ok(()),
     }
