@@ -1,6 +1,7 @@
 //! Colours of people's trunks, by which a view tells people apart.
 //!
-//! Cameras differ in exposure and white balance, so every view has its own colours.
+//! Cameras differ in exposure and white balance, so every view has its own colours. A view that has not seen a person often enough uses
+//! the colour over all views.
 
 use nalgebra::Vector3;
 
@@ -11,50 +12,84 @@ use crate::frame::Place;
 /// Red, green and blue, 0 to 1.
 pub(crate) type Rgb = [f64; 3];
 
-/// Weight of a new colour in the stored one.
+/// Minimum weight of a new colour in the mean.
 const NEW_COLOUR: f64 = 0.1;
-/// Light and shade change a colour by up to this factor, which does not count as a difference.
+/// A colour is known after this many frames; a new person may have been given the detections of others.
+const KNOWN: u32 = 5;
+/// Light and shade change the brightness by up to this factor, which does not count as a difference.
 const SHADE: f64 = 1.2;
 
 /// The colours of a person's trunk.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Colours {
-    /// One per view; `None` if the view has not seen the trunk.
-    views: Vec<Option<Rgb>>,
-    /// The colour over all views.
-    pub(crate) mean: Option<Rgb>,
+    /// One per view.
+    views: Vec<Mean>,
+    /// Over all views.
+    all: Mean,
+}
+
+/// A mean colour, and the number of colours that it is the mean of.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mean {
+    colour: Rgb,
+    n: u32,
+}
+
+impl Mean {
+    fn add(&mut self, new: Rgb) {
+        self.n = self.n.saturating_add(1);
+        let weight = NEW_COLOUR.max(1.0 / f64::from(self.n));
+        for (own, new) in self.colour.iter_mut().zip(new) {
+            *own += weight * (new - *own);
+        }
+    }
+
+    fn known(&self) -> Option<Rgb> {
+        (self.n >= KNOWN).then_some(self.colour)
+    }
 }
 
 impl Colours {
-    /// Adds the colours of a frame.
+    /// Creates the colours of a remembered person.
+    ///
+    /// * `overall`: colour over all views.
+    pub(crate) fn remembered(overall: Option<Rgb>) -> Self {
+        let known = |colour| Mean { colour, n: KNOWN };
+        Self {
+            views: Vec::new(),
+            all: overall.map_or_else(Mean::default, known),
+        }
+    }
+
+    /// Adds the colours of a person's detections.
     pub(crate) fn add(&mut self, frame: &Frame, members: &[Member]) {
-        self.views.resize(frame.n_views(), None);
+        self.views.resize(frame.n_views(), Mean::default());
         for member in members {
             if let Some(colour) = frame.colour(member.at) {
-                let own = &mut self.views[member.at.view];
-                *own = Some(mixed(*own, colour));
-                self.mean = Some(mixed(self.mean, colour));
+                self.views[member.at.view].add(colour);
+                self.all.add(colour);
             }
         }
     }
 
-    /// Returns the difference between a detection and the colour of the person in the same view; `None` if one of them is unknown.
+    /// Returns the colour over all views; `None` until it is known.
+    pub(crate) fn overall(&self) -> Option<Rgb> {
+        self.all.known()
+    }
+
+    /// Returns the difference between a detection and the person's colour; `None` if one of them is unknown.
     pub(crate) fn difference(&self, frame: &Frame, at: Place) -> Option<f64> {
-        let own = self.views.get(at.view).copied().flatten()?;
+        let own = self.views.get(at.view).and_then(Mean::known);
+        let own = own.or_else(|| self.overall())?;
         Some(difference(own, frame.colour(at)?))
     }
 
-    /// Returns the mean difference of several detections, as [`Self::difference`].
+    /// Returns the mean of the differences of several detections; `None` if none is known.
     pub(crate) fn mean_difference(&self, frame: &Frame, members: &[Member]) -> Option<f64> {
         let each = members.iter().filter_map(|member| self.difference(frame, member.at));
         let (n, sum) = each.fold((0.0, 0.0), |(n, sum), by| (n + 1.0, sum + by));
         (n > 0.0).then(|| sum / n)
     }
-}
-
-fn mixed(own: Option<Rgb>, new: Rgb) -> Rgb {
-    let own = own.unwrap_or(new);
-    [0, 1, 2].map(|nth| own[nth] + NEW_COLOUR * (new[nth] - own[nth]))
 }
 
 /// Returns the distance between two colours, apart from a small difference in brightness.

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use skeleton::body::{Covariances, Joints, Kind};
 
 use crate::bones::Bones;
+use crate::colour::Colours;
 use crate::track::Track;
 use crate::{N, State};
 
@@ -135,7 +136,7 @@ pub(crate) fn remembered(track: &Track) -> Option<Remembered> {
         velocity: track.velocity,
         seen_s: track.seen_s,
         bones: track.bones,
-        colour: track.colours.mean,
+        colour: track.colours.overall(),
     })
 }
 
@@ -146,7 +147,7 @@ pub(crate) fn revived(person: &Remembered) -> Track {
     track.coarse.covariances = person.covariances;
     track.velocity = person.velocity;
     track.bones = person.bones;
-    track.colours.mean = person.colour;
+    track.colours = Colours::remembered(person.colour);
     track.state = State::Lost;
     track
 }

@@ -48,6 +48,77 @@ fn follow(n_views: usize, frames: &[Vec<View>]) -> Vec<Vec<Person>> {
     frames.map(|(nth, views)| tracker.step(nth as f64 / RATE_HZ, views)).collect()
 }
 
+/// Two people who stand side by side, and exchange their places while nobody sees them. Returns the ids from left to right, before and
+/// after.
+///
+/// * `colours`: colours of their trunks.
+fn exchanged(colours: [Option<[f64; 3]>; 2]) -> [Vec<u64>; 2] {
+    let cameras = ring(4);
+    let mut random = Rng::with_seed(1);
+    let mut tracker = Tracker::new(cameras.clone(), settings());
+    let mut frame = |nth: usize| {
+        let side = if nth < 20 { -0.25 } else { 0.25 };
+        let people = [side, -side].map(|x| Actor {
+            at: [x, 0.0],
+            turn: 0.0,
+            stature: 1.7,
+        });
+        let mut views = seen(&cameras, &people, 3.0, &mut random);
+        for view in &mut views {
+            if (20..28).contains(&nth) {
+                view.detections.clear();
+            }
+            for (detection, colour) in view.detections.iter_mut().zip(colours) {
+                detection.colour = colour;
+            }
+        }
+        let mut people = tracker.step(nth as f64 / RATE_HZ, &views);
+        people.retain(|person| person.state != State::Lost);
+        people.sort_by(|a, b| {
+            a.joints[12]
+                .map(|neck| neck.x)
+                .partial_cmp(&b.joints[12].map(|neck| neck.x))
+                .unwrap()
+        });
+        people.iter().map(|person| person.id).collect::<Vec<u64>>()
+    };
+    let ids: Vec<Vec<u64>> = (0..32).map(&mut frame).collect();
+    [ids[19].clone(), ids[31].clone()]
+}
+
+#[test]
+fn people_who_exchange_their_places_unseen_keep_their_ids_by_their_colours() {
+    let [before, after] = exchanged([Some([0.7, 0.3, 0.2]), Some([0.2, 0.3, 0.6])]);
+    assert_eq!(before.len(), 2);
+    assert_eq!(after, [before[1], before[0]]);
+    for alike in [[None; 2], [Some([0.5, 0.5, 0.45]), Some([0.55, 0.5, 0.45])]] {
+        let [before, after] = exchanged(alike);
+        assert_eq!(after, before, "nothing tells them apart but their places");
+    }
+}
+
+#[test]
+fn a_person_in_another_light_keeps_the_id() {
+    let cameras = ring(3);
+    let mut random = Rng::with_seed(2);
+    let mut tracker = Tracker::new(cameras.clone(), settings());
+    let actor = Actor {
+        at: [0.2, 0.1],
+        turn: 1.0,
+        stature: 1.8,
+    };
+    for nth in 0..30 {
+        let mut views = seen(&cameras, &[actor], 3.0, &mut random);
+        for view in &mut views {
+            view.detections[0].colour = Some([if nth < 15 { 0.9 } else { 0.2 }; 3]);
+        }
+        let people = tracker.step(f64::from(nth) / RATE_HZ, &views);
+        assert!(people.iter().all(|person| person.id == 1));
+        let n_views = people.iter().map(|person| person.detections.iter().flatten().count());
+        assert!(nth < 5 || n_views.eq([3]), "frame {nth}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 

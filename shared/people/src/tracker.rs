@@ -34,11 +34,13 @@ const REMEMBERED_S: f64 = 60.0;
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
-/// A detection belongs to another person within this distance, in metres, if its colour is nearer to that person's by this much. A smaller
+/// A person takes no detection whose colour is nearer by this much to that of another person within this distance, in metres. A smaller
 /// difference counts as a distance of this many metres for each unit.
-const RIVAL_M: f64 = 1.0;
-const OTHER_COLOUR: f64 = 0.2;
-const COLOUR_M: f64 = 1.0;
+const OTHER_COLOUR: f64 = 0.25;
+const RIVAL_M: f64 = 2.0;
+const COLOUR_M: f64 = 2.0;
+/// A missed person is recognised by the colour of the trunk within [`MISSED_M`], if the colours differ by less than this.
+const SAME_CLOTHES: f64 = 0.12;
 /// Number of views that must see a new person, or all views if there are fewer.
 const VIEWS_AT_ONCE: usize = 3;
 
@@ -290,9 +292,11 @@ impl Tracker {
         let missed = missed.filter(|(_, (track, _))| !is_placed(track));
         let near = missed.filter_map(|(nth, (track, expected))| {
             let distance = of_people(expected, &person.joints)?;
-            let is_near = distance < track.reach(time_s, gap_s) + TAKEN_UP_M;
-            let colour = track.colours.mean_difference(frame, &members).unwrap_or(0.0);
-            is_near.then_some((track.id.is_none(), distance + COLOUR_M * colour, nth))
+            let colour = track.colours.mean_difference(frame, &members);
+            let is_alike = colour.is_some_and(|colour| colour < SAME_CLOTHES);
+            let reach = track.reach(time_s, gap_s) + TAKEN_UP_M;
+            let is_near = distance < if is_alike { reach.max(MISSED_M) } else { reach };
+            is_near.then_some((track.id.is_none(), distance, nth))
         });
         let nearest = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         if let Some((_, _, nth)) = nearest {
@@ -389,7 +393,7 @@ impl Tracker {
         let each = self.gone.iter().enumerate().filter_map(|(nth, person)| {
             let n = person.bones.n.iter().copied().fold(f64::INFINITY, f64::min);
             let bones = track.bones.difference(&person.bones)?;
-            let colour = track.colours.mean.zip(person.colour);
+            let colour = track.colours.overall().zip(person.colour);
             let colour = colour.map_or(0.0, |(new, old)| difference(new, old));
             let is_same = n >= FRAMES_TO_KNOW && bones < SAME_BONES && colour < SAME_COLOUR;
             let is_past = time_s > person.seen_s;
