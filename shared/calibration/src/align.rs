@@ -81,7 +81,7 @@ pub fn aligned(from: &[Camera], to: &[Camera], with_scale: bool) -> Option<Simil
     })
 }
 
-/// Returns the difference between the rigs in every camera, after the first rig was aligned with the second.
+/// Returns the difference between the rigs in every camera, after aligning the first rig with the second.
 pub fn differences(from: &[Camera], to: &[Camera], with_scale: bool) -> Vec<Difference> {
     let Some(similarity) = aligned(from, to, with_scale) else {
         return Vec::new();

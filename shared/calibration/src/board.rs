@@ -96,7 +96,7 @@ pub enum LensKind {
     Fisheye,
 }
 
-/// Loss function of corners, in standard deviations.
+/// Loss functions of corners, in standard deviations.
 struct CornerLoss;
 
 impl CornerLoss {
@@ -200,7 +200,7 @@ pub struct Together {
 pub struct OutOfStep {
     /// Root mean square of the residuals of each camera alone, in pixels.
     pub alone_px: f64,
-    /// Root mean square of the residuals of all cameras together, with free lenses, in pixels.
+    /// Root mean square of the residuals of all cameras together, with free lens parameters, in pixels.
     pub together_px: f64,
     /// Largest change of a focal length between the two adjustments, as a fraction.
     pub bent: f64,

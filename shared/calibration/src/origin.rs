@@ -120,8 +120,8 @@ fn place(rig: &Rig, clicks: &[Click], point: usize) -> Result<Point3<f64>, Origi
     Ok(found.in_world)
 }
 
-/// Finds the new world from a board that lies on the floor with its print up. The origin is the upper left corner of the board. The x
-/// axis points along its rows; the y axis points against its columns.
+/// Finds the new world from a board that lies on the floor with the printed side up. The origin is the upper left corner of the board. The
+/// x axis points along its rows; the y axis points against its columns.
 ///
 /// # Errors
 ///

@@ -7,8 +7,8 @@
 //! - Each other camera is placed from the joints that are then known (resection).
 //! - All cameras, joints, bone lengths and time offsets are adjusted together.
 //!
-//! Pictures have no scale. The scale comes from a person's height, from one known distance, or from a given rig. The vertical and the
-//! floor come from feet that stand. One person is enough; the person whom the cameras see longest is used.
+//! Pictures have no scale. The scale comes from a person's height, from one known distance, or from a given rig. The vertical and the floor
+//! come from feet that stand. One person is enough. If there are several, the person that the cameras see longest is used.
 //!
 //! To check the result, two halves of the recording are calibrated independently. They must give the same rig.
 

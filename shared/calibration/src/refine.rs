@@ -25,7 +25,7 @@ use crate::people::solve::{Solved, rounds};
 use crate::people::{Doubt, PeopleError, Recording, Skeletons};
 use held_out::{Blocks, chosen};
 
-/// A camera is changed if its standard deviation is below this fraction of the prior's.
+/// A camera is changed if its standard deviation is below this fraction of the prior's standard deviation.
 const TOLD: f64 = 0.8;
 /// A camera counts as moved if freeing its pose improves the fit of the joints by the first value, as a fraction. The gain must also exceed
 /// that of any other camera by the second value, as a factor.
@@ -166,7 +166,7 @@ fn nothing(cameras: &[Camera]) -> Outcome {
     }
 }
 
-/// Returns the rig fitted to everything, after it was judged on the data that each half was not fitted to.
+/// Returns the rig fitted to all data. Its quality is judged by fitting each half of the data and testing on the other half.
 fn better(
     study: &Study<'_>,
     choices: &[Choice],
@@ -255,7 +255,7 @@ fn suspect(
     Ok(is_one.then_some(best.1))
 }
 
-/// Returns the rig that fits best together with the given rig. Cameras that the joints do not determine are kept.
+/// Returns the rig that best fits both the joints and the given rig. Cameras that the joints do not determine are kept.
 fn fitted(
     study: &Study<'_>,
     choices: &[Choice],

@@ -35,7 +35,7 @@ pub struct Camera {
     pub numbers: Option<[u64; 2]>,
     /// Time to add to the times of the footage, in milliseconds, so that all cameras share one clock (`parallax sync estimate`).
     pub offset_ms: Option<f64>,
-    /// Amount by which a second of the camera's clock is too long, in millionths (`parallax sync estimate`).
+    /// Deviation of the camera's clock, in parts per million; positive if its seconds are too long (`parallax sync estimate`).
     pub drift_ppm: Option<f64>,
     /// Pixel format of a video device, such as `MJPG` or `YUYV`; by default, the first supported one.
     pub format: Option<String>,
@@ -84,7 +84,7 @@ pub enum Tag {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Transport {
-    /// No packet is lost, but a late packet delays those after it.
+    /// No packet is lost, but a late packet delays the packets after it.
     Tcp,
     /// Late packets are lost.
     Udp,
@@ -158,7 +158,7 @@ pub struct Config {
     pub start_frame: u64,
     /// Use every n-th frame.
     pub frame_step: u64,
-    /// Maximum number of frames to use; by default, all frames, or with live cameras, until the run is stopped.
+    /// Maximum number of frames to use; by default, all frames of the footage, or no limit with live cameras.
     pub n_frames: Option<u64>,
     /// Number of identical repetitions of a picture after which a camera counts as frozen; 0 means never.
     pub frozen_after: u32,

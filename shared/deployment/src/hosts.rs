@@ -13,7 +13,7 @@ use crate::{Deployment, Views};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Host {
-    /// Name of the host, for `--host` and reports; without `--host`, a machine is the host whose name equals its own.
+    /// Name of the host, for `--host` and reports; without `--host`, a machine runs as the host that has the machine's own name.
     pub name: String,
     /// Names of the cameras that are connected to the host.
     #[serde(default)]
@@ -33,7 +33,7 @@ pub enum Carry {
     #[default]
     Frames,
     /// Poses of single views. With a network, the maxima of its maps are sent too, and the views are solved in space as on a single
-    /// machine. Views of filters take no part in the search over several views, only in the triangulation.
+    /// machine. Views of the paper's method are not solved together in space; they are only triangulated.
     Poses,
 }
 
@@ -72,7 +72,7 @@ impl Link {
 }
 
 impl Deployment {
-    /// Returns the host of a name.
+    /// Returns the host with a given name.
     pub fn host(&self, name: &str) -> Option<&Host> {
         self.hosts.iter().find(|host| host.name == name)
     }

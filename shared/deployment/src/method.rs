@@ -82,7 +82,7 @@ pub(crate) struct Stranger {
     pub(crate) message: String,
 }
 
-/// Returns a key that belongs to the method that is not used, if one is given.
+/// Returns a given key that belongs to the method that is not used; `None` if there is no such key.
 ///
 /// * `given`: settings that the user gave.
 pub(crate) fn stranger(method: Method, given: &Table) -> Option<Stranger> {

@@ -16,16 +16,16 @@ pub struct Config {
     pub file: PathBuf,
     /// Detector that finds people: `"shipped"`, or an ONNX file with its card in its metadata or beside it. It gives boxes to the network.
     pub detector: PathBuf,
-    /// Search for people in every n-th frame; by default, twice a second. While people are near each other, or someone has just come or
-    /// gone, the default is eight times a second.
+    /// Interval between searches for people, in frames. By default, there are two searches per second, or eight while people are near each
+    /// other or just after a person has appeared or left.
     pub find_every: Option<u64>,
-    /// Minimum heat of a visible person, 0 to 1, as the mean over the joints.
+    /// Minimum heat (from 0 to 1, as the mean over the joints) at which a person counts as visible.
     pub least_heat: f64,
     /// Maximum number of people in a view, and in a frame.
     pub people: usize,
-    /// Average the results of each person's picture and its mirror image; more exact, but takes twice the time.
+    /// Average the results of each person's picture and its mirror image; this is more accurate, but takes twice as long.
     pub mirror: bool,
-    /// Library of ONNX Runtime (`libonnxruntime.so`) that runs network and detector instead of the built-in runtime.
+    /// ONNX Runtime library (`libonnxruntime.so`) that runs the network and the detector instead of the built-in runtime.
     pub onnx_runtime: Option<PathBuf>,
 }
 

@@ -16,7 +16,7 @@ pub use errors::{ErrorTable, Errors};
 
 /// Time that a frame waits for expected errors in real time.
 pub const ERRORS_DEADLINE: Duration = Duration::from_millis(50);
-/// Maximum age at which a view's last expected errors may replace those of a frame. Beyond this age, no part is switched off.
+/// Maximum age of a view's last expected errors for use with a later frame. If they are older, no part is switched off.
 pub const ERRORS_MAX_AGE: Duration = Duration::from_millis(500);
 
 /// Filters that find people in every view, and the energy that links the views.
@@ -42,9 +42,9 @@ pub struct Config {
     pub combine: Combine,
     /// Energy that links two views: that of the `paper`, or that of the authors' `released` program.
     pub energy: Energy,
-    /// Weight of the geometric term; by default, as learned, or else 0.002 per squared cell (`paper`) or 0.07 (`released`).
+    /// Weight of the geometric term; by default, the learned weight; without one, 0.002 per squared cell (`paper`) or 0.07 (`released`).
     pub alpha: Option<f64>,
-    /// Weight of the part-type term; by default, as learned, or else 0.03.
+    /// Weight of the part-type term; by default, the learned weight; without one, 0.03.
     pub beta: Option<f64>,
     /// Result of `parallax-lab train consistency`: a file, `"shipped"`, or `{ file = FILE, rig = NAME }` to use the tables of a named rig.
     pub consistency: Option<Consistency>,
@@ -207,7 +207,7 @@ pub enum TauName {
     /// No part is ever switched off.
     #[serde(rename = "none")]
     None,
-    /// Thresholds from the file `consistency`, in tenths of the person's size.
+    /// Thresholds from the file that `paper.consistency` names, in tenths of the person's size.
     #[serde(rename = "learned")]
     Learned,
     /// Thresholds of the authors' program for `HumanEva`: median training error plus inaccuracy.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Person")]
 pub struct Config {
-    /// Which of several people comes first: `last`, the one followed in the previous frame; `largest` or `clearest`, chosen anew in every
+    /// Which of several people is followed: `last`, the same person as in the previous frame; `largest` or `clearest`, chosen anew in every
     /// frame.
     pub follow: Follow,
     /// Set of joints: `parse14`, `umpm15` or `humaneva20`.
@@ -33,7 +33,7 @@ pub enum Follow {
     Last,
     /// The person who is largest in the pictures.
     Largest,
-    /// The person whom most views see clearly.
+    /// The person who is seen clearly in the largest number of views.
     Clearest,
 }
 

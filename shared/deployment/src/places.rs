@@ -16,7 +16,7 @@ pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> Stri
     format!("{}:{line}", file.display())
 }
 
-/// Returns the position of a dotted key in `text`; that of its section if the key itself is missing.
+/// Returns the position of a dotted key in `text`; the position of its section if the key itself is missing.
 pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
     let document = DeTable::parse(text).ok()?;
     let mut table = document.into_inner();
@@ -45,7 +45,7 @@ pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> Con
         return ConfigError::Malformed { place, message };
     }
     let key = match &at {
-        // The document cannot be parsed in this case; the slice is the key itself.
+        // In this case the document cannot be parsed, but the text at the span is the key itself.
         Some(span) if error.message().starts_with("duplicate key") => {
             text.get(span.clone()).map(str::to_owned)
         }

@@ -15,10 +15,10 @@ pub struct OwnClock {
     pub drift: f64,
 }
 
-/// Assignment of a camera's frames to common instants: each instant has the nearest frame.
+/// Assignment of a camera's frames to common instants: each instant is assigned the frame nearest in time.
 ///
-/// Instants are counted from 0. Instant 0 is the time of the first frame of the footage that begins last. The interval between instants is
-/// that between the frames of the slowest camera.
+/// Instants are counted from 0. Instant 0 is the time of the first frame of the footage that begins last. The interval between instants
+/// equals the interval between frames of the slowest camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Timeline {

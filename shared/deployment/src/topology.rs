@@ -53,7 +53,7 @@ impl Stage {
         }
     }
 
-    /// Returns the stage of a name.
+    /// Returns the stage with a given name.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
@@ -66,8 +66,8 @@ const RECORD: &str = "record";
 /// Name of the process that carries messages between hosts.
 const BRIDGE: &str = "bridge";
 
-/// Returns the services whose processes a deployment file may assign to cores and give a priority, each with its maximum number
-/// of numbered processes. The recording process is not included, because no file says whether it runs.
+/// Returns the services whose processes a deployment file may assign to cores and give a priority, each with its maximum number of numbered
+/// processes. The recording process is not included, because the deployment file does not say whether it runs.
 pub(crate) fn services(deployment: &Deployment) -> Vec<(&'static str, usize)> {
     let n_views = deployment.cameras.len();
     let of_stage = |stage: Stage| match stage {
@@ -201,7 +201,7 @@ impl Topology {
         &self.processes
     }
 
-    /// Returns the process of a name.
+    /// Returns the process with a given name.
     pub fn process(&self, name: &str) -> Option<&Process> {
         self.processes.iter().find(|process| process.name == name)
     }
@@ -241,8 +241,8 @@ impl Topology {
 
     /// Returns the pairs of views in ascending order.
     ///
-    /// If all views are solved at once, each view but the first is paired with the one before it. There are then as many pairs as messages,
-    /// and together they contain all views.
+    /// If all views are solved at once, each view except the first is paired with the view before it. There are then as many pairs as
+    /// messages, and together the pairs contain all views.
     pub fn pairs(&self) -> &[[usize; 2]] {
         &self.pairs
     }

@@ -1,4 +1,5 @@
-//! Checksums of bytes, and the checked header before the payload of Parallax's own binary files. This module does no input or output.
+//! Checksums of bytes, and the header with a checksum that precedes the payload of Parallax's own binary files. This module does no input
+//! or output.
 
 mod envelope;
 mod fnv;

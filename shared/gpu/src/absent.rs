@@ -1,4 +1,4 @@
-//! Replacement for a build without the feature `gpu`, which has no device.
+//! Replacement for the GPU code in a build without the feature `gpu`. Such a build never has a device.
 
 use std::sync::Arc;
 
@@ -46,7 +46,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// None: there is no device to call this with.
+    /// Never fails, because there is no device to call it with.
     pub fn new(device: &Arc<Device>, _: Arc<Model>, _: Arc<Layout>) -> Result<Self, Unsuitable> {
         match **device {}
     }
@@ -55,7 +55,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// None: there is no device to call this with.
+    /// Never fails, because there is no device to call it with.
     pub fn search(
         &self,
         _image: Rgb8View<'_>,

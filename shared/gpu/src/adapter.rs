@@ -31,9 +31,9 @@ pub enum Kind {
 /// Adapters that may be opened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
-    /// The best one that is not software.
+    /// The best adapter that is not software.
     Hardware,
-    /// The best one, including software: for tests.
+    /// The best adapter, including software; for tests.
     Any,
 }
 

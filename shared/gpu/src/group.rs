@@ -11,14 +11,14 @@ use crate::dispatch::{Dispatch, ROW};
 use crate::programs::{Kernel, Programs};
 use crate::tree::{PANEL, Tree};
 
-/// Cells in a workgroup of `responses`, `combine` and `roots`; side of a tile of `transform`.
+/// Number of cells in a workgroup of `responses`, `combine` and `roots`, and side of a tile of `transform`.
 const RESPONSES: usize = 64;
 const COMBINE: usize = 512;
 const ROOTS: usize = 128;
 const TILE: usize = 32;
 /// Number of roots that are traced at once.
 pub(crate) const BATCH: usize = 64;
-/// Number of values in a range: maximum, inverted minimum, maximum of the own score.
+/// Number of values in a range: the maximum, the inverted minimum, and the maximum of the part's own score.
 const RANGE: usize = 3;
 
 /// A level, in the layout that the kernels expect.
@@ -57,7 +57,7 @@ pub(crate) struct Memory {
     level_of_cell: Buffer,
     /// Responses, `[level][plane][row][col]`.
     pub(crate) maps: Buffer,
-    /// Transforms, and after them scores, in the same order.
+    /// Transforms, followed by scores in the same order.
     moved: Buffer,
     scores: Buffer,
     /// Ranges, `[level][plane][range]`.

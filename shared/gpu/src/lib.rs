@@ -1,8 +1,9 @@
 //! The paper's single-view search on a GPU: from the image to distinct poses, bounds and evidence.
 //!
 //! [`Device::open`] opens a GPU through Vulkan. A [`View`] searches the frames of one view on the GPU. The CPU ([`fmp::Extractor`] and
-//! [`fmp::Solver`]) is the reference. The features are the same bit by bit. For equal responses, so are the poses, scores and bounds.
-//! Responses are plain sums of fused products, as in [`fmp::Extractor::direct`]. Without the feature `gpu` there is never a device.
+//! [`fmp::Solver`]) is the reference. The features are identical bit for bit. If the responses are equal, the poses, scores and bounds are
+//! identical too. Responses are plain sums of fused products, as in [`fmp::Extractor::direct`]. Without the feature `gpu` there is never a
+//! device.
 #![deny(unsafe_code)]
 
 mod adapter;

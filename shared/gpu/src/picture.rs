@@ -47,7 +47,7 @@ struct Tables {
     first: Vec<u32>,
     /// [`TAPS`] weights for every shrunken row or column.
     weights: Vec<f64>,
-    /// Blocks of pixels of the pictures of an octave.
+    /// Blocks of pixels in the pictures of each octave.
     octaves: Vec<Vec<[u32; 2]>>,
     pixels: Vec<[u32; 2]>,
     histograms: Vec<[u32; 2]>,

@@ -17,7 +17,7 @@ const NO_CONTRACTION: [u32; 2] = [0x3_0047, 42];
 ///
 /// # Errors
 ///
-/// The text is not valid WGSL.
+/// Fails if the text is not valid WGSL.
 pub(crate) fn from_wgsl(text: &str) -> Result<Vec<u32>, String> {
     let module = naga::front::wgsl::parse_str(text).map_err(|error| error.emit_to_string(text))?;
     let info = Validator::new(ValidationFlags::all(), Capabilities::FLOAT64)

@@ -1,4 +1,4 @@
-//! Checks whether the kernels support a model and a device. The CPU searches all others.
+//! Checks whether the kernels support a model and a device. If they do not, the CPU does the search.
 
 use fmp::{Edge, Layout, Model, Spring, Springs};
 
@@ -25,7 +25,7 @@ fn without(what: &'static str) -> Unsuitable {
     Unsuitable::Model { what }
 }
 
-/// Returns the shape of a model if all its parts have the same one.
+/// Returns the shape of a model; fails if its parts have different shapes.
 pub(crate) fn shape(model: &Model) -> Result<Shape, Unsuitable> {
     let spec = model.spec();
     let n_types = model.n_types(0);

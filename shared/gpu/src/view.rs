@@ -14,7 +14,7 @@ use crate::programs::{Programs, Sizes};
 use crate::tree::Tree;
 use crate::{DeviceLost, Found, Unsuitable, Wanted, suits};
 
-/// Searches the frames of one view, which have one size, on a GPU.
+/// Searches the frames of one view on a GPU. All frames have the same size.
 ///
 /// One frame is searched at a time; other callers wait.
 #[derive(Debug)]
@@ -132,7 +132,7 @@ impl View {
         Ok(found)
     }
 
-    /// Finds the poses for given responses, for comparisons with the CPU.
+    /// Finds the poses from given responses, for comparisons with the CPU.
     ///
     /// * `responses`: [`Layout::n_responses`] values.
     ///

@@ -157,7 +157,7 @@ fn of_equal_responses_poses_scores_and_bounds_have_the_bits_of_the_cpu() {
         let case = Case::new(&mut rng, shape);
         let view = case.view(&device).unwrap();
         for n_values in [9, 1 << 20] {
-            // Few different values, so that there are ties, or many.
+            // With few different values there are ties; with many there are none.
             let value = |_| rng.u32(0..n_values) as f32 / n_values as f32 * 2.0 - 1.0;
             let responses: Vec<f32> = (0..case.layout.n_responses()).map(value).collect();
             let expected = case.solved(&responses);

@@ -1,4 +1,4 @@
-//! Parallax's own engine: convolutions by `kernels`, the later layers by `rten`.
+//! Parallax's own engine: `kernels` computes the convolutions, and `rten` the later layers.
 
 use kernels::Isa;
 

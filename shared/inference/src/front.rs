@@ -372,9 +372,9 @@ impl<'a> Finding<'a> {
     }
 }
 
-/// Fewest channels, read and written, at which a convolution in tiles is faster than the direct one.
+/// Minimum number of input and output channels at which a convolution in tiles is faster than a direct one.
 const FEWEST_CHANNELS: usize = 32;
-/// Fewest outputs of a channel; below, reading the transformed weights takes longer than the products.
+/// Minimum number of outputs of a channel. With fewer outputs, reading the transformed weights takes longer than the products.
 const FEWEST_OUTPUTS: usize = 64;
 
 /// Returns true if a convolution is large enough to be faster in tiles.

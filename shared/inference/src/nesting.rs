@@ -1,8 +1,8 @@
 //! Checks that the messages in a file are nested as in an ONNX file.
 //!
-//! The library that reads the file trusts its lengths: on a length that points
-//! backwards it loops for ever, and it allocates any size. Lengths are therefore checked first. Field numbers are those of the
-//! published `onnx.proto`.
+//! The library that reads the file trusts the lengths in it. If a length points backwards, the library loops for ever, and it allocates
+//! memory of
+//! any size. Lengths are therefore checked first. Field numbers are those of the published `onnx.proto`.
 
 /// Largest nesting depth.
 const MAX_DEPTH: usize = 32;

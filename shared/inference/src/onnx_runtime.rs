@@ -1,5 +1,4 @@
-//! ONNX Runtime, a library that the user provides: for networks that `rten` cannot run, and for
-//! GPUs.
+//! ONNX Runtime, a library that the user provides. It is used for networks that `rten` cannot run, and for GPUs.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};

@@ -28,7 +28,7 @@ struct Exit {
 #[derive(Debug)]
 struct Step {
     work: Work,
-    /// Blocks for the values without change, and with zeros instead of negative values.
+    /// Blocks that hold the unchanged values, and the values with negative ones replaced by zeros.
     outputs: [Option<usize>; 2],
 }
 
@@ -58,7 +58,7 @@ struct Memory {
 struct Places {
     shapes: Vec<BlockedShape>,
     free: Vec<usize>,
-    /// Blocks of each stack: without change, and with zeros instead of negative values.
+    /// Blocks of each stack: those that hold the unchanged values, and those in which zeros replace negative values.
     of_stacks: Vec<[Option<usize>; 2]>,
     /// Number of steps that have yet to read each of these blocks.
     readers: Vec<[usize; 2]>,

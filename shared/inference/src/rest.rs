@@ -25,7 +25,7 @@ struct Field<'a> {
     content: &'a [u8],
 }
 
-/// Returns the file without the front: the outputs of the front become inputs, beside the network's own inputs. `None` if there is
+/// Returns the file without the front: the outputs of the front become inputs, beside the network's own inputs. Returns `None` if there is
 /// nothing behind the front.
 ///
 /// * `file`: bytes of a file whose nesting has been checked.

@@ -22,9 +22,9 @@ pub struct Session {
 /// A library that runs networks.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RunBy {
-    /// Convolutions by Parallax itself, later layers by `rten`.
+    /// Parallax itself runs the convolutions, and `rten` the later layers.
     Parallax,
-    /// All layers by `rten`, with the reason why Parallax does not run the convolutions.
+    /// All layers are run by `rten`, for this reason why Parallax does not run the convolutions.
     Rten(String),
     /// ONNX Runtime.
     OnnxRuntime(Place),
@@ -66,7 +66,7 @@ impl Session {
         })
     }
 
-    /// Loads a network that is run entirely by `rten`, for comparisons; otherwise as [`Self::parse`].
+    /// Works like [`Self::parse`], but `rten` runs the whole network; for comparisons.
     ///
     /// # Errors
     ///
@@ -82,7 +82,7 @@ impl Session {
         })
     }
 
-    /// As [`Self::parse`], run by ONNX Runtime.
+    /// Works like [`Self::parse`], but ONNX Runtime runs the network.
     ///
     /// # Errors
     ///

@@ -86,7 +86,7 @@ pub fn open(path: &Path, card: Option<&Path>) -> Result<Detector, Failure> {
     open_with(path, card, &Library::BuiltIn)
 }
 
-/// Works like [`open`], with a given library; `shipped` means the detector that ships.
+/// Works like [`open`], with a given library; `shipped` means the shipped detector.
 ///
 /// # Errors
 ///
@@ -100,7 +100,7 @@ pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<
     DetectorFile::of(OnnxFile::open(path, card, library)?)?.fitted()
 }
 
-/// Returns the boxes of people that a detector finds in a picture, in pixels, those with the highest score first.
+/// Returns the boxes of people that a detector finds in a picture, in pixels, in descending order of score.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Positions of joints relative to the parts of a model: from a named file, or from the one that ships with the model.
+//! Positions of joints relative to the parts of a model: from a named file, or from the file that ships with the model.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,8 +21,8 @@ pub struct Joints {
 impl Joints {
     /// Chooses the joints of a model.
     ///
-    /// * `file`: file of joints. `shipped` means the one that ships, for a model that it was trained with. `none` means that a joint is the
-    ///   centre of its part.
+    /// * `file`: file of joints. `shipped` means the shipped file; it must be used with a model that it was trained with. `none` means that
+    ///   a joint is the centre of its part.
     /// * `model`: file of the model; `None` for the model that ships.
     ///
     /// # Errors

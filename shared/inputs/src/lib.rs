@@ -1,5 +1,5 @@
 //! Files that users name, read and checked before any process starts: rigs, models, networks with their cards, tables, and the files that
-//! ship. This crate also reads pictures and videos on which networks are tried. Every error names the file and suggests what to do.
+//! ship. This crate also reads pictures and videos for trying networks. Every error names the file and suggests what to do.
 #![forbid(unsafe_code)]
 
 pub mod advice;
@@ -111,11 +111,7 @@ pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
     rig_with(deployment, ReadOptions::default())
 }
 
-/// Works like [`rig_of`], for uses that need only the lenses: a camera without a pose is at the origin.
-///
-/// # Errors
-///
-/// Fails like [`rig`].
+/// Works like [`rig_of`], for uses that need only the lenses. A camera without a pose is placed at the origin.
 pub fn lenses_of(deployment: &Deployment) -> Result<Rig, Failure> {
     let options = ReadOptions {
         lenses_suffice: true,

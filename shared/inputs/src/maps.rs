@@ -40,7 +40,7 @@ pub fn pose_network(
     Ok(Some(network))
 }
 
-/// Returns the same network with the additional use of mirror images.
+/// Returns the same network, changed to also use mirror images.
 ///
 /// * `asked`: the setting or option that requests mirror images.
 ///
@@ -55,7 +55,7 @@ pub fn mirrored(network: PoseNetwork, asked: &str) -> Result<PoseNetwork, Failur
     })
 }
 
-/// Reads a network that finds keypoints, and its card; `shipped` means the one that ships.
+/// Reads a network that finds keypoints, and its card; `shipped` means the shipped network.
 ///
 /// * `card`: file of the card, if it is not beside the network.
 ///

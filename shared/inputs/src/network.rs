@@ -34,8 +34,8 @@ pub struct NetworkFile {
 impl NetworkFile {
     /// Reads a network, and its card if there is one.
     ///
-    /// * `card`: file of the card. If it is `None`, the card is the first of these that exists: the file beside the network whose ending is
-    ///   `.toml` instead of `.onnx` or after it; the entry [`METADATA_KEY`](crate::cards::METADATA_KEY) of the network.
+    /// * `card`: file of the card. If it is `None`, the card is the first of these that exists: the file beside the network whose ending
+    ///   `.toml` replaces or follows `.onnx`; the entry [`METADATA_KEY`](crate::cards::METADATA_KEY) of the network.
     ///
     /// # Errors
     ///
@@ -124,7 +124,7 @@ impl NetworkFile {
 ///
 /// # Errors
 ///
-/// Fails if the network cannot be run or gives values that are not finite, or if the box has no extent.
+/// Fails if the network cannot be run or gives values that are not finite, or if the box is empty.
 pub fn look<'a>(
     network: &'a PoseNetwork,
     picture: &Picture,

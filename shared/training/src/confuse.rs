@@ -17,7 +17,7 @@ pub(crate) struct Confuser {
 
 /// The loss of a pose: the mean over its parts, each between 0 and the same maximum.
 ///
-/// Together with the solver's terms, it gives loss-augmented inference.
+/// The solver adds this loss to the scores, which gives loss-augmented inference.
 #[derive(Debug)]
 pub(crate) struct Loss<'a> {
     layout: &'a Layout,

@@ -1,8 +1,8 @@
-//! Annotated people: reading, validation, rotation and mirroring, and the parts of a model from their joints.
+//! Annotated people: reading, validation, rotation and mirroring, and the conversion of their joints to the parts of a model.
 //!
-//! [`read`] takes the folder of a data set (PARSE, LSP, LSP-extended) or a file of JSON lines. It returns
-//! [`People`]: the valid people, and a [`Problem`] with file and row for each of the others. A
-//! [`Sample`] is a person with the pixels; a [`SkeletonTable`] converts joints to parts.
+//! [`read`] takes the folder of a data set (PARSE, LSP, LSP-extended) or a file of JSON lines. It returns [`People`]: the valid people, and
+//! a [`Problem`] with file and row for each invalid one. A [`Sample`] is a person with the pixels of the image; a [`SkeletonTable`]
+//! converts joints to parts.
 //!
 //! In pixel coordinates, the centre of the top-left pixel is `(0, 0)`. The MATLAB files count from 1, so their coordinates are
 //! converted when they are read.

@@ -12,7 +12,7 @@ use crate::sparse::Sparse;
 pub(crate) struct FilterSettings {
     /// Cost of a negative window that misses its margin.
     pub cost: f64,
-    /// Cost of a positive window that misses its margin, in costs of a negative window.
+    /// Cost of a positive window that misses its margin, as a multiple of the cost of a negative window.
     pub positive_weight: f64,
     /// Stopping criterion of each machine.
     pub effort: Effort,
@@ -26,7 +26,7 @@ pub(crate) struct FilterSettings {
 /// and biases are divided by the number of parts, so that a person scores about 1.
 ///
 /// * `people`: examples of all people, each part with its type.
-/// * `background`: features of windows without people, each of a filter's size.
+/// * `background`: features of windows without people, each as large as a filter.
 pub(crate) fn first_model(
     shape: &Shape,
     people: &[Example],

@@ -52,8 +52,8 @@ struct Cell {
 
 /// The highest-scoring pose whose parts all overlap the marked boxes.
 ///
-/// The result is exact over all levels: since few cells overlap enough, all pairs of cells are compared. Returns `None` if on no
-/// level all parts can overlap, as for people smaller than the model.
+/// The result is exact over all levels: since few cells overlap enough, all pairs of cells are compared. Returns `None` if there is no
+/// level on which all parts can overlap. This is so for people smaller than the model.
 ///
 /// * `overlap`: least intersection over union of every part's box with the marked box.
 pub(crate) fn best_near(
@@ -85,7 +85,7 @@ pub(crate) fn best_near(
 
 /// The pose whose boxes have the largest overlap with the marked boxes, regardless of its score.
 ///
-/// `None` as in [`best_near`].
+/// Returns `None` in the same cases as [`best_near`].
 pub(crate) fn nearest(
     model: &Model,
     layout: &Layout,

@@ -4,7 +4,7 @@
 //!   an ONNX file.
 //! * [`Task`]: the training data, the cost and the settings of a training run. [`pose`], [`finder`] and [`quality`] are the three tasks.
 //! * [`Trainer`]: runs the steps of a task and keeps the best network. It writes its state as a checkpoint. A training run that is resumed
-//!   from a checkpoint ends with the same bits.
+//!   from a checkpoint gives the same network, bit for bit.
 //! * [`Backend`]: the library that computes. Rust is built in; `LibTorch` comes with the feature `libtorch`, for a processor with fast
 //!   cores.
 //!

@@ -66,7 +66,7 @@ pub(crate) enum Origin {
     },
 }
 
-/// Group of examples in which only the worst counts.
+/// Group of examples in which only the worst example counts.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Group {
     /// The right pose of a person.

@@ -29,10 +29,10 @@ pub struct Settings {
     pub mining_interval: usize,
     /// Cost per unit of a negative that scores above -1 (the `C` of the machine).
     pub cost: f64,
-    /// Cost of a person who scores below 1, in costs of a negative.
+    /// Cost of a person who scores below 1, as a multiple of the cost of a negative.
     pub positive_weight: f64,
-    /// Cost of a wrong pose that scores as well as the right pose of the same person, in costs of a
-    /// negative. 0 turns these examples off, as in Yang & Ramanan 2013.
+    /// Cost of a wrong pose that scores as well as the right pose of the same person, as a multiple of the cost of a negative. The value 0
+    /// turns these examples off, as in Yang & Ramanan 2013.
     pub pose_weight: f64,
     /// Margin between the right pose and a pose with all parts wrong.
     pub pose_margin: f64,
@@ -43,7 +43,7 @@ pub struct Settings {
     /// Memory for the examples and their features, in MiB. Examples that the solution needs are kept even
     /// if they take more.
     pub cache_mib: usize,
-    /// Slack beyond the margin from which a negative is removed from the working set.
+    /// Slack beyond the margin above which a negative is removed from the working set.
     pub room: f64,
     /// Largest number of negatives that are added from one image at a time, best first.
     pub per_image: usize,

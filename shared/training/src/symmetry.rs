@@ -7,8 +7,8 @@ use crate::shape::{Coordinates, Shape};
 
 /// For every parameter, its index in the mirror image and its sign.
 ///
-/// The training set contains the mirror image of each person, so the best model is its own mirror image. An
-/// approximate model is not symmetric. The mean with its mirror image costs no more, since the objective is convex.
+/// The training set contains the mirror image of each person, so the best model is its own mirror image. An approximate model is not
+/// symmetric. The mean of a model and its mirror image has at most the same cost, since the objective is convex.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Symmetry {
     mirrored: Vec<(u32, f64)>,

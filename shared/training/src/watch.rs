@@ -39,7 +39,7 @@ pub enum Event {
     Placed {
         /// Number of people placed.
         n: usize,
-        /// Number of people who fit the model on no level.
+        /// Number of people who do not fit the model on any level.
         n_lost: usize,
         /// Mean score of the people under the current model.
         mean_score: f64,

@@ -1,4 +1,4 @@
-//! Adjustment of everything at once, then again without wrong corners.
+//! Adjustment of all parameters at once, and again without wrong corners.
 
 use geometry::Camera;
 use geometry::bundle::{Cameras, Free, Loss, Settings, solve};
@@ -9,12 +9,12 @@ use super::outcome::{Adjusted, Shown, middle, outcome};
 use super::problem::{BoardProblem, Observation};
 use super::{BoardError, CornerLoss, Outcome, Task};
 
-/// Corners with a residual above this many standard deviations are wrong, unless it is below a limit in pixels.
+/// Corners with a residual above this many standard deviations are wrong, unless the residual is below a limit in pixels.
 const WRONG_SIGMAS: f64 = 5.0;
 const WRONG_PX: f64 = 0.7;
 /// Median length of a residual, in standard deviations along an axis.
 const RAYLEIGH_MEDIAN: f64 = 1.177_410;
-/// Number of times that wrong corners are searched; they stand out more as the rest fits better.
+/// Number of searches for wrong corners. They stand out more clearly when the other corners fit better.
 const ROUNDS: usize = 4;
 
 /// Adjusts cameras and boards.

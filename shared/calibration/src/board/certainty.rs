@@ -8,7 +8,7 @@ use super::Sight;
 const APART: f64 = 0.5;
 /// A board stands still if its corners move less than this between two pictures, in standard deviations of a corner.
 const STILL_SIGMAS: f64 = 2.0;
-/// Assumed speed of a board that no other picture shows, in pixels per frame.
+/// Assumed speed of a board that is seen in one picture only, in pixels per frame.
 const UNKNOWN_PX: f64 = 100.0;
 
 /// Returns the factor by which the standard deviation of a corner is larger than that of a board that stands still.

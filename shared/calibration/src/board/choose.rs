@@ -15,8 +15,8 @@ const SIZES: usize = 8;
 const TILTS: usize = 6;
 /// Returns the frames of `sights` with the best coverage, at most `most`, in their original order.
 ///
-/// Frames are chosen one by one. Each choice adds most to the features that were seen least so far: cells of each camera's picture, sizes
-/// and tilts of the board, and pairs of cameras that see the board together.
+/// Frames are chosen one by one. Each choice is the frame that adds most to the features that were seen least so far: cells of each
+/// camera's picture, sizes and tilts of the board, and pairs of cameras that see the board together.
 pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<usize> {
     let mut all: Vec<usize> = sights.iter().map(|sight| sight.frame).collect();
     all.sort_unstable();

@@ -8,7 +8,8 @@ use super::pose::{Sighted, board_pose, linear};
 use super::problem::{BoardProblem, Observation};
 use super::{CornerLoss, LensKind};
 
-/// Shortest focal length that is tried, as a fraction of the longer side of the picture. Each further one is larger by a constant factor.
+/// Shortest focal length that is tried, as a fraction of the longer side of the picture. Each further focal length is larger by a constant
+/// factor.
 const SHORTEST: f64 = 0.25;
 const FACTOR: f64 = 1.12;
 const TRIED: i32 = 26;

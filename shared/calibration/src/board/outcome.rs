@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point2, Translation3, Vector3};
 use super::problem::{BoardProblem, Observation};
 use super::{CameraOutcome, Known, Outcome, Residual, Sight, Task, choose};
 
-/// Maximum number of parts into which a recording is divided to compare them.
+/// Maximum number of parts into which a recording is divided for comparison.
 const MOST_PARTS: usize = 10;
 
 /// A frame that is used.

@@ -4,9 +4,9 @@ use geometry::bundle::{Cameras, Loss, Problem, Step, Term};
 use geometry::{Camera, LensModel};
 use nalgebra::{Isometry3, Matrix2x3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 
-/// Prior on every camera, as standard deviations. Pixels are square to half a percent, the principal point is within a few percent of
-/// the centre, and lenses are centred. The prior fixes parameters that few pictures leave open. It has no influence if the pictures cover
-/// much, because they then determine each parameter at least ten times better.
+/// Prior on every camera, as standard deviations. Pixels are square to half a percent, the principal point is within a few percent of the
+/// centre, and lenses are centred. The prior fixes parameters that few pictures leave open. It has no influence if the pictures cover much
+/// of the view, because they then determine each parameter at least ten times better.
 const PRINCIPAL_POINT: f64 = 0.04;
 const ASPECT: f64 = 0.005;
 const RADIAL: f64 = 0.5;

@@ -228,7 +228,7 @@ fn first_intrinsics(
     let chosen = own.iter().filter(|sight| frames.contains(&sight.frame));
     let boards: Vec<_> = chosen.map(Sight::sighted).collect();
     let kind = task.lens;
-    // Eight coefficients start from a fit of five, whose minimum is wider.
+    // A fit of eight coefficients starts from a fit of five, which converges from further away.
     let first = if kind == LensKind::Eight {
         LensKind::Five
     } else {

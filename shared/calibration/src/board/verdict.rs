@@ -7,7 +7,7 @@ const FEW_BOARDS: usize = 6;
 const LITTLE_COVERED: f64 = 0.2;
 const LARGE_PX: f64 = 3.0;
 const FOCAL_SHARE: f64 = 0.01;
-/// Largest uncertainty of a focal length, as a fraction, for which its change may show that cameras are out of step.
+/// Largest uncertainty of a focal length (as a fraction) at which a change of it is evidence that cameras are out of step.
 const TOLD_SHARE: f64 = 0.1;
 /// Two lenses are equal if they differ by less than this many standard deviations.
 const SAME_SIGMAS: f64 = 3.0;
@@ -18,7 +18,7 @@ const TURN_DEGREES: f64 = 0.5;
 const WRONG_SHARE: f64 = 0.15;
 const AGREEING_SHARE: f64 = 0.6;
 /// Limits of residuals are for a picture whose longer side has this many pixels; other pictures have limits in proportion, but at least
-/// half.
+/// half of the limit.
 const USUAL_SIDE: f64 = 1280.0;
 
 /// Reason not to trust a calibration.

@@ -28,7 +28,7 @@ struct Grid {
 ///
 /// # Errors
 ///
-/// [`Nothing`] with what was seen instead.
+/// [`Nothing`], which states what was seen instead.
 pub(crate) fn find(
     picture: &Picture,
     board: &Board,

@@ -115,7 +115,7 @@ impl FromStr for Paper {
 }
 
 impl Drawing {
-    /// Returns the name of the page, as [`Paper`] is parsed from, if it has one.
+    /// Returns the name of the page, in the form that [`Paper`] is parsed from, if it has a name.
     pub fn paper(&self) -> Option<&'static str> {
         let [width, height] = self.page;
         let is_page = |size: &[f64; 2]| *size == [width, height] || *size == [height, width];

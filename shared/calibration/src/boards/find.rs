@@ -8,9 +8,9 @@ use crate::boards::marker::{Codes, Sighting};
 use crate::boards::quads::quads;
 use crate::boards::{Board, Corner, Layout, Nothing, Picture};
 
-/// Largest side of a picture that is enlarged to twice its size for another search.
+/// Maximum side of a picture, in pixels, up to which the picture is also searched at twice its size.
 const DOUBLED_UP_TO: usize = 2000;
-/// Side of a picture from which it is also searched at half its size.
+/// Minimum side of a picture, in pixels, from which the picture is also searched at half its size.
 const HALVED_FROM: usize = 900;
 
 /// A board found in a picture.
@@ -88,7 +88,7 @@ impl Finder {
     ///
     /// # Errors
     ///
-    /// [`Nothing`] with what was seen instead.
+    /// [`Nothing`], which states what was seen instead.
     pub fn find(&self, picture: &Picture, hints: Hints) -> Result<Found, Nothing> {
         if let Some(codes) = &self.codes {
             return self.by_markers(codes, picture, hints);

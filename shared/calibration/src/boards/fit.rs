@@ -33,7 +33,7 @@ pub(crate) fn agreeing(layout: &Layout, sightings: &[Sighting]) -> Vec<Sighting>
             best = found;
         }
     }
-    // Repeat with the map that was fitted to all of them.
+    // Repeat with the map that was fitted to all these sightings.
     if let Some(map) = map_of(layout, &best.1) {
         let found = supporters(layout, &map, sightings);
         if found.1.len() >= best.1.len() {

@@ -110,7 +110,7 @@ fn is_crossing(
     apart > LEAST_CONTRAST && apart > 0.25 * mean
 }
 
-/// Returns the shorter of a length's images along both axes of the board, in pixels.
+/// Returns the length in the picture of a length on the board, in pixels: the shorter of those along the two axes of the board.
 fn narrow_px(map: &crate::boards::Homography, point: Point2<f64>, metres: f64) -> Option<f64> {
     let at = map.apply(point)?;
     let mut least = f64::MAX;
@@ -121,7 +121,7 @@ fn narrow_px(map: &crate::boards::Homography, point: Point2<f64>, metres: f64) -
     Some(least)
 }
 
-/// Returns half the side of the window around a corner, which must not contain a marker.
+/// Returns half the side of the window around a corner, chosen so that the window contains no part of a marker.
 fn window_px(map: &crate::boards::Homography, board: &Board, point: Point2<f64>) -> Option<f64> {
     let free = match board.kind {
         Kind::Chessboard => 0.35,
@@ -153,7 +153,7 @@ fn worst_off(layout: &Layout, side: f64, corners: &[Corner]) -> Option<usize> {
         else {
             continue;
         };
-        // At the border of the board, the prediction from the other corners is less exact.
+        // At the border of the board, the prediction from the other corners is less accurate.
         let around = others.iter().filter(|other| (other.0 - point).norm() < 1.6 * side);
         let slack = if around.count() >= 5 { 1.0 } else { 2.0 };
         let off = (expected - corner.at).norm() / (slack * (OFF_SQUARES * square_px).max(OFF_PX));

@@ -12,7 +12,7 @@ const SHORTEST_SIDE: f64 = 6.0;
 /// Largest deviation of an outline from a side, as a fraction of its perimeter.
 const STRAY: f64 = 0.035;
 
-/// Returns the dark quadrilaterals of a picture, with corners clockwise and exact to about half a pixel.
+/// Returns the dark quadrilaterals of a picture, with corners clockwise and accurate to about half a pixel.
 ///
 /// The method is that of `OpenCV` for `ArUco` markers: a threshold relative to the neighbourhood, then outlines, then polygons of four
 /// corners.

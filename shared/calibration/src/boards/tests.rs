@@ -21,7 +21,7 @@ fn grey(drawing: &Drawing, at: [f64; 2]) -> f64 {
     value
 }
 
-/// Returns a picture of a page: `map` takes pixels to millimetres of the page; the surroundings are grey.
+/// Returns a picture of a page: `map` converts pixels to millimetres of the page; the surroundings are grey.
 fn photographed(drawing: &Drawing, map: &Matrix3<f64>, [width, height]: [usize; 2]) -> Picture {
     let mut random = fastrand::Rng::with_seed(5);
     let mut pixels = Vec::new();

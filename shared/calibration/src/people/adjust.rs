@@ -10,7 +10,7 @@ use super::bias::Biases;
 use super::instant::{Instant, Seen, WIDTH, instant};
 use super::sightings::Sightings;
 
-/// Positions of a joint that are closer than this count as one place, as a fraction of the size of the person.
+/// Distance below which two positions of a joint count as one place, as a fraction of the size of the person.
 const PLACE: f64 = 0.04;
 /// Standard deviation of a bone's length over time, as a fraction of its length.
 const BONE_SPREAD: f64 = 0.06;
@@ -173,7 +173,8 @@ impl Adjustment {
         }
     }
 
-    /// Returns the same problem with priors of poses that are stronger by a factor. This has the effect of joints with a lower weight.
+    /// Returns the same problem with priors of poses that are stronger by a factor. This has the same effect as lower weights of the
+    /// joints.
     pub(crate) fn believing(&self, times: f64) -> Self {
         let mut it = self.clone();
         for prior in it.beliefs.poses.iter_mut().flatten() {

@@ -18,9 +18,9 @@ pub(crate) const SHARE: f64 = 0.015;
 const MOST_PAIRS: usize = 10;
 /// Minimum fraction of joints that must agree in the first pair.
 const LEAST_INLIERS: f64 = 0.4;
-/// Angle between rays above which a pair is not preferred further, in radians.
+/// Angle between rays above which a larger angle no longer makes a pair better, in radians.
 const WIDE: f64 = 0.5;
-/// Largest mean cost of a joint, log(1 + (residual / sigma)^2), with which a camera is placed.
+/// Largest mean cost of a joint, log(1 + (residual / sigma)^2), at which a camera can be placed.
 const MOST_COST: f64 = 3.2;
 /// Step between the offsets that are searched, in seconds.
 const STEP_S: f64 = 0.1;

@@ -15,7 +15,8 @@ use crate::align::{Difference, aligned, differences};
 
 /// Largest accepted standard deviation of a camera: degrees, and fraction of its distance to the people.
 const MOST_SD: [f64; 2] = [1.5, 0.04];
-/// Standard deviation below which a camera is known well, in the same units. Calibrations should reach this.
+/// Standard deviation below which a camera is known well: degrees, and fraction of its distance to the people. Calibrations should reach
+/// this.
 const GOOD_SD: [f64; 2] = [0.3, 0.01];
 /// Largest accepted difference between halves. If the error of the whole is `MOST_SD`, the error of each half is √2 times as large, and
 /// the difference between two halves is √2 times that again.

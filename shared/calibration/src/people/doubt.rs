@@ -70,7 +70,7 @@ pub enum Doubt {
     },
     /// One half of the recording gives no rig.
     NoHalf {
-        /// Reason why it gives no rig.
+        /// Reason why this half gives no rig.
         why: Box<Self>,
     },
     /// The lengths of bones change over time.

@@ -5,7 +5,7 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::sightings::Sight;
 
-/// Number of standard deviations beyond which residuals lose their weight.
+/// Number of standard deviations beyond which residuals are down-weighted.
 pub(super) const WIDTH: f64 = 2.0;
 /// Minimum angle between rays, in radians; a smaller angle does not determine the depth.
 const LEAST_ANGLE: f64 = 0.02;

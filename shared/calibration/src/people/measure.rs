@@ -10,7 +10,7 @@ const LEAST: usize = 30;
 const LEAST_PX: f64 = 0.3;
 /// Median length of a residual in the plane, in standard deviations of one axis.
 const MEDIAN: f64 = 1.1774;
-/// Correction for joints that are part of the fit they are compared with: the eight numbers of four views determine three coordinates.
+/// Correction because joints are compared with a fit that includes them: the eight numbers of four views determine three coordinates.
 const FITTED: f64 = 1.25;
 /// Number of cells of a picture along each axis.
 pub(crate) const CELLS: usize = 8;

@@ -37,7 +37,7 @@ pub(crate) fn exchange(
 ) -> usize {
     let mut n = 0;
     for instant in 0..sightings.seen.len() {
-        // The worst view of an instant goes first, because an exchanged view makes the others look wrong.
+        // The worst view of an instant is handled first, because an exchanged view makes the others look wrong.
         for _ in 0..cameras.len() {
             let seen = &sightings.seen[instant];
             let gain = |camera: usize| {

@@ -11,7 +11,7 @@ const SMOOTHING: [f64; 2] = [0.75, 0.015];
 const LONGEST_GAP_S: f64 = 3.0;
 /// Largest overlap of two tracks in one place that can be one person, in seconds. For a moment, one person may be detected in two poses.
 const LONGEST_OVERLAP_S: f64 = 0.25;
-/// Largest distance between the end of one track and the start of another in one place, in sizes of the person.
+/// Largest distance between the end of one track and the start of another at which they count as one place, in sizes of the person.
 const ONE_PLACE: f64 = 0.3;
 /// Maximum number of chains of a camera; those with the best visibility are used.
 const MOST_CHAINS: usize = 3;
@@ -79,8 +79,8 @@ impl Chain {
 
     /// Returns the speed of a joint, from its positions one picture before and one after.
     ///
-    /// The slope of the line that gives the position is not suitable. Between two pictures, its errors are those of the position as well.
-    /// An adjustment would then move clocks until both errors cancel, half a picture away from the truth.
+    /// The slope of the line that gives the position is not suitable. Between two pictures, it has the same errors as the position. An
+    /// adjustment would then move clocks until both errors cancel, half a picture away from the truth.
     fn speed(&self, track: &Track, joint: usize, time_s: f64) -> Vector2<f64> {
         let at = |time_s: f64| Some(Vector2::from(track.place(joint, time_s)?.at));
         let ends = [-1.0, 1.0].map(|sign| at(time_s + sign * self.interval_s));

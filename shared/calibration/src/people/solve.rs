@@ -1,4 +1,4 @@
-//! Solution from an initial rig to the adjustment of everything.
+//! Steps from an initial rig to the adjustment of everything.
 
 use fastrand::Rng;
 use geometry::Camera;
@@ -12,7 +12,7 @@ use super::measure::{Fit, biases, fits, sigmas};
 use super::sides::exchange;
 use super::sightings::Sightings;
 
-/// Number of rounds of clocks, sides, expected errors and adjustment.
+/// Number of rounds. Each round finds clocks, sides and expected errors, then adjusts everything else.
 const ROUNDS: usize = 4;
 /// Standard deviation of an offset about its initial value, in seconds.
 const OFFSET_SD_S: f64 = 0.1;
@@ -42,7 +42,7 @@ impl Solved {
     }
 }
 
-/// Minimum improvement of the fit, as a fraction, for which the joints contradict the given clocks.
+/// Minimum improvement of the fit at which the joints count as contradicting the given clocks, as a fraction.
 const BETTER: f64 = 0.15;
 
 /// Treatment of the clocks.

@@ -68,7 +68,7 @@ pub(crate) struct Costs {
     pub(crate) time_s: f64,
     /// Cost by offset; NaN if the second camera sees nobody.
     each: Vec<f32>,
-    /// Mean cost over the offsets that have one.
+    /// Mean over the offsets that have a cost.
     mean: f64,
 }
 
@@ -181,7 +181,7 @@ impl Curve {
 }
 
 impl Epipolar {
-    /// Returns the mean cost of the joints that two people have in common; `None` if they are too few.
+    /// Returns the mean cost of the joints that two people have in common; `None` if there are too few.
     fn costs(&self, a: &Standing, b: &Standing, mirror: Option<&[usize]>) -> Option<f64> {
         let plain = self.costs_of(a, b, |joint| joint)?;
         let Some(mirror) = mirror else {

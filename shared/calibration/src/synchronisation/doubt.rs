@@ -103,7 +103,7 @@ pub enum Doubt {
         /// Minimum number of sounds.
         least: usize,
     },
-    /// A camera did not record the sounds of the others, or its sounds fit at several offsets. The pair is the one that fits best.
+    /// A camera did not record the sounds of the others, or its sounds fit at several offsets. `cameras` is the pair that fits best.
     Unheard {
         /// Indices of the two cameras.
         cameras: [usize; 2],

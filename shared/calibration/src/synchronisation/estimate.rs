@@ -22,7 +22,7 @@ const LEAST_SEEN_S: f64 = 0.5;
 const LEAST_DRIFT_S: f64 = 10.0;
 /// Largest accepted error of a drift, accumulated over the footage, in seconds.
 const MOST_DRIFT_ERROR_S: f64 = 0.005;
-/// Minimum size of a drift to be used, in standard errors.
+/// Minimum size of a drift for the drift to be used, in standard errors.
 const SURE_DRIFT: f64 = 4.0;
 
 /// Settings of the estimation of clocks.
@@ -84,7 +84,7 @@ pub struct Outcome {
     pub pairs: Vec<PairReport>,
     /// Cost by offset of these pairs.
     pub curves: Vec<Curve>,
-    /// Quality of the most doubtful second-best offset of a group of cameras relative to the others, as a fraction of the best.
+    /// Quality of the second-best offset as a fraction of the best, for the group of cameras whose offset is most doubtful.
     pub second_best: f64,
     /// Every reason not to use the result; if empty, the result can be used.
     pub doubts: Vec<Doubt>,

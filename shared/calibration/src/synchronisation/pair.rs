@@ -1,10 +1,10 @@
-//! Deviation of a joint that two cameras see from their epipolar constraint.
+//! Deviation from the epipolar constraint of a joint that two cameras see.
 
 use geometry::Camera;
 use geometry::epipolar::fundamental;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Expected error of a joint in a picture, in sizes of the person: 4 pixels for a person of 400.
+/// Expected error of a joint in a picture, in sizes of the person: 4 pixels for a person 400 pixels high.
 pub(crate) const NOISE: f64 = 0.01;
 
 /// The epipolar geometry of two cameras.

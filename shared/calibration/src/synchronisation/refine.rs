@@ -88,7 +88,7 @@ struct Row {
     residual: f64,
     px: f64,
     weight: f64,
-    /// Residuals by delay of the second camera.
+    /// Residual for each delay of the second camera.
     over_delay: Vec<f64>,
 }
 
@@ -215,8 +215,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Returns the joints of the person in the second camera with the lowest cost. The cost is over a range of delays, so that no delay is
-    /// preferred.
+    /// Returns the joints of the person in the second camera with the lowest cost. The cost is taken over a range of delays, so that no
+    /// delay is preferred.
     fn nearest(
         &self,
         epipolar: &Epipolar,
@@ -285,7 +285,7 @@ fn alive(tracks: &[Track], time_s: f64) -> impl Iterator<Item = &Track> {
     tracks.iter().filter(is_there)
 }
 
-/// Returns the mean cost of the joints that two people have in common; `None` if they are too few.
+/// Returns the mean cost of the joints that two people have in common; `None` if there are too few.
 fn mean_cost(
     epipolar: &Epipolar,
     [in_a, in_b]: [&[Option<Place>]; 2],
@@ -355,7 +355,7 @@ fn median(mut all: Vec<f64>) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Returns the residuals with missing values interpolated; `None` if more than a third is missing, or if a value at an end is.
+/// Returns the residuals with missing values interpolated; `None` if more than a third is missing, or if a value at an end is missing.
 fn filled(costs: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> =
         costs.iter().enumerate().filter_map(|(nth, it)| Some((nth, (*it)?))).collect();

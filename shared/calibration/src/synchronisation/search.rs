@@ -6,7 +6,7 @@ use crate::synchronisation::curve::{Curve, STEP_S};
 const PRIOR_SAMPLES: f64 = 20.0;
 /// Fraction of the best value at which the basin of the best offset ends.
 const BASIN: f64 = 0.6;
-/// Number of entries to each side; an entry is a peak if none of them is higher.
+/// Number of neighbours on each side that an entry is compared with; the entry is a peak if no neighbour is higher.
 const NEAR: usize = 3;
 /// Length of the blocks of time whose gains are assumed independent, in seconds.
 const BLOCK_S: f64 = 0.5;

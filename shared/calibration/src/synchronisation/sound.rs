@@ -1,7 +1,7 @@
 //! Offsets between clocks from the sounds that all cameras recorded. This is an alternative if people are not seen well.
 //!
-//! Sounds begin suddenly, and all microphones record this. The offset between two clocks is the one at which most beginnings coincide.
-//! Sound takes 2.9 ms per metre, and the positions of its sources are unknown; this limits the accuracy.
+//! Sounds begin suddenly, and all microphones record these beginnings. The offset between two clocks is the one at which most beginnings
+//! coincide. Sound takes 2.9 ms per metre, and the positions of its sources are unknown; this limits the accuracy.
 
 mod beginnings;
 mod parts;
@@ -153,7 +153,7 @@ impl Study<'_> {
         }
     }
 
-    /// Returns the travel time of sound from one camera to another, in seconds. The offset of a pair may be wrong by as much.
+    /// Returns the travel time of sound from one camera to another, in seconds. The offset of a pair may be wrong by this time.
     fn way_s(&self, [a, b]: [usize; 2]) -> f64 {
         let far = self.settings.centres.as_ref().and_then(|all| {
             let metres = (all.get(a)? - all.get(b)?).norm();

@@ -37,7 +37,7 @@ impl Consistency {
         }
     }
 
-    /// Returns the name of the rig that has these cameras, if it is given.
+    /// Returns the name of the rig that has these cameras, if the deployment file gives it.
     pub fn rig(&self) -> Option<&str> {
         match self {
             Self::File(_) => None,

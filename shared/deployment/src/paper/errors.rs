@@ -30,10 +30,10 @@ pub struct ErrorTable {
     pub subject: Option<String>,
     /// Action in the table; not set if the table has none.
     pub action: Option<String>,
-    /// Names of cameras in the table, by their names in the deployment. A camera that is not listed has the same name in both.
+    /// Map from the name of a camera in the deployment to its name in the table. A camera that is not listed has the same name in both.
     #[serde(default)]
     pub views: BTreeMap<String, String>,
-    /// Number of the footage's frame 0 in the table.
+    /// Number that the table gives to the footage's frame 0.
     #[serde(default)]
     pub frame_offset: i64,
     /// Frames of the table per frame of the footage.

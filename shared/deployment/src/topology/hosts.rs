@@ -162,7 +162,7 @@ mod tests {
             let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
             assert_eq!(desk.process(BRIDGE).unwrap().outputs, topics);
             assert_eq!(far.process(BRIDGE).unwrap().inputs, topics);
-            // The fusing host has the same receivers of a topic as before.
+            // On the fusing host, a topic has the same receivers as on a single machine.
             for topic in topics {
                 assert_eq!(desk.receivers_of(topic), whole.receivers_of(topic));
                 assert_eq!(far.receivers_of(topic), 1);

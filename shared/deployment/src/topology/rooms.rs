@@ -13,7 +13,8 @@ const SMALL_QUEUE_LOSSLESS: usize = 16;
 const SKELETONS_QUEUE: usize = 4;
 /// Queue length of images or response maps for one receiver.
 const LARGE_QUEUE: usize = 1;
-/// Queue length of original pictures of live cameras. It holds at most a second, and needs memory only if the recording falls behind.
+/// Queue length of original pictures of live cameras. The queue holds at most one second of pictures, and needs memory only if the
+/// recording falls behind.
 const PICTURE_QUEUE: usize = 16;
 /// Small messages that one receiver may borrow at the same time.
 const SMALL_BORROWED: usize = 2;

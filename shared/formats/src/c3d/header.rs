@@ -1,4 +1,4 @@
-//! The header, and the points whose position it gives.
+//! The header, and the points, whose position in the file it gives.
 
 use crate::c3d::C3dError;
 use crate::c3d::numbers::{BLOCK, Bytes};

@@ -73,8 +73,8 @@ pub struct Marker {
 ///
 /// # Errors
 ///
-/// Fails if writing to `out` fails, if the names do not fit into the format, or if the number of frames or points differs from the
-/// announced one.
+/// Fails if writing to `out` fails, if the names do not fit into the format, or if the number of frames or points differs from the declared
+/// number.
 pub fn write(
     out: &mut impl Write,
     heading: &Heading<'_>,

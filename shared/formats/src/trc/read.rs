@@ -24,14 +24,14 @@ pub enum TrcError {
         /// Expected text.
         expected: &'static str,
     },
-    /// A row has a different number of columns than the header announces.
+    /// A row has a different number of columns than the header declares.
     #[error("line {line}: {got} columns, the header announces {markers} markers")]
     Columns {
         /// Number of the line, from 1.
         line: usize,
         /// Number of columns found.
         got: usize,
-        /// Number of markers announced.
+        /// Number of markers that the header declares.
         markers: usize,
     },
     /// A cell is not a number.

@@ -1,7 +1,7 @@
 //! The part of the wire format of protocol buffers that an ONNX file needs: fields with numbers, texts, bytes and messages.
 
-/// A message being written in the wire format of protocol buffers. It serves for parts of files that [`Network`](crate::onnx::Network) does
-/// not write.
+/// A message being written in the wire format of protocol buffers. It is used for the parts of files that [`Network`](crate::onnx::Network)
+/// does not write.
 #[must_use]
 #[derive(Debug, Default, Clone)]
 pub struct Message(Vec<u8>);

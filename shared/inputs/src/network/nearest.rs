@@ -3,8 +3,8 @@
 use inference::{Description, Port, Side};
 use keypoints::{Boxes, Card, Codec, DetectorCard, Input, Layout, SHIPPED, SHIPPED_DETECTORS};
 
-/// Returns the cards of `configs/networks` that agree best with the inputs and outputs of a network, by sides and names. There are several
-/// if they agree equally well, and none if nothing agrees.
+/// Returns the cards of `configs/networks` that agree best with the inputs and outputs of a network, judged by sizes and names. Returns
+/// several cards if they agree equally well, and no card if none agrees.
 pub fn nearest(description: &Description) -> Vec<&'static str> {
     let rated = SHIPPED.iter().filter_map(|(name, text)| {
         let card = Card::parse(text).ok()?;

@@ -23,7 +23,7 @@ pub struct Person {
 pub struct People {
     /// Valid people, in the order of the data set.
     pub people: Vec<Person>,
-    /// One for each person that was left out because of a fault, in the order of the data set.
+    /// A problem for each person that was left out because of a fault, in the order of the data set.
     pub problems: Vec<Problem>,
 }
 
@@ -121,7 +121,7 @@ pub enum Fault {
         /// Accepted distance, in pixels.
         limit_px: f64,
     },
-    /// A person with the same joints on the same image.
+    /// An earlier person has the same joints on the same image.
     #[error("the same image and joints as {before}")]
     Twice {
         /// Position of the first occurrence in the data set.

@@ -137,7 +137,7 @@ fn is_called(file: &Path, name: &str) -> bool {
     file.file_name().is_some_and(|file_name| file_name == name)
 }
 
-/// Finds the file with the annotations: `path` itself, or in a folder the file with a known name.
+/// Finds the file with the annotations: `path` itself or, if it is a folder, the file in it with a known name.
 fn annotation_file(path: &Path) -> Result<PathBuf, DatasetError> {
     let unrecognised = || DatasetError::Unrecognised {
         path: path.to_owned(),

@@ -1,4 +1,4 @@
-//! One person with the pixels, and augmentation by rotation and mirroring.
+//! One person with the pixels of the image, and augmentation by rotation and mirroring.
 
 use footage::{Affine, Fill, FootageError, Size, Warp, WarpError};
 

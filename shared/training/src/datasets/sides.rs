@@ -107,7 +107,7 @@ mod tests {
         SkeletonTable::published().joint_mirror().to_vec()
     }
 
-    /// The annotation of the same picture, had it shown the person's back.
+    /// The annotation that the picture would have if it showed the person's back.
     fn from_behind(person: &Person) -> Person {
         let mirror = mirror();
         Person {

@@ -40,9 +40,9 @@ pub enum TableError {
     Number {
         /// The counted entries: parts or joints.
         what: &'static str,
-        /// Number found.
+        /// Number of entries found.
         got: usize,
-        /// Largest number accepted.
+        /// Largest accepted number of entries.
         max: usize,
     },
     /// A list does not have one entry per part or joint.
@@ -60,9 +60,9 @@ pub enum TableError {
     SameName {
         /// `parts` or `joints`.
         what: &'static str,
-        /// Number of the first, from 1.
+        /// Number of the first part or joint, from 1.
         first: usize,
-        /// Number of the second, from 1.
+        /// Number of the second part or joint, from 1.
         second: usize,
         /// The duplicate name.
         name: String,

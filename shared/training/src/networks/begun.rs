@@ -46,7 +46,7 @@ pub enum BeginError {
 /// A trained network from which a training run starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Begun {
-    /// Parameters, in the order of the untrained ones.
+    /// Parameters, in the order of the untrained network's parameters.
     pub parameters: Vec<Parameter>,
     /// Values of the constants in the file, by the names of the corresponding parameters.
     pub constants: BTreeMap<String, Vec<f32>>,

@@ -5,8 +5,8 @@
 pub enum Scaling {
     /// No scaling of weights and bias.
     Plain,
-    /// Weights are standardised: every channel has mean 0, the length that keeps the variance of positive parts, and a gain
-    /// (Brock et al. 2021, "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`").
+    /// Weights are standardised: every channel has mean 0, a length that preserves the variance through a `ReLU`, and a gain (Brock et al.
+    /// 2021, "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`").
     Standardised {
         /// Initial gain of every channel.
         gain: f32,
@@ -117,7 +117,7 @@ pub trait Network {
     fn run<O: Ops>(&self, ops: &mut O) -> Vec<O::Value>;
 }
 
-/// Returns x, y and x² + y² of every cell, row by row. x is -1 to 1 from left to right, y from top to bottom.
+/// Returns x, y and x² + y² of every cell, row by row. x increases from -1 to 1 from left to right, and y from top to bottom.
 pub(crate) fn grid(columns: usize, rows: usize) -> Vec<f32> {
     let middle = |at: usize, n: usize| (2 * at + 1) as f32 / n as f32 - 1.0;
     let mut all = Vec::with_capacity(3 * columns * rows);

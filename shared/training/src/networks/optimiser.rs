@@ -51,7 +51,7 @@ pub struct Step {
     pub rule: Rule,
     /// Length of the step.
     pub rate: f32,
-    /// Share of every weight that is subtracted, times the rate.
+    /// Weight decay: the share of every weight that a step subtracts, before multiplication by the rate.
     pub decay: f32,
     /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,

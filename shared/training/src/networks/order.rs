@@ -1,4 +1,4 @@
-//! The order of the samples, which depends only on the number of a sample.
+//! The random order of samples, which is computed from the number of a sample alone.
 
 use fastrand::Rng;
 

@@ -30,7 +30,7 @@ pub struct Parameter {
     pub name: String,
     /// Dimensions, row-major.
     pub dims: Vec<usize>,
-    /// Its role in the network.
+    /// Role of the parameters in the network.
     pub role: Role,
     /// Values of the parameters.
     pub values: Vec<f32>,
@@ -88,8 +88,8 @@ pub(crate) fn normal(rng: &mut Rng) -> f32 {
     (radius * (core::f64::consts::TAU * rng.f64()).cos()) as f32
 }
 
-/// The standardised weights of a convolution. Every channel has mean 0, the length that keeps the variance of positive parts,
-/// and its gain as a factor.
+/// The standardised weights of a convolution. Every channel has mean 0 and a length that preserves the variance through a `ReLU`,
+/// multiplied by its gain.
 ///
 /// * `weights`: `gains.len()` channels, one after the other.
 pub(crate) fn standardised(weights: &[f32], gains: &[f32]) -> Vec<f32> {

@@ -96,7 +96,7 @@ pub trait Task: Sync {
     fn mean(&self, costs: &[(usize, Self::Cost)]) -> Self::Cost;
     /// Evaluates a network on held-out samples.
     fn score(&self, find: &dyn Fn(&Shown) -> Vec<Vec<f32>>) -> Self::Score;
-    /// Returns the value by which the best pass is chosen: lower is better. `None` if the last pass is used.
+    /// Returns the value by which the best pass is chosen: lower is better. Returns `None` if the last pass is used.
     fn rank(&self, _score: &Self::Score) -> Option<f32> {
         None
     }

@@ -15,8 +15,7 @@ pub use bytes::CheckpointBytesError;
 
 /// The state of a training run between two steps.
 ///
-/// Examples are stored by their origin, with a hundred bytes each. Their features are recomputed from the
-/// images.
+/// Examples are stored by their origin, in about a hundred bytes each. Their features are recomputed from the images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
     /// Fingerprint of the plan and the settings.

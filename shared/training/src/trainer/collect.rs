@@ -191,7 +191,8 @@ impl Trainer<'_> {
         }
         let found = self.visit_all(images, |&image| {
             let picture = self.background(image)?;
-            // All poses in the working set may score best, since each may have some slack. The search therefore allows for that many more.
+            // All poses in the working set may score best, since each may have some slack. The search therefore allows for as many
+            // additional poses.
             let n_held = n_held.get(&image).copied().unwrap_or(0);
             let poses = miner.search(&picture, -1.0, self.settings.per_image + n_held);
             let origins = poses.iter().map(|pose| Origin::Background {

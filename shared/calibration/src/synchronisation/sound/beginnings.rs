@@ -6,7 +6,7 @@ use super::Sound;
 pub(super) const HOP_S: f64 = 0.002;
 /// Fraction of the previous sample to subtract from each sample, which removes hum and rumble.
 const EMPHASIS: f64 = 0.95;
-/// Number of hops after a time whose loudness is compared with that of the hops before.
+/// Numbers of hops after and before a time whose mean loudness is compared.
 const AFTER: usize = 4;
 const BEFORE: usize = 12;
 /// Minimum growth of the logarithm of the energy at which a sound begins, and the value at which the growth is capped.

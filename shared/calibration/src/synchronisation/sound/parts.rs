@@ -12,7 +12,7 @@ const LEAST_PARTS: usize = 5;
 const AROUND_S: f64 = 0.5;
 /// Largest accepted error of a drift, accumulated over the recording, in seconds.
 const MOST_ERROR_S: f64 = 0.01;
-/// Minimum size of a drift to be used, in standard errors.
+/// Minimum size of a drift for the drift to be used, in standard errors.
 const SURE: f64 = 4.0;
 /// Largest accepted fraction of parts that contradict the others.
 const MOST_AWAY: f64 = 0.25;
@@ -49,7 +49,8 @@ impl Drift {
         line.filter(|line| line.slope.abs() >= SURE * line.error)
     }
 
-    /// Returns the amount by which a second of the camera is longer than one of the reference; 0 if it cannot be distinguished from 0.
+    /// Returns the amount by which a second of the camera's clock is longer than a second of the reference clock; 0 if it cannot be
+    /// distinguished from 0.
     pub(super) fn sure(&self) -> f64 {
         self.line().map_or(0.0, |line| line.slope)
     }

@@ -10,7 +10,7 @@ struct Room {
     centres: Vec<Point3<f64>>,
     /// Start time of each camera, in seconds.
     begins_s: Vec<f64>,
-    /// Amount by which a second of each camera is longer.
+    /// Amount by which a second of each camera's clock is too long.
     drifts: Vec<f64>,
     length_s: f64,
     /// Times of the sounds.

@@ -40,7 +40,7 @@ fn more_frames_than_16_bits_count_are_read_back() {
     let read = C3d::parse(&file).unwrap();
     assert_eq!(read.n_frames(), 70_000);
     assert_eq!(read.frame(69_999)[0], Some([69_999.0, 0.0, 0.0]));
-    // Files of other programs have only one of the two.
+    // Files from other programs contain only one of these two parameters.
     for name in [&b"LONG_FRAMES"[..], b"ACTUAL_END_FIELD"] {
         let mut one = file.clone();
         let at = one.windows(name.len()).position(|window| window == name);
@@ -49,7 +49,7 @@ fn more_frames_than_16_bits_count_are_read_back() {
     }
 }
 
-/// `ezc3d` refuses a real.
+/// `ezc3d` does not accept a real number here.
 #[test]
 fn the_number_of_frames_is_a_whole_number() {
     for n_frames in [1, 70_000] {

@@ -77,7 +77,7 @@ pub const PAPER_TEST: [PaperTest; 12] = [
     test("S3", "Walking", [6, 448], 412),
 ];
 
-/// Reads those of the paper's test sequences of one subject that exist.
+/// Reads the paper's test sequences of one subject. Sequences that do not exist are left out.
 pub(crate) fn read_subject(
     folder: &Path,
     options: &Options,

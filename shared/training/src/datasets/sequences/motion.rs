@@ -29,7 +29,7 @@ pub struct MotionOptions {
 }
 
 impl Default for MotionOptions {
-    /// All frames; gaps up to a quarter of a second.
+    /// Reads all frames, and interpolates gaps of up to a quarter of a second.
     fn default() -> Self {
         Self {
             frames: None,
@@ -168,7 +168,8 @@ impl<'a> Columns<'a> {
 ///
 /// # Errors
 ///
-/// The first and last frame of the first gap longer than `longest` frames; of all frames if the marker was never visible.
+/// Returns the first and last frame of the first gap longer than `longest` frames, or of the whole recording if the marker was never
+/// visible.
 fn interpolated(seen: &[Option<[f64; 3]>], longest: f64) -> Result<Vec<[f64; 3]>, [usize; 2]> {
     let mut points: Vec<[f64; 3]> = Vec::with_capacity(seen.len());
     while points.len() < seen.len() {

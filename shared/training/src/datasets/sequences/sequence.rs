@@ -13,7 +13,7 @@ pub struct Sequence {
     pub dataset: String,
     /// Name of the subject: `S1`; may be empty.
     pub subject: String,
-    /// Name of the action: `Walking`; the paper's tables have a row for each.
+    /// Name of the action: `Walking`; the paper's tables have a row for each action.
     pub action: String,
     /// The calibrated cameras, in the order of the views.
     pub rig: Rig,

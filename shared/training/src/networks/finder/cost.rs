@@ -12,7 +12,7 @@ const MOST_LOG_ODDS: f32 = 15.0;
 /// The true boxes of a batch, as heat and sides.
 #[derive(Debug, Clone, Default)]
 pub struct Truth {
-    /// Heat of every cell, 0 to 1, exactly 1 at the middle of a box: `[n, rows, columns]`. Cells below 0 do not count.
+    /// Heat of every cell, 0 to 1, exactly 1 at the middle of a box: `[n, rows, columns]`. Cells with a value below 0 do not count.
     pub heat: Vec<f32>,
     /// Distances from the centre of every cell to the sides of its box, in cells; 0 if the cell belongs to no box:
     /// `[n, 4, rows, columns]`.
@@ -139,7 +139,7 @@ mod tests {
         truth.sides[2] = 0.0;
         let mut found: Vec<f32> =
             (0..2 * CHANNELS * cells).map(|_| 3.0 * rng.f32() - 1.5).collect();
-        // The cost has a corner where a side equals the true side.
+        // The cost is not differentiable where a side equals the true side.
         for (nth, side) in truth.sides.iter().enumerate() {
             let [sample, within] = [nth / (4 * cells), nth % (4 * cells)];
             let found = &mut found[sample * CHANNELS * cells + cells + within];

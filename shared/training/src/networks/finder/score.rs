@@ -6,7 +6,7 @@ use super::picture::Around;
 
 /// Least overlap (intersection over union) for a found box to match a true one.
 const SAME: f32 = 0.5;
-/// Overlap with a person that does not count from which a box is not false.
+/// Overlap with an ignored person above which a box does not count as false.
 const UNASKED: f32 = 0.3;
 
 /// Measures of a network's quality.
@@ -16,13 +16,13 @@ pub struct Score {
     pub pictures: usize,
     /// Number of people to be found in the pictures.
     pub people: usize,
-    /// Share of these people who are found.
+    /// Share of the people to be found who are found.
     pub recall: f32,
     /// Number of boxes without a person, per picture.
     pub false_boxes: f32,
     /// Number of pictures without people.
     pub empty: usize,
-    /// Share of these pictures in which no box is found.
+    /// Share of the pictures without people in which no box is found.
     pub quiet: f32,
 }
 

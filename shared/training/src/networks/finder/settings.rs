@@ -23,7 +23,7 @@ pub struct Settings {
     pub small: f32,
     /// Length of the longest step. It is reached after a twentieth of the training, and then decreases as a cosine.
     pub rate: f32,
-    /// Share of every weight that is subtracted, times the rate.
+    /// Weight decay: the share of every weight that a step subtracts, before multiplication by the rate.
     pub decay: f32,
     /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,
@@ -39,7 +39,7 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {
-    /// Share of samples that show one picture. People from other pictures are pasted into the rest.
+    /// Share of samples that show one picture. People from other pictures are pasted into the other samples.
     pub single: f32,
     /// Largest number of pasted pictures.
     pub most_pasted: usize,

@@ -24,7 +24,7 @@ pub struct FinderSample {
     pub sides: Vec<f32>,
 }
 
-/// A picture as in normal use of the network: all of it, placed at the top-left corner.
+/// A sample as the network normally gets it: the whole picture, placed at the top-left corner.
 pub fn plain(picture: &Picture, shape: &Shape) -> FinderSample {
     let [width, height] = picture.size.map(|side| side as f32);
     let step = width.max(height) / shape.side as f32;

@@ -15,7 +15,7 @@ const ALONE: f32 = 0.5;
 const AGREED: f32 = 0.24;
 /// Least distance between left and right joints for a decision about the sides, in lengths of the trunk.
 const APART: f32 = 0.23;
-/// Largest ratio of the limb's distance to the teacher after and before an exchange for which the sides are exchanged.
+/// The sides of a limb are exchanged if this reduces its distance to the teacher to at most this fraction.
 const NEARER: f32 = 0.6;
 
 /// Certainty of the teacher above which its extra keypoints are used.
@@ -88,8 +88,7 @@ impl Marks {
         })
     }
 
-    /// Adds the extra keypoints that the teacher does not have from another teacher, if that teacher finds the joint near them at its
-    /// mark.
+    /// Takes extra keypoints that the teacher does not have from another teacher, if the other teacher finds the nearby joint at its mark.
     ///
     /// * `other`: results of the other teacher, as in [`taught`](Self::taught), with the same sides.
     pub fn add_extras(&mut self, other: &[([f32; 2], f32); N_KEYPOINTS]) {
@@ -100,7 +99,7 @@ impl Marks {
         }
     }
 
-    /// Returns true if a teacher finds the joint near an extra keypoint at its mark.
+    /// Returns true if a teacher finds the joint near an extra keypoint at that joint's mark.
     fn is_beside(&self, keypoint: usize, taught: &[([f32; 2], f32); N_KEYPOINTS]) -> bool {
         let beside = BESIDE[keypoint - N_JOINTS];
         distance(self.marked[beside], taught[beside].0) < AGREED_BESIDE * self.trunk

@@ -100,7 +100,8 @@ pub const MAPS: &str = "maps";
 /// Name of the output with the evidence for the direction of the trunk, `[n, 2]`: components towards the right of the picture and towards
 /// the camera.
 ///
-/// Twice the scalar product of the evidence with a direction is a log-likelihood ratio: facing there versus facing away from there.
+/// Twice the scalar product of the evidence with a direction is the log-likelihood ratio between facing in this direction and facing in the
+/// opposite one.
 pub const FRONT: &str = "front";
 /// Name of the output with the expected errors of the keypoints, in heights of the input, `[n, keypoints]`.
 pub const ERROR: &str = "error";

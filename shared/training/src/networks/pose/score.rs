@@ -45,7 +45,7 @@ pub struct Score {
     pub mean_of_ends: f32,
     /// Share of limbs for which the error of each end is at most half the length of the limb.
     pub both_ends: f32,
-    /// Share of people with certain direction for whom the network distinguishes it from the opposite direction.
+    /// Share of people with a known direction for whom the network prefers that direction to the opposite one.
     pub front: f32,
     /// Area under the ROC curve: the probability that a joint with an error of more than half a head has a larger expected error
     /// than a joint with a smaller error.

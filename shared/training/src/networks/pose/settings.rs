@@ -26,7 +26,7 @@ pub struct Settings {
     pub error_steps: usize,
     /// Length of the longest step. It is reached after a tenth of the training, and then decreases as a cosine.
     pub rate: f32,
-    /// Share of every weight that is subtracted, times the rate.
+    /// Weight decay: the share of every weight that a step subtracts, before multiplication by the rate.
     pub decay: f32,
     /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,

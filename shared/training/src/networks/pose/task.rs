@@ -224,7 +224,7 @@ impl Task for PoseTask<'_> {
         self.settings.steps + self.settings.error_steps
     }
 
-    /// Ends a pass at the start of the training of the expected error alone. That pass and the last one are evaluated.
+    /// Ends a pass at the step from which only the expected error is trained. That pass and the last one are evaluated.
     fn plan(&self, steps: usize, passes: usize) -> Plan {
         let end = if self.is_for_error(steps) {
             self.n_steps()

@@ -8,7 +8,7 @@ use super::settings::Vary;
 use super::{MIRROR, exchange_sides};
 use crate::networks::parameters::normal;
 
-/// Factor by which the box around the joints is enlarged. [`Shape`]'s card tells it to the program that uses the network.
+/// Factor by which the box around the joints is enlarged. The network's card gives this factor to programs that use the network.
 pub const MARGIN: f32 = 1.25;
 /// Margin for hands, feet and hair beyond the joints, on each side, as a share of the longer side.
 const BEYOND: f32 = 0.05;
@@ -95,13 +95,13 @@ fn turned(at: [f32; 2], [cosine, sine]: [f32; 2]) -> [f32; 2] {
     [cosine * x - sine * y, sine * x + cosine * y]
 }
 
-/// A person as in normal use of the network: in the box around the joints, upright or not.
+/// A sample as the network normally gets it: the person, cut out by the box around the joints, rotated upright or not.
 pub fn plain(person: &Person, shape: &Shape) -> Option<NetworkSample> {
     let view = view(person, shape, [1.0, 0.0], (1.0, [0.0; 2], false))?;
     Some(sample(person, shape, &view, &pixels(person, &view)))
 }
 
-/// A randomly varied person.
+/// A randomly varied sample of a person.
 ///
 /// * `other`: another person, who may cover parts of this one.
 pub fn varied(

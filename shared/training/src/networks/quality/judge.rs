@@ -11,7 +11,7 @@ use super::score::{area, rank_correlation};
 pub struct Judgement {
     /// Number of samples.
     pub n: usize,
-    /// Area under the ROC of "the error is larger than tau"; `None` if all samples are in the same class.
+    /// Area under the ROC curve of the classification "the error is larger than tau"; `None` if all samples are in the same class.
     pub area: Vec<Option<f64>>,
     /// Rank correlation of predicted and true error.
     pub rank_correlation: Vec<Option<f64>>,
@@ -37,7 +37,7 @@ impl Judgement {
     ///
     /// * `predicted`: `[sample][part]`, as shares of the height that the tile shows.
     /// * `truth`: the samples.
-    /// * `tau`: the thresholds, as the same shares.
+    /// * `tau`: the thresholds, also as shares of this height.
     ///
     /// # Panics
     ///

@@ -31,8 +31,8 @@ pub fn picture_size(tile: TileShape) -> [usize; 2] {
 
 /// Distance of every part from the truth.
 ///
-/// A single view cannot tell whether it sees the person from behind, and the model names parts by the side of the
-/// picture. Therefore, the assignment of left and right with the smaller errors is used. The pipeline decides over all views.
+/// A single view cannot tell whether it sees the person from behind, and the model names parts by the side of the picture. Therefore, the
+/// assignment of left and right with the smaller errors is used. In the pipeline, all views together decide this.
 pub fn part_errors(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Vec<f64> {
     let errors = |of: &dyn Fn(usize) -> usize| -> Vec<f64> {
         let error = |(part, at): (usize, &[f64; 2])| {

@@ -1,7 +1,6 @@
 //! Measures of predicted errors as classifiers of errors above a threshold.
 
-/// Area under the ROC: the probability that a positive sample scores higher than a negative one; ties
-/// count half.
+/// Area under the ROC curve: the probability that a positive sample scores higher than a negative one; ties count half.
 ///
 /// * Returns `None` if all samples are positive or all are negative.
 pub fn area(scores: &[f32], positive: &[bool]) -> Option<f64> {

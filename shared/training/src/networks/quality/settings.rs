@@ -11,7 +11,7 @@ use crate::networks::settings::{SettingsError, check, count, from_zero};
 pub enum Loss {
     /// Half the squared length of the vector of differences, as in the paper.
     L2,
-    /// The same for small differences, but linear for differences above 1 (Huber).
+    /// The same as `L2` for small differences, but linear for differences above 1 (Huber).
     Robust,
 }
 
@@ -91,7 +91,7 @@ pub struct Settings {
     pub dropout: f32,
     /// For VGG-16, number of passes in which only the top is trained.
     pub frozen_epochs: u32,
-    /// For VGG-16, number of blocks of convolutions that are trained after these passes, counted from the last.
+    /// For VGG-16, number of blocks of convolutions that are trained after the frozen passes, counted from the last block.
     pub unfrozen_blocks: usize,
     /// Augmentation of the samples.
     pub vary: Vary,

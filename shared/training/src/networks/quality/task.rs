@@ -23,7 +23,7 @@ use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 pub struct Validated {
     /// Mean loss.
     pub loss: f32,
-    /// Mean area under the ROC.
+    /// Mean area under the ROC curve.
     pub area: f64,
 }
 
@@ -126,7 +126,7 @@ impl<'a> QualityTask<'a> {
         self.learnt.len().div_ceil(self.settings.batch)
     }
 
-    /// Number of a step's pass, from 0, and the finished share of that pass.
+    /// The pass that a step belongs to (counted from 0), and the fraction of that pass completed at that step.
     fn progress(&self, nth: usize) -> (usize, f32) {
         let steps = self.steps_of_pass();
         (nth / steps, (nth % steps) as f32 / steps as f32)

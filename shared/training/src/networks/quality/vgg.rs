@@ -1,8 +1,8 @@
 //! Reads the weights of torchvision's VGG-16 from a `.safetensors` file.
 //!
 //! The file has eight bytes with the length of a header, the header as JSON (`{"features.0.weight": {"dtype": "F32", "shape": [64, 3, 3,
-//! 3], "data_offsets": [0, 6912]}, ...}`), and the values, little-endian. The top (`classifier`) is not read, because our network has
-//! another.
+//! 3], "data_offsets": [0, 6912]}, ...}`), and the values, little-endian. The top (`classifier`) is not read, because the network here has
+//! a different top.
 
 use std::collections::BTreeMap;
 

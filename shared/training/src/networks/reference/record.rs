@@ -130,7 +130,7 @@ impl<'a> Record<'a> {
         parameters.iter().any(is_learned)
     }
 
-    /// Returns true if a value leads back to a trained parameter.
+    /// Returns true if a value depends on a trained parameter.
     pub(super) fn leads(&self, At(at): At) -> bool {
         self.values[at].back.is_some()
     }

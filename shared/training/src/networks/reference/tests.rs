@@ -1,4 +1,4 @@
-//! Tests every operation: its gradient must match its change, and the written file must give the same values.
+//! Tests every operation: its gradient must match the change of its output, and the written file must give the same values.
 
 use fastrand::Rng;
 
@@ -247,7 +247,7 @@ fn the_gradient_of_every_operation_is_its_change() {
             }
             let share = off.sqrt() / length.sqrt().max(0.1);
             let name = &parameters[at].name;
-            // Some steps cross the bend of an operation.
+            // Some steps cross a point where an operation is not differentiable.
             assert!(share < 0.02, "{network:?}: {name} is {share} off");
         }
     }

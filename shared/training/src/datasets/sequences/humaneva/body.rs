@@ -1,10 +1,10 @@
 //! Converts the segments of a motion capture model to the 20 joint ends of `HumanEva`.
 //!
-//! The files contain four points for each segment of Vicon's Plug-in-Gait model: the origin (`PELO`) and one point on each
-//! axis: anterior (`PELA`, x), lateral (`PELL`, y) and proximal (`PELP`, z). The data set's toolbox
-//! (version 1.1) computes joints from these points, with corrections. The pelvis is moved 50 mm back, and the trunk
-//! leans back by half the width of the shoulders. The upper arms are rotated by half the offset of the shoulder. The head is
-//! 316.103 mm long. This module computes the same, but is not a translation of that code.
+//! The files contain four points for each segment of Vicon's Plug-in-Gait model: the origin (`PELO`) and one point on each axis: anterior
+//! (`PELA`, x), lateral (`PELL`, y) and proximal (`PELP`, z). The data set's toolbox (version 1.1) computes joints from these points, with
+//! corrections. The pelvis is moved 50 mm back, and the trunk leans back by half the width of the shoulders. The upper arms are rotated by
+//! half the offset of the shoulder. The head is 316.103 mm long. This module computes the same joints, but is not a translation of that
+//! code.
 
 use formats::c3d::C3d;
 use geometry::rotation_from_matrix;

@@ -36,11 +36,12 @@ impl Offset {
 /// rates of all cameras are averaged, and frame 1 is the first frame of the earliest camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sync {
-    /// Motion capture frame (from 1, fractional) at frame 1 of the trial.
+    /// Motion capture frame (from 1, fractional) that corresponds to frame 1 of the trial.
     pub motion_first: f64,
     /// Motion capture frames per frame of the trial.
     pub motion_rate: f64,
-    /// For every camera, the frame of its footage (from 1) at frame 1 of the trial; `None` without an offset.
+    /// For each camera, the number (from 1) of the footage frame that corresponds to frame 1 of the trial; `None` for a camera without an
+    /// offset.
     pub image_first: Vec<Option<u64>>,
 }
 
@@ -80,7 +81,7 @@ impl Sync {
         })
     }
 
-    /// Motion capture frame (from 1, fractional) at a frame of the trial (from 1).
+    /// Motion capture frame (from 1, fractional) that corresponds to a frame of the trial (from 1).
     pub fn motion_at(&self, frame: u64) -> f64 {
         self.motion_first + (frame as f64 - 1.0) * self.motion_rate
     }

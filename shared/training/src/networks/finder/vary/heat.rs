@@ -8,7 +8,7 @@ const SPREAD: f32 = 0.08;
 const LEAST_SPREAD: f32 = 0.7;
 /// Least heat of a cell that belongs to a box.
 const BOXED: f32 = 0.4;
-/// Central part of the box of an ignored person in which cells do not count.
+/// Size of the central part of an ignored person's box in which cells do not count, as a share of the box's sides.
 const UNASKED: f32 = 0.7;
 
 /// Heat and sides of every cell; see [`Truth`](crate::networks::finder::Truth).
