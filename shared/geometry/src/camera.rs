@@ -108,14 +108,14 @@ impl Camera {
         self.intrinsics.lens.undistort(&self.intrinsics.normalised(pixel))
     }
 
-    /// Returns the ideal pixel of a pixel: the position at which the same ray is seen without distortion.
+    /// Returns the ideal pixel that corresponds to a pixel: the position at which the same ray is seen without distortion.
     ///
     /// Returns `None` if the lens model cannot be inverted.
     pub fn undistorted_px(&self, pixel: &Point2<f64>) -> Option<Point2<f64>> {
         self.undistort(pixel).map(|normalised| self.intrinsics.pixel(&normalised))
     }
 
-    /// Returns the pixel of an ideal pixel; the inverse of [`undistorted_px`](Self::undistorted_px).
+    /// Returns the recorded pixel that corresponds to an ideal pixel; the inverse of [`undistorted_px`](Self::undistorted_px).
     ///
     /// Returns `None` outside the valid range of the lens.
     pub fn distort_px(&self, ideal: &Point2<f64>) -> Option<Point2<f64>> {

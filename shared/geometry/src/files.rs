@@ -42,7 +42,7 @@ pub enum Format {
     Own,
     /// TOML of Pose2Sim, anipose, Caliscope and `FreeMoCap`: [`pose2sim`].
     Pose2Sim,
-    /// The same in millimetres, as written for anipose and `FreeMoCap`; reading treats it as [`Pose2Sim`](Self::Pose2Sim).
+    /// The same TOML in millimetres, as written for anipose and `FreeMoCap`; reading treats it as [`Pose2Sim`](Self::Pose2Sim).
     Anipose,
     /// XML of Qualisys: [`qualisys`].
     Qualisys,
@@ -145,13 +145,13 @@ impl Unit {
 /// Values that a file may leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadOptions {
-    /// Unit of lengths, if it is not the usual one of the format.
+    /// Unit of lengths, if it differs from the usual unit of the format.
     pub unit: Option<Unit>,
     /// Up direction (opposite to gravity), if the file does not state it.
     pub up: Option<UnitVector3<f64>>,
     /// Image size, if the file does not state it.
     pub size: Option<[u32; 2]>,
-    /// True to include cameras for which the file has a lens but no pose; their pose is that of a camera at the origin.
+    /// True to include cameras for which the file has a lens but no pose; they are placed at the origin.
     pub lenses_suffice: bool,
 }
 

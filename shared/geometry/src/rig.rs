@@ -103,7 +103,7 @@ pub enum RigError {
         /// Maximum coefficient.
         limit: f64,
     },
-    /// A camera is further from the origin than any place on Earth is from its centre.
+    /// A camera is further from the origin than any place on Earth is from the Earth's centre.
     #[error(
         "camera {camera:?}: it is {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
     )]
@@ -265,7 +265,7 @@ impl Rig {
         &self.cameras
     }
 
-    /// Returns the camera of a name.
+    /// Returns the camera with a given name.
     pub fn camera(&self, name: &str) -> Option<&Camera> {
         self.cameras.iter().find(|camera| camera.name == name)
     }

@@ -24,8 +24,8 @@ const PERSISTENT: u32 = 8;
 const MIN_POINTS: usize = 5;
 /// Minimum sine of the angle between two rays; below it, their intersection is too uncertain.
 const MIN_SINE: f64 = 0.2;
-/// A camera is suspected if the residual with it is at least this many times the residual without it. It must also reach limits in degrees
-/// and pixels. Detections are on a grid of cells of four pixels, and may always be off by half a cell in the same direction.
+/// A camera is suspected if the residual with it is at least this many times the residual without it. The residual must also reach limits
+/// in degrees and pixels. Detections are on a grid of cells of four pixels, and may always be off by half a cell in the same direction.
 const FACTOR: f64 = 2.5;
 const MIN_DEGREES: f64 = 0.5;
 const MIN_PX: f64 = 4.0;

@@ -13,7 +13,7 @@ use nalgebra::{Point2, Vector2};
 /// Number of frames to store; enough to check whether two successive velocities agree.
 const N_NOTED: usize = 3;
 /// Maximum speed of a point, in heights of the person per second; a faster point is taken for a different one. The foot of a jogger moves
-/// at 5.
+/// at 5 heights per second.
 const MOST_SPEED: f64 = 9.0;
 /// Maximum change of a velocity between successive intervals, in heights per second. A larger change means that one of the two velocities
 /// belongs to a different point.
@@ -103,8 +103,8 @@ fn between((from_s, from): (f64, Point2<f64>), (to_s, to): (f64, Point2<f64>)) -
 /// A moved point is as accurate as an observed one while the instant is between the two pictures that give its velocity. At a time `s`
 /// after the later picture (negative for before), `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
 ///
-/// * `velocity`: result of [`Tracks::velocity`]. A point without a velocity, or with a skew that is too long for it, keeps its position and
-///   gets a larger standard deviation.
+/// * `velocity`: result of [`Tracks::velocity`]. A point without a velocity, or with a skew that is too long for the velocity, keeps its
+///   position and gets a larger standard deviation.
 /// * `sigma_px`: standard deviation of the point.
 /// * `height_px`: height of the person.
 pub fn moved(
@@ -174,7 +174,7 @@ mod tests {
         tracks.note(0.9, at(98.0));
         tracks.note(1.0, at(100.0));
         assert_eq!(speed(&tracks, 1.1, 102.0).map(f64::round), Some(20.0));
-        // The first point has 1400 pixels per second after 20; the second has 2000, which is always too fast.
+        // The first point moves at 1400 pixels per second after it moved at 20; the second moves at 2000, which is always too fast.
         assert_eq!(speed(&tracks, 1.1, 240.0), None);
         tracks.note(1.1, at(240.0));
         assert_eq!(speed(&tracks, 1.2, 242.0), None, "nor on its way back");

@@ -95,7 +95,7 @@ pub enum TriangulateError {
         /// Index of the observation.
         view: usize,
     },
-    /// No subset of enough views agrees.
+    /// There is no subset of enough views that agree.
     #[error(
         "no {needed} views agree: best reprojection error {residual_px} px exceeds {limit_px} px"
     )]

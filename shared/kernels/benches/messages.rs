@@ -1,6 +1,5 @@
-//! Time of one max-sum message between a part and its parent with six types each, for typical
-//! distances of trained springs. The grids are the largest level of an image of 172 x 224 pixels, one octave
-//! below, and the same for 640 x 480 pixels.
+//! Time of one max-sum message between a part and its parent with six types each, for typical distances of trained springs. The grids are
+//! the largest level of an image of 172 x 224 pixels, the level one octave below it, and the same two levels for 640 x 480 pixels.
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;

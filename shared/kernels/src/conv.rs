@@ -1,7 +1,7 @@
 //! Convolutions and sums of stacks of channels, as used by the networks that find joints.
 //!
-//! Weights are packed once. The sum of an output begins with its bias. Products are added for one block of the
-//! input's channels after the other, tap by tap along rows, channel by channel. Each product is rounded once together with its sum.
+//! Weights are packed once. The sum of an output begins with its bias. Products are added for one block of the input's channels after the
+//! other, tap by tap along rows, channel by channel. A product and the sum to which it is added are rounded together, once.
 
 mod blocked;
 mod fast;
@@ -53,11 +53,11 @@ pub struct Conv {
     size: ConvSize,
     /// Number of channels in a block of the input.
     width: usize,
-    /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs. Empty in tiles.
+    /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs. Empty for a convolution in tiles.
     weights: Vec<Row>,
     /// Biases, padded with zeros to pairs of blocks, as the outputs in the weights are.
     bias: Vec<Row>,
-    /// In tiles: the convolution by 1 x 1 of each position. Otherwise empty.
+    /// For a convolution in tiles: the 1 x 1 convolution of each position. Otherwise empty.
     positions: Vec<Conv>,
 }
 
@@ -101,7 +101,7 @@ impl Conv {
     /// Packs weights.
     ///
     /// * `weights`: `outputs x inputs x kernel rows x kernel columns`.
-    /// * `packed`: true for an input in one block of all channels, as [`BlockedShape::packed`].
+    /// * `packed`: true for an input in one block of all channels, as made by [`BlockedShape::packed`].
     ///
     /// # Errors
     ///
@@ -148,8 +148,8 @@ impl Conv {
         Ok(conv)
     }
 
-    /// Packs weights for a convolution by tiles of 2 x 2 outputs, which takes 16 products in place of 36. `None` unless the kernel is
-    /// 3 x 3 and the stride 1. Outputs are rounded otherwise than those of [`Self::new`]. The input has blocks of 16 channels.
+    /// Packs weights for a convolution by tiles of 2 x 2 outputs, which needs 16 products instead of 36. Returns `None` unless the kernel
+    /// is 3 x 3 and the stride 1. Outputs are rounded differently from those of [`Self::new`]. The input has blocks of 16 channels.
     ///
     /// * `weights`: `outputs x inputs x 3 x 3`.
     ///

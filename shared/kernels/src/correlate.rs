@@ -1,4 +1,4 @@
-//! Responses of many filters on feature maps: most of the arithmetic.
+//! Responses of many filters on feature maps. They are most of the arithmetic of a search.
 
 mod points;
 mod reference;
@@ -84,7 +84,7 @@ pub struct CorrelateWorkspace {
 /// The method by which the responses of a level are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Method {
-    /// The sums of the definition.
+    /// By the sums of the definition.
     Direct,
     /// In tiles, with an index into [`FORMS`].
     Tiles(usize),
@@ -222,11 +222,10 @@ impl FilterBank {
 
     /// Error bound of a response of [`Self::correlate`], as the factor in its formula.
     ///
-    /// Let `u = 2^-24`, and let `N` be the largest number of roundings between an input and a response. Each
-    /// added product is then off by a factor of at most `(1 + u)^N - 1 <= N u / (1 - N u)`
-    /// (Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed., §3.1). The direct sum has
-    /// one rounding per product and one for the weight. In a tile, the sums of absolute products are
-    /// larger by a factor that follows from the matrices, once per axis.
+    /// Let `u = 2^-24`, and let `N` be the largest number of roundings between an input and a response. Each added product then has a
+    /// relative error of at most `(1 + u)^N - 1 <= N u / (1 - N u)` (Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed.,
+    /// §3.1). The direct sum has one rounding per product and one for the weight. In a tile, the sums of absolute products are larger by a
+    /// factor that follows from the matrices, once per axis.
     pub fn error_factor(&self, panel: usize, size: [usize; 2]) -> f64 {
         let filter = self.panels[panel].filter;
         let (roundings, growth) = match self.panels[panel].method(size) {

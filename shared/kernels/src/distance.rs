@@ -136,7 +136,7 @@ impl Body for Best<'_> {
         let mut most = [f64::NEG_INFINITY; LANES];
         let points = x.iter().zip(y).zip(z).zip(scores);
         for (totals, (((x, y), z), scores)) in all.iter_mut().zip(points) {
-            // Copies the slices. Behind references, the compiler handles one position after the other, a tenth as fast.
+            // Copies the slices. With references, the compiler handles one position after the other, which is ten times slower.
             let (x, y, z, scores) = (*x, *y, *z, *scores);
             let here: [f64; LANES] = core::array::from_fn(|lane| {
                 total(from, [x[lane], y[lane], z[lane]], scores[lane], &spring)
@@ -149,7 +149,7 @@ impl Body for Best<'_> {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let most = most.into_iter().fold(f64::NEG_INFINITY, larger);
         let mut of_best = all.iter().enumerate().filter_map(|(chunk, totals)| {
-            // Counts instead of searching, so that all totals are handled at a time.
+            // Counts instead of searching, so that all totals are handled at once.
             let n_best = totals.iter().filter(|total| **total == most).count();
             let lane = (n_best > 0).then(|| totals.iter().position(|total| *total == most))??;
             Some((chunk * LANES + lane, totals[lane]))

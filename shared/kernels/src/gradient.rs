@@ -24,9 +24,9 @@ const DIRECTIONS: [[f64; 2]; 9] = [
 
 /// Squared length, `(levels of grey)^2`, and orientation of the gradient at an inner pixel.
 ///
-/// The gradient is the central difference without the factor of one half, taken in the colour plane
-/// where it is longest (the first of equal ones). Its orientation is that of the unit vector with the largest
-/// absolute scalar product (the first of equal ones), plus 9 if the product is negative.
+/// The gradient is the central difference without the factor of one half, taken in the colour plane where it is longest (the first plane,
+/// if several are equal). Its orientation is that of the unit vector with the largest absolute scalar product (the first, if several are
+/// equal), plus 9 if the product is negative.
 pub(crate) fn gradient(image: &Planes, y: usize, x: usize) -> (f64, usize) {
     let mut longest = (-1.0, [0.0; 2]);
     for plane in 0..3 {

@@ -1,7 +1,5 @@
-//! Grids, images and the hot loops. Each loop has two implementations: a readable reference and a
-//! fast one.
-//!
-//! Both give the same bits on every instruction set.
+//! Grids, images and the hot loops. Each loop has two implementations, a readable reference and a fast one. Both give the same bits on
+//! every instruction set.
 #![expect(
     unsafe_code,
     reason = "SIMD dispatch, loads and stores; every block states why it is sound"

@@ -207,7 +207,7 @@ fn check_reduce(image: &Planes) {
 enum Border {
     First,
     Inside,
-    /// The last sample but one, if the input ends one sample after it.
+    /// The second-to-last sample, if the input ends one sample after it.
     Folded,
     Last,
 }

@@ -87,7 +87,7 @@ pub(crate) trait Simd: Copy {
     fn first(self, n: usize, a: Self::V, b: Self::V) -> Self::V;
     /// Transposes: register `i` contains value `lane + i` of each of the first `LANES` rows.
     fn transposed(self, rows: &[Row], lane: usize) -> Self::Square;
-    /// Runs a kernel in a separate function, where no other values use registers of its loop.
+    /// Runs a kernel in a separate function, so that no other values occupy registers in its loop.
     fn apart(self, kernel: impl Kernel);
 }
 

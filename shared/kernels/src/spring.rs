@@ -23,7 +23,8 @@ pub(crate) struct Axis {
 }
 
 /// Number of cells by which a window is wider than in exact arithmetic. Together with the excess in
-/// [`ScoreRange::spread`](crate::ScoreRange), it keeps a candidate outside from tying with the best inside because of rounding.
+/// [`ScoreRange::spread`](crate::ScoreRange), it ensures that rounding never makes a candidate outside the window tie with the best one
+/// inside.
 const SLACK: f64 = 1e-3;
 
 /// The window of children that can be best for a parent, on one axis.
@@ -111,8 +112,8 @@ impl Reach {
     /// by more than the length of the block.
     pub(crate) fn offsets(&self, block: Range<usize>) -> Range<isize> {
         let (p, last) = (block.start, block.end - 1);
-        // From one parent to the next, neither end of the window moves back, nor by more than one
-        // cell. The offsets of the ends from the parent therefore never increase.
+        // From one parent to the next, each end of the window moves forward by at most one cell, and never back. The offsets of the ends
+        // from the parent therefore never increase.
         let first = self.window(last).start as isize - last as isize;
         let end = self.window(p).end as isize - p as isize;
         first..end.max(first)

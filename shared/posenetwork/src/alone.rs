@@ -12,8 +12,8 @@ const SURE: f64 = 0.2;
 /// Least number of leg joints needed, and least distance from them to the head, as a share of the longer side of the window.
 const LEGS: usize = 3;
 const LONG: f64 = 0.12;
-/// Largest angle, in radians, between the head's direction and upright before the picture is rotated: 70 degrees. For a person who bends
-/// the trunk level over upright legs, this angle is 63 degrees.
+/// Largest angle, in radians, between the head's direction and upright before the picture is rotated: 70 degrees. For a person whose trunk
+/// is bent to the horizontal over upright legs, this angle is 63 degrees.
 const MOST_LEAN: f64 = 7.0 / 18.0 * core::f64::consts::PI;
 
 impl JointMaps {
@@ -49,7 +49,7 @@ impl JointMaps {
         now.towards(towards, MOST_LEAN)
     }
 
-    /// Sum of the evidence of all joints at their peaks. A joint without a peak counts with the floor.
+    /// Sum of the evidence of all joints at their peaks. A joint without a peak counts as the floor value.
     pub fn score(&self, settings: &MapSettings) -> f32 {
         let floor = self.floor();
         let peaks = self.peaks().iter();

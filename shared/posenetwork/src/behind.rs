@@ -9,7 +9,8 @@ use crate::maps::JointMaps;
 const SURE: f64 = 0.2;
 /// Half the width of a limb, as a share of the longer side of the box around the person.
 const HALF_WIDTH: f64 = 0.0375;
-/// Half the width of the head, as a share of the same side. The head reaches from the neck to the top of the head.
+/// Half the width of the head, as a share of the longer side of the box around the person. The head reaches from the neck to the top of the
+/// head.
 const HALF_HEAD: f64 = 0.06;
 /// The edges and diagonals of the trunk. Hips and shoulders are given by their indices in [`PARSE14`].
 const TRUNK: [(usize, usize); 6] = [(2, 8), (3, 9), (8, 9), (2, 3), (2, 9), (3, 8)];

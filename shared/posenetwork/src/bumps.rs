@@ -8,7 +8,7 @@ use crate::person_maps::PersonMaps;
 
 /// Least heat for which another Gaussian is fitted; lower residuals are ignored.
 const LEAST_HEAT: f64 = 0.03;
-/// Least height of a Gaussian whose heat is taken over by its neighbours.
+/// Height to which a Gaussian is reduced at most when its neighbours take over its heat.
 const LEAST_HEIGHT: f64 = 0.002;
 /// Number of times that all heights are fitted again after a Gaussian is added.
 const SWEEPS: usize = 6;
@@ -87,7 +87,8 @@ fn precisions() -> [f64; 2] {
     [1.0 / (wide * wide), 1.0 / (narrow * narrow)]
 }
 
-/// Describes the maps of all joints as sums of Gaussians. The highest is fitted first, each later one to the residual of those before it.
+/// Describes the maps of all joints as sums of Gaussians. The highest Gaussian is fitted first, and each later one is fitted to the
+/// residual of the earlier ones.
 pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
     let size = maps.grid().size;
     let floor = settings.floor();
@@ -149,7 +150,8 @@ fn for_each_cell(bump: &Bump, size: [usize; 2], mut cell: impl FnMut(usize, f64)
     }
 }
 
-/// Fits the heights of all Gaussians of a map by least squares, one Gaussian after the other. Neighbours so share the heat between them.
+/// Fits the heights of all Gaussians of a map by least squares, one Gaussian after the other. In this way, neighbours share the heat
+/// between them.
 ///
 /// * `left`: residual of the map.
 fn fit_heights(bumps: &mut [Bump], left: &mut [f64], size: [usize; 2]) {

@@ -166,7 +166,7 @@ impl Looker<'_> {
         Ok(turned)
     }
 
-    /// Runs the network on several boxes, then closer on the person in the box with the best result.
+    /// Runs the network on several boxes, then on a closer box around the person in the box with the best result.
     ///
     /// * `outlines`: the boxes.
     /// * `turn`: rotation of the picture at first.

@@ -89,7 +89,7 @@ pub struct JointMaps {
 /// Largest number of cells of a map. Larger maps are kept at lower resolution.
 pub const MOST_CELLS: usize = 1 << 15;
 
-/// Distance between two kept cells, such that at most [`MOST_CELLS`] are kept.
+/// Spacing of the cells to keep, chosen so that at most [`MOST_CELLS`] are kept.
 fn coarseness([rows, columns]: [usize; 2]) -> usize {
     let area = |every: &usize| rows.div_ceil(*every) * columns.div_ceil(*every);
     let most = rows.max(columns).max(1);
@@ -305,7 +305,7 @@ impl JointMaps {
     /// in pixels of the picture. The standard deviation comes from the `sigma` of [`Self::of_keypoints`], from the network, or from the
     /// score ([`expected_error`]). Returns `None` if the keypoint was not found or no picture has been read.
     ///
-    /// * `keypoint`: its index in the order of the card or of the file.
+    /// * `keypoint`: index of the keypoint, in the order of the card or of the file.
     pub fn keypoint(&self, keypoint: usize) -> Option<(Keypoint, f64)> {
         let found = self.keypoints.get(keypoint).copied().flatten()?;
         self.window?;
@@ -316,7 +316,7 @@ impl JointMaps {
     }
 
     /// Expected error of a joint's peak: the standard deviation along one axis, in pixels of the picture. It comes from the network if the
-    /// network gives it, otherwise from the heat at the peak ([`expected_error`]). `None` for a joint without a peak.
+    /// network gives it, otherwise from the heat at the peak ([`expected_error`]). Returns `None` for a joint without a peak.
     pub fn expected_px(&self, joint: usize) -> Option<f64> {
         let peak = self.peaks.get(joint).copied().flatten()?;
         let told = self.told.get(joint).copied().flatten();

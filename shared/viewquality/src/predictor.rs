@@ -57,7 +57,7 @@ pub struct NoPredictions {
 /// Returns the expected errors of one view.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Predictor {
-    /// By lookup in a table.
+    /// The errors are looked up in a table.
     Table {
         /// The numbering of frames in the table.
         selection: Selection,
@@ -91,8 +91,8 @@ impl Predictor {
         }
     }
 
-    /// Expected error of every part in a frame of the deployment, in pixels. `None` if there is no
-    /// prediction; every part then counts as usable.
+    /// Expected error of every part in a frame of the deployment, in pixels. Returns `None` if there is no prediction; every part then
+    /// counts as usable.
     pub fn sigma_px(&self, frame: u64) -> Option<&[f32]> {
         match self {
             Self::Table { selection, rows } => {

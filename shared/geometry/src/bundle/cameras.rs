@@ -7,7 +7,7 @@ use nalgebra::{
 use super::{Loss, Term};
 use crate::{Camera, Lens, LensModel};
 
-/// Residual in standard deviations of a point without an image, which is behind the camera or beyond its lens.
+/// Residual of a point without an image (behind the camera or beyond its lens), in standard deviations.
 const NO_IMAGE: f64 = 1e3;
 
 /// The parameters of a camera that are free; the others are held.

@@ -152,7 +152,7 @@ fn one_place(cameras: &[Camera]) -> Option<Finding> {
     })
 }
 
-/// Finds a rig in which no two cameras see a common place within twenty times its size.
+/// Finds a rig in which no two cameras see a common place within twenty times the size of the rig.
 fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
     const STEPS: usize = 8;
     const DEPTHS: usize = 40;

@@ -15,7 +15,7 @@ pub(super) enum Entry {
     Placed(Camera),
     /// A camera with its lens alone, at the origin.
     Lens(Camera),
-    /// The name of a camera alone, and the reason.
+    /// Only the name of a camera, and the reason why its pose is not known.
     Name(LeftOut),
 }
 
@@ -38,7 +38,7 @@ impl Entry {
     }
 }
 
-/// Returns the rig of the cameras that have a pose, and if lenses suffice, also of those that have none.
+/// Returns the rig of the cameras that have a pose and, if lenses suffice, of those without a pose too.
 pub(super) fn rig(
     entries: Vec<Entry>,
     up: Option<UnitVector3<f64>>,

@@ -20,7 +20,7 @@ pub(super) fn finite(field: &str, value: f64) -> Result<f64, ParseError> {
     })
 }
 
-/// Returns a whole number of pixels, also if it is written as a float.
+/// Returns a whole number of pixels, even if it is written as a float.
 pub(super) fn pixels(field: &str, value: f64) -> Result<u32, ParseError> {
     if value.fract() == 0.0 && (1.0..=1e6).contains(&value) {
         return Ok(value as u32);

@@ -19,8 +19,8 @@ pub(super) fn is_pose2sim(text: &str) -> bool {
 
 /// Reads a camera file.
 ///
-/// Tables with `ignore = true` are not cameras. Cameras without rotation and translation, as Caliscope writes those that it could not
-/// place, are left out.
+/// Tables with `ignore = true` are not cameras. Cameras without rotation and translation, which is how Caliscope writes cameras that it
+/// could not place, are left out.
 ///
 /// # Errors
 ///

@@ -188,8 +188,8 @@ impl SwapWatch {
         at.iter().all(|value| value.is_finite()).then_some(at)
     }
 
-    /// Returns the angular residual in degrees if the footage of view `i` is that of camera `camera_of[i]`, with left and right as they fit
-    /// best.
+    /// Returns the angular residual in degrees if the footage of view `i` is that of camera `camera_of[i]`, with left and right exchanged
+    /// where that fits better.
     fn residual_degrees(&self, rays: &[Vec<Vec<Option<Ray>>>], camera_of: &[usize]) -> Option<f64> {
         let mut is_mirrored = vec![false; rays.len()];
         let mut best = self.residual_mirrored(rays, camera_of, &is_mirrored)?;

@@ -24,7 +24,7 @@ const BOUNDS: [Bound; 4] = [
     Bound::MinShare(0.125),
     Bound::MinShare(MIN_SHARE),
 ];
-/// Largest ratio between a depth and that of the focus for the depth to be near it.
+/// Largest ratio between a depth and the depth of the focus for them to count as near each other.
 const NEAR_FACTOR: f64 = 1.6;
 /// Minimum angle between optical axes that have a common focus, in radians (4 degrees).
 const MIN_AXIS_ANGLE: f64 = 0.07;
@@ -58,7 +58,7 @@ struct Projection {
     px: f64,
     /// Height relative to the image's side along the person.
     share: f64,
-    /// Ratio between the depth and that of the focus, or its inverse, whichever is larger; infinite without a focus.
+    /// Ratio between the depth and the depth of the focus, or its inverse, whichever is larger; infinite without a focus.
     from_focus: f64,
 }
 
@@ -132,7 +132,7 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
     };
     let fewer = (2..=n_sharing).rev();
     let found = fewer.clone().find_map(|n| of(n, bound));
-    // This is for a camera that is aimed elsewhere than the others.
+    // This is for a camera that is aimed in a different direction from the others.
     found.or_else(|| BOUNDS.iter().find_map(|bound| fewer.clone().find_map(|n| of(n, *bound))))
 }
 
@@ -249,7 +249,7 @@ impl<'a> Viewpoint<'a> {
         })
     }
 
-    /// Returns the distance from head to feet in pixels; `None` if they must be in the image and are not.
+    /// Returns the distance from head to feet in pixels; `None` if they must be in the image but are not.
     ///
     /// * `half`: vector from the middle to the head.
     /// * `otherwise`: result if the lens model has no image of the head or the feet.

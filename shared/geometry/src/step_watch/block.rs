@@ -40,7 +40,7 @@ struct Sums {
     n: f64,
     miss: f64,
     along: [f64; 2],
-    /// Sum of `e^2`, and below those of `e (g_a + g_b) / 2` and `g_a g_b`.
+    /// Sum of `e^2`; the next fields are the sums of `e (g_a + g_b) / 2` and of `g_a g_b`.
     squares: f64,
     both: f64,
     movement: f64,
@@ -220,7 +220,7 @@ impl Pair {
         true
     }
 
-    /// Returns the slope of the residuals over the velocities, without the part that is constant for a point over all frames. Returns
+    /// Returns the slope of the residuals against the velocities, without the part that is constant for a point over all frames. Returns
     /// `None` without enough movement.
     fn slope(&self) -> Option<Slope> {
         let mut rest = self.all;

@@ -166,7 +166,7 @@ fn a_narrow_loss_finds_the_right_minimum_with_two_outliers_of_six() {
         let scale = [100.0, 100.0, 2.0, 2.0, 2.0, 2.0];
         let offsets = scale.map(|scale| Vector2::new(noise(), noise()) * scale);
         let got = triangulate(&observe(&cameras, &point, &offsets), &settings).expect("a point");
-        // If it starts at its final width, the loss finds another minimum in 7 of these 500 cases.
+        // If the loss starts at its final width, the refinement finds another minimum in 7 of these 500 cases.
         assert!(
             (got.in_world - point).norm() < 0.03,
             "{} is not {point}",

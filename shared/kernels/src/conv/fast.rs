@@ -180,7 +180,7 @@ impl<'a> Layer<'a> {
     }
 }
 
-/// Where sums begin and where they go.
+/// Initial values and destinations of sums.
 struct Ends<'a> {
     bias: &'a [f32],
     residual: Option<&'a [f32]>,

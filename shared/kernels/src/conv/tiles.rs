@@ -1,4 +1,4 @@
-//! Convolutions by kernels of 3 x 3 in tiles of 2 x 2 outputs, with 16 products in place of 36.
+//! Convolutions by kernels of 3 x 3 in tiles of 2 x 2 outputs, with 16 products instead of 36.
 //!
 //! Winograd's minimal filtering F(2x2, 3x3) (Lavin & Gray 2016, section 4.1). A tile of 4 x 4 inputs is transformed, then multiplied
 //! position by position with the transformed kernel. The sums over the channels at one position are a convolution by a kernel of
@@ -49,7 +49,7 @@ fn kernel_to_positions([a, b, c]: [f64; 3]) -> [f64; SIDE] {
     [a, (a + b + c) / 2.0, (a - b + c) / 2.0, c]
 }
 
-/// Where tiles are in a stack.
+/// Positions of tiles in a stack.
 #[derive(Clone, Copy)]
 struct Grid {
     from: BlockedShape,
@@ -71,8 +71,8 @@ impl Grid {
         [tile / self.cols() * STEP, tile % self.cols() * STEP]
     }
 
-    /// Offsets of the rows and of the columns of the inputs of a tile in a block. Those behind the border are replaced by its end;
-    /// only outputs outside of the stack depend on them.
+    /// Offsets of the rows and of the columns of the inputs of a tile in a block. Offsets beyond the border are replaced by the end of the
+    /// border; only outputs outside of the stack depend on them.
     fn inputs(&self, tile: usize) -> [[usize; SIDE]; 2] {
         let from = self.from;
         let corner = self.corner(tile);
@@ -132,7 +132,7 @@ struct Tiles<'a> {
     relu: Option<&'a mut [f32]>,
     /// Position, block of channels, tile, channel of the block.
     inputs: &'a mut [f32],
-    /// As `inputs`.
+    /// Sums, in the order of `inputs`.
     sums: &'a mut [f32],
 }
 
@@ -148,8 +148,8 @@ impl Strip {
         BlockedShape::new([channels, 1, self.n], 0)
     }
 
-    /// Floats from one position to the next. A block is left free, so that the same tile of all positions is not in one set of the
-    /// first-level cache.
+    /// Floats from one position to the next. A block is left free, so that the values of one tile at all positions are not in the same set
+    /// of the first-level cache.
     fn stride(self, shape: BlockedShape) -> usize {
         (shape.n_blocks() * self.n + 1) * BLOCK
     }
@@ -286,7 +286,7 @@ fn sums_to_outputs<S: Simd>(simd: S, [a, b, c, d]: [S::V; SIDE]) -> [S::V; STEP]
     [simd.add(first, c), simd.sub(second, d)]
 }
 
-/// As [`run`], in plain loops.
+/// Works like [`run`], but in plain loops.
 pub(super) fn run_plain(
     conv: &Conv,
     (input, residual): (&Blocked, Option<&Blocked>),

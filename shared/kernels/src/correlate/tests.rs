@@ -221,7 +221,7 @@ fn responses_do_not_depend_on_what_is_computed_together() {
     }
 }
 
-/// The worst-case bound is far above the errors for noise, but not by more than this factor.
+/// The worst-case bound is far above the errors for noise. This is the largest accepted factor between them.
 #[test]
 fn the_error_bound_is_not_far_too_large() {
     for side in [1, 4, 5, 6].into_iter().take(sized(4, 2)) {

@@ -181,7 +181,7 @@ fn normalise(
     }
 }
 
-/// Half the sum of `value` under all norms, clipped. Every term is also added to `sums`.
+/// Half the sum of the products of `value` with each norm, each clipped. Every product is also added to `sums`.
 #[inline(always)]
 fn clipped_sum(value: &Lanes, norms: &[Lanes; 4], sums: &mut [Lanes; 4]) -> Lanes {
     let mut channel = [0.0; LANES];

@@ -3,7 +3,7 @@
 use super::{Grid, MessageRule};
 use crate::spring::Spring;
 
-/// As [`MessageRule::add_message`].
+/// Works like [`MessageRule::add_message`].
 pub(super) fn add_message(rule: &MessageRule, grid: Grid, child: &[f32], parent: &mut [f32]) {
     let transformed: Vec<_> = rule
         .springs

@@ -126,7 +126,7 @@ impl Mirror {
         for (at, &partner) in self.partner.iter().enumerate() {
             for bin in 0..n {
                 let other = match bins {
-                    // Pixel x is pixel width - 1 - x.
+                    // Pixel x becomes pixel width - 1 - x.
                     Some(bins) => (n - bin).checked_sub(bins),
                     None => Some(bin),
                 };

@@ -109,7 +109,7 @@ fn gradients(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     }
 }
 
-/// Brightness of every cell relative to the patch's, and the red and blue components of its colour.
+/// Brightness of every cell relative to that of the patch, and the red and blue components of its colour.
 fn colours(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     let (side, cell, n) = (patch.side, patch.cell, patch.n_cells());
     buffers.means.clear();

@@ -60,7 +60,7 @@ pub enum Finding {
     FieldOfView {
         /// Name of the camera.
         camera: String,
-        /// The wider of both angles, in degrees.
+        /// The larger of the horizontal and vertical angles, in degrees.
         degrees: f64,
     },
     /// The lens model cannot be inverted in part of the image.
@@ -95,7 +95,7 @@ pub enum Finding {
         /// Rotation that would make the camera upright, in degrees.
         degrees: f64,
     },
-    /// A camera does not see the place at which the others look.
+    /// A camera does not see the place at which the others are aimed.
     LooksElsewhere {
         /// Name of the camera.
         camera: String,
@@ -251,7 +251,7 @@ impl Finding {
     }
 }
 
-/// A length in metres with three digits, or from a million on, with a power of ten.
+/// A length in metres, written with three digits; from a million on, with a power of ten.
 struct Metres(f64);
 
 impl fmt::Display for Metres {
