@@ -76,7 +76,7 @@ const BOARD_PX: f64 = 5.0;
 ///
 /// # Errors
 ///
-/// [`OriginError`].
+/// Fails with [`OriginError`].
 pub fn from_points(rig: &Rig, clicks: &[Vec<Click>; 3]) -> Result<Isometry3<f64>, OriginError> {
     let mut points = [Point3::origin(); 3];
     for (nth, (point, clicks)) in points.iter_mut().zip(clicks).enumerate() {
@@ -125,7 +125,7 @@ fn place(rig: &Rig, clicks: &[Click], point: usize) -> Result<Point3<f64>, Origi
 ///
 /// # Errors
 ///
-/// [`OriginError`].
+/// Fails with [`OriginError`].
 pub fn from_board(
     rig: &Rig,
     board: &[Point2<f64>],
@@ -172,7 +172,7 @@ fn mean_centre(rig: &Rig) -> Point3<f64> {
 ///
 /// # Errors
 ///
-/// [`OriginError::Rig`].
+/// Fails with [`OriginError::Rig`].
 pub fn rebased(rig: &Rig, new_from_old: &Isometry3<f64>, source: &str) -> Result<Rig, OriginError> {
     let old_from_new = new_from_old.inverse();
     let cameras = rig.cameras().iter().map(|camera| Camera {

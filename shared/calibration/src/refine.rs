@@ -97,7 +97,8 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// [`PeopleError`] if the recording cannot be used at all. If it determines too little, the result is an [`Outcome`] with doubts.
+/// Fails with [`PeopleError`] if the recording cannot be used at all. If it determines too little, the result is an [`Outcome`] with
+/// doubts.
 pub fn refine(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
     let Recording { cameras, films } = *recording;
     if cameras.len() < 2 || cameras.len() != films.len() {

@@ -40,7 +40,7 @@ type Edit = (Range<usize>, String);
 ///
 /// # Errors
 ///
-/// [`ClocksError`].
+/// Fails with [`ClocksError`].
 pub fn with_clocks(text: &str, clocks: &[ClockKeys]) -> Result<String, ClocksError> {
     let document = DeTable::parse(text).map_err(|_odd| ClocksError::Syntax)?;
     let cameras = document.get_ref().iter().find(|entry| entry.0.get_ref() == "camera");

@@ -26,7 +26,7 @@ impl Loaded {
     ///
     /// # Errors
     ///
-    /// The first [`ConfigError`] found.
+    /// Returns the first [`ConfigError`] found.
     pub fn parse(
         text: &str,
         file: &Path,
@@ -80,7 +80,7 @@ impl Loaded {
     ///
     /// # Errors
     ///
-    /// The first [`ConfigError`] found.
+    /// Returns the first [`ConfigError`] found.
     pub fn again(
         deployment: &Deployment,
         set: &[String],
@@ -125,7 +125,7 @@ impl Loaded {
     ///
     /// # Errors
     ///
-    /// [`ConfigError`] if `set` gives a value that is not allowed.
+    /// Fails with [`ConfigError`] if `set` gives a value that is not allowed.
     pub fn defaults(set: &[String]) -> Result<Self, ConfigError> {
         let mut table = Table::new();
         let on_command_line = overrides(set)?;

@@ -21,7 +21,7 @@ is refused.
 ///
 /// # Errors
 ///
-/// [`ConfigError`] if the defaults cannot be read.
+/// Fails with [`ConfigError`] if the defaults cannot be read.
 pub fn reference() -> Result<String, ConfigError> {
     let defaults = Loaded::defaults(&[])?;
     let entries = defaults.entries().unwrap_or_default();

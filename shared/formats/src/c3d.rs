@@ -54,7 +54,7 @@ impl C3d {
     ///
     /// # Errors
     ///
-    /// [`C3dError`] if the file is not valid. Parsing uses at most some tens of bytes of memory per byte of the file.
+    /// Fails with [`C3dError`] if the file is not valid. Parsing uses at most some tens of bytes of memory per byte of the file.
     pub fn parse(file: &[u8]) -> Result<Self, C3dError> {
         let (bytes, section) = Bytes::of_file(file)?;
         let parameters = Parameters::read(bytes, section)?;

@@ -109,7 +109,7 @@ impl Numbers<'_> {
 ///
 /// # Errors
 ///
-/// [`ContainerError`] if the file is not valid.
+/// Fails with [`ContainerError`] if the file is not valid.
 pub fn variables(file: &[u8]) -> Result<Vec<Vec<u8>>, ContainerError> {
     if file.starts_with(b"MATLAB 7.3") {
         return Err(ContainerError::Version73);
@@ -150,7 +150,7 @@ pub fn variables(file: &[u8]) -> Result<Vec<Vec<u8>>, ContainerError> {
 ///
 /// # Errors
 ///
-/// [`ContainerError`] if the variable is not valid.
+/// Fails with [`ContainerError`] if the variable is not valid.
 pub fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerError> {
     let mut budget = MAX_VALUES;
     let (kind, data) = Bytes(bytes).element("a variable")?;

@@ -76,7 +76,7 @@ impl Framing {
     ///
     /// # Errors
     ///
-    /// A [`FramingError`] if an argument is invalid. A source of a different size is an error; no offset is guessed.
+    /// Returns a [`FramingError`] if an argument is invalid. A source of a different size is an error; no offset is guessed.
     pub fn new(
         camera: &Camera,
         source_size: [u32; 2],

@@ -143,7 +143,7 @@ pub struct NotARotation {
 ///
 /// # Errors
 ///
-/// [`NotARotation`] if an entry of R Rᵀ - I exceeds 1e-3, or if the matrix is a reflection.
+/// Fails with [`NotARotation`] if an entry of R Rᵀ - I exceeds 1e-3, or if the matrix is a reflection.
 pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, NotARotation> {
     const LIMIT: f64 = 1e-3;
     let deviation = (matrix * matrix.transpose() - Matrix3::identity()).abs().max();
@@ -196,7 +196,7 @@ impl Rig {
     ///
     /// # Errors
     ///
-    /// A [`RigError`] for the first invalid camera.
+    /// Returns a [`RigError`] for the first invalid camera.
     pub fn new(
         cameras: Vec<Camera>,
         up_in_world: Option<UnitVector3<f64>>,

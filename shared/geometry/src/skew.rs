@@ -174,7 +174,7 @@ mod tests {
         tracks.note(0.9, at(98.0));
         tracks.note(1.0, at(100.0));
         assert_eq!(speed(&tracks, 1.1, 102.0).map(f64::round), Some(20.0));
-        // The first point moves at 1400 pixels per second after it moved at 20; the second moves at 2000, which is always too fast.
+        // The point moved at 20 pixels per second, and now seems to move at 1400: it must be a different point.
         assert_eq!(speed(&tracks, 1.1, 240.0), None);
         tracks.note(1.1, at(240.0));
         assert_eq!(speed(&tracks, 1.2, 242.0), None, "nor on its way back");

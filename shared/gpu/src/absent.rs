@@ -25,7 +25,7 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// Always [`OpenError::NotBuilt`].
+    /// Always fails with [`OpenError::NotBuilt`].
     pub fn open(_choice: Choice) -> Result<Self, OpenError> {
         Err(OpenError::NotBuilt)
     }

@@ -56,7 +56,7 @@ impl Device {
     ///
     /// # Errors
     ///
-    /// [`OpenError`].
+    /// Fails with [`OpenError`].
     pub fn open(choice: Choice) -> Result<Self, OpenError> {
         let Opened {
             device,
@@ -140,7 +140,7 @@ impl Device {
         self.takes_spirv
     }
 
-    /// Largest number of bytes of a buffer that a kernel can access.
+    /// Maximum number of bytes of a buffer that a kernel can access.
     pub(crate) fn max_binding(&self) -> u64 {
         self.max_binding
     }

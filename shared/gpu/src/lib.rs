@@ -62,7 +62,7 @@ pub struct Found {
 /// Limits for the poses of a result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
-    /// Largest number of poses.
+    /// Maximum number of poses.
     pub n: usize,
     /// Smallest mean distance between the part centres of two poses, in box sides; see [`fmp::Solver::distinct`].
     pub min_separation: f64,

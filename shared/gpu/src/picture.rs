@@ -12,7 +12,7 @@ use crate::{Unsuitable, suits};
 const BLOCK: usize = 128;
 /// Number of cells in a workgroup of the histograms.
 const HISTOGRAM_BLOCK: usize = 42;
-/// Largest number of samples along an axis that make up a shrunken pixel.
+/// Maximum number of samples along an axis that make up a shrunken pixel.
 const TAPS: usize = 4;
 /// Number of orientations in a histogram.
 const ORIENTATIONS: u64 = 18;

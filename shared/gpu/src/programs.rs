@@ -67,7 +67,7 @@ const SOURCES: [(&str, &[Entry]); 3] = [
     ),
 ];
 
-/// Largest number of buffers that a kernel binds.
+/// Maximum number of buffers that a kernel binds.
 pub(crate) const MAX_BUFFERS: u32 = 11;
 
 /// Numbers that are inserted into the texts.

@@ -9,7 +9,7 @@ use crate::suits::{self, Child};
 pub(crate) const PANEL: usize = 160;
 /// Used instead of minus infinity.
 const NEVER: f32 = -1.0e30;
-/// Largest number of parts that are traced together.
+/// Maximum number of parts that are traced together.
 const GROUP: usize = 4;
 
 /// Parts whose subtrees have equal height: their messages are computed together.

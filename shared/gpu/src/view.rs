@@ -56,7 +56,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// [`Unsuitable`]: the device cannot be used, and the CPU has to do the search.
+    /// Fails with [`Unsuitable`]: the device cannot be used, and the CPU has to do the search.
     pub fn new(
         device: &Arc<Device>,
         model: Arc<Model>,
@@ -110,11 +110,11 @@ impl View {
     ///
     /// # Errors
     ///
-    /// [`DeviceLost`]; `evidence` may then be partly written.
+    /// Fails with [`DeviceLost`]; `evidence` may then be partly written.
     ///
     /// # Panics
     ///
-    /// If the size of the image or of `evidence` does not match the layout.
+    /// Panics if the size of the image or of `evidence` does not match the layout.
     pub fn search(
         &self,
         image: Rgb8View<'_>,
@@ -138,7 +138,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// [`DeviceLost`].
+    /// Fails with [`DeviceLost`].
     pub fn solve(&self, responses: &[f32], wanted: Wanted) -> Result<Found, DeviceLost> {
         let mut staging = self.staging.lock().unwrap_or_else(PoisonError::into_inner);
         for group in &self.groups {
@@ -155,11 +155,11 @@ impl View {
     ///
     /// # Errors
     ///
-    /// [`DeviceLost`].
+    /// Fails with [`DeviceLost`].
     ///
     /// # Panics
     ///
-    /// If the size of the image does not match the layout.
+    /// Panics if the size of the image does not match the layout.
     pub fn features(&self, image: Rgb8View<'_>) -> Result<Vec<f32>, DeviceLost> {
         let mut staging = self.staging.lock().unwrap_or_else(PoisonError::into_inner);
         self.upload(image)?;

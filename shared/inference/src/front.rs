@@ -9,7 +9,7 @@ use rten_onnx::onnx::NodeProto;
 
 use crate::source::{Source, int, ints, op, text};
 
-/// Largest number of values in a stack of channels, including padding.
+/// Maximum number of values in a stack of channels, including padding.
 const MOST_VALUES: usize = 1 << 26;
 /// Widest padding.
 const MOST_PADDING: usize = 8;

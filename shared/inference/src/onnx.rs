@@ -107,7 +107,7 @@ impl Network {
     ///
     /// # Panics
     ///
-    /// If the number of values does not match the shape.
+    /// Panics if the number of values does not match the shape.
     pub fn floats(&mut self, name: &str, shape: &[usize], values: Vec<f32>) {
         let n: usize = shape.iter().product();
         assert_eq!(values.len(), n, "{name}: as many as the shape asks for");
@@ -122,7 +122,7 @@ impl Network {
     ///
     /// # Panics
     ///
-    /// If the number of values does not match the shape.
+    /// Panics if the number of values does not match the shape.
     pub fn halves(&mut self, name: &str, shape: &[usize], values: &[f32]) {
         let n: usize = shape.iter().product();
         assert_eq!(values.len(), n, "{name}: as many as the shape asks for");

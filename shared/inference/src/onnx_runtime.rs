@@ -28,7 +28,7 @@ impl OnnxRuntime {
     ///
     /// # Errors
     ///
-    /// [`LoadError::Library`] if the file cannot be loaded or is too old, or if another library has been loaded before.
+    /// Fails with [`LoadError::Library`] if the file cannot be loaded or is too old, or if another library has been loaded before.
     pub fn load(library: &Path) -> Result<Self, LoadError> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         let environment = match &*loaded {

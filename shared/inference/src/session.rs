@@ -49,7 +49,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`LoadError::File`].
+    /// Fails with [`LoadError::File`].
     pub fn parse(file: Vec<u8>) -> Result<Self, LoadError> {
         let fingerprint = check(&file)?;
         let parts = Parts::find(&file);
@@ -70,7 +70,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`LoadError::File`].
+    /// Fails with [`LoadError::File`].
     pub fn parse_by_rten(file: Vec<u8>) -> Result<Self, LoadError> {
         let fingerprint = check(&file)?;
         let (engine, description) = Rten::load(file)?;
@@ -86,7 +86,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`LoadError`].
+    /// Fails with [`LoadError`].
     #[cfg(feature = "ort")]
     pub fn parse_with(runtime: &OnnxRuntime, file: &[u8]) -> Result<Self, LoadError> {
         let fingerprint = check(file)?;
@@ -121,7 +121,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`RunError`], with the library's error.
+    /// Fails with [`RunError`], with the library's error.
     pub fn run(
         &self,
         inputs: &[Input<'_>],

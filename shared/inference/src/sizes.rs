@@ -6,7 +6,7 @@ use rten_onnx::onnx::{AttributeProto, GraphProto, ModelProto, NodeProto, TensorP
 
 /// Largest side, padding, stride or repeat.
 const LARGEST_SIDE: i64 = 1 << 16;
-/// Largest number of values in a tensor.
+/// Maximum number of values in a tensor.
 const MOST_VALUES: i64 = 1 << 28;
 /// Deepest nesting of graphs inside nodes.
 const DEEPEST: usize = 8;

@@ -6,7 +6,7 @@ use rten_onnx::onnx::{GraphProto, ModelProto, NodeProto, TensorProto};
 
 const FLOAT: i32 = 1;
 const FLOAT16: i32 = 10;
-/// Largest number of casts between a constant and its use.
+/// Maximum number of casts between a constant and its use.
 const MOST_CASTS: usize = 4;
 
 /// The graph of a file.

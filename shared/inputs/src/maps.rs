@@ -46,7 +46,7 @@ pub fn pose_network(
 ///
 /// # Errors
 ///
-/// [`ExitKind::Config`] if the network cannot use mirror images.
+/// Fails with [`ExitKind::Config`] if the network cannot use mirror images.
 pub fn mirrored(network: PoseNetwork, asked: &str) -> Result<PoseNetwork, Failure> {
     let name = network.card().name.clone();
     network.mirrored().map_err(|error| {

@@ -38,7 +38,7 @@ fn main() {
     }
 }
 
-/// Least time of many runs, in nanoseconds.
+/// Shortest time of many runs, in nanoseconds.
 fn fastest<T>(mut call: impl FnMut() -> T) -> f64 {
     let time = |_| {
         let begin = Instant::now();

@@ -32,7 +32,7 @@ fn rate(call: impl FnOnce() -> usize) -> f64 {
     n as f64 / begin.elapsed().as_nanos().max(1) as f64
 }
 
-/// Least time of many runs, in microseconds.
+/// Shortest time of many runs, in microseconds.
 fn fastest(n: usize, mut call: impl FnMut()) -> f64 {
     let time = |_| {
         let begin = Instant::now();

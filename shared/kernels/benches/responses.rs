@@ -34,7 +34,7 @@ fn cpu_time() -> f64 {
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }
 
-/// Least processor time of many calls, in seconds.
+/// Shortest processor time of many calls, in seconds.
 fn least(repetitions: usize, mut call: impl FnMut()) -> f64 {
     let once = |_| {
         let begin = cpu_time();

@@ -105,7 +105,7 @@ impl Conv {
     ///
     /// # Errors
     ///
-    /// [`ConvSizeError`]; also if the kernel, a stride or a number of channels is zero.
+    /// Fails with [`ConvSizeError`]; also if the kernel, a stride or a number of channels is zero.
     pub fn new(
         size: ConvSize,
         weights: &[f32],
@@ -155,7 +155,7 @@ impl Conv {
     ///
     /// # Errors
     ///
-    /// As [`Self::new`].
+    /// Fails like [`Self::new`].
     pub fn in_tiles(
         size: ConvSize,
         weights: &[f32],
@@ -187,7 +187,7 @@ impl Conv {
     ///
     /// # Panics
     ///
-    /// If the sizes of the stacks do not match. This includes wrong numbers of channels, a border of the input smaller than
+    /// Panics if the sizes of the stacks do not match. This includes wrong numbers of channels, a border of the input smaller than
     /// the kernel needs, and a residual whose shape or border differs from the outputs.
     pub fn run(
         &self,
@@ -208,7 +208,7 @@ impl Conv {
     ///
     /// # Panics
     ///
-    /// As [`Self::run`].
+    /// Panics like [`Self::run`].
     pub fn run_plain(&self, input: &Blocked, residual: Option<&Blocked>, outputs: Outputs<'_>) {
         self.check(input, residual, &outputs);
         if self.positions.is_empty() {

@@ -17,7 +17,7 @@ use winograd::{Answer, Form, Pending};
 
 pub use reference::correlate_f64;
 
-/// Largest number of filters in a panel.
+/// Maximum number of filters in a panel.
 const N_LANES: usize = ROW;
 /// Numbers of pairs of points for the tiles into which a map can be cut, in ascending order.
 const FORMS: [usize; 2] = [3, 4];
@@ -95,7 +95,7 @@ impl FilterBank {
     ///
     /// # Panics
     ///
-    /// If a template has no cells, or the number of its weights does not match its size.
+    /// Panics if a template has no cells, or the number of its weights does not match its size.
     pub fn new(isa: Isa, filters: &[Template<'_>]) -> Self {
         Self::pack(isa, filters, true)
     }
@@ -104,7 +104,7 @@ impl FilterBank {
     ///
     /// # Panics
     ///
-    /// As [`Self::new`].
+    /// Panics like [`Self::new`].
     pub fn direct(isa: Isa, filters: &[Template<'_>]) -> Self {
         Self::pack(isa, filters, false)
     }
@@ -143,7 +143,7 @@ impl FilterBank {
     ///
     /// # Panics
     ///
-    /// If there are no such panels.
+    /// Panics if there are no such panels.
     pub fn filters(&self, panels: Range<usize>) -> Range<usize> {
         let panels = &self.panels[panels];
         let first = panels.first().map_or(0, |panel| panel.filters.start);
@@ -179,7 +179,7 @@ impl FilterBank {
     ///
     /// # Panics
     ///
-    /// If a map is too small for its placements, or the lengths do not match.
+    /// Panics if a map is too small for its placements, or the lengths do not match.
     #[expect(
         single_use_lifetimes,
         reason = "an argument of type `impl Trait` cannot do without a name"

@@ -33,7 +33,7 @@ impl ScoredPoints {
     ///
     /// # Panics
     ///
-    /// If there are no points, or the number of scores differs from the number of points.
+    /// Panics if there are no points, or the number of scores differs from the number of points.
     pub fn new(points: impl ExactSizeIterator<Item = [f64; 3]>, scores: &[f64]) -> Self {
         let n = points.len();
         assert!(n > 0 && n == scores.len(), "a score for each point");

@@ -20,7 +20,7 @@ pub struct Transformed {
 ///
 /// # Panics
 ///
-/// If the plane is not `rows x cols`.
+/// Panics if the plane is not `rows x cols`.
 pub fn transform_f64(plane: &[f64], [rows, cols]: [usize; 2], spring: &Spring) -> Transformed {
     assert_eq!(plane.len(), rows * cols, "one score per cell");
     let mut down = vec![(0.0, 0); rows * cols];

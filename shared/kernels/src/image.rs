@@ -29,7 +29,7 @@ impl<'a> Rgb8View<'a> {
     ///
     /// # Errors
     ///
-    /// [`ImageSizeError`] if `data` is not exactly `3 * width * height` bytes.
+    /// Fails with [`ImageSizeError`] if `data` is not exactly `3 * width * height` bytes.
     pub fn new(width: usize, height: usize, data: &'a [u8]) -> Result<Self, ImageSizeError> {
         let expected = width.saturating_mul(height).saturating_mul(3);
         if data.len() == expected {

@@ -107,7 +107,7 @@ impl MessageRule {
     ///
     /// # Panics
     ///
-    /// If an index is out of range, or a quadratic weight is not positive.
+    /// Panics if an index is out of range, or a quadratic weight is not positive.
     pub fn new(
         n_child_types: usize,
         springs: Vec<(usize, Spring)>,
@@ -137,7 +137,7 @@ impl MessageRule {
     ///
     /// # Panics
     ///
-    /// If the lengths do not match.
+    /// Panics if the lengths do not match.
     pub fn add_message(
         &self,
         isa: Isa,

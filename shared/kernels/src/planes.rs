@@ -73,7 +73,7 @@ impl Planes {
     ///
     /// # Panics
     ///
-    /// If `data` is not `3 x height x width` samples.
+    /// Panics if `data` is not `3 x height x width` samples.
     pub fn from_samples(width: usize, height: usize, data: Vec<f64>) -> Self {
         assert_eq!(data.len(), 3 * width * height, "three full planes");
         Self {
@@ -124,7 +124,7 @@ pub struct PartOfResized {
 ///
 /// # Panics
 ///
-/// If the new size is zero or larger than the image's.
+/// Panics if the new size is zero or larger than the image's.
 pub fn resize(
     isa: Isa,
     image: Rgb8View<'_>,
@@ -145,7 +145,7 @@ pub fn resize(
 ///
 /// # Panics
 ///
-/// As [`resize`], and if the part is empty or not inside the smaller image.
+/// Panics like [`resize`], and if the part is empty or not inside the smaller image.
 pub fn resize_part(
     isa: Isa,
     image: Rgb8View<'_>,
@@ -190,7 +190,7 @@ pub fn reduced(side: usize) -> usize {
 ///
 /// # Panics
 ///
-/// If a side is shorter than 5 pixels.
+/// Panics if a side is shorter than 5 pixels.
 pub fn reduce(isa: Isa, image: &Planes, workspace: &mut ShrinkWorkspace, out: &mut Planes) {
     check_reduce(image);
     out.reshape(reduced(image.width), reduced(image.height));

@@ -4,12 +4,12 @@ use crate::maps::{JointMaps, MapSettings};
 use crate::network::Turn;
 use crate::outline::outline_of;
 
-/// Least heat, 0 to 1, of a joint that counts for the box around the person.
+/// Minimum heat, 0 to 1, of a joint that counts for the box around the person.
 const FAINT: f64 = 0.02;
 
-/// Least heat, 0 to 1, of a joint that counts for the direction of the head.
+/// Minimum heat, 0 to 1, of a joint that counts for the direction of the head.
 const SURE: f64 = 0.2;
-/// Least number of leg joints needed, and least distance from them to the head, as a share of the longer side of the window.
+/// Minimum number of leg joints needed, and minimum distance from them to the head, as a share of the longer side of the window.
 const LEGS: usize = 3;
 const LONG: f64 = 0.12;
 /// Largest angle, in radians, between the head's direction and upright before the picture is rotated: 70 degrees. For a person whose trunk

@@ -5,7 +5,7 @@ use skeleton::PARSE14;
 use crate::cover::Bar;
 use crate::maps::JointMaps;
 
-/// Least heat, 0 to 1, of a joint at the end of a part that is painted over.
+/// Minimum heat, 0 to 1, of a joint at the end of a part that is painted over.
 const SURE: f64 = 0.2;
 /// Half the width of a limb, as a share of the longer side of the box around the person.
 const HALF_WIDTH: f64 = 0.0375;

@@ -6,19 +6,19 @@ use crate::MapSettings;
 use crate::maps::N_JOINTS;
 use crate::person_maps::PersonMaps;
 
-/// Least heat for which another Gaussian is fitted; lower residuals are ignored.
+/// Minimum heat for which another Gaussian is fitted; lower residuals are ignored.
 const LEAST_HEAT: f64 = 0.03;
 /// Height to which a Gaussian is reduced at most when its neighbours take over its heat.
 const LEAST_HEIGHT: f64 = 0.002;
 /// Number of times that all heights are fitted again after a Gaussian is added.
 const SWEEPS: usize = 6;
-/// Largest number of Gaussians for one joint's map.
+/// Maximum number of Gaussians for one joint's map.
 pub const MOST_OF_A_JOINT: usize = 8;
 /// Number of cells on each side of a maximum to which a Gaussian is fitted.
 const REACH: i64 = 2;
-/// Least value of a cell to which a Gaussian is fitted, as a share of the maximum.
+/// Minimum value of a cell to which a Gaussian is fitted, as a share of the maximum.
 const SHARE: f64 = 0.5;
-/// Least and largest standard deviation along any axis, in cells.
+/// Smallest and largest standard deviation along any axis, in cells.
 const SIGMAS: [f64; 2] = [0.4, 12.0];
 /// Value at which a Gaussian is cut off: [`MapSettings::of_heat`] counts it as zero.
 const NOTHING: f64 = 1e-5;
@@ -81,7 +81,7 @@ impl Bump {
     }
 }
 
-/// Least and largest eigenvalue that a precision may have.
+/// Smallest and largest eigenvalue that a precision may have.
 fn precisions() -> [f64; 2] {
     let [narrow, wide] = SIGMAS;
     [1.0 / (wide * wide), 1.0 / (narrow * narrow)]

@@ -10,7 +10,7 @@ use crate::outline::overlap;
 const FITS: f64 = 0.8;
 /// Largest loss of mean joint heat, 0 to 1, that is accepted for a box that fits better.
 const FAINTER: f64 = 0.1;
-/// Largest number of further runs for one person after the first.
+/// Maximum number of further runs for one person after the first.
 const MOST_MORE: usize = 2;
 
 /// Network and settings for finding the joints of people in a picture.
@@ -64,7 +64,7 @@ impl Looker<'_> {
     ///
     /// # Errors
     ///
-    /// [`LookError`].
+    /// Fails with [`LookError`].
     pub fn look(
         &self,
         what: (Rgb8View<'_>, [f64; 4]),
@@ -116,7 +116,7 @@ impl Looker<'_> {
     ///
     /// # Errors
     ///
-    /// [`LookError`].
+    /// Fails with [`LookError`].
     pub fn look_closer(
         &self,
         (image, seen): (Rgb8View<'_>, Look),
@@ -146,7 +146,7 @@ impl Looker<'_> {
     ///
     /// # Errors
     ///
-    /// [`LookError`].
+    /// Fails with [`LookError`].
     pub fn look_upright(
         &self,
         (image, seen): (Rgb8View<'_>, Look),
@@ -175,7 +175,7 @@ impl Looker<'_> {
     ///
     /// # Errors
     ///
-    /// [`LookError`].
+    /// Fails with [`LookError`].
     pub fn best_of(
         &self,
         (image, outlines): (Rgb8View<'_>, &[[f64; 4]]),

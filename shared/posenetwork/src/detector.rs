@@ -20,7 +20,7 @@ impl Detector {
     ///
     /// # Errors
     ///
-    /// [`FitError`], with the names and dimensions on the card and in the network.
+    /// Fails with [`FitError`], with the names and dimensions on the card and in the network.
     pub fn new(session: Session, card: DetectorCard) -> Result<Self, FitError> {
         let description = session.description();
         let input = input_of(&card.input, &description.inputs)?;
@@ -55,7 +55,7 @@ impl Detector {
     ///
     /// # Errors
     ///
-    /// [`LookError`]; also if the output contains a value that is not finite.
+    /// Fails with [`LookError`]; also if the output contains a value that is not finite.
     pub fn people(
         &self,
         image: Rgb8View<'_>,

@@ -86,7 +86,7 @@ pub struct JointMaps {
     sigma_px: Option<f64>,
 }
 
-/// Largest number of cells of a map. Larger maps are kept at lower resolution.
+/// Maximum number of cells of a map. Larger maps are kept at lower resolution.
 pub const MOST_CELLS: usize = 1 << 15;
 
 /// Spacing of the cells to keep, chosen so that at most [`MOST_CELLS`] are kept.
@@ -100,9 +100,9 @@ fn coarseness([rows, columns]: [usize; 2]) -> usize {
 const GRID_PX: f64 = 2.0;
 /// Factor by which the box around another program's keypoints is enlarged for the grid.
 const BOX_MARGIN: f64 = 1.25;
-/// Largest number of rows of such a grid.
+/// Maximum number of rows of such a grid.
 const MOST_ROWS: usize = 64;
-/// Least standard deviation on such a grid, in cells. A narrower Gaussian could be lost between two cells.
+/// Minimum standard deviation on such a grid, in cells. A narrower Gaussian could be lost between two cells.
 const LEAST_SIGMA: f64 = 1.0;
 
 /// The standard deviation along one axis of a normal distribution in the plane whose mean distance is 1: sqrt(2 / pi).
@@ -113,7 +113,7 @@ impl JointMaps {
     ///
     /// # Errors
     ///
-    /// [`LookError::Output`]; never after the network has run successfully.
+    /// Fails with [`LookError::Output`]; this cannot happen after the network has run successfully.
     pub fn read(&mut self, sight: &Sight<'_>, settings: &MapSettings) -> Result<(), LookError> {
         let keypoints = sight.keypoints()?;
         let rows = joint_rows(sight.network().names());
@@ -183,7 +183,7 @@ impl JointMaps {
     ///
     /// # Panics
     ///
-    /// If a row refers to a keypoint beyond the list.
+    /// Panics if a row refers to a keypoint beyond the list.
     pub fn of_keypoints(
         &mut self,
         keypoints: &[Option<Keypoint>],
@@ -338,7 +338,7 @@ impl JointMaps {
 
     /// The highest maxima of a joint's map ([`PersonMaps::maxima`]).
     ///
-    /// * `n`: largest number of maxima.
+    /// * `n`: maximum number of maxima.
     pub fn maxima(&self, joint: usize, n: usize) -> Vec<([f64; 2], f32)> {
         self.evidence().map_or_else(Vec::new, |maps| maps.maxima(joint, n, |_| true))
     }

@@ -100,7 +100,7 @@ impl PoseNetwork {
     ///
     /// # Errors
     ///
-    /// [`FitError`], with the names and dimensions on the card and in the network.
+    /// Fails with [`FitError`], with the names and dimensions on the card and in the network.
     pub fn new(session: Session, card: Card) -> Result<Self, FitError> {
         let description = session.description();
         let input = input_of(&card.input, &description.inputs)?;
@@ -147,7 +147,7 @@ impl PoseNetwork {
     ///
     /// # Errors
     ///
-    /// [`FitError::Mirror`]: the network returns positions, or a keypoint has no partner on the other side.
+    /// Fails with [`FitError::Mirror`]: the network returns positions, or a keypoint has no partner on the other side.
     pub fn mirrored(self) -> Result<Self, FitError> {
         let mirror = Mirror::new(&self.card, &self.names).map_err(FitError::Mirror)?;
         Ok(Self {
@@ -193,7 +193,7 @@ impl PoseNetwork {
     ///
     /// # Errors
     ///
-    /// [`LookError`]; also if the output contains a value that is not finite.
+    /// Fails with [`LookError`]; also if the output contains a value that is not finite.
     pub fn look<'a>(
         &'a self,
         image: Rgb8View<'_>,
@@ -210,7 +210,7 @@ impl PoseNetwork {
     ///
     /// # Errors
     ///
-    /// As for [`Self::look`].
+    /// Fails like [`Self::look`].
     pub fn look_turned<'a>(
         &'a self,
         image: Rgb8View<'_>,
@@ -328,7 +328,7 @@ impl<'a> Sight<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Self::read`].
+    /// Fails like [`Self::read`].
     pub fn maps_window(&self) -> Result<Window, LookError> {
         let by = match (self.read()?, &self.network.card.output) {
             (
@@ -350,7 +350,7 @@ impl<'a> Sight<'a> {
     ///
     /// # Errors
     ///
-    /// [`LookError::Output`]; never after the network has run successfully.
+    /// Fails with [`LookError::Output`]; this cannot happen after the network has run successfully.
     pub fn read(&self) -> Result<Read<'a>, LookError> {
         let card = &self.network.card;
         let n = self.network.names.len();
@@ -440,7 +440,7 @@ impl<'a> Sight<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Self::read`].
+    /// Fails like [`Self::read`].
     pub fn keypoints(&self) -> Result<Vec<Keypoint>, LookError> {
         let size = self.window.input();
         let mut found = match (self.read()?, &self.network.card.output) {

@@ -4,7 +4,7 @@ use skeleton::PARSE14;
 
 use crate::between::{Tap, between};
 
-/// Least evidence above the floor for a cell to count as a maximum.
+/// Minimum evidence above the floor for a cell to count as a maximum.
 const LEAST_ABOVE: f32 = 1e-3;
 
 /// Position of the cells of maps in a picture.
@@ -58,7 +58,7 @@ impl<'a> PersonMaps<'a> {
     ///
     /// # Panics
     ///
-    /// If the number of values does not match the grid.
+    /// Panics if the number of values does not match the grid.
     pub fn new(grid: MapGrid, values: &'a [f32], floor: f32) -> Self {
         assert_eq!(values.len(), grid.n_values(), "values of the maps");
         Self {
@@ -104,7 +104,7 @@ impl<'a> PersonMaps<'a> {
     /// The highest maxima of a joint's map, the best first: positions in pixels of the picture, and the evidence of their cells. Each
     /// position is the vertex of parabolas through the cell and its neighbours, because the logarithm of a Gaussian is a parabola.
     ///
-    /// * `n`: largest number of maxima.
+    /// * `n`: maximum number of maxima.
     /// * `is_wanted`: returns true for positions that count, in pixels of the picture.
     pub fn maxima(
         &self,

@@ -11,7 +11,7 @@ pub trait Album: Sync {
     ///
     /// # Errors
     ///
-    /// If the image cannot be read.
+    /// Fails if the image cannot be read.
     fn person(&self, person: usize) -> Result<Picture, AlbumError>;
 
     /// Number of background images, which show no people.
@@ -21,6 +21,6 @@ pub trait Album: Sync {
     ///
     /// # Errors
     ///
-    /// If the image cannot be read.
+    /// Fails if the image cannot be read.
     fn background(&self, image: usize) -> Result<Picture, AlbumError>;
 }

@@ -22,7 +22,7 @@ impl Example {
     ///
     /// # Panics
     ///
-    /// If the pose is not on the level.
+    /// Panics if the pose is not on the level.
     pub(crate) fn of(shape: &Shape, at: &Coordinates, map: &FeatureMap<'_>, pose: &Pose) -> Self {
         let runs = pose.parts.iter().enumerate().map(|(part, placed)| {
             let corner = [placed.x, placed.y].map(usize::from);
@@ -39,7 +39,7 @@ impl Example {
     ///
     /// # Panics
     ///
-    /// If the pose is not on the pyramid.
+    /// Panics if the pose is not on the pyramid.
     pub(crate) fn sharing(shape: &Shape, at: &Coordinates, pyramid: &Cells, pose: &Pose) -> Self {
         let row_len = shape.side * N_CHANNELS;
         let mut runs = Vec::with_capacity((shape.side + 3) * shape.n_parts());
@@ -134,7 +134,7 @@ impl Cells {
 ///
 /// # Panics
 ///
-/// If the filter is not on the map.
+/// Panics if the filter is not on the map.
 pub(crate) fn window(map: &FeatureMap<'_>, [x, y]: [usize; 2], side: usize) -> Vec<f32> {
     let row = |row: usize| {
         let first = ((y + row) * map.cols + x) * N_CHANNELS;

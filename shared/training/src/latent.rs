@@ -55,7 +55,7 @@ struct Cell {
 /// The result is exact over all levels: since few cells overlap enough, all pairs of cells are compared. Returns `None` if there is no
 /// level on which all parts can overlap. This is so for people smaller than the model.
 ///
-/// * `overlap`: least intersection over union of every part's box with the marked box.
+/// * `overlap`: minimum intersection over union of every part's box with the marked box.
 pub(crate) fn best_near(
     model: &Model,
     pyramid: &FeaturePyramid<'_>,

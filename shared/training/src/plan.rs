@@ -181,5 +181,5 @@ impl Plan {
     }
 }
 
-/// Least side of a filter, in cells.
+/// Minimum side of a filter, in cells.
 const LEAST_CELLS: usize = 3;

@@ -36,7 +36,7 @@ pub struct Settings {
     pub pose_weight: f64,
     /// Margin between the right pose and a pose with all parts wrong.
     pub pose_margin: f64,
-    /// Least intersection over union of a placed part's box with the marked box.
+    /// Minimum intersection over union of a placed part's box with the marked box.
     pub overlap: f64,
     /// Duality gap at which the machine stops, as a share of its objective.
     pub tolerance: f64,
@@ -45,7 +45,7 @@ pub struct Settings {
     pub cache_mib: usize,
     /// Slack beyond the margin above which a negative is removed from the working set.
     pub room: f64,
-    /// Largest number of negatives that are added from one image at a time, best first.
+    /// Maximum number of negatives that are added from one image at a time, best first.
     pub per_image: usize,
     /// Number of background images that are searched between two solutions.
     pub batch: usize,
@@ -106,9 +106,9 @@ pub struct SettingsError {
     pub key: &'static str,
     /// Value of the setting.
     pub got: f64,
-    /// Least accepted value.
+    /// Smallest accepted value.
     pub min: f64,
-    /// Greatest accepted value.
+    /// Largest accepted value.
     pub max: f64,
 }
 
@@ -117,7 +117,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// [`SettingsError`], for the first setting out of range.
+    /// Fails with [`SettingsError`], for the first setting out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
         const LEAST: f64 = 1e-12;
         const MOST: f64 = 1e12;

@@ -86,11 +86,11 @@ impl Shape {
     ///
     /// # Errors
     ///
-    /// [`ModelError`] if the shape is not a tree or a number is not finite.
+    /// Fails with [`ModelError`] if the shape is not a tree or a number is not finite.
     ///
     /// # Panics
     ///
-    /// If the length of `v` is not the number of coordinates of the shape.
+    /// Panics if the length of `v` is not the number of coordinates of the shape.
     pub fn model(&self, v: &[f64], threshold: f64) -> Result<Model, ModelError> {
         let at = self.coordinates();
         assert_eq!(v.len(), at.len(), "the vector of this shape");

@@ -55,7 +55,7 @@ impl Sparse {
     ///
     /// # Panics
     ///
-    /// If a run would end beyond the end of `shared`.
+    /// Panics if a run would end beyond the end of `shared`.
     pub fn sharing(
         shared: Option<Arc<[f32]>>,
         runs: impl IntoIterator<Item = (usize, Run)>,

@@ -97,7 +97,7 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     ///
-    /// [`TrainError::NoBackgrounds`].
+    /// Fails with [`TrainError::NoBackgrounds`].
     pub fn new(
         plan: &'a Plan,
         settings: &'a Settings,
@@ -162,7 +162,7 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     ///
-    /// [`TrainError::Model`] if the parameters are not a valid model.
+    /// Fails with [`TrainError::Model`] if the parameters are not a valid model.
     pub fn model(&self) -> Result<Model, TrainError> {
         Ok(self.plan.shape().model(&self.v, self.threshold)?)
     }
@@ -297,7 +297,7 @@ impl<'a> Trainer<'a> {
     }
 }
 
-/// Largest number of passes for one solution.
+/// Maximum number of passes for one solution.
 const MAX_PASSES: usize = 200;
 
 fn steps(settings: &Settings, n_backgrounds: usize) -> Vec<Step> {

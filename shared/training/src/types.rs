@@ -267,7 +267,7 @@ fn by_size(mut labels: Vec<usize>, k: usize) -> Vec<usize> {
     labels
 }
 
-/// Largest number of iterations from one start.
+/// Maximum number of iterations from one start.
 const MAX_ROUNDS: usize = 1000;
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ fn main() {
     println!("CPU ms, least of {REPEATS}: tile {sampled:.3}, network {run:.3}");
 }
 
-/// Least CPU time of the whole process over many repetitions, in milliseconds.
+/// Shortest CPU time of the whole process over many repetitions, in milliseconds.
 fn fastest(mut act: impl FnMut()) -> f64 {
     let now = || {
         let time = clock_gettime(ClockId::ProcessCPUTime);

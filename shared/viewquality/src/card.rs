@@ -146,7 +146,7 @@ impl Card {
     ///
     /// # Errors
     ///
-    /// [`CardError`], naming the entry.
+    /// Fails with [`CardError`], naming the entry.
     pub fn parse<'a>(
         entries: impl IntoIterator<Item = (&'a str, &'a str)>,
         n_parts: usize,

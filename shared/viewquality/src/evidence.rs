@@ -7,7 +7,7 @@ use crate::Tile;
 /// Version of the layout of [`evidence`]; a network declares the version that it was trained with.
 pub const EVIDENCE_VERSION: u32 = 1;
 
-/// Largest number of types of a part in the layout.
+/// Maximum number of types of a part in the layout.
 pub const N_TYPES: usize = 6;
 
 /// Values of every part, in this order, followed by the types.
@@ -121,7 +121,7 @@ pub enum EvidenceError {
 ///
 /// # Errors
 ///
-/// [`EvidenceError`]
+/// Fails with [`EvidenceError`].
 pub fn evidence(
     (model, layout): (&Model, &Layout),
     candidates: &[Pose],

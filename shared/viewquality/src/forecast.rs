@@ -84,11 +84,11 @@ impl Forecaster {
     ///
     /// # Errors
     ///
-    /// [`ForecastError`]
+    /// Fails with [`ForecastError`].
     ///
     /// # Panics
     ///
-    /// If the image has no pixels, or a candidate is not on the layout.
+    /// Panics if the image has no pixels, or a candidate is not on the layout.
     pub fn run(&mut self, input: &ForecastInput<'_>) -> Result<Forecast, ForecastError> {
         let (model, layout) = input.on;
         let pose = input.candidates.first().ok_or(EvidenceError::NoPose)?;

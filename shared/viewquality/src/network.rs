@@ -73,7 +73,7 @@ impl Network {
     ///
     /// # Errors
     ///
-    /// [`NetworkError`], with the names and shapes found and expected.
+    /// Fails with [`NetworkError`], with the names and shapes found and expected.
     pub fn parse(file: Vec<u8>, n_parts: usize) -> Result<Self, NetworkError> {
         Self::new(Session::parse(file)?, n_parts)
     }
@@ -157,7 +157,7 @@ impl Network {
     ///
     /// # Errors
     ///
-    /// [`NetworkError::Shape`] if a slice or the output has an unexpected length, [`NetworkError::Run`]
+    /// Fails with [`NetworkError::Shape`] if a slice or the output has an unexpected length, and with [`NetworkError::Run`]
     /// if the library fails.
     pub fn run(&self, tile: &[f32], evidence: &[f32]) -> Result<Vec<f32>, NetworkError> {
         let TileShape { height, width } = self.shape;

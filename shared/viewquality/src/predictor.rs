@@ -71,7 +71,7 @@ impl Predictor {
     ///
     /// # Errors
     ///
-    /// [`NoPredictions`] if there are no such rows; the error lists the sequences of the table.
+    /// Fails with [`NoPredictions`] if there are no such rows; the error lists the sequences of the table.
     pub fn from_table(
         table: &Table,
         selection: Selection,

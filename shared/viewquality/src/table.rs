@@ -113,7 +113,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// [`TableError`], naming line and column.
+    /// Fails with [`TableError`], naming line and column.
     pub fn parse(text: &str, n_parts: usize) -> Result<Self, TableError> {
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)

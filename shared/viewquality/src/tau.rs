@@ -100,7 +100,7 @@ impl Tau {
     ///
     /// # Errors
     ///
-    /// [`TauError`]
+    /// Fails with [`TauError`].
     pub fn parse(text: &str, n_parts: usize) -> Result<Self, TauError> {
         let mut px = Vec::new();
         for (line, content) in text.lines().enumerate() {

@@ -146,7 +146,7 @@ impl Sampler {
     ///
     /// # Panics
     ///
-    /// If `out` has another length, or the image has no pixels.
+    /// Panics if `out` has another length, or the image has no pixels.
     pub fn sample(
         &mut self,
         image: Rgb8View<'_>,

@@ -21,7 +21,7 @@ const ROUNDS: usize = 4;
 ///
 /// # Errors
 ///
-/// [`BoardError::NotFinite`].
+/// Fails with [`BoardError::NotFinite`].
 pub(crate) fn adjusted(
     task: &Task,
     cameras: Vec<Camera>,

@@ -26,7 +26,7 @@ const OUT_OF_STEP_PX: f64 = 0.4;
 ///
 /// # Errors
 ///
-/// [`BoardError`] if there is no result. A result that should not be trusted has [`Outcome::doubts`].
+/// Fails with [`BoardError`] if there is no result. A result that should not be trusted has [`Outcome::doubts`].
 pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     let usable = |sight: &&Sight| sight.points.len() >= LEAST_CORNERS && verdict::is_spread(sight);
     let sights: Vec<Sight> = task.sights.iter().filter(usable).cloned().collect();

@@ -28,7 +28,7 @@ struct Grid {
 ///
 /// # Errors
 ///
-/// [`Nothing`], which states what was seen instead.
+/// Fails with [`Nothing`], which states what was seen instead.
 pub(crate) fn find(
     picture: &Picture,
     board: &Board,

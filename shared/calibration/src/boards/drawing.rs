@@ -127,7 +127,7 @@ impl Drawing {
     ///
     /// # Errors
     ///
-    /// [`PaperError::TooSmall`].
+    /// Fails with [`PaperError::TooSmall`].
     pub fn new(board: &Board, paper: Paper) -> Result<Self, PaperError> {
         let size = board.size_metres().map(|value| 1e3 * value);
         let needed = [size[0] + 2.0 * MARGIN, size[1] + 2.0 * MARGIN + FOOT];

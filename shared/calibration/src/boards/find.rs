@@ -88,7 +88,7 @@ impl Finder {
     ///
     /// # Errors
     ///
-    /// [`Nothing`], which states what was seen instead.
+    /// Fails with [`Nothing`], which states what was seen instead.
     pub fn find(&self, picture: &Picture, hints: Hints) -> Result<Found, Nothing> {
         if let Some(codes) = &self.codes {
             return self.by_markers(codes, picture, hints);

@@ -57,7 +57,8 @@ pub enum PeopleError {
 ///
 /// # Errors
 ///
-/// [`PeopleError`] if the recording cannot be used at all. If it determines too little, the result is an [`Outcome`] with doubts.
+/// Fails with [`PeopleError`] if the recording cannot be used at all. If it determines too little, the result is an [`Outcome`] with
+/// doubts.
 pub fn estimate(recording: &Recording<'_>, settings: &Settings) -> Result<Outcome, PeopleError> {
     let Recording { cameras, films } = *recording;
     check(cameras, films, settings)?;

@@ -98,7 +98,7 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// [`FilmError`] if the films cannot be used at all. Usable footage that determines too little gives an [`Outcome`] with doubts.
+/// Fails with [`FilmError`] if the films cannot be used at all. Usable footage that determines too little gives an [`Outcome`] with doubts.
 pub fn estimate(
     cameras: &[Camera],
     films: &[Film],

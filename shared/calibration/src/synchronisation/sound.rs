@@ -68,7 +68,7 @@ pub struct SoundSettings {
 ///
 /// # Errors
 ///
-/// [`FilmError`] for fewer than two cameras, a reference that does not exist, or a window that is out of range.
+/// Fails with [`FilmError`] for fewer than two cameras, a reference that does not exist, or a window that is out of range.
 pub fn estimate_by_sound(sounds: &[Sound], settings: &SoundSettings) -> Result<Outcome, FilmError> {
     check_settings(sounds.len(), settings.reference, settings.window_s)?;
     let heard: Vec<Beginnings> = sounds.iter().map(Beginnings::of).collect();

@@ -80,7 +80,7 @@ impl Envelope {
     ///
     /// # Errors
     ///
-    /// [`EnvelopeError`]. A truncated file, or one with a single changed byte, is always refused.
+    /// Fails with [`EnvelopeError`]. A truncated file, or one with a single changed byte, is always refused.
     pub fn open<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], EnvelopeError> {
         let expected = self.magic;
         let rest = bytes.strip_prefix(&expected).ok_or(EnvelopeError::Magic { expected })?;

@@ -58,7 +58,7 @@ fn count(found: usize) -> ParseError {
 ///
 /// # Errors
 ///
-/// [`UnwritableRig::Lens`] for a fisheye or a rational lens.
+/// Fails with [`UnwritableRig::Lens`] for a fisheye or a rational lens.
 pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
     let intrinsics = &camera.intrinsics;
     let kc = match *intrinsics.lens.model() {

@@ -207,7 +207,8 @@ fn sized<const N: usize>(
 ///
 /// # Errors
 ///
-/// [`UnwritableRig::Name`] for a name with characters other than letters, digits, `_` and `-`, because names are part of the keys.
+/// Fails with [`UnwritableRig::Name`] for a name with characters other than letters, digits, `_` and `-`, because names are part of the
+/// keys.
 pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
     let mut lines = vec![
         "%YAML:1.0".to_owned(),

@@ -118,7 +118,7 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Ent
 ///
 /// # Errors
 ///
-/// [`UnwritableRig::Name`] for a camera named `metadata` or `cameras`, because these names have another meaning in the format.
+/// Fails with [`UnwritableRig::Name`] for a camera named `metadata` or `cameras`, because these names have another meaning in the format.
 pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
     let table = |camera| camera_table(camera, Unit::Metres);
     let tables: Result<String, _> = rig.cameras().iter().map(table).collect();

@@ -42,7 +42,7 @@ pub fn parse(name: &str, text: &str, options: &ReadOptions) -> Result<Rig, Parse
 ///
 /// # Errors
 ///
-/// [`UnwritableRig::Lens`] for any lens with coefficients other than k1 k2 p1 p2.
+/// Fails with [`UnwritableRig::Lens`] for any lens with coefficients other than k1 k2 p1 p2.
 pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
     let intrinsics = &camera.intrinsics;
     let distortion = match *intrinsics.lens.model() {

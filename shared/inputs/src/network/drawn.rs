@@ -38,7 +38,7 @@ pub fn limbs() -> Vec<Limb> {
 ///
 /// # Errors
 ///
-/// [`LookError::Output`]; this cannot happen after the network has run.
+/// Fails with [`LookError::Output`]; this cannot happen after the network has run.
 pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> {
     let settings = MapSettings::default();
     let mut maps = JointMaps::default();

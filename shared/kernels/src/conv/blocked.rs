@@ -123,7 +123,7 @@ impl Blocked {
     ///
     /// # Panics
     ///
-    /// If the number of values does not match the channels, rows and columns.
+    /// Panics if the number of values does not match the channels, rows and columns.
     pub fn fill(&mut self, planes: &[f32]) {
         let shape = self.shape;
         let [channels, rows, cols] = shape.sides();

@@ -9,7 +9,7 @@ use super::{Blocked, BlockedShape, Conv, Outputs};
 use crate::isa::Isa;
 use crate::simd::{Kernel, Simd};
 
-/// Largest number of pixels whose sums are computed at once.
+/// Maximum number of pixels whose sums are computed at once.
 const MOST_PIXELS: usize = 8;
 /// Number of weights, in floats for a block of outputs, that stay in the first-level cache while the pixels are processed.
 const CHUNK: usize = 4608;

@@ -8,7 +8,7 @@ use crate::isa::Isa;
 ///
 /// # Panics
 ///
-/// If the sizes of the repeated `b` or of the outputs differ from those of `a`.
+/// Panics if the sizes of the repeated `b` or of the outputs differ from those of `a`.
 pub fn add_repeated(isa: Isa, a: &Blocked, b: &Blocked, repeat: usize, outputs: Outputs<'_>) {
     let [channels, rows, cols] = b.shape().sides();
     let sides = [channels, rows * repeat, cols * repeat];

@@ -1,8 +1,8 @@
 //! The matrices of Toom-Cook correlation, computed from the interpolation points.
 
-/// Largest number of values in a line of a tile.
+/// Maximum number of values in a line of a tile.
 pub(super) const MAX_TILE: usize = 10;
-/// Largest number of pairs of points.
+/// Maximum number of pairs of points.
 const MAX_PAIRS: usize = 4;
 
 /// Points `0, p, -p, q, -q, .., infinity` for tiles of `2 pairs + 2` values, as polynomials.
@@ -129,7 +129,7 @@ impl Points {
         all.fold(0.0, f64::max)
     }
 
-    /// Largest number of roundings between a cell or weight and a response, without the additions
+    /// Maximum number of roundings between a cell or weight and a response, without the additions
     /// over channels: both lines of cells, the transformed weight, both lines of products.
     pub(super) fn roundings(&self) -> usize {
         2 * self.n_pairs + 1 + 2 * (self.n_pairs + 1)

@@ -12,7 +12,7 @@ use crate::N_CHANNELS;
 ///
 /// # Panics
 ///
-/// If a placement is not on the map.
+/// Panics if a placement is not on the map.
 pub fn correlate_f64(
     filter: Template<'_>,
     map_size: [usize; 2],

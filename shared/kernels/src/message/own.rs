@@ -26,7 +26,7 @@ impl OwnScores<'_> {
     ///
     /// # Panics
     ///
-    /// If the lengths do not match.
+    /// Panics if the lengths do not match.
     pub fn write(&self, isa: Isa, grid: Grid, plane: &mut [f32]) -> ScoreRange {
         let cells = grid.rows * grid.cols;
         assert_eq!(self.map.len(), cells, "one response per cell");

@@ -57,7 +57,7 @@ impl Case {
     }
 }
 
-/// The least and the largest score of a plane, by definition.
+/// The smallest and the largest score of a plane, by definition.
 fn range(grid: Grid, planes: &[f32], plane: usize) -> ScoreRange {
     let cells = (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| grid.at(plane, y, x)));
     let ScoreRange { mut min, mut max } = ScoreRange::NONE;

@@ -28,7 +28,7 @@ impl MessageRule {
     ///
     /// # Panics
     ///
-    /// If the lengths do not match, or `parent_type` or `at` is out of range.
+    /// Panics if the lengths do not match, or `parent_type` or `at` is out of range.
     pub fn trace(
         &self,
         child: ChildScores<'_>,

@@ -40,7 +40,7 @@ fn area_taps(from: usize, to: usize) -> Vec<Taps> {
 ///
 /// # Panics
 ///
-/// If the new size is zero or larger than the image's.
+/// Panics if the new size is zero or larger than the image's.
 pub fn resize_by_taps(image: Rgb8View<'_>, [width, height]: [usize; 2]) -> Planes {
     super::check_resize(image, [width, height]);
     let mut out = Planes::default();
@@ -72,7 +72,7 @@ pub fn resize_by_taps(image: Rgb8View<'_>, [width, height]: [usize; 2]) -> Plane
 ///
 /// # Panics
 ///
-/// If a side is shorter than 5 pixels.
+/// Panics if a side is shorter than 5 pixels.
 pub fn reduce_by_taps(image: &Planes) -> Planes {
     super::check_reduce(image);
     let mut out = Planes::default();

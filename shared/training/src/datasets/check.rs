@@ -22,7 +22,7 @@ pub(crate) struct Row {
     pub(crate) person: Result<Person, Fault>,
 }
 
-/// Least extent of a person, in pixels; a smaller extent is a fault.
+/// Minimum extent of a person, in pixels; a smaller extent is a fault.
 const MIN_EXTENT_PX: f64 = 1.0;
 
 /// Separates the valid people from those with a fault.

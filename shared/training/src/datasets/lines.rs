@@ -24,7 +24,7 @@ struct Line {
 ///
 /// # Errors
 ///
-/// [`Fault::Syntax`], and [`Fault::Count`] if `visible` and `joints` differ in length.
+/// Fails with [`Fault::Syntax`], or with [`Fault::Count`] if `visible` and `joints` differ in length.
 pub fn parse_line(line: &str) -> Result<(Person, Option<String>), Fault> {
     let line: Line = serde_json::from_str(line).map_err(|error| Fault::Syntax {
         message: error.to_string(),
@@ -57,7 +57,7 @@ pub fn parse_line(line: &str) -> Result<(Person, Option<String>), Fault> {
 ///
 /// # Errors
 ///
-/// Only if the path of the image is not Unicode.
+/// Fails only if the path of the image is not Unicode.
 pub fn to_line(person: &Person, name: Option<&str>) -> Result<String, serde_json::Error> {
     let known = |joint: &[f64; 2]| {
         let is_finite = joint.iter().all(|value| value.is_finite());

@@ -35,7 +35,7 @@ pub enum MatLayoutError {
 ///
 /// # Errors
 ///
-/// [`MatLayoutError`]. The values are not validated.
+/// Fails with [`MatLayoutError`]. The values are not validated.
 pub fn parse_labels(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
     const NAME: &str = "ptsAll";
     with_numbers(file, NAME, |numbers| match three_sizes(numbers) {
@@ -64,7 +64,7 @@ pub fn parse_labels(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
 ///
 /// # Errors
 ///
-/// [`MatLayoutError`]. The values are not validated.
+/// Fails with [`MatLayoutError`]. The values are not validated.
 pub fn parse_joints(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
     const NAME: &str = "joints";
     with_numbers(file, NAME, |numbers| {

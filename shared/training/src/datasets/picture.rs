@@ -27,7 +27,7 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// [`ImageSizeError`](kernels::ImageSizeError) if there are more or fewer bytes.
+    /// Fails with [`ImageSizeError`](kernels::ImageSizeError) if there are more or fewer bytes.
     pub fn new(size: Size, rgb: Vec<u8>) -> Result<Self, kernels::ImageSizeError> {
         Rgb8View::new(size.width, size.height, &rgb)?;
         Ok(Self { size, rgb })
@@ -37,7 +37,7 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// [`FootageError`], which names the file.
+    /// Fails with [`FootageError`], which names the file.
     pub fn read(path: &Path) -> Result<Self, FootageError> {
         let (size, rgb) = footage::read_image(path)?;
         Ok(Self { size, rgb })
@@ -62,7 +62,7 @@ impl Picture {
     ///
     /// # Panics
     ///
-    /// Never: the number of bytes is checked when a picture is made.
+    /// Never panics: the number of bytes is checked when a picture is made.
     #[expect(
         clippy::expect_used,
         reason = "the number of bytes is checked when a picture is made"

@@ -88,7 +88,7 @@ pub enum DatasetError {
 ///
 /// # Errors
 ///
-/// [`DatasetError`]. A person with a fault is listed in [`People::problems`]. The fault is an error only if its kind is
+/// Fails with [`DatasetError`]. A person with a fault is listed in [`People::problems`]. The fault is an error only if its kind is
 /// in [`ReadOptions::fatal`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<People, DatasetError> {
     let file = annotation_file(path)?;

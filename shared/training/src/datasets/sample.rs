@@ -18,7 +18,7 @@ impl Sample {
     ///
     /// # Errors
     ///
-    /// [`FootageError`], which names the file.
+    /// Fails with [`FootageError`], which names the file.
     pub fn read(person: &Person) -> Result<Self, FootageError> {
         Ok(Self {
             image: Picture::read(&person.image)?,
@@ -33,7 +33,7 @@ impl Sample {
     ///
     /// # Panics
     ///
-    /// If `joint_mirror` does not have one entry per joint, or has an index out of range.
+    /// Panics if `joint_mirror` does not have one entry per joint, or has an index out of range.
     #[must_use]
     pub fn mirrored(&self, joint_mirror: &[usize]) -> Self {
         assert_eq!(
@@ -68,7 +68,7 @@ impl Sample {
     ///
     /// # Errors
     ///
-    /// [`WarpError`] if the image has no pixels or the angle is not a number.
+    /// Fails with [`WarpError`] if the image has no pixels or the angle is not a number.
     pub fn rotated(&self, degrees: f64, fill: Fill) -> Result<Self, WarpError> {
         let source = self.image.size();
         let (sin, cos) = degrees.to_radians().sin_cos();

@@ -67,7 +67,7 @@ impl Selection {
     ///
     /// # Errors
     ///
-    /// [`NotASelection`](SelectError::NotASelection), [`BadRange`](SelectError::BadRange),
+    /// Fails with [`NotASelection`](SelectError::NotASelection), [`BadRange`](SelectError::BadRange),
     /// [`EmptyList`](SelectError::EmptyList).
     pub fn from_argument(text: &str) -> Result<Self, SelectError> {
         if let Some(rows) = ranges(text) {
@@ -91,7 +91,7 @@ impl Selection {
     ///
     /// # Errors
     ///
-    /// [`BadRange`](SelectError::BadRange), [`EmptyList`](SelectError::EmptyList).
+    /// Fails with [`BadRange`](SelectError::BadRange) or [`EmptyList`](SelectError::EmptyList).
     pub fn from_list(path: &Path, list: &str) -> Result<Self, SelectError> {
         let mut selection = Self::default();
         for line in list.lines().map(str::trim).filter(|line| !line.is_empty()) {

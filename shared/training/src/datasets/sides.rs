@@ -45,7 +45,7 @@ impl Sides {
     ///
     /// # Panics
     ///
-    /// If `joint_mirror` does not have one entry per joint, or has an index out of range.
+    /// Panics if `joint_mirror` does not have one entry per joint, or has an index out of range.
     #[must_use]
     pub fn of(self, person: Person, joint_mirror: &[usize]) -> Person {
         assert_eq!(

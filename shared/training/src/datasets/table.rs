@@ -151,7 +151,7 @@ pub enum TableError {
 const TOLERANCE: f64 = 1e-3;
 
 impl SkeletonTable {
-    /// Largest number of parts and of joints.
+    /// Maximum number of parts and of joints.
     pub const MAX: usize = 64;
 
     /// Checks `spec`.
@@ -218,7 +218,7 @@ impl SkeletonTable {
     ///
     /// # Panics
     ///
-    /// If there are fewer joints than [`n_joints`](Self::n_joints).
+    /// Panics if there are fewer joints than [`n_joints`](Self::n_joints).
     pub fn parts_of(&self, joints: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let part = |weights: &Vec<(usize, f64)>| {
             weights.iter().fold([0.0; 2], |sum, &(joint, weight)| {

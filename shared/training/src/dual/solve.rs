@@ -31,11 +31,11 @@ impl Gap {
 pub struct Effort {
     /// Duality gap at which to stop, as a share of the objective.
     pub tolerance: f64,
-    /// Largest number of passes over all examples.
+    /// Maximum number of passes over all examples.
     pub max_passes: usize,
 }
 
-/// Largest number of passes over the active examples between two passes over all examples.
+/// Maximum number of passes over the active examples between two passes over all examples.
 const PASSES_OVER_MOVING: usize = 10;
 
 /// Slope, in margins, below which an example with a share between 0 and its cost counts as optimal.

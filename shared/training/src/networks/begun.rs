@@ -62,7 +62,7 @@ pub struct Begun {
 ///
 /// # Errors
 ///
-/// [`BeginError`]
+/// Fails with [`BeginError`].
 pub(crate) fn begun(
     mut all: Vec<Parameter>,
     may_lack: Option<&str>,

@@ -172,7 +172,7 @@ impl<T: Task> Trainer<T> {
     ///
     /// # Errors
     ///
-    /// [`TrainError`]
+    /// Fails with [`TrainError`].
     pub fn new(task: T, backend: Backend, checkpoint: Option<&[u8]>) -> Result<Self, TrainError> {
         let computer = Computer {
             backend,
@@ -246,7 +246,7 @@ impl<T: Task> Trainer<T> {
     ///
     /// # Errors
     ///
-    /// [`StoreError::Encode`]
+    /// Fails with [`StoreError::Encode`].
     pub fn checkpoint(&self) -> Result<Vec<u8>, StoreError> {
         wrap(CHECKPOINT, &self.state)
     }

@@ -23,7 +23,7 @@ const ENVELOPE: Envelope = Envelope {
     version: 1,
 };
 
-/// Largest number of hidden units accepted in a file.
+/// Maximum number of hidden units accepted in a file.
 const MAX_HIDDEN: usize = 4096;
 
 /// Reason why bytes are not the file of a network.
@@ -88,7 +88,7 @@ impl Network {
     ///
     /// # Errors
     ///
-    /// [`FileError`]
+    /// Fails with [`FileError`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, FileError> {
         let payload = ENVELOPE.open(bytes)?;
         let (words, rest) = payload.as_chunks::<4>();

@@ -64,7 +64,7 @@ pub struct Pass {
 /// Shares of the features, and of the hidden units, that are left out of a step at random.
 const FEATURES_OUT: f32 = 0.15;
 const UNITS_OUT: f32 = 0.5;
-/// Least standard deviation by which a feature is divided.
+/// Minimum standard deviation by which a feature is divided.
 const MIN_DEVIATION: f32 = 0.02;
 /// Number of steps until the full step length is reached.
 const WARM_UP: f32 = 200.0;

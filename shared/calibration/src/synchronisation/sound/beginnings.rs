@@ -13,7 +13,7 @@ const BEFORE: usize = 12;
 const GROWTH: [f64; 2] = [0.5, 3.5];
 /// Minimum number of hops between two beginnings.
 const APART: usize = 25;
-/// Largest number of hops between two beginnings of the same sound.
+/// Maximum number of hops between two beginnings of the same sound.
 const TOGETHER: i64 = 6;
 /// Half the width of the kernel that smooths the peaks of the cosine, in hops; it allows for sources at different distances.
 const SMOOTH: i64 = 4;

@@ -55,7 +55,7 @@ pub struct Motion {
 ///
 /// # Errors
 ///
-/// [`MotionError`].
+/// Fails with [`MotionError`].
 pub fn read_motion(
     file: &Path,
     table: Option<&MarkerTable>,

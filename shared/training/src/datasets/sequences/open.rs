@@ -19,7 +19,7 @@ use crate::datasets::sequences::{
 ///
 /// # Errors
 ///
-/// [`SequenceError`], which names the file.
+/// Fails with [`SequenceError`], which names the file.
 pub fn read(path: &Path, options: &Options) -> Result<Vec<Sequence>, SequenceError> {
     if path.extension().is_some_and(|extension| extension == "toml") {
         return Ok(vec![described::read(path, options)?]);

@@ -84,7 +84,7 @@ impl Sequence {
     /// Keeps some of the frames.
     ///
     /// * `every`: distance between two kept frames, counted from the first.
-    /// * `most`: largest number of frames.
+    /// * `most`: maximum number of frames.
     pub fn thin_out(&mut self, every: usize, most: Option<usize>) {
         let kept = std::mem::take(&mut self.frames).into_iter();
         let kept = kept.step_by(every.max(1));

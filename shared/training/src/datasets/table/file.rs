@@ -67,7 +67,7 @@ impl SkeletonTable {
     ///
     /// # Errors
     ///
-    /// [`SkeletonFileError`]
+    /// Fails with [`SkeletonFileError`].
     pub fn read(path: &Path) -> Result<Self, SkeletonFileError> {
         let text = fs::read_to_string(path).map_err(|source| SkeletonFileError::Io {
             path: path.to_owned(),
@@ -84,7 +84,7 @@ impl SkeletonTable {
     ///
     /// # Errors
     ///
-    /// [`SkeletonFileError`]
+    /// Fails with [`SkeletonFileError`].
     ///
     /// ```
     /// let table = training::datasets::SkeletonTable::parse(

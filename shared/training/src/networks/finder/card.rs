@@ -4,7 +4,7 @@ use super::network::{BOXES, PICTURE, STRIDE, Shape};
 use super::score::Score;
 use crate::networks::pose::{DEVIATION, FILL, MEAN};
 
-/// Least score of a box that is kept.
+/// Minimum score of a box that is kept.
 const LEAST_SCORE: f64 = 0.2;
 /// Overlap (intersection over union) above which the worse of two boxes is dropped. Boxes of people who stand in front of each other can
 /// overlap by more than half.

@@ -112,7 +112,7 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 ///
 /// # Errors
 ///
-/// [`BeginError`]
+/// Fails with [`BeginError`].
 pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
     begun::begun(initial(shape, seed), None, file)
 }

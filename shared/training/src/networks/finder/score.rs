@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::picture::Around;
 
-/// Least overlap (intersection over union) for a found box to match a true one.
+/// Minimum overlap (intersection over union) for a found box to match a true one.
 const SAME: f32 = 0.5;
 /// Overlap with an ignored person above which a box does not count as false.
 const UNASKED: f32 = 0.3;

@@ -41,9 +41,9 @@ pub struct Settings {
 pub struct Vary {
     /// Share of samples that show one picture. People from other pictures are pasted into the other samples.
     pub single: f32,
-    /// Largest number of pasted pictures.
+    /// Maximum number of pasted pictures.
     pub most_pasted: usize,
-    /// Least height of a person, as a share of the height of the shown picture.
+    /// Minimum height of a person, as a share of the height of the shown picture.
     pub least_height: f32,
     /// Largest height of a person, as a share of the height of the shown picture.
     pub most_height: f32,
@@ -90,7 +90,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// The first invalid setting.
+    /// Returns an error for the first invalid setting.
     pub fn check(&self) -> Result<(), SettingsError> {
         let Shape {
             side,

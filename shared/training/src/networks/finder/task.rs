@@ -35,7 +35,7 @@ const JUDGED: usize = 10;
 ///
 /// # Panics
 ///
-/// If the parameters belong to another network.
+/// Panics if the parameters belong to another network.
 pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
     onnx::write(shape, parameters, document(metadata))
 }
@@ -78,11 +78,11 @@ impl<'a> FinderTask<'a> {
     ///
     /// # Errors
     ///
-    /// [`NobodyShown`]
+    /// Fails with [`NobodyShown`].
     ///
     /// # Panics
     ///
-    /// If the card that this crate writes is not valid.
+    /// Panics if the card that this crate writes is not valid.
     pub fn new(
         settings: &'a Settings,
         [learnt, kept]: [&'a [Picture]; 2],

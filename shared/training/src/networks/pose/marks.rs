@@ -13,7 +13,7 @@ const USABLE: f32 = 0.4;
 const ALONE: f32 = 0.5;
 /// Largest distance at which a mark and the teacher agree, in lengths of the trunk.
 const AGREED: f32 = 0.24;
-/// Least distance between left and right joints for a decision about the sides, in lengths of the trunk.
+/// Minimum distance between left and right joints for a decision about the sides, in lengths of the trunk.
 const APART: f32 = 0.23;
 /// The sides of a limb are exchanged if this reduces its distance to the teacher to at most this fraction.
 const NEARER: f32 = 0.6;

@@ -150,7 +150,7 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 ///
 /// # Errors
 ///
-/// [`BeginError`]
+/// Fails with [`BeginError`].
 pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
     crate::networks::begun::begun(initial(shape, seed), Some(OF_EXTRAS), file)
 }

@@ -106,7 +106,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// The first invalid setting.
+    /// Returns an error for the first invalid setting.
     pub fn check(&self) -> Result<(), SettingsError> {
         let shape = &self.shape;
         for (setting, side) in [("shape.width", shape.width), ("shape.height", shape.height)] {

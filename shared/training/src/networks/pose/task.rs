@@ -38,7 +38,7 @@ const JUDGED: usize = 10;
 ///
 /// # Panics
 ///
-/// If the parameters belong to another network.
+/// Panics if the parameters belong to another network.
 pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
     onnx::write(shape, parameters, document(metadata))
 }
@@ -133,7 +133,7 @@ impl<'a> PoseTask<'a> {
     ///
     /// # Errors
     ///
-    /// [`TooFew`]
+    /// Fails with [`TooFew`].
     pub fn new(
         settings: &'a Settings,
         [learnt, kept]: [&'a [Person]; 2],

@@ -41,7 +41,7 @@ impl Judgement {
     ///
     /// # Panics
     ///
-    /// If there are fewer predictions than samples.
+    /// Panics if there are fewer predictions than samples.
     pub fn new(predicted: &[Vec<f32>], truth: &[&Sample], tau: &[f32]) -> Self {
         let n = truth.len();
         let mut judgement = Self {

@@ -67,7 +67,7 @@ pub struct Settings {
     pub unit: Unit,
     /// Loss of the network's output.
     pub loss: Loss,
-    /// Largest number of passes over the samples.
+    /// Maximum number of passes over the samples.
     pub epochs: u32,
     /// Number of passes without improvement in validation after which the training ends.
     pub patience: u32,
@@ -161,7 +161,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// The first setting out of range.
+    /// Returns an error for the first setting that is out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
         let vary = &self.vary;
         let numbers = [

@@ -53,7 +53,7 @@ impl Samples {
     ///
     /// # Errors
     ///
-    /// [`StoreError::Encode`] if there are more than 16 GiB.
+    /// Fails with [`StoreError::Encode`] if there are more than 16 GiB.
     pub fn to_bytes(&self) -> Result<Vec<u8>, StoreError> {
         let payload = Payload {
             tile: self.tile,
@@ -67,7 +67,7 @@ impl Samples {
     ///
     /// # Errors
     ///
-    /// [`SamplesError`]. All returned samples have the expected sizes and finite numbers.
+    /// Fails with [`SamplesError`]. All returned samples have the expected sizes and finite numbers.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, SamplesError> {
         let Payload {
             tile,

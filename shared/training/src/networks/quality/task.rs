@@ -77,7 +77,7 @@ impl<'a> QualityTask<'a> {
     ///
     /// # Errors
     ///
-    /// [`TaskError`]
+    /// Fails with [`TaskError`].
     pub fn new(
         settings: &'a Settings,
         samples: &'a Samples,

@@ -51,7 +51,7 @@ struct Entry {
 ///
 /// # Errors
 ///
-/// If the bytes are not such a file, or belong to another network.
+/// Fails if the bytes are not such a file, or belong to another network.
 pub fn parse(bytes: &[u8]) -> Result<Vec<Parameter>, VggError> {
     let (length, rest) = bytes.split_first_chunk().ok_or(VggError::Truncated)?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok();

@@ -52,7 +52,7 @@ impl Checkpoint {
     ///
     /// # Errors
     ///
-    /// [`CheckpointBytesError::Encode`] if there are more than 4 GiB.
+    /// Fails with [`CheckpointBytesError::Encode`] if there are more than 4 GiB.
     pub fn to_bytes(&self, stamp: u64) -> Result<Vec<u8>, CheckpointBytesError> {
         let payload = bincode::serde::encode_to_vec((stamp, self), configuration());
         let payload = payload.map_err(|error| CheckpointBytesError::Encode(Box::new(error)))?;
@@ -64,7 +64,7 @@ impl Checkpoint {
     ///
     /// # Errors
     ///
-    /// [`CheckpointBytesError`]; truncated bytes, and bytes with one change, are always refused.
+    /// Fails with [`CheckpointBytesError`]; truncated bytes, and bytes with one change, are always refused.
     pub fn from_bytes(bytes: &[u8]) -> Result<(Self, u64), CheckpointBytesError> {
         let payload = ENVELOPE.open(bytes)?;
         let decoded = bincode::serde::decode_from_slice(payload, configuration());

@@ -116,7 +116,7 @@ impl<'a> Body<'a> {
     ///
     /// # Errors
     ///
-    /// The name of the first missing point.
+    /// Returns the name of the first missing point.
     pub(crate) fn new(trial: &'a C3d, measures: Measures) -> Result<Self, String> {
         let marker = |names: &&[&str]| {
             let found = names.iter().find_map(|name| trial.point(name));

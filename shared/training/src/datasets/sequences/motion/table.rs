@@ -56,7 +56,7 @@ impl MarkerTable {
     ///
     /// # Errors
     ///
-    /// [`MotionError::Io`], [`MotionError::Table`].
+    /// Fails with [`MotionError::Io`] or [`MotionError::Table`].
     pub fn read(path: &Path) -> Result<Self, MotionError> {
         let text = std::fs::read_to_string(path).map_err(|source| MotionError::Io {
             path: path.to_owned(),

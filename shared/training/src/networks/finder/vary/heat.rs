@@ -4,9 +4,9 @@ use super::{Around, STRIDE};
 
 /// Standard deviation of the heat around the middle of a box, as a share of its width and height.
 const SPREAD: f32 = 0.08;
-/// Least standard deviation, in cells.
+/// Minimum standard deviation, in cells.
 const LEAST_SPREAD: f32 = 0.7;
-/// Least heat of a cell that belongs to a box.
+/// Minimum heat of a cell that belongs to a box.
 const BOXED: f32 = 0.4;
 /// Size of the central part of an ignored person's box in which cells do not count, as a share of the box's sides.
 const UNASKED: f32 = 0.7;

@@ -2,13 +2,13 @@
 
 use super::{Around, FILL, Picture};
 
-/// Least visible share of a person whom the network should find.
+/// Minimum visible share of a person whom the network should find.
 const SEEN: f32 = 0.3;
 /// Share of a person below which the person counts as invisible.
 const UNSEEN: f32 = 0.04;
-/// Least height of a person, in pixels of the input.
+/// Minimum height of a person, in pixels of the input.
 const LEAST_PX: f32 = 14.0;
-/// Largest number of pixels, across and down, that are averaged for a pixel of the input.
+/// Maximum number of pixels, across and down, that are averaged for a pixel of the input.
 const MOST_MEAN: usize = 16;
 
 /// A picture and its placement in the sample.
