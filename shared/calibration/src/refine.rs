@@ -27,8 +27,8 @@ use held_out::{Blocks, chosen};
 
 /// A camera is changed if its standard deviation is below this fraction of the prior's standard deviation.
 const TOLD: f64 = 0.8;
-/// A camera counts as moved if freeing its pose improves the fit of the joints by the first value, as a fraction. The gain must also exceed
-/// that of any other camera by the second value, as a factor.
+/// A camera counts as moved if freeing its pose improves the fit of the joints by the first value, as a fraction. The gain must also be
+/// larger than the gain of any other camera by the second value, as a factor.
 const SUSPECT: [f64; 2] = [0.15, 1.5];
 
 /// Settings of a refinement.

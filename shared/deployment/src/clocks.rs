@@ -22,7 +22,7 @@ pub enum ClocksError {
     /// The file is not valid TOML.
     #[error("the file is no longer valid TOML")]
     Syntax,
-    /// The file has no camera of that name.
+    /// The file has no camera with that name.
     #[error("the file has no [[camera]] named {name:?}")]
     NoCamera {
         /// Name of the missing camera.

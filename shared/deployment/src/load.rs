@@ -22,7 +22,7 @@ pub struct Loaded {
 impl Loaded {
     /// Reads the text of a deployment file; `set` has `key=value` pairs that replace its values.
     ///
-    /// * `file`: file that contains the text. All relative paths are relative to it, including those in `set`.
+    /// * `file`: file that contains the text. Relative paths, including those in `set`, are relative to the folder of this file.
     ///
     /// # Errors
     ///
@@ -168,7 +168,7 @@ fn overrides(set: &[String]) -> Result<Table, ConfigError> {
     Ok(table)
 }
 
-/// Replaces values of `table` by those of `over`, key by key.
+/// Replaces values of `table` by the values of `over`, key by key.
 fn merge(table: &mut Table, over: Table) {
     for (key, value) in over {
         match (table.get_mut(&key), value) {

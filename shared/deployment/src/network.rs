@@ -14,7 +14,8 @@ use crate::shipped::{SHIPPED, relative_to};
 pub struct Config {
     /// Network that finds joints: `"shipped"`, or an ONNX file with its card in its metadata or beside it (`.toml` for `.onnx`).
     pub file: PathBuf,
-    /// Detector that finds people: `"shipped"`, or an ONNX file with its card in its metadata or beside it. It gives boxes to the network.
+    /// Detector that finds people: `"shipped"`, or an ONNX file with its card in its metadata or beside it. The detector gives boxes to the
+    /// network.
     pub detector: PathBuf,
     /// Interval between searches for people, in frames. By default, there are two searches per second, or eight while people are near each
     /// other or just after a person has appeared or left.

@@ -40,7 +40,7 @@ pub struct Config {
     pub workers: usize,
     /// How the poses of a view's pairs are combined: `mean`, as published, or `consensus`, the pose that most views support.
     pub combine: Combine,
-    /// Energy that links two views: that of the `paper`, or that of the authors' `released` program.
+    /// Energy that links two views: the energy of the `paper`, or that of the authors' `released` program.
     pub energy: Energy,
     /// Weight of the geometric term; by default, the learned weight; without one, 0.002 per squared cell (`paper`) or 0.07 (`released`).
     pub alpha: Option<f64>,

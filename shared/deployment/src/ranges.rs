@@ -13,8 +13,8 @@ const DAY_S: f64 = 86_400.0;
 /// Maximum number of frames of any footage: a thousand years of video.
 const MOST_FRAMES: f64 = 1e12;
 
-/// Keys with their minimum and maximum. The value of a key is a number, a list of numbers or a table of numbers; for `camera`, the
-/// range is that of the list's length.
+/// Keys with their minimum and maximum. The value of a key is a number, a list of numbers or a table of numbers; for `camera`, the range
+/// limits the length of the list.
 ///
 /// The ranges of whole numbers are also given as `f64`, which represents all of them exactly.
 pub(crate) const RANGES: [(&str, f64, f64); 26] = [

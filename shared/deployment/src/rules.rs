@@ -305,7 +305,7 @@ fn runtime(deployment: &Deployment) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// Checks that a name is that of a service or of a process of the deployment.
+/// Checks that a name is the name of a service or of a process of the deployment.
 fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Complaint> {
     let services = services(deployment);
     let is_one = services.iter().any(|&(service, n)| {

@@ -207,9 +207,9 @@ fn output(calibrated: [u32; 2], wanted: OutSize) -> Result<([u32; 2], f64), Fram
 
 /// Returns the roll with which the world's up direction points up in the picture, at the focus of the rig.
 ///
-/// The vector from half a metre below to half a metre above the rig's focus is projected with the lens. [`Framing`] with the returned
-/// angle shows it vertical. If the focus is not in view, a point on the camera's own axis is used. The angle is in radians in (-π, π],
-/// clockwise.
+/// The vector from half a metre below to half a metre above the rig's focus is projected with the lens. A [`Framing`] with the returned
+/// angle shows this vector as vertical. If the focus is not in view, a point on the camera's own axis is used. The angle is in radians in
+/// (-π, π], clockwise.
 ///
 /// Returns `None` if the rig has no up direction, or if the camera looks straight up or down.
 pub fn upright_roll(camera: &Camera, rig: &Rig) -> Option<f64> {

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector
 
 use crate::{Camera, Intrinsics};
 
-/// Maximum focal length, in image sizes: a hundred times that of the longest telephoto lens.
+/// Maximum focal length, in image sizes: a hundred times the focal length of the longest telephoto lens.
 const FOCAL_LIMIT: f64 = 1e4;
 /// Maximum lens coefficient. Calibrations that fit noise have coefficients in the thousands.
 const COEFFICIENT_LIMIT: f64 = 1e7;

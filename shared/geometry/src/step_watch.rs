@@ -179,7 +179,7 @@ impl StepWatch {
         let all: f64 = kept.iter().map(weight).sum();
         let sum: f64 = kept.iter().map(|estimate| weight(estimate) * estimate.offset_s).sum();
         let offset = sum / all;
-        // The error is the larger of that stated by the samples and that from the scatter of the estimates.
+        // Two errors are known, from the samples and from the scatter of the estimates; the larger is used.
         let off = |estimate: &Estimate| (weight(estimate) * (estimate.offset_s - offset)).powi(2);
         let scatter = kept.iter().map(off).sum::<f64>() * n / (n - 1.0) / (all * all);
         let error = scatter.max(1.0 / all).sqrt().max(MIN_ERROR_S);

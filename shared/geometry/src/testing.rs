@@ -37,7 +37,7 @@ pub(crate) fn lens() -> impl Strategy<Value = Lens> {
     lens_model().prop_map(Lens::new)
 }
 
-/// Generates cameras of 640x480, 4 to 6 m from the origin in any direction, looking at it, with some roll.
+/// Generates cameras of 640x480, 4 to 6 m from the origin in any direction, looking at the origin, with some roll.
 pub(crate) fn camera() -> impl Strategy<Value = Camera> {
     let inside = (500.0..900.0, 0.9..1.1, 300.0..340.0, 220.0..260.0, lens());
     let place = (0.0..std::f64::consts::TAU, 4.0..6.0, -0.5..1.5, -0.6..0.6);

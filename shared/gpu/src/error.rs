@@ -37,7 +37,7 @@ pub enum Unsuitable {
     /// The device is too small.
     #[error("the GPU has a limit of {has} {what}, but {needed} are needed")]
     TooSmall {
-        /// Unit of both numbers, and its use.
+        /// Unit and purpose of both numbers.
         what: &'static str,
         /// The number needed.
         needed: u64,

@@ -106,7 +106,7 @@ impl View {
     /// Searches an image.
     ///
     /// * `levels`: returns the levels whose evidence the given candidates need.
-    /// * `evidence`: [`Layout::n_responses`] values. Only those of the returned levels are written.
+    /// * `evidence`: [`Layout::n_responses`] values. Only the values of the returned levels are written.
     ///
     /// # Errors
     ///

@@ -24,7 +24,7 @@ pub struct Session {
 pub enum RunBy {
     /// Parallax itself runs the convolutions, and `rten` the later layers.
     Parallax,
-    /// All layers are run by `rten`, for this reason why Parallax does not run the convolutions.
+    /// `rten` runs all layers. The text is the reason why Parallax does not run the convolutions.
     Rten(String),
     /// ONNX Runtime.
     OnnxRuntime(Place),

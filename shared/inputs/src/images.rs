@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use failure::{ExitKind, Failure, in_file};
 
-/// Returns the named images; those in folders are in the order of their names.
+/// Returns the named images; images in a folder are in the order of their names.
 ///
 /// # Errors
 ///

@@ -193,8 +193,8 @@ pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Fa
     Ok(Some(learned))
 }
 
-/// Reads the network that estimates the direction in which a person faces. Returns `None` for the name `none`, and for the shipped
-/// network if the model has other parts than those it was trained for.
+/// Reads the network that estimates the direction in which a person faces. Returns `None` for the name `none`, and for the shipped network
+/// if the parts of the model are not those that this network was trained for.
 ///
 /// # Errors
 ///

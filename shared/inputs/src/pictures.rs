@@ -132,7 +132,7 @@ pub struct Searched {
     layout: Layout,
     /// Number of pixels of the picture per searched pixel.
     per_pixel: [f64; 2],
-    /// Pixels of the searched image; `None` if they are those of the picture.
+    /// Pixels of the searched image; `None` if the picture itself is searched.
     smaller: Option<Vec<u8>>,
 }
 

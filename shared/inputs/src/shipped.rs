@@ -82,7 +82,7 @@ impl Shipped {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 
-    /// Reads a file of this kind; `shipped` means the shipped one.
+    /// Reads a file of this kind; `shipped` means the shipped file.
     ///
     /// # Errors
     ///

@@ -59,7 +59,7 @@ fn rule() -> MessageRule {
     MessageRule::new(N_TYPES, springs(), choices.collect())
 }
 
-/// Synthetic responses with the spread of those of trained filters.
+/// Synthetic responses with the same spread as the responses of trained filters.
 fn maps(grid: Grid) -> Vec<Vec<f32>> {
     let mut noise = 1_u64;
     let mut next = || {

@@ -61,7 +61,7 @@ impl Bump {
         f64::from(self.heat) * (-0.5 * (xx * x * x + 2.0 * xy * x * y + yy * y * y)).exp()
     }
 
-    /// Range of cells where the Gaussian is not cut off, for columns and for rows: the first and the one after the last.
+    /// Range of cells where the Gaussian is not cut off, for columns and for rows: the first cell, and the cell after the last.
     ///
     /// * `size`: number of columns and rows.
     fn extent(&self, size: [usize; 2]) -> [[usize; 2]; 2] {

@@ -6,7 +6,7 @@ use crate::maps::{JointMaps, MapSettings};
 use crate::network::{LookError, PoseNetwork, Turn, Workspace};
 use crate::outline::overlap;
 
-/// Largest overlap of two boxes for which a second run is worthwhile. Boxes with more overlap show the network the same.
+/// Largest overlap of two boxes for which a second run is worthwhile. Boxes that overlap more show the network nearly the same picture.
 const FITS: f64 = 0.8;
 /// Largest loss of mean joint heat, 0 to 1, that is accepted for a box that fits better.
 const FAINTER: f64 = 0.1;

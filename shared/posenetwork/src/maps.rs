@@ -76,7 +76,7 @@ pub struct JointMaps {
     window: Option<Window>,
     /// Peak of each joint's map, in pixels of the picture, with its heat from 0 to 1.
     peaks: Vec<Option<Keypoint>>,
-    /// All keypoints, in pixels of the picture; their scores mean the same as those of the peaks.
+    /// All keypoints, in pixels of the picture; their scores have the same meaning as the scores of the peaks.
     keypoints: Vec<Option<Keypoint>>,
     /// The expected error of each joint according to the network, in pixels of the picture; empty if the network does not give it.
     told: Vec<Option<f64>>,

@@ -399,7 +399,7 @@ impl<'a> Sight<'a> {
     fn also(&self, name: Option<&str>) -> Option<&'a Tensor> {
         let name = name?;
         let names = self.network.outputs.iter().zip(self.outputs);
-        // These outputs follow those of the codec.
+        // These outputs come after the outputs of the codec.
         names.rev().find(|output| output.0.as_str() == name).map(|name| name.1)
     }
 

@@ -14,7 +14,7 @@ pub(crate) struct FilterSettings {
     pub cost: f64,
     /// Cost of a positive window that misses its margin, as a multiple of the cost of a negative window.
     pub positive_weight: f64,
-    /// Stopping criterion of each machine.
+    /// Stopping criterion for the training of each machine.
     pub effort: Effort,
     /// Seed of the random order of steps.
     pub seed: u64,

@@ -27,7 +27,7 @@ pub struct Settings {
     pub interval: usize,
     /// Levels per octave on which images without people are searched.
     pub mining_interval: usize,
-    /// Cost per unit of a negative that scores above -1 (the `C` of the machine).
+    /// Cost per unit by which a negative scores above -1 (the `C` of the machine).
     pub cost: f64,
     /// Cost of a person who scores below 1, as a multiple of the cost of a negative.
     pub positive_weight: f64,
@@ -49,7 +49,7 @@ pub struct Settings {
     pub per_image: usize,
     /// Number of background images that are searched between two solutions.
     pub batch: usize,
-    /// Number of rounds in which the types of the parts are those of the clusters.
+    /// Number of rounds in which every part keeps the type of its cluster.
     pub fixed_rounds: usize,
     /// Number of later rounds in which the model chooses the types.
     pub latent_rounds: usize,

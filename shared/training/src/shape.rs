@@ -33,8 +33,8 @@ pub struct Shape {
 /// Layout of the vector of a [`Shape`]: all filters, the quadratic and the linear coefficients of all springs,
 /// the biases of all pairs of types, and the root's bias.
 ///
-/// The trained vector is not the model's parameter `w` but `v = (w - w_0) r`, where `w_0` is the least
-/// stiffness and `r` the scale of the root's bias. The minimised norm is that of `v`.
+/// The trained vector is not the model's parameter `w` but `v = (w - w_0) r`, where `w_0` is the least stiffness and `r` the scale of the
+/// root's bias. The norm that is minimised is the norm of `v`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coordinates {
     first_type: Vec<usize>,
@@ -149,7 +149,7 @@ impl Coordinates {
         self.root + 1
     }
 
-    /// Returns true if the vector is empty. It never is, since the root has a bias.
+    /// Returns true if the vector is empty. This is never the case, since the root has a bias.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -45,7 +45,7 @@ pub struct Forecast {
 /// Reason why there is no prediction for a frame.
 #[derive(Debug, thiserror::Error)]
 pub enum ForecastError {
-    /// There is no candidate, or the network is not made for such poses.
+    /// There is no candidate, or the network is not made for poses of this kind.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
     /// The box around the pose is empty or not finite.

@@ -11,7 +11,7 @@ const STILL_SIGMAS: f64 = 2.0;
 /// Assumed speed of a board that is seen in one picture only, in pixels per frame.
 const UNKNOWN_PX: f64 = 100.0;
 
-/// Returns the factor by which the standard deviation of a corner is larger than that of a board that stands still.
+/// Returns the factor by which the standard deviation of a corner is larger than for a board that stands still.
 ///
 /// If a board moved between two pictures of a frame, all its corners share the same error. A sight therefore says no more about this
 /// error than a single corner would.

@@ -24,7 +24,7 @@ pub(crate) struct Pair {
 const SAME_TURN: f64 = 0.1;
 const SAME_SHIFT: f64 = 0.15;
 
-/// Finds the pose that most meetings agree with, and returns the mean of these.
+/// Finds the pose that the largest number of meetings agrees with, and returns the mean over these meetings.
 pub(crate) fn pair(meetings: &[Meeting]) -> Option<Pair> {
     let step = meetings.len().div_ceil(60).max(1);
     let candidates = meetings.iter().step_by(step).flat_map(|meeting| meeting.a_from_b.iter());

@@ -21,7 +21,7 @@ pub(crate) struct Observation {
     pub(crate) on_board: Point3<f64>,
     /// Position in the picture, in pixels.
     pub(crate) seen: Point2<f64>,
-    /// Factor by which the standard deviation is larger than that of a corner of a board that stands still.
+    /// Factor by which the standard deviation is larger than for a board that stands still.
     pub(crate) spread: f64,
 }
 

@@ -201,7 +201,7 @@ fn each_alone(
     Ok(outcome)
 }
 
-/// Returns the known intrinsics, or those from the camera's own boards.
+/// Returns the known intrinsics, or the intrinsics estimated from the camera's own boards.
 fn first_intrinsics(
     task: &Task,
     camera: usize,

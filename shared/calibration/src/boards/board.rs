@@ -15,11 +15,11 @@ const USUAL_TAGS: &str = "DICT_APRILTAG_36h11";
 /// Pattern of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Black and white squares; the counts are those of inner corners.
+    /// Black and white squares; columns and rows are counted in inner corners.
     Chessboard,
-    /// Black and white squares with a marker in each white one; the counts are those of squares.
+    /// Black and white squares with a marker in each white one; columns and rows are counted in squares.
     Charuco,
-    /// Markers side by side; the counts are those of markers.
+    /// Markers side by side; columns and rows are counted in markers.
     Grid,
 }
 

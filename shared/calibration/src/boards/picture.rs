@@ -46,7 +46,7 @@ impl Picture {
         &self.pixels
     }
 
-    /// Returns the grey value of a pixel; outside the picture, that of the nearest pixel.
+    /// Returns the grey value of a pixel; outside the picture, the grey value of the nearest pixel.
     pub(crate) fn at(&self, x: isize, y: isize) -> f64 {
         let x = x.clamp(0, self.width as isize - 1) as usize;
         let y = y.clamp(0, self.height as isize - 1) as usize;

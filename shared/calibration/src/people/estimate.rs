@@ -27,7 +27,7 @@ const MOST_BONES: f64 = 0.2;
 /// Reason why a recording cannot be used at all.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PeopleError {
-    /// There is only one camera, or the number of films differs from that of cameras.
+    /// There is only one camera, or the number of films differs from the number of cameras.
     #[error(
         "{cameras} cameras with {films} films: at least 2 cameras are needed, each with its film"
     )]
@@ -37,7 +37,7 @@ pub enum PeopleError {
         /// Number of films.
         films: usize,
     },
-    /// There are fewer joints than a body has, or the number of sides differs from that of joints.
+    /// There are fewer joints than a body has, or the number of sides differs from the number of joints.
     #[error("{joints} joints with {sides} sides: at least {least} joints are needed, each with its side", least = N_JOINTS)]
     Joints {
         /// Number of joints.

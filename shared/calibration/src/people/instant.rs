@@ -57,7 +57,7 @@ impl Instant {
     }
 }
 
-/// Triangulates the joints of an instant that at least two cameras see.
+/// Triangulates those joints of an instant that at least two cameras see.
 pub(super) fn instant(
     cameras: &[Camera],
     seen: &[Vec<Option<Sight>>],

@@ -121,7 +121,7 @@ impl Chain {
     }
 }
 
-/// Returns the people that a camera sees longest, those with the best visibility first.
+/// Returns the people that a camera sees longest, in descending order of visibility.
 pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: f64) -> Vec<Chain> {
     let own_s = self::interval_s(film).unwrap_or(interval_s);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
@@ -329,7 +329,7 @@ mod tests {
                 }
             }
             let correlation = both / (squares[0] * squares[1]).sqrt();
-            // The correlation is over about 8000 numbers.
+            // The correlation is computed from about 8000 numbers.
             assert!(correlation.abs() < 0.04, "{correlation} at {phase} s");
         }
     }

@@ -18,7 +18,7 @@ pub enum Doubt {
     Unconnected {
         /// Index of the camera.
         camera: usize,
-        /// Number of joints that the camera sees together with others.
+        /// Number of joints that the camera sees together with other cameras.
         n: usize,
         /// Minimum number of joints.
         least: usize,

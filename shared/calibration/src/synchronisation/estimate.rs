@@ -63,7 +63,7 @@ pub struct CameraClock {
 pub struct PairReport {
     /// Indices of the two cameras.
     pub cameras: [usize; 2],
-    /// Offset of the pair in the common solution: that of the first camera minus that of the second, in seconds.
+    /// Offset of the pair in the common solution, in seconds: the offset of the first camera minus the offset of the second.
     pub offset_s: f64,
     /// Best offset of the pair alone, in seconds.
     pub best_s: f64,
@@ -295,7 +295,7 @@ impl Study<'_> {
         }
     }
 
-    /// Returns the common time in which at least two cameras see people.
+    /// Returns the span of common time in which at least two cameras see people.
     fn span(&self, clocks: &[Clock]) -> [f64; 2] {
         let (mut starts, mut ends) = (Vec::new(), Vec::new());
         for &camera in self.active {

@@ -35,7 +35,7 @@ pub struct Joint {
 /// Reason why films cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilmError {
-    /// The number of films differs from that of cameras.
+    /// The number of films differs from the number of cameras.
     #[error("{films} films were given for {cameras} cameras")]
     Number {
         /// Number of films.

@@ -14,7 +14,7 @@ const MOST_TIMES: usize = 300;
 /// Half-widths of the parabolas that are fitted to the costs, in seconds: wide for slow movement, narrow for fast movement. The one with
 /// the smallest standard errors is used.
 const REACHES_S: [f64; 4] = [0.16, 0.08, 0.04, 0.02];
-/// Largest half-width as a fraction of the footage, because joints must be visible over the whole width.
+/// Largest half-width, as a fraction of the footage. It is limited because joints must be visible over the whole width.
 const MOST_REACH: f64 = 0.05;
 /// Change of offsets above which costs are computed again, in seconds.
 const MOVED_S: f64 = 0.005;

@@ -118,7 +118,7 @@ fn spread(n_cameras: usize, peaks: &[(f64, [usize; 2], f64)]) -> Vec<f64> {
         if of_a == of_b {
             continue;
         }
-        // The offset of a pair is that of the first camera minus that of the second.
+        // The offset of a pair is the offset of the first camera minus the offset of the second.
         let by = offsets_s[a] - offset_s - offsets_s[b];
         for camera in 0..n_cameras {
             if tree[camera] == of_b {

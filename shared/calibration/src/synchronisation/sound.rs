@@ -61,8 +61,8 @@ pub struct SoundSettings {
 
 /// Estimates the clocks from sounds.
 ///
-/// In the [`Outcome`], residuals are NaN, and `n` is the number of beginnings of sounds that a camera shares with others. Costs are one
-/// minus the cosine between the beginnings of two cameras.
+/// In the [`Outcome`], residuals are NaN, and `n` is the number of beginnings of sounds that a camera shares with other cameras. Costs are
+/// one minus the cosine between the beginnings of two cameras.
 ///
 /// * `sounds`: recordings of the cameras, in order.
 ///

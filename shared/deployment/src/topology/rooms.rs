@@ -53,9 +53,9 @@ pub struct Room {
     pub topic: String,
     /// Content of the topic.
     pub content: Content,
-    /// Number of processes that may receive the topic at the same time; at least those of the deployment.
+    /// Number of processes that may receive the topic at the same time; at least the number of its receivers in the deployment.
     pub receivers: usize,
-    /// Number of extra receivers of the topic; no sender waits for them.
+    /// Number of extra receivers of the topic, for which no sender waits.
     pub onlookers: usize,
     /// Number of messages that may wait for one receiver.
     pub queued: usize,
@@ -79,8 +79,8 @@ pub struct ViewSize {
 }
 
 impl Topology {
-    /// Returns the capacity of all topics between processes: those of every view, of every worker, and of the result. Topics of expected
-    /// errors are included even if no process publishes any.
+    /// Returns the capacity of all topics between processes: the topics of every view, of every worker, and of the result. Topics of
+    /// expected errors are included even if no process publishes any.
     ///
     /// * `mode`: behaviour of a stage that is slower than its input.
     /// * `views`: sizes of every view of the deployment.

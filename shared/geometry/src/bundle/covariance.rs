@@ -46,7 +46,7 @@ fn listed(directions: &[Vec<String>]) -> String {
 
 /// Returns the covariance of the shared parameters at the current values, with all local blocks unknown.
 ///
-/// The weights of losses are those at the current values.
+/// The weights of losses are taken at the current values.
 ///
 /// # Errors
 ///

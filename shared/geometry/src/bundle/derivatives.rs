@@ -79,7 +79,7 @@ fn compared<P: Problem>(
     .fold(0.0, f64::max)
 }
 
-/// Returns the values of all terms, or of those of one block.
+/// Returns the values of all terms, or of the terms of one block.
 fn terms<P: Problem>(
     problem: &P,
     local: Option<usize>,

@@ -69,7 +69,7 @@ impl Equations {
             n_residuals: 0,
             weights: [0.0; 2],
         };
-        // Position of each shared parameter among those of the block; n if it is not among them.
+        // Position of each shared parameter among the parameters of the block; n if the block does not depend on it.
         let mut places = vec![n; n];
         let each = problem.locals().into_iter().enumerate();
         for (local, size) in each.filter(|block| is_wanted(block.0)) {

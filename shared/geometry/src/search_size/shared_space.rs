@@ -7,7 +7,7 @@ use crate::{Camera, Rig};
 
 /// Height of a standing person, in metres.
 pub const PERSON_METRES: f64 = 1.7;
-/// Number of sample points on the rays of a camera: cells of its image in either direction, and depths.
+/// Numbers of sample points: cells of a camera's image in either direction, and depths along each ray.
 const CELLS: usize = 9;
 const DEPTHS: usize = 24;
 /// Maximum height of a person who must be entirely in the image, and of one who may be cut off, relative to the image's side along the
@@ -136,7 +136,7 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
     found.or_else(|| BOUNDS.iter().find_map(|bound| fewer.clone().find_map(|n| of(n, *bound))))
 }
 
-/// Returns positions on the rays of all cameras that at least two of them see.
+/// Returns positions on the rays of all cameras. Each position is seen by at least two cameras.
 fn places(rig: &Rig, is_whole: bool) -> Vec<Place> {
     let (up, focus) = (rig.up_in_world(), aim(rig));
     let viewpoint = |camera| Viewpoint::new(camera, up, focus, is_whole);

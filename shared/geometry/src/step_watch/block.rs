@@ -27,7 +27,7 @@ struct Pair {
     views: [usize; 2],
     /// Essential matrix; `None` for cameras in one place.
     essential: Option<Matrix3<f64>>,
-    /// Sums over all samples, then those of every point.
+    /// Sums over all samples, followed by the sums over the samples of each point.
     all: Sums,
     points: Vec<Sums>,
     /// Sum of the squared longer sides.

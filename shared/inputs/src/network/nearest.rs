@@ -14,7 +14,7 @@ pub fn nearest(description: &Description) -> Vec<&'static str> {
     best(&rated.collect::<Vec<_>>())
 }
 
-/// Works like [`nearest`] for the cards of `configs/detectors` whose input and output can be those of the network.
+/// Works like [`nearest`] for the cards of `configs/detectors` whose input and output can match the network.
 pub fn nearest_detectors(description: &Description) -> Vec<&'static str> {
     let rated = SHIPPED_DETECTORS.iter().filter_map(|(name, text)| {
         let card = DetectorCard::parse(text).ok()?;

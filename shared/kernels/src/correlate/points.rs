@@ -16,10 +16,10 @@ const MAX_PAIRS: usize = 4;
 /// `w(x^2)` for 0, `x w(x^2)` for infinity, and `x^2 v_p(x^2) + p x v_p(x^2)` for `p`.
 /// Even and odd values of a line are therefore only combined in the last addition.
 ///
-/// All numbers here are exact in single precision: the points are `1`, `2`, `1/2` for tiles of 8 and
-/// `1`, `5/2`, `5/4`, `5/16` for tiles of 10. For tiles of 10, sets of fractions up to 4 were tried. The smallest
-/// [`amplification`](Self::amplification) is that of `1/4` in place of `5/16`. The chosen set is within a twentieth of it,
-/// and its measured error is smaller by a third. The usual `1`, `2`, `1/2`, `4` amplifies 4 times as much.
+/// All numbers here are exact in single precision: the points are `1`, `2`, `1/2` for tiles of 8 and `1`, `5/2`, `5/4`, `5/16` for tiles of
+/// 10. For tiles of 10, sets of fractions up to 4 were tried. The set with `1/4` in place of `5/16` has the smallest
+///     [`amplification`](Self::amplification). The chosen set is within a twentieth of this value, and its measured error is smaller by a
+///     third. The usual `1`, `2`, `1/2`, `4` amplifies 4 times as much.
 #[derive(Debug, Clone)]
 pub(super) struct Points {
     pub(super) n_pairs: usize,

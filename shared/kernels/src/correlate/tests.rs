@@ -109,7 +109,7 @@ impl Problem {
     }
 }
 
-/// The largest absolute cell of each channel less than ten cells away from those of a placement.
+/// For each channel, the largest absolute value in the cells that are less than ten cells away from those of a placement.
 fn largest_near(level: Level<'_>, filter: [usize; 2], at: [usize; 2]) -> [f64; N_CHANNELS] {
     let near =
         |axis: usize, n: usize| at[axis].saturating_sub(9)..n.min(at[axis] + filter[axis] + 9);

@@ -175,7 +175,7 @@ fn a_small_or_strange_box_has_maps_too() {
 fn frames_after_the_first_need_no_further_memory() {
     let mut maps = maps(&person());
     let before = [maps.values.capacity(), maps.peaks.capacity()];
-    // The widest grid possible.
+    // The widest possible grid.
     let mut wide = vec![None; 25];
     for (nth, x) in [(0, 0.0), (1, 5000.0)] {
         wide[nth] = Some(Keypoint {

@@ -33,7 +33,8 @@ impl Turn {
         quarters * core::f64::consts::FRAC_PI_2
     }
 
-    /// The direction nearest to that of the head. `self` is kept if it differs from the head's direction by at most `most`, in radians.
+    /// Returns the direction nearest to the direction of the head. `self` is kept if it differs from the head's direction by at most
+    /// `most`, in radians.
     ///
     /// * `towards`: direction of the head, in pixels of the picture, across and down.
     pub(crate) fn towards(self, [x, y]: [f64; 2], most: f64) -> Self {
@@ -67,7 +68,7 @@ impl Turn {
         }
     }
 
-    /// Rotates the values of a window to those of the input.
+    /// Rotates the values of a window into the orientation of the input.
     ///
     /// * `window`: width and height of the window, in pixels.
     /// * `memory`: reused from picture to picture.

@@ -9,7 +9,7 @@ pub struct ReadOptions {
     pub only: Option<Selection>,
     /// The people to leave out, such as a test set.
     pub without: Option<Selection>,
-    /// Number of joints of a person; if `None`, that of the first person.
+    /// Number of joints of a person; if `None`, the number of joints of the first person.
     pub n_joints: Option<usize>,
     /// Largest accepted distance of a joint outside the image, in pixels. Hand-marked joints are up to 2 px outside.
     pub outside_px: f64,

@@ -63,7 +63,7 @@ pub enum DatasetError {
     /// People have a fault of a fatal kind.
     #[error("{n_fatal} of {n_people} people have a fault of a fatal kind")]
     Fatal {
-        /// Number of people with such a fault.
+        /// Number of people with a fault of a fatal kind.
         n_fatal: usize,
         /// Number of people in the data set.
         n_people: usize,

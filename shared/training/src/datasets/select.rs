@@ -42,7 +42,7 @@ pub enum SelectError {
         /// The file.
         path: PathBuf,
     },
-    /// No person is on the named image.
+    /// The named image shows no person of the data set.
     #[error("{name} of the selection is not an image of {}", data.display())]
     NoSuchImage {
         /// Name of the image.

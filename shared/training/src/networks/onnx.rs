@@ -75,7 +75,7 @@ fn ints(all: &[usize]) -> Attribute {
 #[derive(Debug, Clone)]
 struct Value {
     name: String,
-    /// Dimensions without the batch.
+    /// Dimensions, without the dimension of the batch.
     dims: Dims,
 }
 

@@ -17,7 +17,7 @@ const MOMENTUM_OF_STATISTICS: f32 = 0.05;
 pub(crate) struct Schedule {
     /// Number of steps.
     pub(crate) steps: usize,
-    /// Share of the steps, from the first, in which the length rises.
+    /// Share of the steps, counted from the first, in which the step length rises.
     pub(crate) rising: f32,
     /// Length of the longest step.
     pub(crate) longest: f32,

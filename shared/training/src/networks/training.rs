@@ -84,7 +84,7 @@ pub trait Task: Sync {
     fn restarts(&self, _nth: usize) -> bool {
         false
     }
-    /// Returns for every parameter true if the step trains it.
+    /// Returns, for every parameter, true if the step trains it.
     fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool>;
     /// Returns how a step changes the parameters.
     fn step(&self, nth: usize) -> Step;

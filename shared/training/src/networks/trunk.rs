@@ -1,8 +1,8 @@
 //! The residual network over a picture, used by the networks for joints and for people.
 //!
-//! The convolutions are not followed by batch normalisation. Their weights are standardised instead (Brock et al. 2021,
-//! "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`"). Every residual block begins
-//! as the identity.
+//! The convolutions are not followed by batch normalisation. Their weights are standardised instead (Brock et al. 2021, "Characterizing
+//! signal propagation to close the performance gap in unnormalized `ResNets`"). At the start of a training run, every residual block is the
+//! identity.
 
 use crate::networks::ops::{Conv, Ops, Scaling};
 

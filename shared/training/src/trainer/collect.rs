@@ -64,7 +64,7 @@ impl Trainer<'_> {
         })
     }
 
-    /// The current model, with the interval for background images.
+    /// The current model, with the pyramid interval for background images.
     fn mining_model(&self) -> Result<Model, TrainError> {
         let shape = Shape {
             interval: self.settings.mining_interval,

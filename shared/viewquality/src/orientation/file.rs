@@ -11,7 +11,7 @@
 //! | 2 x units, f32 | weights of the outputs |
 //! | 2, f32 | biases of the outputs |
 //!
-//! All values are little-endian. They follow the checked header of [`formats::checksum::Envelope`].
+//! All values are little-endian. They follow the header with a checksum, [`formats::checksum::Envelope`].
 
 use formats::checksum::{Envelope, EnvelopeError};
 

@@ -6,7 +6,7 @@ use crate::synchronisation::doubt::Doubt;
 use crate::synchronisation::refine::{Fit, Problem};
 use crate::synchronisation::search::{Found, Rival, peak, second};
 
-/// Minimum number of joints that a camera must see together with others, in both directions.
+/// Minimum number of joints that a camera must see together with other cameras, in both directions.
 const LEAST_JOINTS: usize = 200;
 /// Limits of the second-best offset: its gain relative to the best, and its distance in standard errors.
 const MOST_RATIO: f64 = 0.8;

@@ -19,7 +19,7 @@ const MOST_STEPS: usize = 20;
 /// Largest and smallest change of offsets in a step, in seconds.
 const STEPS_S: [f64; 2] = [0.02, 1e-5];
 
-/// Cost of a joint in two cameras by delay of the second, in a block of time.
+/// Cost of a joint in two cameras, by delay of the second camera, in a block of time.
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
     cameras: [usize; 2],

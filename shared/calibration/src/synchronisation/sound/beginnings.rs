@@ -40,7 +40,7 @@ pub(super) struct Match {
     pub(super) first_s: f64,
     /// Smoothed cosine between both recordings by offset; NaN if they hardly overlap.
     pub(super) cosines: Vec<f64>,
-    /// Best offset in seconds. It is added to a time of the first recording to get that of the second.
+    /// Best offset in seconds. It is added to a time of the first recording to get the time of the second.
     pub(super) offset_s: f64,
     /// Cosine at the best offset.
     pub(super) cosine: f64,

@@ -72,9 +72,9 @@ impl Drift {
     }
 }
 
-/// Compares the parts of a recording with those of another.
+/// Compares the parts of a recording with the parts of another recording.
 ///
-/// * `offset_s`: common offset, to add to times of the reference to get those of the camera.
+/// * `offset_s`: common offset; a time of the reference plus this offset is the time of the camera.
 /// * `way_s`: travel time of sound from one camera to the other.
 pub(super) fn parts(
     reference: &Beginnings,

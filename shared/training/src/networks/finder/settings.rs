@@ -19,7 +19,7 @@ pub struct Settings {
     pub batch: usize,
     /// Number of steps of the training.
     pub steps: usize,
-    /// Share of the steps, from the first, that use inputs of three quarters of the side.
+    /// Share of the steps, counted from the first, with inputs of three quarters of the full side.
     pub small: f32,
     /// Length of the longest step. It is reached after a twentieth of the training, and then decreases as a cosine.
     pub rate: f32,

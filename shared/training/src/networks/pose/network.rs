@@ -13,7 +13,7 @@ use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::trunk::{Trunk, block, plain, with_gain};
 
-/// Number of joints with a map: those of [`PARSE14`], in its order.
+/// Number of joints with a map: all joints of [`PARSE14`], in its order.
 pub const N_JOINTS: usize = PARSE14.joints.len();
 /// Names of the keypoints whose maps follow those of the joints.
 pub const EXTRAS: [&str; 5] = [
@@ -31,7 +31,7 @@ pub(crate) const OF_EXTRAS: &str = "extra_";
 /// Pixels of the input per cell of the maps.
 pub const STRIDE: usize = 4;
 
-/// The sides of the input must be multiples of this.
+/// The sides of the input must be multiples of this number.
 pub(crate) const MULTIPLE: usize = 32;
 
 /// Factor of the logits of a map in the softmax for features at its maximum.

@@ -19,7 +19,7 @@ pub struct Settings {
     pub batch: usize,
     /// Number of steps of the training.
     pub steps: usize,
-    /// Share of the steps, from the first, with inputs that are 32 pixels smaller across and down: three fifths of the pixels by
+    /// Share of the steps, counted from the first, with inputs that are 32 pixels smaller across and down: three fifths of the pixels by
     /// default.
     pub small: f32,
     /// Number of later steps that train only the expected error, on held-out people.
@@ -48,9 +48,9 @@ pub struct Settings {
 pub struct Vary {
     /// Share of the samples that are rotated until the trunk is upright, before a random rotation.
     pub upright: f32,
-    /// Standard deviation of the angle for these samples, in degrees.
+    /// Standard deviation of the random rotation of samples with an upright trunk, in degrees.
     pub turn_upright: f32,
-    /// Standard deviation of the angle for all other samples, in degrees.
+    /// Standard deviation of the random rotation of all other samples, in degrees.
     pub turn: f32,
     /// Standard deviation of the logarithm of the scale.
     pub scale: f32,

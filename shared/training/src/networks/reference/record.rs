@@ -16,7 +16,7 @@ pub(super) struct At(usize);
 pub(super) type Back<'a> = Box<dyn Fn(&Record<'a>, &[f32], &mut Gradients) + 'a>;
 
 struct Value<'a> {
-    /// Dimensions without the batch.
+    /// Dimensions, without the dimension of the batch.
     dims: Dims,
     values: Vec<f32>,
     /// Backward pass; `None` for values that have no gradient.
