@@ -83,7 +83,7 @@ pub struct Outcome {
     pub blocks: [usize; 2],
     /// True if the new rig is better.
     pub is_better: bool,
-    /// Every reason to trust neither the given rig nor the new one.
+    /// All reasons for which neither the given rig nor the new one can be trusted.
     pub doubts: Vec<Doubt>,
     /// Number of instants that were used.
     pub n_instants: usize,

@@ -22,7 +22,7 @@ pub struct Camera {
     /// file.
     pub keypoints: Option<PathBuf>,
     /// Names of the keypoints: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16`, `lsp-14`, `coco-wholebody-133`,
-    /// `halpe-136` or `body-135`; by default, as the file says, or according to the number of keypoints.
+    /// `halpe-136` or `body-135`; by default, the names in the file or, without such names, those that match the number of keypoints.
     pub keypoint_names: Option<String>,
     /// Network for this camera, instead of `network.file`.
     pub network: Option<PathBuf>,

@@ -72,7 +72,7 @@ impl Loaded {
 }
 
 impl Loaded {
-    /// Returns a loaded deployment with other values.
+    /// Returns the deployment, loaded again with different values.
     ///
     /// * `refused`: returns the reason if the value of a dotted key may not be replaced.
     ///

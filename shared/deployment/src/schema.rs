@@ -63,7 +63,7 @@ fn resolved(schema: &Value, at: String) -> Option<String> {
     Some(reference.map_or(at, |reference| reference.trim_start_matches('#').to_owned()))
 }
 
-/// Returns a number; a whole number has no decimal point.
+/// Converts a number; a whole number gets no decimal point.
 fn as_written(number: f64) -> Value {
     if number.fract() == 0.0 {
         Value::from(number as i64)

@@ -223,7 +223,7 @@ impl Topology {
         self.count(|process| [RESULTS, RECORD].contains(&process.service))
     }
 
-    /// Returns the number of views. Services with one process per view have as many processes.
+    /// Returns the number of views. Services with one process per view have this number of processes.
     pub fn n_views(&self) -> usize {
         self.n_views
     }
@@ -241,8 +241,8 @@ impl Topology {
 
     /// Returns the pairs of views in ascending order.
     ///
-    /// If all views are solved at once, each view except the first is paired with the view before it. There are then as many pairs as
-    /// messages, and together the pairs contain all views.
+    /// If all views are solved at once, each view except the first is paired with the view before it. The number of pairs then equals the
+    /// number of messages, and together the pairs contain all views.
     pub fn pairs(&self) -> &[[usize; 2]] {
         &self.pairs
     }

@@ -234,7 +234,7 @@ impl Rig {
         Self { left_out, ..self }
     }
 
-    /// Returns the rig with another up direction.
+    /// Returns the rig with a different up direction.
     #[must_use]
     pub fn with_up(self, up_in_world: Option<UnitVector3<f64>>) -> Self {
         Self {

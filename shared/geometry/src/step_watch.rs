@@ -41,7 +41,7 @@ const MOST_MISS: f64 = 0.2;
 /// for the whole person, and for some seconds for each point, while limbs move back and forth. The offsets of all pairs of views give the
 /// offsets of the views, relative to their median. The result is the mean of the last estimates, weighted by their certainty.
 ///
-/// This is not a synchronisation. Offsets beyond 40 ms come out too large (60 ms as 69), because limbs do not move evenly for so long.
+/// This is not a synchronisation. Offsets beyond 40 ms come out too large (60 ms as 69), because limbs do not move evenly for that long.
 #[derive(Debug, Clone)]
 pub struct StepWatch {
     cameras: Vec<Camera>,

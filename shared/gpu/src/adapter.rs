@@ -18,7 +18,7 @@ pub struct Adapter {
 pub enum Kind {
     /// A program that computes on the processor, slower than the code that is written for the processor.
     Software,
-    /// A device of another kind.
+    /// A device of any other kind.
     Other,
     /// A share of a card, in a virtual machine.
     Virtual,

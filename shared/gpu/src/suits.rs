@@ -6,7 +6,7 @@ use crate::Unsuitable;
 use crate::device::Device;
 use crate::programs::MAX_BUFFERS;
 
-/// Maximum number of types that fits the packing of a root.
+/// Maximum number of types for which a root can be packed.
 const MAX_TYPES: usize = 8;
 /// Side of a cell, in pixels.
 const CELL_PX: usize = 4;

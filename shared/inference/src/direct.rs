@@ -20,7 +20,7 @@ pub(crate) struct Parts {
     rest: Option<Rten>,
 }
 
-/// A network in two parts, and as a whole for inputs of other shapes.
+/// A network in two parts, and as a whole for inputs of different shapes.
 #[derive(Debug)]
 pub(crate) struct Direct {
     pub(crate) parts: Parts,

@@ -1,4 +1,4 @@
-//! The front of a network: convolutions, sums and the operations between them, found in the file from the input on.
+//! The front of a network: convolutions, sums and the operations between them, found in the file by starting at the input.
 //!
 //! Another library runs the rest. It also runs every network with an unsupported convolution.
 
@@ -75,7 +75,7 @@ impl Operation {
     }
 }
 
-/// A named value that is needed behind the front.
+/// A named value that the nodes behind the front need.
 #[derive(Debug)]
 pub(crate) struct Exit {
     pub(crate) name: String,

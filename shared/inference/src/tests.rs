@@ -116,8 +116,8 @@ impl Net {
     }
 }
 
-/// A residual block at half the size, whose result is added to the values at full size. Both are also used without the sum, and a sigmoid
-/// is last.
+/// A residual block at half the size, whose result is added to the values at full size. Both are also used without the sum, and the last
+/// operation is a sigmoid.
 fn residual(
     [inputs, narrow, wide]: [usize; 3],
     sides: [usize; 2],

@@ -1,4 +1,4 @@
-//! ONNX files whose card says whether they are networks that find keypoints or detectors of people.
+//! ONNX files whose card states whether they find keypoints or people.
 
 use std::path::Path;
 

@@ -27,7 +27,7 @@ impl Joints {
     ///
     /// # Errors
     ///
-    /// Fails if a file cannot be read, or if the named file was trained with another model.
+    /// Fails if a file cannot be read, or if the named file was trained with a different model.
     pub fn of(file: &Path, model: Option<&Path>) -> Result<Self, Failure> {
         let chosen = |joint_file| Self {
             file: joint_file,

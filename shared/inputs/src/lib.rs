@@ -180,7 +180,7 @@ fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> 
 ///
 /// # Errors
 ///
-/// Fails if the file cannot be read, or was trained with another model.
+/// Fails if the file cannot be read, or was trained with a different model.
 pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Failure> {
     let Some(file) = file else {
         return Ok(None);
@@ -198,7 +198,7 @@ pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Fa
 ///
 /// # Errors
 ///
-/// Fails if the file cannot be read, is of another kind, or does not fit the parts of the model.
+/// Fails if the file cannot be read, is of a different kind, or does not fit the parts of the model.
 pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, Failure> {
     let has_head = model.n_parts() == skeleton::N_PARTS;
     if deployment::is_none(file) || (!has_head && deployment::is_shipped(file)) {

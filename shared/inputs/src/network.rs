@@ -142,8 +142,8 @@ pub fn look<'a>(
     })
 }
 
-/// Returns the box that best fits a person seen in another box, as a deployment determines it ([`Looker::look_closer`]), and the rotation
-/// of the picture there.
+/// Returns the box that best fits a person who was seen in a given box, as a deployment determines it ([`Looker::look_closer`]), and the
+/// rotation of the picture there.
 ///
 /// * `outline`: box in which the person is seen, in pixels of the picture.
 ///

@@ -108,7 +108,7 @@ impl HogShape {
 ///
 /// # Panics
 ///
-/// Panics if `out` has another size, or a side of the image is shorter than 3 pixels.
+/// Panics if `out` has the wrong size, or a side of the image is shorter than 3 pixels.
 pub fn hog(
     isa: Isa,
     image: &Planes,

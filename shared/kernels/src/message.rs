@@ -1,9 +1,9 @@
 //! Max-sum messages: the best score of a child's subtree for every position and type of the parent.
 //!
-//! A message is computed in three steps: the generalised distance transform of Felzenszwalb & Huttenlocher 2012 for
-//! quadratic springs, the maximum over the child's types, and the sum into the parent's scores. All steps are done row
-//! by row in one sweep. The transform does not follow a lower envelope. It evaluates every candidate in a window that contains
-//! all possible winners. Cells are then independent, so each lane computes one cell.
+//! A message is computed in three steps: the generalised distance transform of Felzenszwalb & Huttenlocher 2012 for quadratic springs, the
+//! maximum over the child's types, and the addition to the parent's scores. All steps are done row by row in one sweep. The transform does
+//! not follow a lower envelope. It evaluates every candidate in a window that contains all possible winners. Cells are then independent, so
+//! each lane computes one cell.
 
 mod buffer;
 mod fast;

@@ -255,7 +255,7 @@ mod tests {
         bytes.take(n).collect()
     }
 
-    /// An image that already has other contents.
+    /// An image that already has different contents.
     fn used() -> Planes {
         Planes::from_samples(3, 5, vec![f64::NAN; 45])
     }

@@ -343,7 +343,7 @@ impl JointMaps {
         self.evidence().map_or_else(Vec::new, |maps| maps.maxima(joint, n, |_| true))
     }
 
-    /// The evidence where a view shows nothing of a joint.
+    /// The evidence at positions where a view shows nothing of a joint.
     pub fn floor(&self) -> f32 {
         self.floor
     }

@@ -84,7 +84,7 @@ pub struct Sight<'a> {
     outputs: &'a [Tensor],
 }
 
-/// The output of a network, decoded as its card says.
+/// The output of a network, decoded as its card specifies.
 #[derive(Debug, Clone, Copy)]
 pub enum Read<'a> {
     /// One map for each keypoint.
@@ -346,7 +346,7 @@ impl<'a> Sight<'a> {
         Ok(self.window.shifted(by))
     }
 
-    /// Decodes the output as the card says.
+    /// Decodes the output as the card specifies.
     ///
     /// # Errors
     ///
@@ -403,7 +403,7 @@ impl<'a> Sight<'a> {
         names.rev().find(|output| output.0.as_str() == name).map(|name| name.1)
     }
 
-    /// Checks that the outputs other than the keypoints are finite and have the shape that the card says.
+    /// Checks that the outputs other than the keypoints are finite and have the shape that the card specifies.
     fn check_also(&self) -> Result<(), LookError> {
         let also = &self.network.card.also;
         for (name, n) in [(&also.front, 2), (&also.error, self.network.names.len())] {

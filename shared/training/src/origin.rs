@@ -87,7 +87,7 @@ impl Origin {
         }
     }
 
-    /// The image of the example: true if it shows a person, and its number.
+    /// Returns true if the image of the example shows a person, and the number of the image.
     pub(crate) fn source(&self) -> (bool, u32) {
         match self {
             Self::Right { person, .. } | Self::Mistake { person, .. } => (true, *person),

@@ -137,7 +137,7 @@ fn it_learns_and_a_training_that_was_interrupted_ends_with_the_same_bits() {
     assert!(whole == resumed, "everything that they know is the same");
 }
 
-/// `LibTorch` sums in another order, so that the results of some steps are close but not equal.
+/// `LibTorch` sums in a different order, so that the results of some steps are close but not equal.
 #[cfg(feature = "libtorch")]
 #[test]
 fn both_backends_learn_the_same() {

@@ -30,7 +30,7 @@ pub enum NetworkError {
     /// An entry of the network's card is invalid.
     #[error(transparent)]
     Card(#[from] CardError),
-    /// The network has other inputs or outputs than expected.
+    /// The network has unexpected inputs or outputs.
     #[error("the network has the {what} {got}, expected {expected}")]
     Names {
         /// `inputs` or `outputs`.

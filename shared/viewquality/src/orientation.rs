@@ -1,9 +1,9 @@
 //! Estimates the direction in which a person faces, from the picture of one view.
 //!
-//! A part detector only knows left and right of the picture. Whether the person is seen from the front or
-//! from behind must be determined separately. This module uses the surroundings of the head. Histograms of oriented
-//! gradients and colours of three patches are the input of a network with one hidden layer. Its two outputs are
-//! [`multiview::FrontEvidence`], which can be added over several views of one person.
+//! A part detector only distinguishes left and right of the picture. Whether the person is seen from the front or from behind must be
+//! determined separately. This module uses the surroundings of the head. Histograms of oriented gradients and colours of three patches are
+//! the input of a network with one hidden layer. Its two outputs are [`multiview::FrontEvidence`], which can be added over several views of
+//! one person.
 //!
 //! The method is our own; the paper does not solve this problem.
 //!

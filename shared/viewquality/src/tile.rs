@@ -146,7 +146,7 @@ impl Sampler {
     ///
     /// # Panics
     ///
-    /// Panics if `out` has another length, or the image has no pixels.
+    /// Panics if `out` has the wrong length, or the image has no pixels.
     pub fn sample(
         &mut self,
         image: Rgb8View<'_>,

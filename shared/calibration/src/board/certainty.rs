@@ -13,8 +13,8 @@ const UNKNOWN_PX: f64 = 100.0;
 
 /// Returns the factor by which the standard deviation of a corner is larger than for a board that stands still.
 ///
-/// If a board moved between two pictures of a frame, all its corners share the same error. A sight therefore says no more about this
-/// error than a single corner would.
+/// If a board moved between two pictures of a frame, all its corners share the same error. A sight therefore gives no more information
+/// about this error than a single corner.
 ///
 /// * `speeds`: speed of the board in pixels per frame, by camera and frame.
 /// * `sigma_px`: standard deviation of a corner, in pixels.

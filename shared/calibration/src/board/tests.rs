@@ -393,8 +393,8 @@ fn cameras_out_of_step_have_lenses_by_their_own_pictures_and_what_is_stated_hold
     let truth = ring(3, BROWN);
     let board = board(6, 4);
     let mut errors_stated = Vec::new();
-    // With few frames, an adjustment of all cameras has hardly larger residuals than each camera alone, because it distorts lenses by up to
-    // a quarter.
+    // With few frames, an adjustment of all cameras has residuals that are hardly larger than those of each camera alone, because it
+    // distorts lenses by up to a quarter.
     for (n_held, every, seed) in [(8, 1, 7), (0, 1, 7), (3, 1, 2), (8, 6, 3), (0, 6, 4)] {
         let carried = Carried {
             truth: &truth,

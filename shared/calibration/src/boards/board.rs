@@ -124,7 +124,7 @@ impl Board {
         builtins::builtin_dictionary(self.dictionary?)
     }
 
-    /// Returns the same board with another dictionary; `None` if the dictionary has too few markers.
+    /// Returns the same board with a different dictionary; `None` if the dictionary has too few markers.
     #[must_use]
     pub fn with_dictionary(&self, name: &'static str) -> Option<Self> {
         let other = Self {

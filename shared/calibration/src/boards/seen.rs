@@ -16,7 +16,7 @@ pub struct Corner {
 pub enum Nothing {
     /// The picture has no grid of corners.
     NoGrid,
-    /// The picture has a grid with other counts than the board's.
+    /// The picture has a grid with different numbers of rows and columns than the board.
     OtherGrid {
         /// Number of inner corners along one side of the grid.
         columns: usize,

@@ -82,7 +82,7 @@ pub struct Outcome {
     pub cameras: Vec<CameraClock>,
     /// Results for each pair that was searched.
     pub pairs: Vec<PairReport>,
-    /// Cost by offset of these pairs.
+    /// Cost by offset, for each pair that was searched.
     pub curves: Vec<Curve>,
     /// Quality of the second-best offset as a fraction of the best, for the group of cameras whose offset is most doubtful.
     pub second_best: f64,

@@ -122,7 +122,7 @@ fn a_drift_is_told_where_the_footage_is_long_enough() {
     assert_eq!(outcome.cameras[1].drift_error, None);
 }
 
-/// Returns two people who work in place, with slow arms and hardly a step.
+/// Returns two people who work in one place, moving their arms slowly and hardly taking a step.
 fn working(time_s: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
     let person = |of: f64, [x, y]: [f64; 2]| {
         let place = [

@@ -9,7 +9,7 @@ struct Parameter<'a> {
     /// Number of the parameter's group.
     id: u8,
     name: String,
-    /// Kind of value: -1 for characters; 1, 2 or 4 for numbers with as many bytes.
+    /// Kind of value: -1 for characters; 1, 2 or 4 for numbers of that many bytes.
     kind: i8,
     /// Sizes of the value; the first index varies fastest.
     sizes: &'a [u8],

@@ -32,13 +32,13 @@ pub struct Envelope {
 /// Reason why bytes are not a file of the expected kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum EnvelopeError {
-    /// The file is of another kind.
+    /// The file is of a different kind.
     #[error("the file does not begin with `{}`", String::from_utf8_lossy(.expected))]
     Magic {
         /// Expected first bytes.
         expected: [u8; 8],
     },
-    /// The file was written by another version of Parallax.
+    /// The file was written by a different version of Parallax.
     #[error("the file has version {got}, this Parallax reads version {expected}")]
     Version {
         /// Version of the file.

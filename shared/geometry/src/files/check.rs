@@ -10,7 +10,7 @@ use crate::{Camera, Rig, upright_roll};
 pub use agreement::{CameraError, EpipolarReport, PairError, epipolar_check};
 pub use finding::{Finding, Severity};
 
-/// Cameras count as being in one place if all distances between them are below this, in metres.
+/// Cameras count as being in one place if all distances between them are below this number of metres.
 const ONE_PLACE: f64 = 0.01;
 /// Distance from the origin beyond which a camera is reported as far away, in metres.
 const FAR_AWAY: f64 = 10_000.0;

@@ -21,7 +21,7 @@ use storage::Storage;
 
 /// Reads cameras from one or more files. Each file has a name, which is used for a camera without one.
 ///
-/// Files in the form of `EasyMocap` are read together; every other file is one camera.
+/// Files in the form of `EasyMocap` are read together; every other file describes one camera.
 ///
 /// # Errors
 ///

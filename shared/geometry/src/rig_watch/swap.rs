@@ -22,7 +22,7 @@ const FACTOR: f64 = 2.5;
 const LEAD: f64 = 1.5;
 /// Angular residual above which the cameras do not see one person at the position that the rig gives.
 const CONTRADICTION_DEGREES: f64 = 2.5;
-/// Angular residual that is reported after a few frames, because no detection of a person is so far off.
+/// Angular residual that is reported after a few frames, because no correct detection of a person has such a large residual.
 const IMPOSSIBLE_DEGREES: f64 = 5.0;
 
 /// Computes, frame by frame, the angular residual of the rays with the footage of two cameras exchanged.

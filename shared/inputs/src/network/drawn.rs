@@ -32,7 +32,7 @@ pub fn limbs() -> Vec<Limb> {
     PARSE14.limbs.iter().map(limb).collect()
 }
 
-/// Draws the output of a network for its window of a picture. The first tile has the joints. Each further tile has the map of one joint
+/// Draws the output of a network for its window of a picture. The first tile shows the joints. Each further tile shows the map of one joint
 /// over the window, with the joint's name and its score from 0 to 1. Maps are drawn relative to their highest value, so that weak ones are
 /// visible.
 ///

@@ -31,7 +31,7 @@ pub enum MatLayoutError {
 
 /// Reads PARSE's `labels.mat`: `ptsAll`, joints x 2 x people, in pixels from 1.
 ///
-/// * Returns one annotation per person, in pixels from 0; all joints are visible.
+/// * Returns one annotation per person, in pixels counted from 0; all joints are visible.
 ///
 /// # Errors
 ///
@@ -60,7 +60,7 @@ pub fn parse_labels(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
 /// set is joints x 3 x people, with a flag that is 1 if the joint is visible (Johnson & Everingham 2010, 2011).
 /// An array of 3 x 3 x people is read in the original layout.
 ///
-/// * Returns one annotation per person, in pixels from 0.
+/// * Returns one annotation per person, in pixels counted from 0.
 ///
 /// # Errors
 ///

@@ -13,7 +13,7 @@ pub enum BeginError {
     /// The file is not an ONNX file.
     #[error("it is not an ONNX file")]
     Read(#[from] rten_onnx::protobuf::ProtobufError),
-    /// A layer is missing: the network is of another kind or smaller.
+    /// A layer is missing: the network is smaller or of a different kind.
     #[error(
         "it has no constant {name}; the network in the settings needs one with the dimensions {expected:?}"
     )]
@@ -23,7 +23,7 @@ pub enum BeginError {
         /// Expected dimensions.
         expected: Vec<usize>,
     },
-    /// A layer has other dimensions than expected.
+    /// A layer has unexpected dimensions.
     #[error("its {name} has the dimensions {got:?}, the network in the settings has {expected:?}")]
     Size {
         /// Name of the layer and its role.

@@ -20,7 +20,7 @@ const MAX_BYTES: usize = 16 << 30;
 /// Reason why bytes cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The file has another kind or version, or is damaged.
+    /// The file has a different kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
     /// The checksum is right, but the payload does not have the form that the header names.

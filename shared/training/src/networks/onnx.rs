@@ -29,7 +29,7 @@ pub struct Document {
 ///
 /// # Panics
 ///
-/// Panics if the parameters belong to another network.
+/// Panics if the parameters belong to a different network.
 pub fn write(network: &impl Network, parameters: &[Parameter], document: Document) -> Vec<u8> {
     let inputs = network.inputs();
     let mut writer = Writer {

@@ -5,7 +5,7 @@
 //! * [`varied`], [`plain`]: the inputs made from a person, and the outputs that the network should give.
 //! * [`PoseTask`]: the training.
 //! * [`begun`]: the parameters of a previously trained network, from which a training run starts.
-//! * [`file()`]: a trained network as an ONNX file; [`card()`] says how to use it.
+//! * [`file()`]: a trained network as an ONNX file; [`card()`] describes how to use it.
 //! * [`Score`]: measures of the network's quality.
 //!
 //! Labels are **as seen**: for a person seen from behind, left and right joints are exchanged, so that the label follows

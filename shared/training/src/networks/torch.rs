@@ -138,7 +138,7 @@ impl<'a> Forward<'a> {
         core::array::from_fn(|at| self.parameters[self.next].dims[at] as i64)
     }
 
-    /// The weights of a convolution, [standardised](crate::networks::parameters::standardised) if its scaling says so.
+    /// The weights of a convolution, [standardised](crate::networks::parameters::standardised) if its scaling requires this.
     fn weight(&mut self, name: &str, scaling: Scaling) -> Tensor {
         let dims: [i64; 4] = self.dims();
         let weight = self.parameter(&format!("{name}.weight"));

@@ -144,7 +144,7 @@ pub enum TrainError {
     /// The bytes are not a checkpoint, or were changed.
     #[error("the checkpoint cannot be used")]
     Checkpoint(#[from] StoreError),
-    /// The checkpoint belongs to another training run.
+    /// The checkpoint belongs to a different training run.
     #[error(
         "the checkpoint is of a training with other {learned_from} or settings, or from another network"
     )]

@@ -70,7 +70,7 @@ pub(crate) fn plain(channels: usize, kernel: usize, stride: usize) -> Conv {
     }
 }
 
-/// The same convolution with another initial gain.
+/// The same convolution with a different initial gain.
 pub(crate) fn with_gain(gain: f32, conv: Conv) -> Conv {
     Conv {
         scaling: Scaling::Standardised { gain },

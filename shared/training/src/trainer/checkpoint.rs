@@ -30,7 +30,7 @@ pub struct Checkpoint {
 /// Reason why a training run cannot be resumed from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// The checkpoint belongs to another training run.
+    /// The checkpoint belongs to a different training run.
     #[error(
         "the checkpoint is of another training: people, images without people or settings have changed"
     )]

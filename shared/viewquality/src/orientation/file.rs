@@ -29,10 +29,10 @@ const MAX_HIDDEN: usize = 4096;
 /// Reason why bytes are not the file of a network.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FileError {
-    /// The file has another kind or version, or is damaged.
+    /// The file has a different kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The network was made for other features.
+    /// The network was made for different features.
     #[error("the network takes {got} features, but this Parallax computes {expected}")]
     Features {
         /// Number of features in the file.

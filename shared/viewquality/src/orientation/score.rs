@@ -17,7 +17,7 @@ pub struct Score {
 }
 
 impl Score {
-    /// Share of people for whom the detector is right, from 0 to 1.
+    /// Share of people whose direction the detector finds, from 0 to 1.
     pub fn share(&self) -> f64 {
         self.n_right as f64 / self.n.max(1) as f64
     }

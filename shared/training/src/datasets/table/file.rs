@@ -26,7 +26,7 @@ pub enum SkeletonFileError {
     /// The name of a part or joint is unknown.
     #[error("{whose} names the {what} {name:?}, which does not exist")]
     NoSuch {
-        /// Text that says where the name is used.
+        /// Text that states where the name is used.
         whose: String,
         /// `part`, or `joint`.
         what: &'static str,

@@ -10,8 +10,7 @@ pub const SIDE: usize = 320;
 pub struct Around {
     /// Left, top, right, bottom, in pixels.
     pub outline: [f32; 4],
-    /// True if the network should find this person. Otherwise the box is ignored: hardly anything of the person is visible, or
-    /// it is uncertain whether it is a person.
+    /// True if the network should find this person. Otherwise the box is ignored: the person is hardly visible, or may not be a person.
     pub counts: bool,
 }
 

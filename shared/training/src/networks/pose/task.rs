@@ -38,7 +38,7 @@ const JUDGED: usize = 10;
 ///
 /// # Panics
 ///
-/// Panics if the parameters belong to another network.
+/// Panics if the parameters belong to a different network.
 pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
     onnx::write(shape, parameters, document(metadata))
 }

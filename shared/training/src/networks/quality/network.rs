@@ -43,7 +43,7 @@ pub enum Kind {
     Evidence,
     /// A few separable convolutions, pooled around every part, and the evidence.
     Small,
-    /// The paper's network: VGG-16 with another top, on the tile alone.
+    /// The paper's network: VGG-16 with a different top, on the tile alone.
     Vgg16,
 }
 

@@ -40,7 +40,7 @@ pub enum TaskError {
         /// Number of validation samples.
         validated: usize,
     },
-    /// The samples have tiles of another size.
+    /// The samples have tiles of a different size.
     #[error("the samples have tiles of {} x {}, but the network takes {} x {}", got[0], got[1], expected[0], expected[1])]
     Tile {
         /// Height and width in the samples.
@@ -48,7 +48,7 @@ pub enum TaskError {
         /// Height and width that the network takes.
         expected: [usize; 2],
     },
-    /// The given weights belong to another network.
+    /// The given weights belong to a different network.
     #[error("weights for `{name}` are missing, or have another size")]
     Weights {
         /// Name of the parameter.

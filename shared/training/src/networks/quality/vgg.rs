@@ -26,7 +26,7 @@ pub enum VggError {
         /// Name of the layer.
         name: String,
     },
-    /// A layer has another size or number type.
+    /// A layer has a different size or number type.
     #[error("`{name}` is {dtype} of {got:?}, expected F32 of {expected:?}")]
     Layer {
         /// Name of the layer.
@@ -51,7 +51,7 @@ struct Entry {
 ///
 /// # Errors
 ///
-/// Fails if the bytes are not such a file, or belong to another network.
+/// Fails if the bytes are not a file of this kind, or belong to a different network.
 pub fn parse(bytes: &[u8]) -> Result<Vec<Parameter>, VggError> {
     let (length, rest) = bytes.split_first_chunk().ok_or(VggError::Truncated)?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok();

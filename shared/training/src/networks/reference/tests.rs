@@ -325,7 +325,7 @@ fn the_number_of_threads_changes_no_bit() {
     assert!(learned(1) == learned(5));
 }
 
-/// `LibTorch` sums in another order, so that the results are close but not equal.
+/// `LibTorch` sums in a different order, so that the results are close but not equal.
 #[cfg(feature = "libtorch")]
 #[test]
 fn both_backends_give_the_same_values_and_gradients() {

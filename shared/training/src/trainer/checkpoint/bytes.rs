@@ -24,7 +24,7 @@ const MAX_BYTES: usize = 4 << 30;
 /// Reason why bytes are not a checkpoint or could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointBytesError {
-    /// The file has another kind or version, or is damaged.
+    /// The file has a different kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
     /// The checksum is right, but the payload is not a checkpoint.

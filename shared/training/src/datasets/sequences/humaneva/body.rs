@@ -258,7 +258,7 @@ impl Pose<'_> {
         ))
     }
 
-    /// The axes of a segment at another origin. The origin is interpolated linearly, the rotation spherically.
+    /// The axes of a segment, moved to a different origin. The origin is interpolated linearly, the rotation spherically.
     fn segment(&self, axes: &str, origin: &str) -> Option<Isometry3<f64>> {
         let [o, x, y, z] = ["O", "A", "L", "P"].map(|name| self.points(&format!("{axes}{name}")));
         let (o, x, y, z) = (o?, x?, y?, z?);

@@ -34,7 +34,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     }
     let head_above_foot = |frame: &[[f64; 3]; 14]| frame[HEAD][2] - frame[LEGS[0][2]][2];
     let head = median(all().map(head_above_foot));
-    // A person may be lying. A head that is below the feet most of the time means a wrong axis.
+    // A person may be lying. A head that is below the feet most of the time indicates a wrong axis.
     if head < -0.3 * leg {
         return refuse(format!(
             "the head would be {:.2} m below the feet: does another axis point up? (up = \"y\" in a marker table)",

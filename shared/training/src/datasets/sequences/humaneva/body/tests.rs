@@ -22,7 +22,7 @@ const STANDING: [(&str, [f64; 3]); 13] = [
     ("RTI", [0.0, -100.0, 90.0]),
 ];
 
-/// A trial with all points that are needed. The person has another position in every frame.
+/// A trial with all points that are needed. The person has a different position in every frame.
 pub(crate) fn person(places: &[Isometry3<f64>]) -> Trial {
     let mut labels = Vec::new();
     let mut points = Vec::new();
