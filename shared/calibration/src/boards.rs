@@ -10,8 +10,8 @@
 //! | corners with sub-pixel precision | `corner` |
 //!
 //! The coordinate system of a board is in metres. Its origin is the upper left corner as printed; x points right, y points down, and z
-//! points away from the viewer. Pixel coordinates are as everywhere: the centre of the upper left pixel is (0, 0). This module uses no
-//! clock, file or thread.
+//! points away from the viewer. Pixel coordinates are the same as in all other crates: the centre of the upper left pixel is (0, 0). This
+//! module uses no clock, file or thread.
 
 mod board;
 mod layout;

@@ -56,8 +56,8 @@ pub struct Settings {
     pub as_seen: bool,
     /// Known offset to add to the times of each camera to get common times, in seconds.
     pub offsets_s: Vec<f64>,
-    /// Largest possible error of these offsets, in seconds; offsets are searched within this range. Errors of a few frames are found
-    /// even if it is 0.
+    /// Largest possible error of these offsets, in seconds; offsets are searched within this range. Errors of a few frames are found even
+    /// if this range is 0.
     pub window_s: f64,
     /// Source of the scale.
     pub scale: Scale,

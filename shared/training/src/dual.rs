@@ -55,7 +55,7 @@ pub struct Cost<K> {
 
 /// The working set of examples, and the solution so far.
 ///
-/// `K` identifies the groups, `T` is the caller's tag of an example.
+/// `K` identifies the groups, and `T` is the caller's tag of an example.
 #[derive(Debug)]
 pub struct Machine<K, T> {
     entries: Vec<Entry<T>>,

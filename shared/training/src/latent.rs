@@ -18,8 +18,8 @@ pub struct Marked {
 }
 
 impl Marked {
-    /// The rectangle `[x1, y1, x2, y2]` in which the person is searched. It encloses all boxes and is enlarged on
-    /// every side by half the sum of its width and height (Yang & Ramanan 2013).
+    /// The rectangle `[x1, y1, x2, y2]` in which the person is searched for. It encloses all boxes and is enlarged on every side by half
+    /// the sum of its width and height (Yang & Ramanan 2013).
     pub fn surroundings(&self) -> [f64; 4] {
         let half = self.side / 2.0;
         let low = |axis: usize| {

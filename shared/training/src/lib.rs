@@ -1,9 +1,8 @@
 //! Trains flexible mixtures of parts from people whose joints are marked (Yang & Ramanan 2013), and [`networks`].
 //!
-//! Reading order: a [`Plan`] is computed from the annotations alone (sizes, types of parts). A [`Trainer`]
-//! runs the [`Step`]s: initial filters, placing people, mining hard examples, and solving the structural
-//! support vector machine ([`Machine`]). Images come from an [`Album`], progress is reported to a [`Watch`].
-//! Between any two steps, the state can be saved as a [`Checkpoint`].
+//! Reading order: a [`Plan`] is computed from the annotations alone (sizes, types of parts). A [`Trainer`] runs the [`Step`]s: initial
+//! filters, placing people, mining hard examples, and solving the structural support vector machine ([`Machine`]). Images come from an
+//! [`Album`], and progress is reported to a [`Watch`]. Between any two steps, the state can be saved as a [`Checkpoint`].
 #![forbid(unsafe_code)]
 
 mod album;

@@ -1,7 +1,7 @@
 //! Training of networks: one finds joints, one finds people, and one predicts the errors of single views.
 //!
-//! * [`Network`]: a network, defined once by the operations of [`Ops`]. [`initial`] plans its parameters, [`write()`] writes it as
-//!   an ONNX file.
+//! * [`Network`]: a network, defined once by the operations of [`Ops`]. [`initial`] creates its parameters, and [`write()`] writes it as an
+//!   ONNX file.
 //! * [`Task`]: the training data, the cost and the settings of a training run. [`pose`], [`finder`] and [`quality`] are the three tasks.
 //! * [`Trainer`]: runs the steps of a task and keeps the best network. It writes its state as a checkpoint. A training run that is resumed
 //!   from a checkpoint gives the same network, bit for bit.

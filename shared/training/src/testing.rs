@@ -19,7 +19,7 @@ pub(crate) fn shape() -> Shape {
     }
 }
 
-/// A random vector for the shape, with values of the same size as trained ones.
+/// A random vector for the shape, with values of the same size as trained values.
 pub(crate) fn vector(seed: u64) -> Vec<f64> {
     let at = shape().coordinates();
     let mut random = fastrand::Rng::with_seed(seed);

@@ -15,9 +15,8 @@ pub(crate) struct Types {
 
 /// Clusters every part of all people into types by k-means.
 ///
-/// If there is a mirror, type `k` of a part is the mirror image of type `k` of the part on the other
-/// side. The types of a part in the middle come in mirrored pairs: 0 and 1, 2 and 3, and so on. If the number of types is
-/// odd, such a part has one type less.
+/// If there is a mirror, type `k` of a part is the mirror image of type `k` of the part on the other side. The types of a part in the
+/// middle come in mirrored pairs: 0 and 1, 2 and 3, and so on. If the number of types is odd, such a part has one type fewer.
 ///
 /// There are fewer types if there are fewer different people.
 ///

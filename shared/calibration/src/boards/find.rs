@@ -262,7 +262,7 @@ fn variants(board: &Board) -> Vec<Variant> {
                     for turn in 0..4 {
                         let layout =
                             regrouped(Layout::of(&told), told.columns, is_from_below, turn);
-                        // The description does not say where tags are counted from or how they are rotated.
+                        // The description does not state where tags are counted from or how they are rotated.
                         add(told.clone(), layout, turned.clone());
                     }
                 }

@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use crate::boards::marker::Sighting;
 use crate::boards::{Homography, Layout};
 
-/// Largest distance of a marker from its position predicted by the others, in sides of the marker. It allows for lens distortion.
+/// Largest distance of a marker from the position predicted by the other markers, in sides of the marker. It allows for lens distortion.
 const OFF_SIDES: f64 = 0.45;
 /// Maximum number of pairs of markers to try.
 const MOST_PAIRS: usize = 300;

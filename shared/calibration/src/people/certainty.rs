@@ -73,7 +73,7 @@ fn distances(outcome: &Outcome) -> Vec<f64> {
     each.map(|camera| (camera.centre_in_world() - middle).norm()).collect()
 }
 
-/// Adds an error to the standard deviations of the rotations that no block of the recording shows. If a network finds the joints, rigs of
+/// Adds to the standard deviations of the rotations an error that no block of the recording shows. If a network finds the joints, rigs of
 /// few cameras have the same rotation error in every block, a few tenths of a degree. The median residual as an angle is about as large.
 fn add_common(outcome: &mut Outcome) {
     for (report, camera) in outcome.reports.iter_mut().zip(&outcome.cameras) {

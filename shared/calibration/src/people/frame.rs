@@ -9,7 +9,7 @@ use crate::align::{Similarity, aligned};
 
 /// Speed below which an ankle counts as standing, in metres per second.
 const STANDING_M_S: f64 = 0.25;
-/// Minimum distance between standing feet, and largest deviation from a plane, for the plane to be the floor; metres.
+/// Minimum distance between standing feet, and largest deviation from a plane, for the plane to be the floor, both in metres.
 const FLOOR_M: [f64; 2] = [0.3, 0.06];
 /// Largest angle between the normal of the floor and the direction of bodies, in radians.
 const FROM_BODIES: f64 = 0.5;

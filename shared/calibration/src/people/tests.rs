@@ -114,7 +114,7 @@ fn clocks_that_joints_do_not_contradict_are_as_given() {
     assert!(offsets.eq(given), "{:?}", outcome.reports);
 }
 
-/// Shifts all joints of a camera, by the same amount for half a second, then by another.
+/// Shifts all joints of a camera by an amount that changes every half second.
 fn drifting(films: &mut [Film], px: f64, seed: u64) {
     let mut random = fastrand::Rng::with_seed(seed);
     for film in films {

@@ -307,7 +307,8 @@ fn mean_cost(
     (n >= LEAST_JOINTS).then(|| sum / weights)
 }
 
-/// Returns for every pair the variance of the biases of its joints: the excess variance of their medians over that expected without bias.
+/// Returns for every pair the variance of the biases of its joints: the excess variance of their medians over the variance expected without
+/// bias.
 fn spreads(n_pairs: usize, biased: &BTreeMap<(usize, usize, i64), Vec<Timed>>) -> Vec<f64> {
     let mut found: Vec<Vec<[f64; 2]>> = vec![Vec::new(); n_pairs];
     for ((pair, ..), rows) in biased {

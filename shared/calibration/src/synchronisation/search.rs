@@ -2,7 +2,7 @@
 
 use crate::synchronisation::curve::{Curve, STEP_S};
 
-/// Number of extra samples without a gain, so that few samples have a low weight.
+/// Number of samples without a gain that are added, so that a small number of samples has a low weight.
 const PRIOR_SAMPLES: f64 = 20.0;
 /// Fraction of the best value at which the basin of the best offset ends.
 const BASIN: f64 = 0.6;
@@ -180,7 +180,7 @@ fn total(curves: &[Curve], offsets_s: &[f64]) -> f64 {
 
 /// Curves of all pairs between a group and the other cameras, as a function of a shift of the whole group.
 struct Joint<'a> {
-    /// Each curve, its entry without a shift, and the direction in which the shift counts.
+    /// Each curve, its entry without a shift, and the sign with which the shift is added.
     crossing: Vec<(&'a Curve, i64, i64)>,
     half: i64,
 }
@@ -227,7 +227,7 @@ impl<'a> Joint<'a> {
         each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
     }
 
-    /// Returns the gains of the blocks of time, without a shift and with one.
+    /// Returns the gains of the blocks of time, without and with a shift.
     fn blocks(&self, by: i64) -> Vec<[f64; 2]> {
         let mut blocks = std::collections::BTreeMap::<(usize, i64), [f64; 2]>::new();
         for (number, &(curve, now, sign)) in self.crossing.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Offsets between clocks from the sounds that all cameras recorded. This is an alternative if people are not seen well.
 //!
-//! Sounds begin suddenly, and all microphones record these beginnings. The offset between two clocks is the one at which most beginnings
-//! coincide. Sound takes 2.9 ms per metre, and the positions of its sources are unknown; this limits the accuracy.
+//! Sounds begin suddenly, and all microphones record these beginnings. The offset between two clocks is the offset at which the largest
+//! number of beginnings coincides. Sound takes 2.9 ms per metre, and the positions of its sources are unknown; this limits the accuracy.
 
 mod beginnings;
 mod parts;

@@ -95,7 +95,7 @@ impl Picture {
 }
 
 impl std::fmt::Debug for Picture {
-    /// Prints only the size, because the pixels are too many to print.
+    /// Prints only the size, because there are too many pixels to print.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(out, "Picture({})", self.size)
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 
-/// Number of delays to each side for which costs are known and a parabola is fitted.
+/// Number of delays on each side for which costs are known and a parabola is fitted.
 pub(super) const REACH: i64 = 4;
 pub(super) const HALF: i64 = REACH + 3;
 /// Length of the blocks of time whose errors are assumed independent, in seconds.

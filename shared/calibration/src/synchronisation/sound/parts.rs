@@ -1,4 +1,4 @@
-//! Comparison of successive parts of long recordings: whether the offset is constant or drifts.
+//! Comparison of successive parts of long recordings, which shows whether the offset is constant or drifts.
 
 use super::beginnings::{Beginnings, HOP_S};
 use super::{HEARD_S, LEAST, LEAST_COSINE, MOST_RATIO, SPARE_S};

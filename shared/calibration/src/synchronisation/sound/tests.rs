@@ -15,7 +15,7 @@ struct Room {
     length_s: f64,
     /// Times of the sounds.
     sounds_s: Vec<f64>,
-    /// Level of the noise; sounds have 1000 to 8000 at a distance of one metre.
+    /// Level of the noise; sounds have levels of 1000 to 8000 at a distance of one metre.
     noise: f64,
 }
 

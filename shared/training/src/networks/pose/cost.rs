@@ -32,7 +32,7 @@ pub struct Truth {
 pub struct Cost {
     /// Cost of the maps.
     pub maps: f32,
-    /// Cost of the direction, in nats per person of certain direction.
+    /// Cost of the direction, in nats per person with a known direction.
     pub front: f32,
     /// Cost of the expected errors.
     pub error: f32,

@@ -3,13 +3,13 @@
 use super::person::Target;
 use super::{MIRROR, N_JOINTS, N_KEYPOINTS};
 
-/// Peak of the teacher above which a joint of a pair is used to decide about left and right.
+/// Height of the teacher's peak above which a joint of a pair is used to decide about left and right.
 const SURE_OF_SIDES: f32 = 0.55;
-/// Peak above which the teacher's joint is kept as an alternative to a mark that contradicts it.
+/// Height of the peak above which the teacher's joint is kept as an alternative to a mark that contradicts it.
 const SURE: f32 = 0.7;
-/// Peak above which the teacher's joint is averaged with a mark that agrees.
+/// Height of the peak above which the teacher's joint is averaged with a mark that agrees.
 const USABLE: f32 = 0.4;
-/// Peak above which the teacher's joint is used if there is no mark.
+/// Height of the peak above which the teacher's joint is used if there is no mark.
 const ALONE: f32 = 0.5;
 /// Largest distance at which a mark and the teacher agree, in lengths of the trunk.
 const AGREED: f32 = 0.24;
@@ -58,7 +58,7 @@ fn mean(of: &[f32]) -> f32 {
 impl Marks {
     /// Exchanges left and right of limbs whose marks the teacher clearly contradicts.
     ///
-    /// * Returns true for exchanged legs, and true for exchanged arms.
+    /// * Returns two values: true if the legs were exchanged, and true if the arms were exchanged.
     pub fn mend_sides(&mut self) -> [bool; 2] {
         LIMBS.map(|limb| {
             let is_sure = |joint: &usize| {

@@ -125,7 +125,7 @@ impl Network for Shape {
     }
 }
 
-/// The parameters of an untrained network. The last dense layers give outputs that are likely for all people.
+/// The parameters of an untrained network. At first, the last dense layers give outputs that are likely for any person.
 pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     let mut all = parameters::initial(shape, seed);
     for parameter in &mut all {

@@ -83,8 +83,8 @@ struct KeptApart<'a> {
 }
 
 impl<'a> KeptApart<'a> {
-    /// Assigns [`RUN`] people alternately to each part, since neighbours in a list can be pictures of the same person. If there are
-    /// too few people, all are used for both.
+    /// Assigns groups of [`RUN`] people alternately to the two parts, since neighbours in a list can be pictures of the same person. If
+    /// there are too few people, all are used for both.
     fn new(people: &'a [Person]) -> Self {
         let (calibrating, judged): (Vec<_>, Vec<_>) =
             people.iter().enumerate().partition(|(at, _)| (at / RUN).is_multiple_of(2));

@@ -69,12 +69,12 @@ fn a_subject_is_read_with_synchronised_streams() {
     assert_eq!(first, [0, 10, 5]);
     let numbers: Vec<u64> = walking.frames.iter().map(|frame| frame.number).collect();
     assert_eq!(&numbers[..3], &[6, 7, 8]);
-    // Motion capture frames 101 to 104 are used by 62 + 2 (f - 1) for f = 21 and 22.
+    // Frame f corresponds to motion capture frame 62 + 2 (f - 1), so frames 21 and 22 need the lost frames.
     assert!(!numbers.contains(&21) && !numbers.contains(&22));
     assert_eq!(numbers.len(), 590 - 6 + 1 - 2);
     let frame = &walking.frames[0];
     assert_eq!(frame.index, 5);
-    // At motion capture frame 72, the pelvis is 50 mm behind 72 mm.
+    // At motion capture frame 72, the pelvis is 50 mm behind x = 72 mm.
     let pelvis = frame.joints[1].unwrap();
     assert!((pelvis[0] - 0.022).abs() < 1e-6, "{pelvis:?}");
 }
