@@ -56,9 +56,9 @@ pub enum FramingError {
 /// Mapping from a source's frame to the pipeline's frame: rotation, resizing, cropping and padding.
 ///
 /// Without roll, the calibrated image is scaled uniformly. Pixel edges are mapped to pixel edges, so `u_out = (u + 0.5) s - 0.5` if the
-/// sizes divide. With roll, the image also rotates about its principal point, and different focal lengths become equal:
-/// `f_out = s √(fx fy)`. In both cases, [`camera`](Self::camera) describes the warped picture exactly, including the lens. The caller
-/// must fill output pixels that are outside the source.
+/// sizes are divisible. With roll, the image also rotates about its principal point, and different focal lengths become equal: `f_out = s
+/// √(fx fy)`. In both cases, [`camera`](Self::camera) describes the warped picture exactly, including the lens. The caller must fill output
+/// pixels that are outside the source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Framing {
     camera: Camera,

@@ -49,7 +49,7 @@ impl std::fmt::Display for LensModel {
 
 /// A lens: its model, and the part of the image in which the model can be inverted.
 ///
-/// Outside the image they were fitted to, distortion polynomials stop being monotonic at some radius. A lens refuses every ray beyond the
+/// Distortion polynomials stop being monotonic at some radius outside the image they were fitted to. A lens refuses every ray beyond the
 /// first such radius, and every ray more than 87 degrees off the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {

@@ -249,7 +249,7 @@ impl Rig {
         &self.left_out
     }
 
-    /// Returns an error text for a missing camera that lists the cameras of the rig: `no camera "c"; it has a, b`.
+    /// Returns the text of an error about a missing camera, with a list of the cameras of the rig: `no camera "c"; it has a, b`.
     pub fn lacks(&self, name: &str) -> String {
         if let Some(LeftOut { why, .. }) =
             self.left_out.iter().find(|left_out| left_out.camera == name)

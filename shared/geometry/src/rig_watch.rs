@@ -34,11 +34,11 @@ const MAX_DEGREES: f64 = 1.5;
 
 /// Tracks the residuals of the same points in all cameras, with and without each camera.
 ///
-/// With four or more cameras, the rays of every two other cameras are triangulated, and the point is projected into the camera. The
-/// residual is the offset of the camera's own observation from this projection. Two medians are taken: over the points of a frame, in x
-/// and in y; then over the last frames of each group of three cameras, as a vector. The length of this vector is used, because errors of
-/// detections change direction, but the offset of a moved camera does not. The residual of a camera is the median over all groups that contain it. A single
-/// wrong camera only affects these groups.
+/// With four or more cameras, a point is triangulated from the rays of every two other cameras, and projected into the camera. The residual
+/// is the offset of the camera's own observation from this projection. Two medians are taken: over the points of a frame, in x and in y;
+/// then over the last frames of each group of three cameras, as a vector. The length of this vector is used, because errors of detections
+/// change direction, but the offset of a moved camera does not. The residual of a camera is the median over all groups that contain it. A
+/// single wrong camera only affects these groups.
 ///
 /// With three cameras, the epipolar distance to the ray of one other camera is used instead, without its direction, because the two
 /// remaining cameras may agree by chance. This hardly detects a camera that is rotated along its epipolar lines. With two cameras, it is

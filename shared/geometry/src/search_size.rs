@@ -52,7 +52,7 @@ pub struct SearchSize {
     /// Height of a person of [`PERSON_METRES`] in the calibrated image, in pixels: the median over the space that the camera shares with
     /// others. It is `None` for a camera that shares no space.
     pub person_px: Option<f64>,
-    /// Scale that would be chosen without the limit on time; larger than `scale` if the limit applies.
+    /// Scale that would be chosen without the limit on processor time; larger than `scale` if the limit applies.
     pub wanted: f64,
 }
 
@@ -62,7 +62,7 @@ impl SearchSize {
         self.person_px.map(|person_px| person_px * self.scale)
     }
 
-    /// Returns true if the limit on time makes the person smaller than [`GOOD_PX`].
+    /// Returns true if the limit on processor time makes the person smaller than [`GOOD_PX`].
     pub fn is_limited(&self) -> bool {
         let px = self.person_in_frame_px();
         self.scale < self.wanted && px.is_some_and(|px| px < GOOD_PX[0])

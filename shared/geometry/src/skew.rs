@@ -40,8 +40,8 @@ pub struct Velocity {
 }
 
 impl Velocity {
-    /// Returns the movement of the point in a time, in pixels. Returns `None` for a time longer than the interval over which the velocity
-    /// was measured, because nobody moves evenly for that long.
+    /// Returns the movement of the point during a given time, in pixels. Returns `None` for a time longer than the interval over which the
+    /// velocity was measured, because nobody moves evenly for that long.
     pub fn shift(&self, seconds: f64) -> Option<Vector2<f64>> {
         (seconds.abs() <= self.gap_s).then(|| self.px_per_s * seconds)
     }

@@ -1,4 +1,4 @@
-//! Networks from ONNX files, run by Parallax itself with the `rten` library, which are built in, or by ONNX Runtime, which the user
+//! Networks from ONNX files. They are run by Parallax itself together with the built-in library `rten`, or by ONNX Runtime, which the user
 //! provides.
 //!
 //! A [`Session`] is a loaded network. It has a description of its inputs and outputs ([`Description`]) and runs on one thread

@@ -1,4 +1,4 @@
-//! Checks the sizes that the nodes of a network state as constants, because the library allocates any size.
+//! Checks the sizes that the nodes of a network state as constants, because the library allocates memory of any size.
 
 use std::collections::HashMap;
 
@@ -48,7 +48,7 @@ pub(crate) struct TooLarge {
     most: i64,
 }
 
-/// Checks all nodes of a file. A file that cannot be read is left to the library.
+/// Checks all nodes of a file. A file that cannot be read is not refused here, because the library refuses it.
 pub(crate) fn check(file: &[u8]) -> Result<(), TooLarge> {
     let graph = ModelProto::parse_buf(file).ok().and_then(|model| model.graph);
     graph.map_or(Ok(()), |graph| check_graph(&graph, DEEPEST))

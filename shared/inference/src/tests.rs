@@ -1,4 +1,4 @@
-//! Compares networks run by Parallax itself with `rten`, and tests which networks are left to `rten`.
+//! Compares networks run by Parallax itself with `rten`, and tests which networks `rten` runs alone.
 
 use crate::onnx::{Attribute, Network, Side};
 use proptest::prelude::*;

@@ -143,7 +143,7 @@ pub fn look<'a>(
 }
 
 /// Returns the box that best fits a person who was seen in a given box, as a deployment determines it ([`Looker::look_closer`]), and the
-/// rotation of the picture there.
+/// rotation of the picture in that box.
 ///
 /// * `outline`: box in which the person is seen, in pixels of the picture.
 ///

@@ -55,7 +55,7 @@ pub struct Conv {
     width: usize,
     /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs. Empty for a convolution in tiles.
     weights: Vec<Row>,
-    /// Biases, padded with zeros to pairs of blocks, as the outputs in the weights are.
+    /// Biases, padded with zeros to pairs of blocks like the outputs in the weights.
     bias: Vec<Row>,
     /// For a convolution in tiles: the 1 x 1 convolution of each position. Otherwise empty.
     positions: Vec<Conv>,
@@ -105,7 +105,7 @@ impl Conv {
     ///
     /// # Errors
     ///
-    /// Fails with [`ConvSizeError`]; also if the kernel, a stride or a number of channels is zero.
+    /// Fails with [`ConvSizeError`], also if the kernel, a stride or a number of channels is zero.
     pub fn new(
         size: ConvSize,
         weights: &[f32],

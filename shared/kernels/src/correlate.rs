@@ -167,12 +167,11 @@ impl FilterBank {
     ///
     /// `out[l][f][y][x] = sum over rows r, columns c, channels k of map_l[y + r][x + c][k] w_f[r][c][k]`
     ///
-    /// The error is at most `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`. The
-    /// maximum is over the cells less than 10 away from those under the filter, and `c` is
-    /// [`Self::error_factor`]. Filters of 3 to 6 cells a side are evaluated on a tile of the map at
-    /// once (Winograd). Other filters, and those on very small maps, are evaluated by the definition. The method depends
-    /// only on sizes. Every response is summed in the same order, whatever else is requested and
-    /// on every instruction set, so the bits are always the same.
+    /// The error is at most `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`. The maximum is over the cells
+    /// less than 10 away from those under the filter, and `c` is [`Self::error_factor`]. Filters of 3 to 6 cells a side are evaluated for a
+    /// whole tile of the map at once (Winograd). Other filters, and those on very small maps, are evaluated by the definition. The method
+    /// depends only on sizes. Every response is summed in the same order, regardless of the other requested responses and of the
+    /// instruction set, so the bits are always the same.
     ///
     /// * `out`: `levels x filters x rows x cols`, without gaps; overwritten.
     /// * Does not allocate if `workspace` has been used before or has enough [memory](Self::reserve).

@@ -1,7 +1,7 @@
 //! The distance transform in double precision, along the lower envelope of parabolas.
 //!
-//! The method is that of Felzenszwalb & Huttenlocher, *Distance Transforms of Sampled Functions*, 2012, as in the reference
-//! programs. All values are double, except the breakpoints of the envelope, which are single.
+//! The method is that of Felzenszwalb & Huttenlocher, *Distance Transforms of Sampled Functions*, 2012, as in the reference programs. All
+//! values are in double precision, except the breakpoints of the envelope, which are in single precision.
 
 use crate::spring::{Axis, Spring};
 

@@ -24,7 +24,7 @@ impl JointMaps {
         sum / self.peaks().len().max(1) as f64
     }
 
-    /// Returns how to rotate the picture so that the network sees this person upright. The direction is that from the legs to the neck and
+    /// Returns how to rotate the picture so that the network sees this person upright. The direction points from the legs to the neck and
     /// head. It changes less than the direction of the trunk when a person bends down.
     ///
     /// * `now`: rotation used so far; it is kept if the direction differs by at most 70 degrees.

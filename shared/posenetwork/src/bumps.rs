@@ -8,7 +8,7 @@ use crate::person_maps::PersonMaps;
 
 /// Minimum heat for which another Gaussian is fitted; lower residuals are ignored.
 const LEAST_HEAT: f64 = 0.03;
-/// Height to which a Gaussian is reduced at most when its neighbours take over its heat.
+/// Height below which a Gaussian is not reduced, even if its neighbours take over its heat.
 const LEAST_HEIGHT: f64 = 0.002;
 /// Number of times that all heights are fitted again after a Gaussian is added.
 const SWEEPS: usize = 6;

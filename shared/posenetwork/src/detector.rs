@@ -1,4 +1,4 @@
-//! A people detector with its card: takes a picture, returns boxes.
+//! A people detector with its card. It takes a picture and returns boxes.
 
 use inference::{Input, Session};
 use kernels::Rgb8View;
@@ -55,7 +55,7 @@ impl Detector {
     ///
     /// # Errors
     ///
-    /// Fails with [`LookError`]; also if the output contains a value that is not finite.
+    /// Fails with [`LookError`], also if the output contains a value that is not finite.
     pub fn people(
         &self,
         image: Rgb8View<'_>,

@@ -183,7 +183,7 @@ impl JointMaps {
     ///
     /// # Panics
     ///
-    /// Panics if a row refers to a keypoint beyond the list.
+    /// Panics if one of `ways` refers to a keypoint beyond the list.
     pub fn of_keypoints(
         &mut self,
         keypoints: &[Option<Keypoint>],

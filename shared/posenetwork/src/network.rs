@@ -1,4 +1,4 @@
-//! A network with its card: takes a picture and a box, returns keypoints and maps.
+//! A network with its card. It takes a picture and a box, and returns keypoints and maps.
 
 mod errors;
 mod mirror;
@@ -193,7 +193,7 @@ impl PoseNetwork {
     ///
     /// # Errors
     ///
-    /// Fails with [`LookError`]; also if the output contains a value that is not finite.
+    /// Fails with [`LookError`], also if the output contains a value that is not finite.
     pub fn look<'a>(
         &'a self,
         image: Rgb8View<'_>,

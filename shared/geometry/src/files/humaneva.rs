@@ -2,8 +2,8 @@
 //!
 //! The numbers are separated by blanks or line breaks, in this order: fc (2), cc (2), alpha (1), kc (5: k1 k2 p1 p2 k3), R (9, row by row,
 //! world to camera), T (3, mm). Pixels are counted from the centre of the first pixel, as in Bouguet's toolbox. The file has neither the
-//! name of its camera nor the image size, which is 640x480 for the colour cameras unless [`ReadOptions::size`] gives another. The world of
-//! `HumanEva` has z up; the caller must set [`ReadOptions::up`].
+//! name of its camera nor the image size, which is 640x480 for the colour cameras unless [`ReadOptions::size`] gives another size. The
+//! world of `HumanEva` has z up; the caller must set [`ReadOptions::up`].
 
 use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers};
 use crate::{Camera, LensModel, Rig};

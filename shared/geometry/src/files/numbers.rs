@@ -59,7 +59,7 @@ pub(super) fn intrinsics(
         finite(field, entry)?;
     }
     let place = |row: usize, column: usize| format!("{field}[{row}][{column}]");
-    // Skew is not modelled. It is refused if it would move a point at the border by a hundredth of a pixel.
+    // Skew is not modelled. It is refused if it would move a point at the border by a hundredth of a pixel or more.
     if k[(0, 1)].abs() > 1e-5 * k[(0, 0)].abs() {
         let requirement = "skew is not supported: it must be 0";
         return Err(ParseError::Value {

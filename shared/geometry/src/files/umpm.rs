@@ -1,7 +1,8 @@
 //! `.ini` files of UMPM (not in INI syntax): 19 numbers on 6 lines for one camera, in millimetres.
 //!
 //! The numbers are three rows of K, then k1 k2 p1 p2, then the Rodrigues vector and the translation, both world to camera. Line breaks do
-//! not matter. The file has neither the name of its camera nor the image size, which is 644x486 unless [`ReadOptions::size`] gives another.
+//! not matter. The file has neither the name of its camera nor the image size, which is 644x486 unless [`ReadOptions::size`] gives another
+//! size.
 
 use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers};
 use crate::{Camera, LensModel, Rig};

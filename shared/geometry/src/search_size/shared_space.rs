@@ -30,7 +30,8 @@ const NEAR_FACTOR: f64 = 1.6;
 const MIN_AXIS_ANGLE: f64 = 0.07;
 /// Minimum size of a space shared by more than two cameras, relative to the space shared by two.
 const MIN_SPACE_SHARE: f64 = 0.03;
-/// Minimum height of a person seen from above, relative to the height seen from the side, because the size of the parts does not change.
+/// Minimum height of a person seen from above, relative to the height seen from the side. There is a minimum because the size of the parts
+/// does not change.
 const MIN_FORESHORTENING: f64 = 0.7;
 
 /// Height of a standing person in each camera, in the space which that camera shares with others.
@@ -90,7 +91,7 @@ impl Place {
 /// Finds the heights of a standing person in the space that the cameras share. Positions with the whole person in the images are preferred
 /// over those with only the middle of the person in the images.
 ///
-/// Without an up direction, the height is that seen from the side.
+/// Without an up direction, the height is measured as seen from the side.
 pub(super) fn heights(rig: &Rig) -> Heights {
     let n = rig.cameras().len();
     for is_whole in [true, false] {
@@ -269,7 +270,7 @@ impl<'a> Viewpoint<'a> {
         Some(px.unwrap_or(otherwise))
     }
 
-    /// Returns true if a person of a height fits into the picture around a pixel, upright or across.
+    /// Returns true if a person of a given height fits into the picture around a pixel, upright or across.
     fn has_room(&self, centre: &Point2<f64>, px: f64) -> bool {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
         let across = centre.x.min(width - centre.x);

@@ -38,7 +38,7 @@ pub(super) fn search(
     }
 }
 
-/// Returns the fit without one view that has the smallest worst error; the first of several equal ones.
+/// Returns the fit with the smallest worst error among the fits that leave out one view; the first, if several are equal.
 fn leave_one_out(views: &Views<'_>, used: Subset, settings: &Settings) -> Option<(Subset, Fit)> {
     let mut best: Option<(Subset, Fit)> = None;
     for view in used.iter() {

@@ -76,7 +76,7 @@ fn cases() -> impl Strategy<Value = Case> {
 }
 
 impl Case {
-    /// Rows and columns of the output if the padding after the input equals that before.
+    /// Rows and columns of the output if the padding after the input equals the padding before it.
     fn out(&self) -> [usize; 2] {
         [0, 1].map(|axis| {
             let padded = self.sides[axis] + 2 * self.size.pad[axis];

@@ -16,7 +16,7 @@ pub(super) const POSITIONS: usize = 16;
 const STEP: usize = 2;
 /// Rows and columns of inputs in a tile.
 const SIDE: usize = 4;
-/// Most tiles that are transformed at once, so that they stay in the second-level cache.
+/// Maximum number of tiles that are transformed at once, so that they stay in the second-level cache.
 const MOST_TILES: usize = 32;
 
 /// Memory for transformed tiles, kept from one convolution to the next.

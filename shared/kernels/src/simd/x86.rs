@@ -14,11 +14,11 @@ use std::arch::x86_64::{
 use super::portable::copy_partial;
 use super::{Kernel, Row, Simd};
 
-/// AVX2 and FMA. Because of the private field, a value can only be made where they were detected.
+/// AVX2 and FMA. Because of the private field, a value can only be made where these instructions were detected.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Avx2(());
 
-/// AVX-512 F and VL. Because of the private field, a value can only be made where they were detected.
+/// AVX-512 F and VL. Because of the private field, a value can only be made where these instructions were detected.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Avx512(());
 

@@ -1,4 +1,4 @@
-//! Tests with small networks made here, and cards that match them or not.
+//! Tests with small networks that are made here, and with cards that match or do not match them.
 
 use inference::onnx::{Attribute, Network, Side};
 
@@ -233,7 +233,7 @@ fn a_list_is_read_with_its_unit() {
     let mut net = network("Relu");
     net.nodes.clear();
     net.outputs[0].1 = sides(&[1, 1, 3, 3]);
-    // Returns the mean of the picture, which is black, and positions.
+    // The network returns the mean of the picture, which is black, and positions.
     net.floats(
         "places",
         &[9],

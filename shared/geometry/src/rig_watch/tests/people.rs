@@ -8,7 +8,7 @@ use crate::{Framing, OutSize};
 /// Number of points of one side; head and neck precede both sides.
 const SIDE: usize = 12;
 const N: usize = 2 + 2 * SIDE;
-/// Number of points of the arm, which are the first of a side.
+/// Number of points of the arm, which are the first points of a side.
 const ARM: usize = 5;
 
 fn mirror() -> Vec<usize> {
