@@ -206,7 +206,8 @@ pub fn read_many(paths: &[&Path], options: &ReadOptions) -> Result<Rig, RigFileE
 ///
 /// # Errors
 ///
-/// Fails with [`RigFileError::Unwritable`] if the format cannot describe the rig, and with [`RigFileError::Write`] if the file cannot be written.
+/// Fails with [`RigFileError::Unwritable`] if the format cannot describe the rig, and with [`RigFileError::Write`] if the file cannot be
+/// written.
 pub fn write(path: &Path, format: Format, rig: &Rig) -> Result<(), RigFileError> {
     let unwritable = |source| RigFileError::Unwritable {
         path: path.to_path_buf(),

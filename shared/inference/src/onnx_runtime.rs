@@ -97,7 +97,7 @@ fn begin(library: &Path) -> Result<Environment, EngineError> {
     Ok(builder.with_telemetry(false).build()?)
 }
 
-/// The error without its recovery value.
+/// The same error, without its recovery value.
 fn plain<T>(error: &ort::Error<T>) -> EngineError {
     error.to_string().into()
 }

@@ -21,8 +21,8 @@ pub struct Joints {
 impl Joints {
     /// Chooses the joints of a model.
     ///
-    /// * `file`: file of joints. `shipped` means the shipped file; it must be used with a model that it was trained with. `none` means that
-    ///   a joint is the centre of its part.
+    /// * `file`: file of joints. `shipped` means the shipped file, which is used only for the model that it was trained with. `none` means
+    ///   that a joint is the centre of its part.
     /// * `model`: file of the model; `None` for the model that ships.
     ///
     /// # Errors

@@ -11,7 +11,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Creates a picture from grey values, row by row. Returns `None` if it would be empty, or if there are not width times height values.
+    /// Creates a picture from grey values, row by row. Returns `None` if the picture would be empty, or if there are not width times height
+    /// values.
     pub fn new(width: usize, height: usize, pixels: Vec<u8>) -> Option<Self> {
         let count = width.checked_mul(height)?;
         (count > 0 && count == pixels.len()).then_some(Self {

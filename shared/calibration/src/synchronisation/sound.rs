@@ -276,7 +276,7 @@ fn shared(pairs: &[Pair], camera: usize) -> usize {
     own.map(|pair| pair.found.n).max().unwrap_or(0)
 }
 
-/// Returns the pair of a camera that fits best.
+/// Returns the best-fitting pair that contains a camera.
 fn best(pairs: &[Pair], camera: usize) -> Option<&Pair> {
     let own = pairs.iter().filter(|pair| pair.cameras.contains(&camera));
     own.max_by(|a, b| a.found.cosine.total_cmp(&b.found.cosine))

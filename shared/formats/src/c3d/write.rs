@@ -116,7 +116,7 @@ fn numbers(point: Option<&Marker>, step: f64) -> [u8; 16] {
     let values = point.map_or([0.0, 0.0, 0.0, -1.0], |point| {
         let [x, y, z] = point.position.map(|value| value as f32);
         let steps = (point.residual / step).round().clamp(0.0, MAX_RESIDUAL);
-        // A residual that is NaN is unknown.
+        // A residual of NaN means that the residual is unknown.
         let steps = if steps.is_nan() { 0.0 } else { steps };
         let cameras = f32::from(point.cameras & 0x7f);
         [x, y, z, cameras * 256.0 + steps as f32]
