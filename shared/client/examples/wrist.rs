@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use parallax_client::{Client, ClientError, State, Wish};
 
-/// Half of the width that the bar shows, metres.
+/// Half of the width that the bar shows, in metres.
 const REACH_M: f64 = 2.0;
 const WIDTH: usize = 60;
 

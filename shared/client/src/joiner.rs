@@ -45,7 +45,7 @@ pub(crate) struct Joiner<P> {
     wish: Wish,
     n_views: usize,
     pending: BTreeMap<u64, Gathered<P>>,
-    /// Number of the first frame that may still be given.
+    /// Number of the first frame that may still be given to the caller.
     next: u64,
     /// Number of parts that came after their frame, and of frames that were given up.
     pub(crate) n_late: u64,
@@ -112,8 +112,8 @@ impl<P> Joiner<P> {
         Some(gathered)
     }
 
-    /// Returns the frames that need not wait any longer, in order. Frames before them stop waiting, too; if skeletons are
-    /// requested, those without one are given up.
+    /// Returns the frames that need not wait any longer, in order. Frames before them stop waiting, too; if skeletons are requested, frames
+    /// without a skeleton are given up.
     ///
     /// The skeleton is the last message about a frame. When it arrives, all other parts are there or will never come.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<Gathered<P>> {

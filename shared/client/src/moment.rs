@@ -23,7 +23,7 @@ pub struct Moment {
     pub views: Vec<ViewMoment>,
     /// True if all requested parts are there.
     pub is_complete: bool,
-    /// Number of frames between the previous moment and this one that were not given. The pipeline skipped them, they were
+    /// Number of frames between the previous moment and this one that were not given to the caller. The pipeline skipped them, they were
     /// lost with a process, or newer ones replaced them. 0 for the first moment of a run.
     pub n_missed: u64,
 }
@@ -66,13 +66,13 @@ pub struct Joint<'a> {
 /// Position of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Position in the world frame of the calibration, metres.
+    /// Position in the world frame of the calibration, in metres.
     pub in_world: [f64; 3],
-    /// Covariance `[xx, xy, xz, yy, yz, zz]`, square metres.
+    /// Covariance `[xx, xy, xz, yy, yz, zz]`, in square metres.
     pub covariance: [f64; 6],
-    /// Standard deviation along one axis, averaged over the three axes: `sqrt((xx + yy + zz) / 3)`, metres.
+    /// Standard deviation along one axis, averaged over the three axes: `sqrt((xx + yy + zz) / 3)`, in metres.
     pub deviation_m: f64,
-    /// Root mean square distance of the reprojections from the observations of the views, pixels.
+    /// Root mean square distance of the reprojections from the observations of the views, in pixels.
     pub reprojection_px: f64,
     /// Number of views from which the joint was located.
     pub n_views: u32,
@@ -223,7 +223,7 @@ impl Picture {
         }
     }
 
-    /// Returns the width and height, pixels; 0 if there is no picture.
+    /// Returns the width and height, in pixels; 0 if there is no picture.
     pub fn size(&self) -> [u32; 2] {
         let header = self.header();
         [header.width, header.height]

@@ -17,5 +17,5 @@ pub use osc::osc_datagrams;
 pub use send::{Counts, run};
 pub use target::{Form, Target, TargetError};
 
-/// Maximum size of a datagram, bytes. A datagram of this size crosses any network in one piece.
+/// Maximum size of a datagram, in bytes. A datagram of this size crosses any network in one piece.
 pub const MOST_BYTES: usize = 1400;

@@ -86,7 +86,7 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// Returns a [`ClientError`] if the deployment cannot be joined. That it does not run is not an error.
+    /// Returns a [`ClientError`] if the deployment cannot be joined. It is not an error if the deployment does not run.
     pub fn wait_for(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         check_wish(wish)?;
         match Connection::open(deployment, wish) {
@@ -211,7 +211,7 @@ impl Reader {
         }
     }
 
-    /// Tries to join the deployment. All failures except that it does not run are passed to the caller.
+    /// Tries to join the deployment. Failures are passed to the caller, unless the deployment just does not run.
     fn join(&self) -> Option<Connection> {
         match Connection::open(&self.deployment, &self.wish) {
             Ok(connection) => {

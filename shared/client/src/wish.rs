@@ -39,14 +39,14 @@ impl Wish {
         }
     }
 
-    /// Requests also the single-view pose of every view.
+    /// Also requests the single-view pose of every view.
     #[must_use]
     pub fn with_poses(mut self) -> Self {
         self.poses = true;
         self
     }
 
-    /// Requests also the picture of every view.
+    /// Also requests the picture of every view.
     ///
     /// With [`Self::skeletons`], the picture is a copy. With [`Self::views`], it stays in the memory of its sender. A client can then
     /// hold only one picture of a view at a time: until a [`Moment`](crate::Moment) is dropped, later frames come without their pictures.

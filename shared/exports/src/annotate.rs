@@ -1,4 +1,4 @@
-//! Draws the pose in space on the picture of a view: limbs, and around every joint the ellipse of two standard deviations.
+//! Draws the 3D pose on the picture of a view: limbs, and around every joint the ellipse of two standard deviations.
 
 use core::f64::consts::TAU;
 

@@ -110,7 +110,7 @@ fn node(
     writeln!(out, "{tab}}}")
 }
 
-/// Returns the angles of a rotation as `Rz Rx Ry`, radians: `[z, x, y]`.
+/// Returns the angles of a rotation as `Rz Rx Ry`, in radians: `[z, x, y]`.
 fn zxy(turn: &UnitQuaternion<f64>) -> [f64; 3] {
     let turn = turn.to_rotation_matrix();
     let m = turn.matrix();
@@ -132,12 +132,12 @@ fn unwrapped(angles: [f64; 3], last: [f64; 3]) -> [f64; 3] {
     core::array::from_fn(|i| angles[i] + ((last[i] - angles[i]) / turn).round() * turn)
 }
 
-/// Frames in which a bone or the whole body is held.
+/// Frames in which a bone or the whole body keeps its last rotation.
 #[derive(Debug, Default)]
 struct Held {
-    /// First and last frame of each run in which any bone is held.
+    /// First and last frame of each run in which any bone keeps its last rotation.
     runs: Vec<[usize; 2]>,
-    /// Number of frames in which the whole body is held.
+    /// Number of frames in which the whole body keeps its last rotations.
     n_whole: usize,
     n_frames: usize,
 }

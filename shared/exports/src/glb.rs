@@ -20,11 +20,11 @@ use crate::{Point, Trial};
 use mesh::Mesh;
 use store::Store;
 
-/// Length at rest of a bone that was never seen, metres.
+/// Length at rest of a bone that was never seen, in metres.
 const UNSEEN_M: f64 = 0.2;
 /// Length up to which a bone is not drawn, metres, because matrices divide by the length.
 const SHORTEST_M: f64 = 1e-4;
-/// Size of a keypoint's mark, metres.
+/// Size of a keypoint's mark, in metres.
 const MARK_M: f64 = 0.02;
 
 /// A piece of the skin, on a separate node.

@@ -1,4 +1,4 @@
-//! Writes the pose in space as each view sees it, in the keypoint format of `OpenPose`: a file for every view and frame, `BODY_25`.
+//! Writes the 3D pose as each view sees it, in the keypoint format of `OpenPose`: a file for every view and frame, `BODY_25`.
 //!
 //! The format has a confidence for every keypoint. Here, it is the share of the views from which the joint was triangulated.
 //! The standard deviation of the position in the picture has a separate key, which other programs ignore. A keypoint that was not found,

@@ -9,7 +9,7 @@ use crate::{Point, Trial};
 
 /// Maximum number of cameras per point in C3D.
 const C3D_CAMERAS: u32 = 0x7f;
-/// Finest step of C3D's residuals, millimetres.
+/// Finest step of C3D's residuals, in millimetres.
 const FINEST_MM: f64 = 0.01;
 
 /// Returns the frame rate. The table of formats says that it is needed, and the caller has checked that it is known.

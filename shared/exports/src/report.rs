@@ -1,12 +1,12 @@
-//! HTML pages about runs and rigs, and the parts that all pages share: one style, and one method to escape text.
+//! HTML pages about runs and rigs, and the parts that all pages share: one style, and one method of escaping text.
 //!
 //! Every page is a single HTML file without other resources: no font, no picture, no style from elsewhere. The only
 //! script is that of [`run`], which draws the skeleton in space.
 //!
-//! Markup is a separate type that accepts only constants of the program, numbers and escaped text. Templates were
-//! considered but not used. Most of these pages is SVG made in loops of numbers with a fixed number of digits, which templates do not
-//! shorten. The page of a model is also XML, whose empty elements end with a slash, and `maud` writes only those of HTML.
-//! Each page has a test with text that would break it.
+//! Markup is a separate type that accepts only constants of the program, numbers and escaped text. Templates were considered but not used.
+//! Most of the content of these pages is SVG, which is made in loops from numbers with a fixed number of digits; templates would not
+//! shorten it. The page of a model must also be valid XML, in which empty elements end with a slash, but `maud` writes only the empty
+//! elements of HTML. Each page has a test with text that would break the page if it were not escaped.
 
 pub mod html;
 pub mod parts;

@@ -216,7 +216,7 @@ fn arc(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     })
 }
 
-/// Returns the length of every node's bone, metres: the median over the frames in which both ends were seen. `None` if there is no such
+/// Returns the length of every node's bone, in metres: the median over the frames in which both ends were seen. `None` if there is no such
 /// frame, or no such bone.
 pub(crate) fn lengths(trial: &Trial) -> [Option<f64>; N_NODES] {
     let landmarks = Landmarks::of(trial);

@@ -10,7 +10,7 @@ use crate::Naming;
 
 /// Maximum number of places on the grid. It is more than a day at 50 Hz; a larger number comes from a wrong frame number.
 const MAX_SLOTS: u64 = 5_000_000;
-/// Limit of coordinates, metres. A larger coordinate counts as missing.
+/// Limit of coordinates, in metres. A larger coordinate counts as missing.
 const MAX_COORDINATE: f64 = 1e6;
 /// States of smoothed points that were not measured.
 const FILLED: [&str; 2] = ["filled", "rejected"];
@@ -20,11 +20,11 @@ const TOLERANCE: f64 = 0.25;
 /// A point in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Position in the world of the rig, metres.
+    /// Position in the world of the rig, in metres.
     pub in_world: Point3<f64>,
-    /// Covariance, square metres: xx, xy, xz, yy, yz, zz; NaN if unknown.
+    /// Covariance, in square metres: xx, xy, xz, yy, yz, zz; NaN if unknown.
     pub covariance: [f64; 6],
-    /// Root mean square distance of the point's reprojections from the observations of the views, pixels of their frames.
+    /// Root mean square distance of the point's reprojections from the observations of the views, in pixels of their frames.
     pub reprojection_px: Option<f64>,
     /// Bit `v` is set if the point was triangulated from view `v` of [`Trial::views`].
     pub views: u32,
@@ -40,7 +40,7 @@ impl Point {
         all.iter().all(|value| value.is_finite()).then_some(all)
     }
 
-    /// Returns the expected root mean square error of the position, metres; `None` if it is not known.
+    /// Returns the expected root mean square error of the position, in metres; `None` if it is not known.
     pub fn deviation_m(&self) -> Option<f64> {
         let trace = self.covariance()?.trace();
         (trace >= 0.0).then(|| trace.sqrt())
@@ -143,7 +143,7 @@ impl Trial {
         self.first_frame + slot as u64 * self.frame_step
     }
 
-    /// Returns the time at which a place's frame was taken, seconds after frame 0 of the footage.
+    /// Returns the time at which a place's frame was taken, in seconds after frame 0 of the footage.
     pub fn time_s(&self, slot: usize) -> Option<f64> {
         let rate_hz = self.rate_hz?;
         Some(self.frame(slot) as f64 / self.frame_step as f64 / rate_hz)

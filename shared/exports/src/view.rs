@@ -14,21 +14,21 @@ pub struct ViewCamera {
     pub camera: Camera,
     /// Map from pixels of that camera to pixels of the pictures: two rows of an affine map.
     pub picture_from_camera: [[f64; 3]; 2],
-    /// Width and height of the pictures, pixels.
+    /// Width and height of the pictures, in pixels.
     pub size: [u32; 2],
 }
 
 /// A point in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
-    /// Position, pixels; the centre of the top-left pixel is (0, 0).
+    /// Position, in pixels; the centre of the top-left pixel is (0, 0).
     pub at: [f64; 2],
-    /// Covariance of the position: xx, xy, yy, square pixels; `None` if it is not known.
+    /// Covariance of the position: xx, xy, yy, in square pixels; `None` if it is not known.
     pub covariance: Option<[f64; 3]>,
 }
 
 impl Seen {
-    /// Returns the expected root mean square error of the position, pixels.
+    /// Returns the expected root mean square error of the position, in pixels.
     pub fn deviation_px(&self) -> Option<f64> {
         let [xx, _, yy] = self.covariance?;
         (xx + yy >= 0.0).then(|| (xx + yy).sqrt())

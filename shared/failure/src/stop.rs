@@ -23,8 +23,8 @@ use crate::now_nanos;
 const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 /// Signals within this time after the first count as one request: `timeout` sends two, and so does a closing terminal.
 const SAME_WISH: Duration = Duration::from_millis(500);
-/// Time that a process continues after a signal that is not from its supervisor, seconds. systemd signals all
-/// processes at once, including the supervisor, which then ends the other processes in order.
+/// Time that a process continues after a signal that is not from its supervisor, in seconds. systemd signals all processes at once,
+/// including the supervisor, which then ends the other processes in order.
 const UNASKED_SECONDS: u32 = 2;
 /// The exit status of a process that is ended by a second signal.
 const ENDED_AT_ONCE: i32 = 130;

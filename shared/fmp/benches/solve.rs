@@ -114,7 +114,7 @@ impl ExtraTerms for Lines<'_> {
     }
 }
 
-/// Returns a tree of limbs: the parent of every part is the part before it, or five before it.
+/// Returns a tree of limbs: the parent of every part is the part before it, or the part five before it.
 fn spec() -> ModelSpec {
     let part = |part: usize| {
         let spring = |k: usize| Spring {

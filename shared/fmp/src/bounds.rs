@@ -53,9 +53,8 @@ impl Bounds {
         self.0.len()
     }
 
-    /// Returns the upper bound of the score of a pose on a level under terms that add at most `gain` (the sum
-    /// over the parts, and the sum of its absolute values), for poses that score at least `lowest`.
-    /// Not finite if unknown.
+    /// Returns the upper bound of the score of a pose on a level under terms that add at most `gain` (the sum over the parts, and the sum
+    /// of its absolute values), for poses that score at least `lowest`. The bound is not finite if it is unknown.
     ///
     /// Rounding is monotone, so a computed score never exceeds the score computed with every term at
     /// its bound. That score differs from the sum computed here by rounding alone. A score takes
@@ -95,7 +94,7 @@ impl Upper {
         self.most < f64::from(lowest)
     }
 
-    /// Returns the maximum loss of a pose against the bound without scoring less than `lowest`.
+    /// Returns how much a pose may lose against the bound without scoring less than `lowest`.
     ///
     /// If one term of a pose has a given value, the bound of the pose is [`Self::most`], minus that
     /// term's bound, plus the value. The value itself can be as large as the loss, and adds as much

@@ -29,7 +29,7 @@ impl Extractor {
         Self::on(Isa::best(), model)
     }
 
-    /// Like [`Self::new`], for a given instruction set; the responses are the same on all.
+    /// Like [`Self::new`], for a given instruction set; the responses are the same on all instruction sets.
     pub fn on(isa: Isa, model: Arc<Model>) -> Self {
         Self::with(FilterBank::new, isa, model)
     }
@@ -66,8 +66,8 @@ impl Extractor {
     /// The values are the same. Filters smaller than the largest filter have a response at the same cells
     /// as the largest one, at the position of their own top-left cell.
     ///
-    /// * `out`: at least [`Layout::n_responses`] values, `[level][filter][row][col]`; all of them
-    ///   are overwritten. It may lie in shared memory.
+    /// * `out`: at least [`Layout::n_responses`] values, `[level][filter][row][col]`; all of them are overwritten. It may be in shared
+    ///   memory.
     ///
     /// # Panics
     ///

@@ -18,16 +18,16 @@ pub struct Placement {
 /// One level of the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelLayout {
-    /// Side of a cell, in pixels of the original image: `cell_px * 2^(level / interval)`. It is computed as in
-    /// the reference programs, bit for bit; a whole octave is exact.
+    /// Side of a cell, in pixels of the original image: `cell_px * 2^(level / interval)`. It is computed as in the reference programs, bit
+    /// for bit; whole octaves are exact.
     pub scale: f64,
     /// Size `[width, height]` of the resized image, in pixels of the level.
     pub image_size: [usize; 2],
-    /// Size `[rows, cols]` of the padded feature map, cells.
+    /// Size `[rows, cols]` of the padded feature map, in cells.
     pub padded: [usize; 2],
-    /// Height of every response map of the level, cells.
+    /// Height of every response map of the level, in cells.
     pub rows: usize,
-    /// Width of every response map of the level, cells.
+    /// Width of every response map of the level, in cells.
     pub cols: usize,
     /// Start of the level's maps in the array of responses.
     pub offset: usize,
@@ -87,9 +87,8 @@ impl Layout {
         let mut levels: Vec<LevelLayout> = Vec::with_capacity(n_levels);
         let mut offset = 0;
         for level in 0..n_levels {
-            // The programs take a power for the first octave and halve it from there on. A running
-            // product would drift by a few units in the last place. A centre halfway
-            // between two pixels would then be rounded to the other pixel.
+            // The reference programs compute powers for the first octave, and halve them for every further octave. A running product would
+            // drift by a few units in the last place. A centre halfway between two pixels would then be rounded to the other pixel.
             let shrink = 1.0 / step.powf((level % spec.interval) as f64);
             let relative = shrink * 0.5_f64.powi((level / spec.interval) as i32);
             let image_size = if level < spec.interval {

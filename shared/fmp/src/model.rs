@@ -60,7 +60,7 @@ pub struct PartSpec {
 /// A model as read from a file, not yet validated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
-    /// Description of the model's origin, for people.
+    /// Description of the model's origin, for human readers.
     pub name: String,
     /// The parts, parents before children.
     pub parts: Vec<PartSpec>,
@@ -70,7 +70,7 @@ pub struct ModelSpec {
     pub root_bias: f64,
     /// Levels per octave of the pyramid.
     pub interval: usize,
-    /// Side of a feature cell, pixels of its level.
+    /// Side of a feature cell, in pixels of its level.
     pub cell_px: usize,
     /// Minimum score of the positives in training; detection uses `min(threshold, -1)`.
     pub threshold: f64,
@@ -229,7 +229,7 @@ impl Model {
         &self.0.filters[self.0.parts[part].filter_of_type[mixture]]
     }
 
-    /// Returns the largest `[rows, cols]` over all filters, cells.
+    /// Returns the largest `[rows, cols]` over all filters, in cells.
     pub fn max_filter(&self) -> [usize; 2] {
         let largest = |side: fn(&Filter) -> usize| self.0.filters.iter().map(side).max();
         [

@@ -4,7 +4,7 @@ use crate::{Bounds, Layout, Pose, Scope, Window};
 
 /// Responses of all filters on the offered levels.
 ///
-/// The array may lie in shared memory; it is not copied.
+/// The array may be in shared memory; it is not copied.
 #[derive(Debug, Clone, Copy)]
 pub struct Responses<'a> {
     layout: &'a Layout,

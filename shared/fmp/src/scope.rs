@@ -118,9 +118,8 @@ impl Scope {
 }
 
 impl Layout {
-    /// Returns the cells of a level in a scope: those at which the centre of the largest filter is in the
-    /// region, and the next ones outside it. If the region ends at the border of the image, all remaining
-    /// cells are included. There is at least one cell.
+    /// Returns the cells of a level in a scope: those at which the centre of the largest filter is in the region, and the adjacent cells
+    /// outside it. If the region ends at the border of the image, all remaining cells are included. There is at least one cell.
     pub fn window(&self, scope: &Scope, level: usize) -> Window {
         let it = &self.levels[level];
         if scope.is_whole {

@@ -38,7 +38,7 @@ pub trait ExtraTerms: Sync {
     fn of_type(&self, part: usize, mixture: usize) -> f32;
 
     /// Returns an upper bound of the sum of both terms for any placement of the part. The
-    /// [`IncrementalSolver`] uses it to prune levels and poses. Infinite if unknown.
+    /// [`IncrementalSolver`] uses it to prune levels and poses. The bound is infinite if it is unknown.
     fn max_gain(&self, _part: usize) -> f32 {
         f32::INFINITY
     }
@@ -107,7 +107,7 @@ impl Solver {
         Self::on(Isa::best(), model)
     }
 
-    /// Like [`Self::new`], for a given instruction set; the answers are the same on all.
+    /// Like [`Self::new`], for a given instruction set; the results are the same on all instruction sets.
     pub fn on(isa: Isa, model: Arc<Model>) -> Self {
         let rule_of = |part: usize| {
             let edge = model.spec().parts[part].edge.as_ref()?;

@@ -27,19 +27,18 @@ pub struct TrackSettings {
     pub levels: u16,
     /// Search distance around the last pose's box, as a share of the box's longer side.
     pub margin: f64,
-    /// Number of frames after a full search at which the next full search is made; 0 and 1 mean every frame.
+    /// Interval between full searches, in frames; 0 and 1 mean a full search in every frame.
     pub full_every: u64,
     /// Maximum step between frames across which a pose is tracked; 1 means that no frame may be skipped.
     pub max_gap: u64,
     /// Maximum drop of the score below that of the last full search; a larger drop causes a full search of the same
     /// frame.
     pub max_drop: f32,
-    /// Maximum movement of a pose per second, as a share of its box's longer side; at low frame
-    /// rates, it exceeds `margin`.
+    /// Maximum movement of a pose per second, as a share of its box's longer side; at low frame rates, this distance exceeds `margin`.
     pub speed: f64,
     /// Maximum time between frames across which a pose is tracked, in seconds.
     pub max_gap_s: f64,
-    /// Time after a full search at which the next full search is made, in seconds.
+    /// Interval between full searches, in seconds.
     pub full_every_s: f64,
 }
 

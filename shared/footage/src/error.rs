@@ -64,7 +64,7 @@ pub enum FootageError {
         /// Path of the file.
         path: PathBuf,
     },
-    /// The file is not an image, or is damaged or cut off.
+    /// The file is not an image, or is damaged or truncated.
     #[error("cannot decode the image {}", path.display())]
     Image {
         /// Path of the file.
@@ -107,7 +107,7 @@ pub enum FootageError {
         path: PathBuf,
         /// Size of the pictures.
         size: Size,
-        /// Minimum width and height, pixels.
+        /// Minimum width and height, in pixels.
         min_side: usize,
     },
     /// `step` is 0.

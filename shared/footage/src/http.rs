@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Maximum size of an answer's head, bytes.
+/// Maximum size of an answer's head, in bytes.
 const MAX_HEAD: u64 = 16 << 10;
 
 /// Kind of answer.
@@ -41,7 +41,7 @@ impl Answer {
 pub(crate) fn ask(address: &str) -> Option<Answer> {
     let (scheme, rest) = address.split_once("://")?;
     let (host, path) = rest.split_at(rest.find(['/', '?']).unwrap_or(rest.len()));
-    // Without its password, a camera refuses. With TLS, the answer cannot be read.
+    // A camera refuses a request without its password. With TLS, the answer cannot be read.
     if !scheme.eq_ignore_ascii_case("http") || host.contains('@') {
         return None;
     }

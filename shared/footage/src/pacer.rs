@@ -35,7 +35,7 @@ impl Pacer {
         }
     }
 
-    /// Returns the time at which frame `k` is due, nanoseconds of the caller's clock; 0 without a rate.
+    /// Returns the time at which frame `k` is due, in nanoseconds of the caller's clock; 0 without a rate.
     pub fn due_nanos(&self, k: u64) -> u64 {
         match self.rate_hz {
             None => 0,

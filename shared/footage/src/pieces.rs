@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 
 /// Maximum number of pieces that may wait. Further pieces are lost and counted.
 const MAX_WAITING: usize = 128;
-/// Maximum plausible length of an element, bytes.
+/// Maximum plausible length of an element, in bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
 /// Kind of a piece of a stream.
@@ -26,7 +26,7 @@ pub enum PieceKind {
 pub struct Piece {
     /// Kind of the piece.
     pub kind: PieceKind,
-    /// Time of the piece's picture in the stream, nanoseconds in whole milliseconds; 0 for a head.
+    /// Time of the piece's picture in the stream, in nanoseconds, rounded to whole milliseconds; 0 for a head.
     pub nanos: u64,
     /// Bytes of the piece.
     pub bytes: Vec<u8>,

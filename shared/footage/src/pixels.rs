@@ -23,7 +23,7 @@ pub enum PixelFormat {
 }
 
 impl PixelFormat {
-    /// All formats, best first: first the formats with the fewest bytes, then those that lose least.
+    /// All formats, best first: first the formats with the fewest bytes, then the formats that lose the least information.
     pub const ALL: [Self; 7] = [
         Self::Jpeg,
         Self::Yuyv,

@@ -69,7 +69,7 @@ impl RemadeStream {
         })
     }
 
-    /// Reads the next picture into `rgb`. Returns its time in the stream, nanoseconds; `None` at the end.
+    /// Reads the next picture into `rgb`. Returns its time in the stream, in nanoseconds; `None` at the end.
     ///
     /// # Errors
     ///

@@ -13,14 +13,14 @@ use std::sync::atomic::{AtomicI64, Ordering};
 
 use rustix::io::{FdFlags, fcntl_setfd};
 
-/// Number of consecutive offsets that must agree, and their tolerance, nanoseconds: `ffmpeg` rounds to whole milliseconds.
+/// Number of consecutive offsets that must agree, and their tolerance, in nanoseconds: `ffmpeg` rounds to whole milliseconds.
 const N_EQUAL: usize = 16;
 const EQUAL_NANOS: i64 = 1_100_000;
 /// Seconds from 1900, where NTP begins, to 1970.
 const NTP_TO_UNIX_S: i64 = 2_208_988_800;
 /// Value that stands for an unknown offset.
 const UNKNOWN: i64 = i64::MIN;
-/// Maximum plausible length of a box, bytes.
+/// Maximum plausible length of a box, in bytes.
 const MAX_HEAD: u64 = 1 << 20;
 const MAX_TIME: u64 = 64;
 
@@ -68,13 +68,13 @@ impl SenderClock {
         Ok(clock)
     }
 
-    /// Returns the camera's clock at time 0 of its stream, nanoseconds since 1970 began; `None` before it is known.
+    /// Returns the camera's clock at time 0 of its stream, in nanoseconds since 1970 began; `None` before it is known.
     pub(crate) fn offset_nanos(&self) -> Option<i64> {
         Some(self.0.load(Ordering::Relaxed)).filter(|offset| *offset != UNKNOWN)
     }
 }
 
-/// A time of the stream, and the time of the clock at that moment, nanoseconds.
+/// A time of the stream, and the time of the clock at that moment, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Told {
     presented: i64,

@@ -1,6 +1,6 @@
 //! Width and height of an image.
 
-/// Width and height of an image, pixels.
+/// Width and height of an image, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Size {
     /// Number of columns.

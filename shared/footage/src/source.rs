@@ -68,7 +68,7 @@ pub struct SourceInfo {
 pub struct FrameView<'a> {
     /// Index in the footage, counted from 0: `start + k * step`. Some `k` may be missing.
     pub index: u64,
-    /// Presentation time, seconds after frame 0 of the footage; `None` if the rate is not known.
+    /// Presentation time, in seconds after frame 0 of the footage; `None` if the rate is not known.
     pub time_s: Option<f64>,
     /// The pixels, RGB, row major, `width * height * 3` bytes.
     pub rgb: &'a [u8],
@@ -277,8 +277,8 @@ impl Reader {
     }
 }
 
-/// Returns the size of the pictures of footage as they are stored, and the turn in the tag of the first one. Faster than opening the
-/// footage.
+/// Returns the size of the pictures of footage as they are stored, and the turn in the tag of the first one. This is faster than opening
+/// the footage.
 ///
 /// # Errors
 ///

@@ -33,14 +33,14 @@ pub struct SourceSpec {
     /// Numbers in the names of pictures that are frames, so that a missing picture is a missing frame. If not set, the frames are the
     /// pictures in order, regardless of their names.
     pub numbers: Option<PictureNumbers>,
-    /// Method to turn the pictures.
+    /// Method of turning the pictures.
     pub rotation: Rotation,
     /// Maximum factor by which the pictures of a video may be shrunk when they are decoded.
     ///
     /// The factor is the largest whole number up to this maximum that divides both sides of the pictures. Each pixel is the mean of the
     /// pixels that it covers. With 1, the pictures are not shrunk.
     pub most_shrink: usize,
-    /// Minimum width and height of pictures before shrinking, pixels.
+    /// Minimum width and height of pictures before shrinking, in pixels.
     pub min_side: usize,
     /// The `ffmpeg` executable, a name on the search path or a path. Needed only for videos.
     pub ffmpeg: PathBuf,

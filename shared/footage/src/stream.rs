@@ -22,11 +22,11 @@ use crate::source::probe::{fraction, is_5_1};
 use crate::source::program::missing;
 use crate::{FootageError, Pieces, Size};
 
-/// Time without data after which a stream counts as gone, seconds.
+/// Time without data after which a stream counts as gone, in seconds.
 const SILENCE_S: u64 = 5;
 /// Time that a stream may take to identify itself. It is longer than any time limit of the decoder.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Minimum and maximum plausible rate in a header, frames per second.
+/// Minimum and maximum plausible rate in a header, in frames per second.
 const RATES_HZ: [f64; 2] = [1.0, 1000.0];
 /// Divisor of a picture's rows: the decoder reports the size of the top eighth of each picture, in grey.
 pub(crate) const SHARE: usize = 8;
@@ -85,10 +85,10 @@ struct Asked {
 /// One frame of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StreamFrame {
-    /// Presentation time of the frame on the clock of the camera, nanoseconds after an arbitrary moment; `None` if the stream has no
+    /// Presentation time of the frame on the clock of the camera, in nanoseconds after an arbitrary moment; `None` if the stream has no
     /// times of its own.
     pub presented_nanos: Option<i64>,
-    /// Time at which the frame was taken by the clock of the camera, nanoseconds since 1970 began. `None` if the camera does not report
+    /// Time at which the frame was taken by the clock of the camera, in nanoseconds since 1970 began. `None` if the camera does not report
     /// it; RTSP cameras report it some seconds after they were opened.
     pub unix_nanos: Option<i64>,
     /// Time of the frame in the decoder, nanoseconds, even if the decoder invented it. It equals
@@ -285,7 +285,7 @@ impl StreamSpec {
         let mut options = vec!["-fflags", "nobuffer", "-flags", "low_delay"];
         options.extend(["-analyzeduration", "1000000", "-probesize", "1000000"]);
         if !self.has_times() {
-            // A JPEG picture that is cut short is dropped, because its lower part would otherwise be grey.
+            // A truncated JPEG picture is dropped, because its lower part would otherwise be grey.
             options.extend(["-err_detect", "explode"]);
         }
         if self.is_bare {

@@ -20,15 +20,15 @@ use crate::Size;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turn(pub(crate) Orientation);
 
-/// Method to turn the pictures of footage.
+/// Method of turning the pictures of footage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rotation {
-    /// Not turned: the pixels as they are stored. A calibration that was made of stored pixels refers to these.
+    /// Not turned: the pixels as they are stored. A calibration that was made of stored pixels refers to these pixels.
     #[default]
     Stored,
     /// Turned according to the tag: pictures as video players show them.
     Tag,
-    /// Turned by this, regardless of the tag.
+    /// Turned by the given turn, regardless of the tag.
     By(Turn),
 }
 
@@ -171,7 +171,7 @@ impl fmt::Display for Turn {
 mod tests {
     use super::*;
 
-    /// Returns the point at which a stored point is shown, from the pixels.
+    /// Returns the point at which a stored point is shown, computed from the pixels.
     fn shown([x, y]: [usize; 2], turn: Turn) -> [usize; 2] {
         let size = Size::new(3, 2);
         let mut rgb = vec![0; size.rgb_bytes()];

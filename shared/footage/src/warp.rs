@@ -21,7 +21,7 @@ pub type Affine = [[f64; 3]; 2];
 /// Maximum factor by which an image is shrunk.
 const MAX_SCALE: f64 = 64.0;
 
-/// Maximum translation, pixels: larger than any image, and exact in fixed point.
+/// Maximum translation, in pixels: larger than any image, and exact in fixed point.
 const MAX_SHIFT: f64 = 1e6;
 
 /// The value of pixels outside of the source.
@@ -37,7 +37,7 @@ pub enum Fill {
 /// Reason why a warp cannot be created.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum WarpError {
-    /// The source or the output has no pixel.
+    /// The source or the output has no pixels.
     #[error("cannot warp an image of {source_size} to {output_size}")]
     Empty {
         /// Size of the source.

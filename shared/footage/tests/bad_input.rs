@@ -361,7 +361,7 @@ proptest! {
             bytes.truncate(1 + cut.index(bytes.len()));
         }
         fs::write(&path, if is_noise { &noise } else { &bytes }).unwrap();
-        // Either result is right, but it must not panic.
+        // Either result is right, but reading must not panic.
         if let Err(error) = read_all(&spec(&path)) {
             named(&error, "x.");
         }

@@ -251,7 +251,7 @@ fn the_film_is_read_and_not_the_cover_in_front_of_it() {
     }
 }
 
-/// Writes a sequence of JPEG pictures, some of which are cut, in a container.
+/// Writes a sequence of JPEG pictures, some of which are truncated, in a container.
 fn cut(folder: &Path, name: &str, is_cut: impl Fn(usize) -> bool) -> PathBuf {
     let mut stream = Vec::new();
     for nth in 0..8 {

@@ -11,7 +11,7 @@ pub use kind::CardKind;
 pub(crate) use kind::{DETECTOR_FORMAT, FORMAT, VERSION, check_head};
 pub use value::{Refine, Score};
 
-/// Maximum side of an input, pixels.
+/// Maximum side of an input, in pixels.
 const MAX_SIDE: usize = 2048;
 /// Maximum number of keypoints.
 const MAX_KEYPOINTS: usize = 256;
@@ -71,9 +71,9 @@ impl Also {
 pub struct Input {
     /// Name of the input; if left out, the only input.
     pub name: Option<String>,
-    /// Width, pixels.
+    /// Width, in pixels.
     pub width: usize,
-    /// Height, pixels.
+    /// Height, in pixels.
     pub height: usize,
     /// Order of the input's axes.
     #[serde(default)]
@@ -163,7 +163,7 @@ pub enum Fit {
     Stretch,
 }
 
-/// Output of a network, and the method to read it.
+/// Output of a network, and the method of reading it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Codec {
@@ -184,7 +184,7 @@ pub enum Codec {
         /// True if each cell is in the middle of the pixels that it covers; otherwise, it is on the first of them. Not allowed with `udp`.
         #[serde(default)]
         centred: bool,
-        /// Method to refine a maximum.
+        /// Method of refining a maximum.
         #[serde(default)]
         refine: Refine,
         /// Meaning of a score.

@@ -5,7 +5,7 @@ use crate::card::{Layout, ListField, ListUnit, Refine, Score};
 /// A keypoint that a network found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keypoint {
-    /// Column and row, pixels of the network's input.
+    /// Column and row, in pixels of the network's input.
     pub at: [f64; 2],
     /// Confidence of the network. It is from 0 to 1 if the network gives a share or log-odds, otherwise in the network's own unit.
     pub score: f64,
@@ -99,7 +99,7 @@ impl<'a> HeatMaps<'a> {
 
     /// Returns the number of pixels of the input between two cells, across and down.
     ///
-    /// * `input`: width and height of the network's input, pixels.
+    /// * `input`: width and height of the network's input, in pixels.
     /// * `udp`: true if corner cells are on corner pixels. Otherwise, each cell covers an equal share of the input.
     pub fn step(&self, input: [usize; 2], udp: bool) -> [f64; 2] {
         let cells = [self.columns, self.rows];
@@ -129,7 +129,7 @@ impl<'a> HeatMaps<'a> {
 
     /// Returns the maximum of every map.
     ///
-    /// * `input`: width and height of the network's input, pixels.
+    /// * `input`: width and height of the network's input, in pixels.
     /// * `udp`: true if corner cells are on corner pixels. Otherwise, the first cell is on the first pixel, and each cell covers an equal
     ///   share of the input.
     pub fn keypoints(
@@ -309,7 +309,7 @@ impl<'a> List<'a> {
 
     /// Returns the keypoints. The score is 1 for a list without scores.
     ///
-    /// * `input`: width and height of the network's input, pixels.
+    /// * `input`: width and height of the network's input, in pixels.
     pub fn keypoints(&self, input: [usize; 2], unit: ListUnit, score: Score) -> Vec<Keypoint> {
         let scale = match unit {
             ListUnit::Pixel => [1.0; 2],

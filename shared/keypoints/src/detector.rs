@@ -42,7 +42,7 @@ pub struct DetectorCard {
     pub most_overlap: f64,
 }
 
-/// Output of a detector, and the method to read it.
+/// Output of a detector, and the method of reading it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Boxes {
@@ -61,8 +61,7 @@ pub enum Boxes {
         #[serde(default)]
         decoded: bool,
     },
-    /// Boxes of people only, `[1, n, 5]`: left, top, right, bottom, pixels of the input, and score (`RTMDet` as exported by
-    /// mmdeploy).
+    /// Boxes of people only, `[1, n, 5]`: left, top, right, bottom, in pixels of the input, and score (`RTMDet` as exported by mmdeploy).
     List {
         /// Name of the output.
         boxes: String,
@@ -97,7 +96,7 @@ fn strides() -> Vec<usize> {
 /// A box around a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PersonBox {
-    /// Left, top, right, bottom, pixels.
+    /// Left, top, right, bottom, in pixels.
     pub outline: [f64; 4],
     /// Confidence of the network, 0 to 1.
     pub score: f64,

@@ -3,7 +3,7 @@
 use crate::card::{Card, Codec, Fit, Layout};
 use crate::decode::Keypoint;
 
-/// Minimum side of a window over a grid, pixels of the picture.
+/// Minimum side of a window over a grid, in pixels of the picture.
 const LEAST_SIDE_PX: f64 = 8.0;
 /// Maximum ratio of the sides of such a window.
 const MOST_SLENDER: f64 = 4.0;
@@ -23,7 +23,7 @@ const MOST_SLENDER: f64 = 4.0;
 ///   edges of the box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// Middle of the window in the picture, pixels.
+    /// Middle of the window in the picture, in pixels.
     centre: [f64; 2],
     /// Number of pixels of the picture per pixel of the input, across and down.
     step: [f64; 2],
@@ -36,7 +36,7 @@ pub struct Window {
 impl Window {
     /// Returns the window around a person; `None` for a box without an extent, or with numbers that are not finite.
     ///
-    /// * `outline`: the box: left, top, right, bottom, pixels of the picture.
+    /// * `outline`: the box: left, top, right, bottom, in pixels of the picture.
     pub fn new(card: &Card, outline: [f64; 4]) -> Option<Self> {
         Self::of_input(card, outline, [card.input.width, card.input.height])
     }
@@ -82,7 +82,7 @@ impl Window {
     ///
     /// Returns `None` for numbers that are not finite, and for a box whose sides are exchanged.
     ///
-    /// * `outline`: the box: left, top, right, bottom, pixels of the picture.
+    /// * `outline`: the box: left, top, right, bottom, in pixels of the picture.
     /// * `margin`: factor by which the box is enlarged about its middle.
     /// * `most_rows`: maximum number of rows of cells. There are at most four times as many columns.
     pub fn grid(outline: [f64; 4], margin: f64, most_rows: usize) -> Option<Self> {
@@ -113,12 +113,12 @@ impl Window {
         self.input
     }
 
-    /// Returns the point of the picture at a point of the input.
+    /// Maps a point in the network's input to the corresponding point in the picture.
     pub fn in_picture(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| self.centre[axis] + (at[axis] - self.middle[axis]) * self.step[axis])
     }
 
-    /// Returns the point of the input at a point of the picture.
+    /// Maps a point in the picture to the corresponding point in the network's input.
     pub fn in_input(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| (at[axis] - self.centre[axis]) / self.step[axis] + self.middle[axis])
     }

@@ -10,9 +10,9 @@ use crate::{MAX_CANDIDATES, MAX_LEVELS, Stamp, Status, Timing};
 #[type_name("GridMessage.v1")]
 #[repr(C)]
 pub struct GridMessage {
-    /// Centre of the first cell, pixels of the frame.
+    /// Centre of the first cell, in pixels of the frame.
     pub first_px: [f64; 2],
-    /// Distance between neighbouring cells, across and down, pixels of the frame.
+    /// Distance between neighbouring cells, across and down, in pixels of the frame.
     pub cell_px: [f64; 2],
     /// Number of columns and rows.
     pub size: [u32; 2],
@@ -20,9 +20,8 @@ pub struct GridMessage {
 
 /// The user header of a sample of `[f32]`, without gaps.
 ///
-/// With the method of networks, the sample has the maps of one person after the other, in the order of the candidates:
-/// `[joint][row][column]`. With the paper's method, it has the responses of an `fmp::Scope`. The header's alignment places the
-/// values at the start of a cache line.
+/// With the network method, the sample has the maps of one person after the other, in the order of the candidates: `[joint][row][column]`.
+/// With the paper's method, it has the responses of an `fmp::Scope`. The header's alignment places the values at the start of a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("EvidenceHeader.v4")]
 #[repr(C)]
@@ -32,11 +31,11 @@ pub struct EvidenceHeader {
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// Width of the image, pixels.
+    /// Width of the image, in pixels.
     pub width: u32,
-    /// Height of the image, pixels.
+    /// Height of the image, in pixels.
     pub height: u32,
-    /// Says that there is evidence, or why there is none.
+    /// States whether there is evidence, and if not, why.
     pub status: Status,
     /// Number of valid entries of `levels`.
     pub n_levels: u32,
@@ -46,9 +45,9 @@ pub struct EvidenceHeader {
     pub padding: u32,
     /// The maps of each person.
     pub people: [GridMessage; MAX_CANDIDATES],
-    /// First column of the image with responses, and the column after the last, pixels.
+    /// First column of the image with responses, and the column after the last, in pixels.
     pub x: [u32; 2],
-    /// First row of the image with responses, and the row after the last, pixels.
+    /// First row of the image with responses, and the row after the last, in pixels.
     pub y: [u32; 2],
     /// First level that has responses, and the level after the last.
     pub scope_levels: [u16; 2],

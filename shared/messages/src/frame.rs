@@ -18,18 +18,18 @@ pub struct FrameHeader {
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// Width, pixels; 0 if there is no image.
+    /// Width, in pixels; 0 if there is no image.
     pub width: u32,
-    /// Height, pixels; 0 if there is no image.
+    /// Height, in pixels; 0 if there is no image.
     pub height: u32,
-    /// Says that there is an image, or why there is none.
+    /// States whether there is an image, and if not, why.
     pub status: Status,
     /// Explicit padding.
     pub reserved: u32,
     /// Number of frames of this view since the session began that were due but never sent.
     pub n_dropped: u64,
-    /// Time from the instant of the frame, which all views share, until the picture was taken, nanoseconds. Negative if the
-    /// picture was taken earlier; 0 if the time is not known.
+    /// Time from the instant of the frame, which all views share, until the picture was taken, in nanoseconds. Negative if the picture was
+    /// taken earlier; 0 if the time is not known.
     pub skew_nanos: i64,
     /// Explicit padding.
     pub reserved_end: [u64; 6],

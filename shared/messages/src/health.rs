@@ -19,7 +19,7 @@ pub struct Health {
     pub epoch: u32,
     /// Number of iterations of the process's main loop.
     pub n_loops: u64,
-    /// Time of sending, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time of sending, `CLOCK_MONOTONIC`, in nanoseconds.
     pub at_nanos: u64,
     /// Number of messages received.
     pub n_received: u64,
@@ -29,11 +29,11 @@ pub struct Health {
     pub n_dropped: u64,
     /// Last frame sent.
     pub last_frame: u64,
-    /// Median computing time of a frame, microseconds.
+    /// Median computing time of a frame, in microseconds.
     pub p50_micros: u64,
-    /// 99th percentile of the computing time, microseconds.
+    /// 99th percentile of the computing time, in microseconds.
     pub p99_micros: u64,
-    /// Peak physical memory of the process, including mapped shared memory, bytes; 0 if the system does not report it.
+    /// Peak physical memory of the process, including mapped shared memory, in bytes; 0 if the system does not report it.
     pub peak_memory_bytes: u64,
     /// 1 once the process has reached the end of the stream and forwarded it.
     pub finished: u32,

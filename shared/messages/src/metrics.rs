@@ -5,7 +5,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 /// Maximum number of rows of a [`Metrics`]: one row of waiting per view, and the rows that belong to no view.
 pub const MAX_ROWS: usize = 24;
-/// Maximum length of a view name in [`Metrics`], bytes; longer names are cut.
+/// Maximum length of a view name in [`Metrics`], in bytes; longer names are truncated.
 pub const MAX_NAME: usize = 32;
 /// Number of causes in [`Metrics::n_dropped`].
 pub const N_CAUSES: usize = 5;
@@ -33,9 +33,9 @@ pub struct Metrics {
     pub pid: u32,
     /// Number of restarts of the process.
     pub epoch: u32,
-    /// Time at which counting began, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which counting began, `CLOCK_MONOTONIC`, in nanoseconds.
     pub began_at_nanos: u64,
-    /// Time of sending, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time of sending, `CLOCK_MONOTONIC`, in nanoseconds.
     pub at_nanos: u64,
     /// Number of messages received.
     pub n_received: u64,
@@ -45,11 +45,11 @@ pub struct Metrics {
     pub sent_millihertz: u64,
     /// Number of messages or frames lost, by [`Cause`].
     pub n_dropped: [u64; N_CAUSES],
-    /// Size of the evidence sent, bytes.
+    /// Size of the evidence sent, in bytes.
     pub evidence_bytes: u64,
-    /// Physical memory of the process, including mapped shared memory, bytes; 0 if the system does not report it.
+    /// Physical memory of the process, including mapped shared memory, in bytes; 0 if the system does not report it.
     pub memory_bytes: u64,
-    /// Peak physical memory of the process, bytes.
+    /// Peak physical memory of the process, in bytes.
     pub peak_memory_bytes: u64,
     /// Number of frames or results that wait in the process, or [`NO_QUEUE`].
     pub queue: u32,
@@ -97,14 +97,14 @@ pub struct CameraCounts {
     pub n_refused: u64,
     /// Pictures per second, in millionths, measured by the times of the camera; 0 if unknown.
     pub rate_microhertz: u64,
-    /// Time from the common instant until the last used picture was taken, nanoseconds; negative if it was taken earlier.
+    /// Time from the common instant until the last used picture was taken, in nanoseconds; negative if it was taken earlier.
     pub off_grid_nanos: i64,
     /// Median of `off_grid_nanos` over the last pictures, nanoseconds, or [`UNMEASURED`].
     pub skew_nanos: i64,
     /// Rate at which the camera falls behind the common instants, parts per billion, or [`UNMEASURED`]. Negative for a camera
     /// that is faster.
     pub drift_ppb: i64,
-    /// Shortest time from capture to arrival over the last ten seconds, by the clock of the camera, nanoseconds;
+    /// Shortest time from capture to arrival over the last ten seconds, by the clock of the camera, in nanoseconds;
     /// [`UNMEASURED`] if it is not known.
     pub delay_nanos: i64,
     /// Source of the time at which the last picture was taken.
@@ -177,7 +177,7 @@ impl Default for Metrics {
     }
 }
 
-/// Statistics of the durations of one span, nanoseconds.
+/// Statistics of the durations of one span, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("MetricsRow.v1")]
 #[repr(C)]

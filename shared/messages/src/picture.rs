@@ -21,11 +21,11 @@ pub struct PictureHeader {
     pub stamp: Stamp,
     /// Times at which the picture arrived and the message was sent.
     pub timing: Timing,
-    /// Width, pixels.
+    /// Width, in pixels.
     pub width: u32,
-    /// Height, pixels.
+    /// Height, in pixels.
     pub height: u32,
-    /// Says that there is a picture, or why there is none: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
+    /// States whether there is a picture, and if not, why: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
     pub status: Status,
     /// Format of the bytes, four letters.
     ///
@@ -34,9 +34,9 @@ pub struct PictureHeader {
     pub format: [u8; 4],
     /// Number that the camera gave the picture, or [`NO_SEQUENCE`].
     pub sequence: u64,
-    /// Time of the picture in the stream, nanoseconds; 0 if it has none.
+    /// Time of the picture in the stream, in nanoseconds; 0 if it has none.
     pub presented_nanos: u64,
-    /// Time of the first common instant of the run, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time of the first common instant of the run, `CLOCK_MONOTONIC`, in nanoseconds.
     pub grid_start_nanos: u64,
     /// Common instants per second, before `frame_step` is applied.
     pub grid_rate_hz: f64,
@@ -44,7 +44,7 @@ pub struct PictureHeader {
     pub bytes_per_row: u32,
     /// Number of times that the camera had been opened before this connection.
     pub connection: u32,
-    /// Name of the camera, UTF-8, padded with zeros; a longer name is cut.
+    /// Name of the camera, UTF-8, padded with zeros; a longer name is truncated.
     pub name: [u8; MAX_NAME],
     /// Explicit padding.
     pub reserved: [u64; 7],

@@ -63,7 +63,7 @@ impl Searched {
     }
 }
 
-/// In place of a colour: the trunk is not seen, or there is no picture.
+/// Value used instead of a colour if the trunk is not seen, or if there is no picture.
 pub const NO_COLOUR: [f32; 3] = [-1.0; 3];
 
 /// The single-view result: distinct candidates, best first.
@@ -75,15 +75,15 @@ pub struct ViewPose {
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// Says that there is a candidate, or why there is none.
+    /// States whether there is a candidate, and if not, why.
     pub status: Status,
     /// Number of valid candidates.
     pub n_candidates: u32,
-    /// Width of the image, pixels.
+    /// Width of the image, in pixels.
     pub width: u32,
-    /// Height of the image, pixels.
+    /// Height of the image, in pixels.
     pub height: u32,
-    /// Size of the responses that were sent as evidence, bytes; 0 without a subscriber.
+    /// Size of the responses that were sent as evidence, in bytes; 0 without a subscriber.
     pub evidence_bytes: u64,
     /// Time from the instant of the frame until the picture was taken, nanoseconds, as in [`FrameHeader`](crate::FrameHeader).
     pub skew_nanos: i64,
@@ -91,10 +91,10 @@ pub struct ViewPose {
     pub searched: Searched,
     /// Number of extra keypoints per candidate: all keypoints that any view of the deployment knows.
     pub n_keypoints: u32,
-    /// The candidates. With the paper's method, they have cells. With the method of networks, they have a score only; `joints`
-    /// and `heats` have the rest.
+    /// The candidates. With the paper's method, they have cells. With the network method, they have a score only; `joints` and `heats` have
+    /// the rest.
     pub candidates: [PoseMessage; MAX_CANDIDATES],
-    /// Best position of every joint of every candidate, pixels of the frame. Used by the method of networks only.
+    /// Best position of every joint of every candidate, in pixels of the frame. Used by the network method only.
     pub joints: [[[f32; 2]; MAX_JOINTS]; MAX_CANDIDATES],
     /// Local scores of the parts of the first candidate.
     pub local: [LocalMessage; MAX_PARTS],
@@ -104,11 +104,10 @@ pub struct ViewPose {
     /// Confidence of the network in every joint of every candidate, from 0 to 1. It is 0 for a joint that is not seen, and always with
     /// the paper's method.
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
-    /// Median colour of the trunk of every candidate: red, green and blue from 0 to 1, or [`NO_COLOUR`]. Used by the method of networks
-    /// only.
+    /// Median colour of the trunk of every candidate: red, green and blue from 0 to 1, or [`NO_COLOUR`]. Used by the network method only.
     pub colours: [[f32; 3]; MAX_CANDIDATES],
-    /// The extra keypoints of one candidate after the other, for as many candidates as fit: `[column, row, standard
-    /// deviation along one axis]`, pixels of the frame. The deviation is 0 for a keypoint that was not found.
+    /// The extra keypoints of one candidate after the other, for as many candidates as fit: `[column, row, standard deviation along one
+    /// axis]`, in pixels of the frame. The deviation is 0 for a keypoint that was not found.
     pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],
 }
 
@@ -153,7 +152,7 @@ pub struct PairPose {
     pub stamp: Stamp,
     /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
-    /// Says that there is a hypothesis, or why there is none.
+    /// States whether there is a hypothesis, and if not, why.
     pub status: Status,
     /// Number of valid hypotheses.
     pub n_hypotheses: u32,
@@ -166,7 +165,7 @@ pub struct PairPose {
     /// Age of the expected errors of each of the two views, in frames, plus 1. The value 1 means this very frame; 0 means that
     /// there are no expected errors, and every part counts as usable.
     pub sigma_age: [u16; 2],
-    /// Predicted distance of every part's centre from the truth in each of the two views, pixels of the frame. It is valid for
-    /// as many parts as the poses have, and only if `sigma_age` is not 0.
+    /// Predicted distance of every part's centre from the truth in each of the two views, in pixels of the frame. It is valid for as many
+    /// parts as the poses have, and only if `sigma_age` is not 0.
     pub sigma_px: [[f32; MAX_PARTS]; 2],
 }

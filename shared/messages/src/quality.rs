@@ -14,20 +14,20 @@ pub struct ViewQuality {
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// Says that there is a prediction, or why there is none. Without a prediction, fusion treats every part as usable.
+    /// States whether there is a prediction, and if not, why. Without a prediction, fusion treats every part as usable.
     pub status: Status,
     /// Number of valid parts.
     pub n_parts: u32,
-    /// Expected distance of the part's centre from the truth, pixels of the frame.
+    /// Expected distance of the part's centre from the truth, in pixels of the frame.
     pub sigma_px: [f32; MAX_PARTS],
     /// Number of valid thresholds: the number of parts, or 0.
     pub n_thresholds: u32,
     /// Fingerprint of the network's file; 0 without a network.
     pub network: u32,
-    /// Error above which a part is switched off, pixels of the frame, from the network's file.
+    /// Error above which a part is switched off, in pixels of the frame, from the network's file.
     pub tau_px: [f32; MAX_PARTS],
     /// Input tile of the network: `[x1, y1, x2, y2]`, the centres of its outermost pixels in pixels of the frame.
     pub tile: [f32; 4],
-    /// Duration of the prediction, nanoseconds.
+    /// Duration of the prediction, in nanoseconds.
     pub took_nanos: u64,
 }

@@ -11,16 +11,15 @@ use crate::{MAX_JOINTS, MAX_KEYPOINTS, MAX_PARTS, MAX_PEOPLE, MAX_VIEWS, Stamp, 
 #[type_name("Joint3d.v1")]
 #[repr(C)]
 pub struct Joint3d {
-    /// Position in the world frame of the rig, metres.
+    /// Position in the world frame of the rig, in metres.
     pub in_world: [f64; 3],
     /// Covariance `[xx, xy, xz, yy, yz, zz]`, metres^2.
     pub covariance: [f64; 6],
-    /// Root mean square distance of the joint's reprojections from the observations that were used,
-    /// pixels.
+    /// Root mean square distance of the joint's reprojections from the observations that were used, in pixels.
     pub reprojection_px: f64,
     /// Bit `v` is set if view `v` was used.
     pub views_used: u32,
-    /// Says that there is a position, or why there is none.
+    /// States whether there is a position, and if not, why.
     pub status: Status,
 }
 
@@ -33,13 +32,13 @@ pub struct FusedView {
     pub energy: f64,
     /// Number of pairs that were averaged; 0 if the pose is the view's own, or if there is no pose.
     pub n_pairs: u32,
-    /// Says that there is a pose, or why there is none.
+    /// States whether there is a pose, and if not, why.
     pub status: Status,
     /// 1 if the view sees the person from behind, and left and right have been exchanged.
     pub exchanged: u32,
     /// Number of valid centres.
     pub n_parts: u32,
-    /// Centre of every anatomical part, pixels of the frame.
+    /// Centre of every anatomical part, in pixels of the frame.
     pub centres_px: [[f64; 2]; MAX_PARTS],
     /// Score of the view's best single-view candidate.
     pub single_score: f64,
@@ -121,9 +120,9 @@ pub struct SkeletonMessage {
     /// Certainty of which views see the person from the same side: energy of the chosen assignment
     /// minus that of the best other assignment.
     pub facing_margin: f64,
-    /// Certainty that left and right are not exchanged in all views: log-odds, nats.
+    /// Certainty that left and right are not exchanged in all views: log-odds, in nats.
     pub sides_margin: f64,
-    /// Height of the person when standing upright, from the lengths of the bones, metres; 0 if it is not known.
+    /// Height of the person when standing upright, from the lengths of the bones, in metres; 0 if it is not known.
     pub stature_m: f64,
     /// Root mean square deviation of the bone lengths from those of real people, in standard deviations.
     pub body_deviation: f64,

@@ -12,7 +12,7 @@ pub struct Stamp {
     pub session: u64,
     /// Index of the frame in the footage, counted from 0; the same in all synchronised views.
     pub frame: u64,
-    /// Time at which the frame was captured, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the frame was captured, `CLOCK_MONOTONIC`, in nanoseconds.
     pub captured_at_nanos: u64,
     /// Index of the view in the rig, or of the pair in a [`PairPose`](crate::PairPose); 0 in a
     /// message about all views.
@@ -112,7 +112,7 @@ impl Status {
     }
 }
 
-/// Times at which a stage received its last input and sent its result; `CLOCK_MONOTONIC`, nanoseconds.
+/// Times at which a stage received its last input and sent its result; `CLOCK_MONOTONIC`, in nanoseconds.
 ///
 /// The difference is computing time. The time from one stage's `sent_at_nanos` to the next stage's
 /// `received_at_nanos` is transport.

@@ -1,4 +1,5 @@
-//! Angles between the segments of a body, computed from the positions of its joints, with deviations from their covariances.
+//! Angles between the segments of a body, computed from the positions of its joints, with standard deviations that follow from the
+//! covariances of the joints.
 //!
 //! Definitions follow the recommendations of the International Society of Biomechanics where points suffice: Wu et al. 2002 (hip, ankle;
 //! *J. Biomech.* 35:543) and Wu et al. 2005 (shoulder, elbow; *J. Biomech.* 38:981). A table in `docs/guide/smooth.md` lists the angles,

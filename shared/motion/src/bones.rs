@@ -6,7 +6,7 @@ use crate::recorded::{Recorded, median};
 use crate::role::{RIGID, Role};
 use crate::track::{Estimate, Smoothed, State};
 
-/// Number of steps of the projection; it converges quadratically from a few centimetres off.
+/// Number of steps of the projection; it converges quadratically if the start is a few centimetres off.
 const N_STEPS: usize = 6;
 /// Maximum deviation of a bone's length, as a share of the length; a bone beyond it is wrong and stays unchanged.
 const MOST_OFF: f64 = 0.5;

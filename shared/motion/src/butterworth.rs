@@ -26,13 +26,13 @@ pub struct CutoffError {
     pub rate_hz: f64,
 }
 
-/// Returns the bilinear transform is usable up to 0.45 of the rate.
+/// Returns the lowest rate at which a cutoff can be used, in Hz. The bilinear transform is usable up to 0.45 of the rate.
 fn needed_hz(cutoff_hz: f64) -> f64 {
     cutoff_hz / TWICE / 0.45
 }
 
-/// Filters every joint: a Butterworth filter of second order forwards and backwards. Together, it is of fourth order, has no delay,
-/// and passes half of the power at the cutoff.
+/// Filters every joint: a Butterworth filter of second order forwards and backwards. Together, the two passes are of fourth order, have no
+/// delay, and pass half of the power at the cutoff.
 ///
 /// Gaps between measurements up to `fill_s` are first filled by cubic curves. Longer gaps split a track into pieces that are filtered
 /// separately. Non-uniform instants are interpolated (cubic) to a uniform grid and back; [`Report::resampled_s`] is the largest difference

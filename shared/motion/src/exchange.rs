@@ -53,7 +53,7 @@ fn away(track: &Track, at: usize, measured: &Usable) -> Option<f64> {
 /// Exchanges two joints if neither fits its own track but each fits the other track.
 fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
     let is_out = |track: &Track| track.used[at].is_some() && track.weights[at] == 0.0;
-    // One of them may fit by chance where the limbs cross.
+    // One of the two joints may fit by chance where the limbs cross.
     if !is_out(&tracks[a]) || !is_out(&tracks[b]) {
         return false;
     }

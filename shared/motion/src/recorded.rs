@@ -139,8 +139,8 @@ impl Recorded {
         self.joints.iter().map(other).collect()
     }
 
-    /// Returns the indices at which another person begins, or the same person at another place. There, the whole body is farther away than
-    /// a person can move, and stays there.
+    /// Returns the indices at which another person begins, or the same person at another place. At such an index, the whole body is farther
+    /// away than a person can move, and stays at the new place.
     ///
     /// The limit is half a metre plus 12 m/s, faster than anyone runs. The position of the body is the median of its joints along each
     /// axis.

@@ -10,7 +10,8 @@ pub(crate) type Usable = Option<(Vector3<f64>, Matrix3<f64>)>;
 
 /// Degrees of freedom of the heavy-tailed (Student) noise for which measurements are weighted.
 pub(crate) const FREEDOM: f64 = 4.0;
-/// A measurement is rejected if its squared Mahalanobis distance from the other measurements is larger; this rejects 1 of 10 000 good ones.
+/// A measurement is rejected if its squared Mahalanobis distance from the other measurements is larger; this rejects 1 of 10 000 good
+/// measurements.
 pub(crate) const GATE: f64 = 21.11;
 /// Factor on the covariance of the other measurements, because movement is sometimes less predictable than over the whole track: a punch
 /// is not an outlier. At high rates, it has little effect, because the measurement's own covariance dominates the sum.
@@ -18,7 +19,7 @@ const SURPRISE: f64 = 9.0;
 /// Number of rounds of computing weights; they have converged by then.
 const N_ROUNDS: usize = 4;
 
-/// Position of a joint, with its covariance in the unit of those of the measurements, unscaled.
+/// Position of a joint, with its covariance, which is not scaled, like the covariances of the measurements.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Known {
     pub(crate) position: Vector3<f64>,

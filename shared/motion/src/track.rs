@@ -72,8 +72,8 @@ pub type Smoothed = Result<Estimate, Absent>;
 
 /// Standard deviation assumed for a measurement without a covariance before its scale is estimated, in metres.
 const UNKNOWN_SD_M: f64 = 0.02;
-/// Limits to which standard deviations of a measurement are clipped, in metres. Smaller ones are rounding errors; larger ones carry no
-/// information.
+/// Limits to which standard deviations of a measurement are clipped, in metres. Smaller deviations are rounding errors; larger deviations
+/// carry no information.
 const SD_M: [f64; 2] = [1e-5, 10.0];
 /// Maximum distance of a measurement from the origin, in metres.
 const FARTHEST_M: f64 = 1e6;

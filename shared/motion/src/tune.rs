@@ -9,7 +9,7 @@ use crate::rts::{FREEDOM, Usable, forwards, weight};
 const LEAST: f64 = -1.0;
 const MOST: f64 = 5.5;
 const STEP: f64 = 0.5;
-/// Standard deviation of the natural logarithm of the scale before any measurement: covariances are right within a factor of 3.
+/// Standard deviation of the natural logarithm of the scale before any measurement: covariances are correct to within a factor of 3.
 const SCALE_SD: f64 = 1.0;
 /// Weight of the likelihood. People do not move exactly as the model assumes, so the innovations carry less information.
 /// Without this weight, fast movement at a low rate is taken for noise.
@@ -18,7 +18,7 @@ const SHARE: f64 = 0.1;
 const SCALES: [f64; 2] = [1e-4, 1e4];
 /// Minimum number of measurements for an estimate.
 const LEAST_MEASURED: usize = 12;
-/// Number of windows used of a long track, and number of instants of each.
+/// Number of windows that are used of a long track, and (below) number of instants of each window.
 const N_WINDOWS: usize = 6;
 const WINDOW: usize = 250;
 /// Number of innovations at the beginning of a window that are not counted: they depend on the initial assumptions.

@@ -56,18 +56,15 @@ pub struct AllViewsEstimate {
 /// view alone can raise the energy (up to the tolerance of `epsilon_px`), or after `max_iterations
 /// / 2` solutions of every view.
 ///
-/// The benefit was measured as PCP3D of `parallax-lab eval` on 134 instants (three views, 14 of them four; see the
-/// documentation of the crate). The mean of the terms (weight `1 / (n - 1)`) with two starts is
-/// compared with the mean of pairs:
+/// The benefit was measured as PCP3D of `parallax-lab eval` on 134 instants (120 of three views and 14 of four; see the documentation of
+/// the crate). The mean of the terms (weight `1 / (n - 1)`) with two starts is compared with the mean of pairs:
 ///
-/// * By geometry, it reaches 73.3 against 71.0. It needs 15 solutions of a single
-///   view against 20 (four views: 23 against 40).
+/// * With geometry alone, it reaches 73.3 against 71.0. It needs 15 solutions of a single view, against 20 (four views: 23 against 40).
 /// * With the network's expected errors, it reaches 75.9 against 75.1.
 /// * The sum of the terms (weight 1) reaches 72.6, with 17 solutions (four views: 32).
 /// * With an earlier model, pairs were better for three views (73.4 against 71.1).
-/// * If one of the four cameras was moved by two degrees, pairs are still better on these 14 instants (79.8 against 75.0
-///   by geometry). But they are not better on all 70 frames (78.3 with types against 80.0), nor with the network
-///   (81.3 against 84.3).
+/// * If one of the four cameras was moved by two degrees, pairs are still better on these 14 instants (79.8 against 75.0 with geometry
+///   alone). But they are not better on all 70 frames (78.3 with types against 80.0), nor with the network (81.3 against 84.3).
 ///
 /// A deployment selects this method by `views = "all"` in its section `[paper]`, with the mean of the terms
 /// and two starts.

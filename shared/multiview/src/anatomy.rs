@@ -1,10 +1,8 @@
-//! Decides which side of a skeleton is the right one, from the direction in which heads, knees,
-//! elbows and backs bend.
+//! Decides which side of a skeleton is the right-hand side, from the direction in which heads, knees, elbows and backs bend.
 //!
-//! Exchanging left and right in all views at once changes no energy. Two views show whether
-//! they agree, but not which of them is from behind. The labelled skeleton can show it. Let `l` point from
-//! its right to its left, and `u` from its pelvis to its neck. Then `l x u` points to the front if the
-//! labels are right, and to the back if they are exchanged; and bodies bend forwards.
+//! Exchanging left and right in all views at once changes no energy. Two views show whether they agree, but not which of them sees the
+//! person from behind. The labelled skeleton can show it. Let `l` point from its right to its left, and `u` from its pelvis to its neck.
+//! Then `l x u` points to the front if the labels are right, and to the back if they are exchanged; and bodies bend forwards.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 

@@ -50,17 +50,15 @@ struct Choice {
 
 /// Chooses a part's position in every view.
 ///
-/// The paper takes the mean over a view's pairs. If the pairs disagree, as for crossed legs and
-/// lifted arms, the mean lies between two positions and fits neither. This function looks for the
-/// point of the world that most views support. It considers all points `X` in which rays of positions
-/// of two views meet, and minimises
+/// The paper takes the mean over a view's pairs. If the pairs disagree, as for crossed legs and lifted arms, the mean lies between two
+/// positions and fits neither. This function looks for the point of the world that most views support. It considers all points `X` at which
+/// rays of positions of two views meet, and minimises
 ///
 /// `sum over views of min over positions k of c^2 (ln(1 + r_k^2 / c^2) - w ln(n_k / n))`
 ///
-/// where `r_k` is the distance of the projection of `X` from position `k` in sigma, and `n_k` of
-/// the view's `n` pairs found that position. The means are a further alternative, with the cost of
-/// one position that a single pair found; they are chosen if nothing else is consistent. A view
-/// with a single position keeps it. This rule is our own.
+/// where `r_k` is the distance of the projection of `X` from position `k` in sigma, and `n_k` of the view's `n` pairs found that position.
+/// The means are a further alternative, with the cost of a position that a single pair found; they are chosen if nothing else is
+/// consistent. A view with a single position keeps it. This rule is our own.
 ///
 /// * Returns one position per view, in pixels; `None` for a view without positions.
 pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<Option<[f64; 2]>> {
@@ -138,7 +136,7 @@ fn vote_cost(settings: &ConsensusSettings, n_votes: usize, n_pairs: usize) -> f6
     -settings.loss_sigmas.powi(2) * settings.vote_weight * share.ln()
 }
 
-/// The distinct positions of a view, in order of first occurrence.
+/// Returns the distinct positions of a view, in order of first occurrence.
 ///
 /// Answers close to the first one of a group are merged into one answer at their mean.
 fn distinct(
@@ -208,7 +206,7 @@ fn mean(points: &[[f64; 2]]) -> Point2<f64> {
     Point2::from(sum.map(|sum| sum / points.len() as f64))
 }
 
-/// Returns the cheapest point in which two rays meet, with its cost first.
+/// Returns the cost and the position of the cheapest point at which two rays meet.
 fn best(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],

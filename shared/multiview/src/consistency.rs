@@ -206,7 +206,7 @@ impl ExtraTerms for Consistency<'_> {
 /// The key of a part whose support adds nothing.
 pub(crate) const NO_SUPPORT: u64 = u64::MAX;
 
-/// Returns a key of everything in a support on which the terms of one pair depend.
+/// Returns a key that identifies everything in a support that affects the terms of one pair.
 pub(crate) fn support_key(support: &Pose, part: usize) -> u64 {
     let at = support.parts[part];
     let fields = [at.x, at.y, u16::from(at.mixture)].map(u64::from);

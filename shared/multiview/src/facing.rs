@@ -78,8 +78,8 @@ pub struct FacingHypothesis {
 pub struct FacingSettings {
     /// Energy cost of exchanging one view from one frame to the next.
     pub change_cost: f64,
-    /// Weight of the earlier frames' scores in the next frame, 0..1. The default halves the weight in 34
-    /// frames: people keep facing one way for longer than a stoop or a stride takes.
+    /// Weight of the earlier frames' scores in the next frame, 0..1. The default halves the weight in 34 frames: people face the same way
+    /// for longer than they take to bend down or make a step.
     pub memory: f64,
 }
 

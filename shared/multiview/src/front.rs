@@ -42,7 +42,7 @@ pub(crate) fn trunk(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
 /// Projects a direction in the world to the two components of [`FrontEvidence`], for a person at a place:
 /// towards the right of the picture, and towards the camera.
 ///
-/// The right is perpendicular to the ray from the camera to the place.
+/// The direction to the right is perpendicular to the ray from the camera to the place.
 pub fn front_in_view(camera: &Camera, place: &Point3<f64>, front: &Vector3<f64>) -> [f64; 2] {
     let in_camera = camera.camera_from_world * place;
     let Some(ray) = in_camera.coords.try_normalize(1e-9) else {

@@ -214,7 +214,7 @@ fn weights(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> 
 mod tests {
     use super::*;
 
-    /// Two cameras side by side: the line of a point is its own row.
+    /// Two cameras side by side: the epipolar line of a point is its own row.
     fn side_by_side() -> Matrix3<f64> {
         Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0)
     }

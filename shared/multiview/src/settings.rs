@@ -92,8 +92,8 @@ pub struct Settings {
     pub tau_px: Vec<f32>,
     /// The expected error that switches a part off.
     pub switch: SwitchBy,
-    /// The same thresholds in tenths of the person's size in the view, which is the longer side of the
-    /// rectangle around the part centres of its best pose; used if `tau_px` is empty.
+    /// The thresholds of `tau_px` in tenths of the person's size in the view, which is the longer side of the rectangle around the part
+    /// centres of its best pose; used if `tau_px` is empty.
     pub tau_tenths: Vec<f32>,
     /// `Released` only: minimum difference of the expected errors at which the better of two views that
     /// are both off is switched on again, in pixels, one per part (the median training errors); if empty,

@@ -1,4 +1,4 @@
-//! Decides which side of the body is the right one, for all views together, over time.
+//! Decides, for all views together and over time, which side of the body is the right-hand side.
 //!
 //! Exchanging left and right in all views changes no energy. So the decision uses the front evidence of the views
 //! ([`front`](crate::front())) and the way bodies bend ([`anatomical_evidence`](crate::anatomical_evidence)).
@@ -11,12 +11,12 @@ pub struct SidesSettings {
     /// Log-likelihood ratio per nat of the views' evidence about the front. The value is below 1 because views err together
     /// about the front of a person more often than if they were independent.
     pub front_weight: f64,
-    /// Log-likelihood ratio per unit of anatomical evidence (trunk lengths), nats.
+    /// Log-likelihood ratio per unit of anatomical evidence (trunk lengths), in nats.
     pub anatomy_weight: f64,
     /// Probability that a person turns around from one frame to the next. It limits the weight of the earlier
     /// frames.
     pub turn: f64,
-    /// Log-odds below which a decision is unsure, nats.
+    /// Log-odds below which a decision is unsure, in nats.
     pub unsure: f64,
 }
 
@@ -42,13 +42,13 @@ pub struct Sides {
     pub unsure: bool,
 }
 
-/// Tracks over time which side is the right one: a Bayes filter of one bit.
+/// Tracks over time which side is the right-hand side, with a Bayes filter of one bit.
 ///
 /// The bit is carried from frame to frame by the direction in which the person faces, so the labels
 /// of the frames do not matter.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SidesFilter {
-    /// The last direction, and the log-odds that it is right.
+    /// The last direction, and the log-odds that it is correct.
     last: Option<(Vector3<f64>, f64)>,
 }
 

@@ -175,8 +175,8 @@ impl<'a> FirstSolver<'a> {
         Some(is_better)
     }
 
-    /// Returns the view without which the others agree best, if most of its joints contradict their solution. `None` if there is no
-    /// such view, or with fewer than four views, which cannot show it.
+    /// Returns the view without which the others agree best, if most of its joints contradict the solution of the others. `None` if there
+    /// is no such view, or if there are fewer than four views, which cannot show a contradiction.
     ///
     /// A half-covered view still fits with its other half; a view whose camera was moved fits nowhere.
     fn contradicts(&mut self, used: &[Used]) -> Option<usize> {
@@ -240,24 +240,24 @@ fn set_exchanged(used: &mut [Used], combination: usize) {
     }
 }
 
-/// How well the direction in which a solution faces, or the opposite direction, agrees with the evidence of the views, in nats. Whether the
-/// names of all views are exchanged is decided elsewhere.
+/// Returns how well the direction in which a solution faces, or the opposite direction, agrees with the evidence of the views, in nats.
+/// Whether the names of all views are exchanged is decided elsewhere.
 ///
 /// Consider two pairs of opposite cameras, and shoulders rotated by an angle from their viewing directions. Shoulders rotated by the same
-/// angle the other way look alike except for the names. If left and right follow the picture, only this function distinguishes the two.
+/// angle in the other direction look the same except for the names. If left and right follow the picture, only this function distinguishes
+/// the two.
 fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
     let said = views.iter().map(|view| (view.camera, view.front));
     let said: Vec<(&Camera, FrontEvidence)> = said.collect();
     front_log_ratio_of(&found.joints, &said).abs() / 2.0
 }
 
-/// Share of the joints used for the [`shortfall`] of a view. A shortfall that holds for only a quarter of the joints is exceeded by three
-/// quarters.
+/// Share of the joints used for the [`shortfall`] of a view. At this share, three quarters of the joints exceed the shortfall.
 const QUARTER: f64 = 0.25;
 const MOST: f64 = 0.75;
 
-/// Amount by which the found joints fit a view less than the view's own best places: the smallest
-/// amount that holds for a share of the joints.
+/// Returns how much less the found joints fit a view than the view's own best places do: the quantile of this amount over the joints, at a
+/// given share.
 fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
     let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
         let named = view.named(joint);

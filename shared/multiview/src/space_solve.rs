@@ -90,7 +90,7 @@ impl Held<'_> {
 }
 
 /// Refines every joint between the places of the finest grid: along each axis, moves it to the maximum of a parabola through the energy at
-/// its place and the two neighbours, if that is better.
+/// its place and the two neighbours, if that raises the energy.
 fn between_places(mut best: SpacePose, views: &[SpaceView<'_>], held: &Held<'_>) -> SpacePose {
     let step = held.settings.finest_m;
     for joint in (0..N_SWEEPS).flat_map(|_| 0..N) {

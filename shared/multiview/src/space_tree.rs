@@ -50,9 +50,9 @@ pub struct SpaceSettings {
     pub springs: f64,
     /// Maximum cost of a bone, as a number of standard deviations; the cost is half of their square.
     pub cap: f64,
-    /// Cost of the right and the left joint of a pair at the same place.
+    /// Cost of placing the right and the left joint of a pair at the same point.
     pub apart: f64,
-    /// Distance from which a pair costs nothing, in metres.
+    /// Minimum distance between the two joints of a pair at which the pair costs nothing, in metres.
     pub least_apart_m: f64,
     /// True if left and right follow the picture: every view may have them exchanged, independently of the others.
     pub as_seen: bool,
@@ -102,7 +102,7 @@ pub struct SpacePose {
 /// Stature of unknown people, and its standard deviation, in metres; our choice, wide enough for children.
 const STATURE: [f64; 2] = [1.65, 0.20];
 
-/// Bone lengths of [`TREE`] for a person with these joints, or for any person if `joints` is `None`.
+/// Returns the bone lengths of [`TREE`] for a person with these joints, or for any person if `joints` is `None`.
 ///
 /// The stature combines the estimate from the joints with the prior for people, each weighted by its certainty.
 pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N - 1] {
@@ -152,7 +152,7 @@ pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettin
     settings.apart * (1.0 - share).max(0.0)
 }
 
-/// The best of all choices of one place for each joint: messages from the leaves to the root, then back.
+/// Returns the best of all choices of one place for each joint, by messages from the leaves to the root and back.
 ///
 /// * `choices`: the places of every joint, possibly none.
 /// * `occupied`: places that joints are kept away from.

@@ -33,7 +33,7 @@ pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
 pub trait JointEvidence {
     /// Returns how well a joint fits at a point of the picture, in pixels.
     fn at(&self, joint: usize, point: [f64; 2]) -> f32;
-    /// Possible positions of a joint in pixels of the picture, the best first, each with its evidence.
+    /// Returns the possible positions of a joint, in pixels of the picture, the best first, each with its evidence.
     fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
     /// Returns the evidence of a joint that the view does not show: the floor.
     fn floor(&self) -> f32;

@@ -1,5 +1,4 @@
-//! The start of a frame: which candidate of every view shows the person, and from which side each view
-//! sees the person.
+//! The start of fusion for a frame: which candidate of every view shows the person, and from which side each view sees the person.
 
 use crate::consistency::PairTerms;
 use crate::{Epipolar, PairInput, Settings, TypeTables, ViewInput};
@@ -10,7 +9,7 @@ const MAX_STATES: usize = 200_000;
 /// Maximum number of views, not counting the first, for which every assumption about facing is tried.
 const MAX_FREE: usize = 6;
 
-/// The joint start of all views of a frame.
+/// The common start of all views of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     /// Candidate of every view.
@@ -28,8 +27,8 @@ pub struct Start {
 /// candidate per view and `facing` off, this is the paper's start. Up to 200 000 joint states are
 /// searched exhaustively. Beyond that, views are added one by one and then revised until nothing
 /// changes. Ties go to the lower candidates. The terms between views are always the paper's, even under
-/// [`EnergyKind::Released`](crate::EnergyKind::Released), whose program has no choice of a start;
-/// its alpha, which is meant for heat maps, gives them a large weight.
+/// [`EnergyKind::Released`](crate::EnergyKind::Released), because the authors' program does not choose a start. Its alpha, which is meant
+/// for heat maps, gives these terms a large weight.
 ///
 /// * `views`: the views with a result, in a fixed order.
 /// * `tables`: part-type tables of a pair of indices into `views`.

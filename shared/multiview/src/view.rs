@@ -138,8 +138,8 @@ pub struct ViewInput<'a> {
     pub plan: &'a ViewPlan,
     /// Distinct candidates of the view, best first; not empty.
     pub candidates: &'a [Pose],
-    /// Candidates that show another person than the other views do: bit `c` is set for candidate `c`. They cannot be a start. At least
-    /// one bit is 0.
+    /// Candidates that show a different person from the other views: bit `c` is set for candidate `c`. They cannot be a start. At least one
+    /// bit is 0.
     pub others: u64,
     /// Expected error of every part, in pixels; `None` without a prediction.
     pub sigma_px: Option<&'a [f32]>,

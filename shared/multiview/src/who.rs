@@ -12,7 +12,7 @@ pub struct SeenPerson {
     pub height: f64,
 }
 
-/// Maximum distance of the rays to the same person, in metres. Only the nearest third of the joints is used, since half of a person may be
+/// Maximum distance between rays to the same person, in metres. Only the nearest third of the joints is used, since half of a person may be
 /// covered.
 const SAME_M: f64 = 0.20;
 /// Minimum score of a joint that is used to identify a person.
@@ -20,7 +20,7 @@ const LEAST_SCORE: f64 = 0.3;
 /// Maximum number of people per view that are considered, largest boxes first.
 const MOST: usize = 4;
 
-/// Chooses one person in every view so that the rays of the views meet; the largest person, if there are several.
+/// Chooses one person in every view so that the rays of the views meet. If there are several such people, the largest is chosen.
 ///
 /// * `views`: the camera and the people of every view.
 /// * `as_seen`: true if left and right follow the picture, so that two views may have them exchanged.

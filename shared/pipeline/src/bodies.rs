@@ -37,7 +37,7 @@ pub(crate) struct Bodies {
     n_without: u32,
 }
 
-/// After this many frames without a body, the next body is taken for another person.
+/// After this many frames without a body, the next body is assumed to be another person's.
 const FORGET_AFTER: u32 = 30;
 
 /// Change of one of the 14 joints.

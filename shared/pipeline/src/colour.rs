@@ -7,10 +7,10 @@ use crate::placed::N;
 /// The joints of the trunk: left and right hip, left and right shoulder.
 const HIPS: [usize; 2] = [2, 3];
 const SHOULDERS: [usize; 2] = [8, 9];
-/// Samples between the shoulders and the hips, and from one side to the other.
+/// Number of samples from the shoulders to the hips, and (below) from one side to the other.
 const DOWN: usize = 7;
 const ACROSS: usize = 5;
-/// Sampled part of the trunk, as shares of its height and width: the rest shows collars, belts, arms and the background.
+/// Sampled part of the trunk, as shares of its height and width: the rest often shows collars, belts, arms or the background.
 const HEIGHT: [f32; 2] = [0.15, 0.85];
 const WIDTH: [f32; 2] = [0.25, 0.75];
 

@@ -33,7 +33,7 @@ pub enum EstimatorError {
 pub struct Estimate {
     /// The single-view results.
     pub answers: Vec<Option<ViewResult>>,
-    /// The joint start: the candidate of every view, and whether its sides are exchanged.
+    /// The start of all views together: the candidate of every view, and whether its sides are exchanged.
     pub start: Vec<Option<(usize, bool)>>,
     /// The part of every view's image that was searched.
     pub scopes: Vec<Option<Scope>>,

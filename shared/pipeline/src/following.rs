@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn the_largest_is_the_one_that_is_large_in_the_pictures() {
-        // The first camera is at x = 5 m, the others all around.
+        // The first camera is at x = 5 m; the other cameras surround the people.
         let near_and_far: &[([f64; 2], f64)] = &[([0.0, 0.0], 1.0), ([1.2, 1.2], 0.7)];
         let cameras: Vec<_> = (0..3).map(camera).collect();
         let found = found(&cameras, near_and_far);

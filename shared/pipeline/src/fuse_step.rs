@@ -138,7 +138,7 @@ impl FuseStep {
         self.solver.n_sweeps()
     }
 
-    /// Returns the joint start of a frame; `None` for views without a result.
+    /// Returns the common start of all views of a frame; `None` for views without a result.
     ///
     /// Every fusion worker computes the start for all views. It needs only their (small) single-view results,
     /// and all pairs start from the same person.
@@ -175,7 +175,7 @@ impl FuseStep {
         start
     }
 
-    /// Solves one pair from the joint start.
+    /// Solves one pair from the common start of all views.
     ///
     /// * Returns `None` if either view has no result, or if the evidence of either view does not
     ///   [cover](Responses::covers) its poses.

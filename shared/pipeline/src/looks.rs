@@ -14,7 +14,7 @@ const SAME_BOX: f64 = 0.85;
 const BEHIND: f64 = 0.2;
 /// Minimum number of joints of a person behind others that the others do not cover.
 const LEAST_BEHIND: usize = 7;
-/// Minimum heat of a new person, as a share of the heat of the best person in the frame; anything fainter is a chair or a poster.
+/// Minimum heat of a new person, as a share of the heat of the best person in the frame; a fainter detection is often a chair or a poster.
 const FAINT: f64 = 0.7;
 /// Minimum heat of a joint that counts for the position of its person, 0 to 1.
 const SURE: f64 = 0.2;
@@ -69,7 +69,7 @@ fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>
 }
 
 impl Looks<'_> {
-    /// Holds the people of the previous frame who stand still: their last sight is reused. The first person is looked at in every frame,
+    /// Holds the people of the previous frame who stand still: their last sighting is reused. The first person is looked at in every frame,
     /// and so is a person behind a larger one.
     ///
     /// * `before`: the people of the previous frame; the entries of held people are overwritten.
@@ -223,10 +223,10 @@ impl Looks<'_> {
         Ok(Some(best))
     }
 
-    /// Reuses the last sight of a person of the previous frame who has hardly moved; returns true if the person was added.
+    /// Reuses the last sighting of a person of the previous frame who has hardly moved; returns true if the person was added.
     ///
     /// * `n_held`: number of frames since the last look.
-    /// * `before`: the sight of the person in the previous frame; overwritten.
+    /// * `before`: the sighting of the person in the previous frame; overwritten.
     fn hold(
         &self,
         track: &Track,
@@ -250,8 +250,8 @@ impl Looks<'_> {
         is_new
     }
 
-    /// Looks at a person of the previous frame in the same box and in a wider box, unless somebody is already known there. Keeps
-    /// the best sight if it is good.
+    /// Looks at a person of the previous frame in the same box and in a wider box, unless somebody is already known there. Keeps the best
+    /// sighting if it is good.
     fn see_wider(&self, track: &Track, memory: &mut NetworkMemory) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
             return Ok(());
@@ -291,7 +291,7 @@ impl Looks<'_> {
     /// Looks at a person of the previous frame, unless somebody is already known there. If the person has moved far, looks closer, which
     /// takes some time. If the person lies down or gets up, looks with the picture rotated. Keeps a person who is seen well.
     ///
-    /// * `before`: the sight of the person in the previous frame.
+    /// * `before`: the sighting of the person in the previous frame.
     fn see_again(
         &self,
         track: &Track,

@@ -8,7 +8,7 @@ use statistics::Sorted;
 use crate::tracks::{Pace, Track, wider};
 
 /// Maximum distance of two joints that count as the same, as a share of the height of the network's window. The second constant is the
-/// share of common joints at which two sights show the same person, with sides as labelled or exchanged.
+/// share of common joints at which two sightings show the same person, with sides as labelled or exchanged.
 const SAME_JOINT: f64 = 0.05;
 const TWIN: f64 = 0.3;
 /// Within this share of the maximum gap between frames, nobody leaves the box of the last frame: a running person moves 0.2 m in 0.07 s.
@@ -16,7 +16,8 @@ const SOON: f64 = 1.0 / 6.0;
 /// Time for which a person who stands still is held without a look, as a share of the maximum gap between frames: a person who starts
 /// to walk moves 0.1 m in 0.13 s.
 const HELD: f64 = 1.0 / 3.0;
-/// An empty box is looked into again at the fourth search after: chairs and posters stay in place.
+/// An empty box is looked into again at the fourth search after it was found empty. Most empty boxes contain a chair or a poster, which
+/// stays in place.
 const LOOKED_AGAIN: u32 = 4;
 /// After this multiple of the maximum gap between frames (2 s), a person may be anywhere.
 pub const LOST: f64 = 5.0;
@@ -39,7 +40,8 @@ pub struct NetworkMemory {
     pub(crate) empty: Vec<Empty>,
     /// Number of frames until the next search for boxes; `None` before the first frame.
     pub(crate) until: Option<u64>,
-    /// Number of remaining frames with frequent searches: people were near each other, or one of several was lost or found.
+    /// Number of remaining frames with frequent searches. Such searches start when people are near each other, or when one of several
+    /// people is lost or found.
     n_unsettled: u64,
     /// Number of the last frame, if known ([`Self::begin`]).
     last: Option<u64>,
@@ -197,7 +199,7 @@ impl NetworkMemory {
 }
 
 impl Seen {
-    /// Checks a person who was looked at; returns true if the person is seen well and lies in the frame.
+    /// Checks a person who was looked at; returns true if the person is seen well and is inside the frame.
     ///
     /// * `size`: width and height of the frame; `least_heat`: minimum mean heat of the joints of a person who is seen well, 0 to 1.
     pub(crate) fn judge(&mut self, size: [usize; 2], least_heat: f64) -> bool {
@@ -213,7 +215,7 @@ pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     before.iter().any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)
 }
 
-/// Returns the share of joints that two sights have in common, with sides as labelled or exchanged.
+/// Returns the share of joints that two sightings have in common, with sides as labelled or exchanged.
 fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     let [_, top, _, bottom] = first.extent();
     let near = SAME_JOINT * (bottom - top);
@@ -231,7 +233,7 @@ fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     share(&|joint| joint).max(share(&|joint| MIRRORED[joint]))
 }
 
-/// Returns the displacements of the joints from one sight to another.
+/// Returns the displacements of the joints from one sighting to another.
 fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]> {
     let both = first.peaks().iter().zip(second.peaks());
     both.filter_map(|(a, b)| {
@@ -244,7 +246,7 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Sorted::new(values.collect::<Vec<f64>>()).upper_median()
 }
 
-/// Returns the displacement of a whole person from one sight to another, as a share of the height of the first window. It is the median
+/// Returns the displacement of a whole person from one sighting to another, as a share of the height of the first window. It is the median
 /// over the joints along each axis, so errors of single joints have little effect.
 pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<[f64; 2]> {
     let [_, top, _, bottom] = first.extent();

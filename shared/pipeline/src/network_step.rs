@@ -33,10 +33,10 @@ pub enum Eyes {
 pub struct NetworkSettings {
     /// Maximum number of people per view; each person costs a run of the network.
     pub n_people: usize,
-    /// Boxes are searched for in every n-th frame, and in every frame in which nobody is seen well.
+    /// Number of frames from one search for boxes to the next. Every frame in which nobody is seen well is searched, too.
     pub find_every: u64,
-    /// Search interval while people are near each other, and for [`Self::find_every`] frames after. A briefly hidden person is then found
-    /// again soon. It also applies after one of several people was lost or found.
+    /// Search interval while people are near each other, and for [`Self::find_every`] frames afterwards. A briefly hidden person is then
+    /// found again soon. It also applies after one of several people was lost or found.
     pub find_every_of_several: u64,
     /// Number of frames by which the second regular search comes earlier. With different phases, the views do not all search in the same
     /// frame.
@@ -112,8 +112,8 @@ impl NetworkStep {
     ///
     /// People who stand still are held. In a frame with a search, the detector's boxes come before the boxes of the previous frame, so that
     /// no box shrinks or drifts unnoticed. A person whose pose was much worse than usual is also looked at in a wider box, and the better
-    /// sight is kept. The step looks at up to twice as many people as it keeps, and keeps the largest. While somebody is seen, empty boxes
-    /// are skipped in some searches.
+    /// sighting is kept. The step looks at up to twice as many people as it keeps, and keeps the largest. While somebody is seen, empty
+    /// boxes are skipped in some searches.
     ///
     /// # Errors
     ///
@@ -282,7 +282,7 @@ fn front_of(sighting: &Sighting, seen: &Seen) -> FrontEvidence {
     seen.front.filter(|_| is_told).unwrap_or_default()
 }
 
-/// Finds boxes around people, in pixels. Certain and large ones come first, because the frame has room for only a few.
+/// Finds boxes around people, in pixels. Certain and large boxes come first, because the frame has room for only a few.
 fn find(
     detector: &Detector,
     image: Rgb8View<'_>,

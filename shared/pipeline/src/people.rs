@@ -1,4 +1,4 @@
-//! Finds the people that the views of a frame could mean: candidates of different views that are one person in space.
+//! Finds the people that the views of a frame may show. Each person consists of candidates of different views that are one person in space.
 
 use geometry::{Camera, Ray};
 use multiview::ViewPlan;
@@ -21,7 +21,7 @@ const LENGTHS: [[f64; 2]; N_POINTS - 1] = [[0.05, 0.5], [0.2, 0.8], [0.0, 0.7], 
 const TOLERANCE: f64 = 0.15;
 /// A candidate shows a person if its trunk is nearer to the person's midline than this share of the candidate's size.
 const SAME: f64 = 0.15;
-/// People whose trunks are nearer than this are the same person, in metres.
+/// Distance between two trunks below which they belong to the same person, in metres.
 const APART_M: f64 = 0.5;
 /// Maximum distance between two rays to the same point, in metres: twice the tolerance for the size of a body.
 const MAX_GAP_M: f64 = 0.5;
@@ -34,7 +34,7 @@ const MIN_VIEWS: usize = 3;
 /// Minimum strength of a person, as a share of the strength of the strongest person.
 const MIN_STRENGTH: f64 = 0.28;
 
-/// A person that several views could mean.
+/// A person that several views may show.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Person {
     /// The candidate of every view; `None` for a view without a candidate.
@@ -44,8 +44,8 @@ pub(crate) struct Person {
     pub lines_px: Vec<Option<Line>>,
     /// Middle of the trunk, in metres in the world.
     pub place: Point3<f64>,
-    /// Sum over the views of how clearly they see the person. A view counts the score of its candidate above the weakest third, reduced
-    /// with the distance from the projected person.
+    /// Sum over the views of how clearly they see the person. Each view contributes the amount by which its candidate's score exceeds those
+    /// of the weakest third of the view's candidates. The contribution shrinks with the distance from the projected person.
     pub strength: f64,
     /// Size in the pictures, in pixels of the frame: longer side of the rectangle around the parts, averaged over the views
     /// that see the person.
@@ -105,7 +105,7 @@ impl FoundBody {
     }
 }
 
-/// A frame's candidates, and the people that they could mean.
+/// A frame's candidates, and the people that they may show.
 pub(crate) struct Found {
     views: Vec<Vec<FoundBody>>,
     pub(crate) people: Vec<Person>,
@@ -157,8 +157,9 @@ impl Found {
 ///
 /// Each pair of candidates of two views is placed in space by the midlines. A plausible person is searched for in the other views until
 /// nothing changes. The strongest group is the first person. Each other group is a person if it is apart from all earlier ones in space,
-/// and in all pictures but one. A person must be seen by three views, or by both views of two, and be at least 0.28 times as strong as the
-/// first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this method is our own.
+/// and in all pictures but one. A person must be seen by three views, or by both views of a rig with two, and be at least 0.28 times as
+/// strong as the first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this method is our
+/// own.
 ///
 /// * `cameras`, `views`: the cameras of the views, and the candidates of each view.
 pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {
@@ -191,7 +192,7 @@ fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     found
 }
 
-/// Returns the best group, and those of the other groups that are different people.
+/// Returns the best group, and each of the other groups that is a different person.
 fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let mut kept: Vec<Person> = Vec::new();

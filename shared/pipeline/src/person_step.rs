@@ -1,4 +1,4 @@
-//! Solves one person in space; reads the network maps of all views in place.
+//! Solves one person in space from the network maps of all views, which it reads in place.
 
 use std::sync::Arc;
 
@@ -308,8 +308,8 @@ fn front_seen(sighting: &Sighting) -> FrontEvidence {
     if !sighting.front.iter().all(|number| number.is_finite()) {
         return FrontEvidence::default();
     }
-    // A person in a handstand was upright for the network. For a lying person, the network's evidence says nothing about up and down in
-    // the picture.
+    // The network saw a person in a handstand upright, because the picture was rotated. For a lying person, the network's evidence says
+    // nothing about up and down in the picture.
     let weight = sighting.trunk_upward().unwrap_or(1.0).powi(2) as f32;
     sighting.front.map(|told| weight * told)
 }

@@ -24,7 +24,7 @@ pub struct BodySettings {
     pub prior: bool,
     /// Let the prior learn this person's bone lengths from the earlier frames.
     pub learn: bool,
-    /// Weight of a skeleton's deviation from a person in the choice among assumptions: score per squared standard
+    /// Weight of the deviation of a skeleton from a human body when one of several assumptions is chosen: score per squared standard
     /// deviation ([`skeleton::body::deviation`]).
     pub score: f64,
 }
@@ -80,10 +80,10 @@ pub struct SkeletonSettings {
     /// Weight of the agreement of all views in the decision about facing: score per squared cell of
     /// distance between a part and its reprojection. This is the geometric term over all views.
     pub agreement: f64,
-    /// Weight of the views' front evidence in that decision: score per nat. If the sides of a skeleton fit neither way,
-    /// some views are assumed to be on the wrong side.
+    /// Weight of the views' front evidence in the decision about facing: score per nat. If the evidence fits neither the sides of a
+    /// skeleton nor the exchanged sides, some views are assumed to be on the wrong side.
     pub front_score: f64,
-    /// Distance at which the penalty for disagreement is capped, cells.
+    /// Distance at which the penalty for disagreement is capped, in cells.
     pub max_distance_cells: f64,
 }
 

@@ -41,7 +41,7 @@ pub struct Skeleton {
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
-    /// Number of people that the views could mean.
+    /// Number of people that the views may show.
     pub n_people: usize,
     /// Number of pairs that were averaged.
     pub n_pairs: usize,
@@ -59,7 +59,7 @@ pub struct Skeleton {
 struct Frame<'a> {
     answers: &'a [Option<ViewResult>],
     fused: &'a Fused<'a>,
-    /// True if the person is the only one that the views could mean.
+    /// True if the views may show only this person.
     is_alone: bool,
 }
 

@@ -184,8 +184,8 @@ impl Space {
     }
 }
 
-/// Returns the weight of the front evidence of a view: the squared cosine of the angle between the trunk in the picture and the
-/// vertical, 0 upside down. The detector was not trained on the heads of people who bend.
+/// Returns the weight of the front evidence of a view: the squared cosine of the angle between the trunk in the picture and the vertical; 0
+/// for a person upside down. The detector was not trained on the heads of people who bend.
 fn upright(centres_px: &[[f64; 2]]) -> f64 {
     let cosine = trunk_upward(centres_px);
     if cosine > 0.0 { cosine * cosine } else { 0.0 }

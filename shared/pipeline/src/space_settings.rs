@@ -14,7 +14,7 @@ pub struct SpaceStepSettings {
     pub space: SpaceSettings,
     /// Settings by which the maps were turned into evidence.
     pub maps: MapSettings,
-    /// Minimum heat of half of a person's joints in two views each, 0 to 1.
+    /// Minimum heat that half of a person's joints must have in two views, 0 to 1.
     pub least_heat: f64,
     /// The joints of the result.
     pub joints: &'static JointSet,

@@ -1,4 +1,4 @@
-//! The step in space: computes the joints of people; reads the network maps of all views in place.
+//! The step in space: computes the joints of people from the network maps of all views, which it reads in place.
 
 use std::sync::Arc;
 

@@ -48,7 +48,7 @@ pub(crate) struct Track {
 pub(crate) struct Pace {
     /// Mean velocity per frame, weighted towards the last looks.
     velocity: [f64; 2],
-    /// Distance between the last two sights.
+    /// Distance between the last two sightings.
     step: f64,
 }
 

@@ -34,11 +34,11 @@ pub struct FramePeople {
 /// Settings of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WhoSettings {
-    /// The rule for which of several people comes first.
+    /// Rule that decides which of several people comes first.
     pub follow: Follow,
     /// True if views label sides as they appear in the picture, so that two views may disagree.
     pub as_seen: bool,
-    /// Minimum heat of half of the joints of a new person in two views, 0 to 1.
+    /// Minimum heat that half of the joints of a new person must have in two views, 0 to 1.
     pub least_heat: f64,
     /// Maximum number of people at the same time.
     pub n_people: usize,

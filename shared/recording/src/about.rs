@@ -25,7 +25,7 @@ pub struct About {
     pub version: String,
     /// Session in the stamp of every message.
     pub session: u64,
-    /// Start time, nanoseconds since 1970.
+    /// Start time, in nanoseconds since 1970.
     pub began_unix_nanos: u64,
     /// Settings of the run, as JSON.
     pub settings: String,

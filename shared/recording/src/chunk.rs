@@ -3,11 +3,11 @@
 use crate::Entry;
 use crate::message::PREAMBLE;
 
-/// Size of the head of a record, bytes: opcode and length.
+/// Size of the head of a record, in bytes: opcode and length.
 pub(crate) const RECORD_HEAD_BYTES: u64 = 1 + 8;
 /// Number of bytes before the records of a chunk: the head of the record, times, length, checksum, compression, length.
 pub(crate) const HEAD_BYTES: usize = 1 + 8 + 8 + 8 + 8 + 4 + 4 + 8;
-/// Maximum size of a chunk that is read, bytes.
+/// Maximum size of a chunk that is read, in bytes.
 const MOST_BYTES: u64 = 1 << 30;
 /// Number of bytes of a message before its data.
 pub(crate) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
@@ -15,7 +15,7 @@ pub(crate) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
 /// Size and checksum of the records of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Chunk {
-    /// Size of the chunk's records, bytes.
+    /// Size of the chunk's records, in bytes.
     pub(crate) n_bytes: u64,
     /// Checksum of the records.
     pub(crate) checksum: u32,

@@ -32,12 +32,12 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         })
     }
 
-    /// Returns the position, bytes from the start of the file.
+    /// Returns the position, in bytes from the start of the file.
     pub(crate) fn at(&self) -> u64 {
         self.at
     }
 
-    /// Returns the length of the file, bytes.
+    /// Returns the length of the file, in bytes.
     pub(crate) fn end(&self) -> u64 {
         self.end
     }

@@ -7,17 +7,17 @@ use crate::{About, AboutError, Count, Kind};
 /// Position and times of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Entry {
-    /// Time at which the message was received, nanoseconds, `CLOCK_MONOTONIC` of the recording machine.
+    /// Time at which the message was received, in nanoseconds, `CLOCK_MONOTONIC` of the recording machine.
     pub log_time: u64,
     /// Time at which the message was sent, by the same clock.
     pub publish_time: u64,
-    /// Offset of the message's data, bytes from the start of the file.
+    /// Offset of the message's data, in bytes from the start of the file.
     pub offset: u64,
-    /// Length of the data, bytes.
+    /// Length of the data, in bytes.
     pub len: u64,
     /// Frame of the message; `None` for heartbeats, and if the topic was not known yet.
     pub frame: Option<u64>,
-    /// Offset of the message's chunk, bytes from the start of the file.
+    /// Offset of the message's chunk, in bytes from the start of the file.
     pub chunk: u64,
 }
 
@@ -33,9 +33,9 @@ pub struct Track {
 /// Part of a file that could be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Extent {
-    /// Size of the file, bytes.
+    /// Size of the file, in bytes.
     pub file_bytes: u64,
-    /// Offset of the end of the last complete record, bytes.
+    /// Offset of the end of the last complete record, in bytes.
     pub whole_bytes: u64,
     /// True if the file is complete.
     pub is_complete: bool,
@@ -50,7 +50,7 @@ pub struct Extent {
 /// A damaged position in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Damage {
-    /// Offset of the damage, bytes from the start of the file.
+    /// Offset of the damage, in bytes from the start of the file.
     pub offset: u64,
     /// Description of the damage.
     pub what: &'static str,

@@ -86,7 +86,7 @@ impl Kind {
         }
     }
 
-    /// Returns the size of the message without its array, bytes. For skeletons, whose list of people is written as an array, this is the
+    /// Returns the size of the message without its array, in bytes. For skeletons, whose list of people is written as an array, this is the
     /// size of the fields before the count.
     pub fn head_bytes(self) -> usize {
         match self {
@@ -102,7 +102,7 @@ impl Kind {
         }
     }
 
-    /// Returns the size of an element of the message's array, bytes; `None` if it has no array.
+    /// Returns the size of an element of the message's array, in bytes; `None` if it has no array.
     pub fn element_bytes(self) -> Option<usize> {
         match self {
             Self::Frame | Self::Picture => Some(size_of::<u8>()),
@@ -120,7 +120,7 @@ impl Kind {
         }
     }
 
-    /// Returns the offset of the message's status, bytes; `None` if it has no stamp.
+    /// Returns the offset of the message's status, in bytes; `None` if it has no stamp.
     pub(crate) fn status_at(self) -> Option<usize> {
         match self {
             Self::Frame => Some(core::mem::offset_of!(FrameHeader, status)),
@@ -194,7 +194,7 @@ impl Kind {
 mod tests {
     use super::*;
 
-    /// Returns the size and alignment of a type in CDR, bytes. An array of variable length counts as 0.
+    /// Returns the size and alignment of a type in CDR, in bytes. An array of variable length counts as 0.
     fn size(kind: &str) -> [usize; 2] {
         if let Some((one, n)) = kind.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')) {
             let [size, alignment] = size(one);

@@ -19,9 +19,9 @@ pub enum Malformed {
     /// The length of the message does not match its type and its count.
     #[error("the message has {len} bytes, expected {expected}")]
     Length {
-        /// Length of the message, bytes.
+        /// Length of the message, in bytes.
         len: u64,
-        /// Expected length, bytes. If the count is missing, this is the minimum length.
+        /// Expected length, in bytes. If the count is missing, this is the minimum length.
         expected: u64,
     },
     /// The message is not little-endian CDR.
@@ -137,7 +137,7 @@ pub struct Envelope {
     pub stamp: Stamp,
     /// Times of the message.
     pub timing: Timing,
-    /// Says that the message contains a result, or why it has none.
+    /// States whether the message contains a result, and if not, why.
     pub status: Status,
 }
 

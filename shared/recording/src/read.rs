@@ -21,13 +21,13 @@ pub enum ReadError {
     /// A chunk does not match its checksum, so none of its messages can be trusted.
     #[error("the chunk at byte {offset} does not match its checksum")]
     Checksum {
-        /// Offset of the chunk in the file, bytes.
+        /// Offset of the chunk in the file, in bytes.
         offset: u64,
     },
     /// A message has changed since the file was scanned.
     #[error("the message at byte {offset} cannot be read")]
     Message {
-        /// Offset of the message in the file, bytes.
+        /// Offset of the message in the file, in bytes.
         offset: u64,
         /// Cause of the error.
         #[source]
@@ -44,7 +44,7 @@ pub struct Buffer {
 
 #[derive(Debug, Default)]
 struct Loaded {
-    /// Offset of the chunk, bytes from the start of the file.
+    /// Offset of the chunk, in bytes from the start of the file.
     at: Option<u64>,
     records: Vec<u8>,
     is_sound: bool,
@@ -137,9 +137,9 @@ pub struct Damaged {
     pub topic: String,
     /// Frame of the message.
     pub frame: Option<u64>,
-    /// Offset of the message, bytes from the start of the file.
+    /// Offset of the message, in bytes from the start of the file.
     pub offset: u64,
-    /// Offset of the message's chunk, bytes from the start of the file. One changed byte in a chunk damages all its messages.
+    /// Offset of the message's chunk, in bytes from the start of the file. One changed byte in a chunk damages all its messages.
     pub chunk: u64,
 }
 

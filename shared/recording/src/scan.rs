@@ -17,9 +17,9 @@ use crate::cursor::{Cursor, Stop};
 use crate::seal::unseal;
 use crate::{ReadError, Recording, about};
 
-/// Block size of the search, bytes.
+/// Block size of the search, in bytes.
 const WINDOW_BYTES: u64 = 1 << 16;
-/// Maximum length of a record that is not a message or a chunk, bytes.
+/// Maximum length of a record that is not a message or a chunk, in bytes.
 const MAX_RECORD_BYTES: u64 = 16 << 20;
 /// Maximum number of false starts of records in a search.
 const MOST_FALSE_STARTS: u32 = 10_000;
@@ -169,7 +169,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                     message.entry.chunk = begin;
                     message.entry.offset = self.cursor.at();
                     message.entry.len = len - MESSAGE_HEAD_BYTES;
-                    // The names of topics may follow at the end only, so it is decided there which messages have a frame.
+                    // The names of the topics may appear only at the end of the file, so it is decided there which messages have a frame.
                     if message.entry.len >= FRAME_END as u64 {
                         let head = self.cursor.array::<FRAME_END>()?;
                         let frame = head.last_chunk().copied();

@@ -12,7 +12,7 @@ use crate::gate::{Gate, Keeper};
 use crate::seal::seal;
 use crate::{About, Count, Entry, Envelope, Kind, about, count, message};
 
-/// Size at which a chunk ends, bytes. It ends with the message that exceeds this size, or earlier, with the last message of its frame.
+/// Size at which a chunk ends, in bytes. It ends with the message that exceeds this size, or earlier, with the last message of its frame.
 const CHUNK_BYTES: u64 = 4 << 20;
 
 /// Reason why a recording cannot be written.
@@ -21,7 +21,7 @@ pub enum WriteError {
     /// The file cannot be written to. Its present content stays readable.
     #[error("cannot write the recording beyond {n_bytes} bytes")]
     Write {
-        /// Size of the file, bytes.
+        /// Size of the file, in bytes.
         n_bytes: u64,
         /// Cause of the error.
         #[source]

@@ -28,7 +28,7 @@ pub struct FrameLine {
     pub seen: Option<u32>,
     /// [`FrameLine::OK`] if any person has a skeleton, [`FrameLine::NO_RESULT`], or the reason why no person has one.
     pub status: String,
-    /// Time at which the frame was taken, seconds after frame 0 of the footage, if its rate is known.
+    /// Time at which the frame was taken, in seconds after frame 0 of the footage, if its rate is known.
     #[serde(deserialize_with = "nullable")]
     pub time_s: Option<f64>,
     /// Views that did not contribute to the result, with the reasons.
@@ -63,14 +63,14 @@ pub struct PersonLine {
     /// Certainty of left and right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sides: Option<Sides>,
-    /// Log-odds that left and right are not exchanged in all views, nats.
+    /// Log-odds that left and right are not exchanged in all views, in nats.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sides_margin: Option<f64>,
     /// State of every joint and keypoint with a position: `measured`, `exchanged`, `filled` or `rejected`; only in
     /// `pose3d-smooth.jsonl`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub states: BTreeMap<String, String>,
-    /// Height of the person when standing upright, from the lengths of the bones, metres; `None` if too few lengths are known.
+    /// Height of the person when standing upright, from the lengths of the bones, in metres; `None` if too few lengths are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stature_m: Option<f64>,
     /// [`FrameLine::OK`], or the reason why there is no skeleton.
@@ -161,11 +161,11 @@ pub enum JointLine {
 /// A joint with a position.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlacedJoint {
-    /// Covariance of the position, square metres: xx, xy, xz, yy, yz, zz. NaN if it is not known.
+    /// Covariance of the position, in square metres: xx, xy, xz, yy, yz, zz. NaN if it is not known.
     pub covariance_m2: [f64; 6],
-    /// Position in the world, metres.
+    /// Position in the world, in metres.
     pub position_m: [f64; 3],
-    /// Root mean square distance from the observations of the views, pixels of their frames; `None` if it is not known.
+    /// Root mean square distance from the observations of the views, in pixels of their frames; `None` if it is not known.
     pub reprojection_px: Option<f64>,
     /// Views from which the joint was triangulated.
     pub views: Vec<String>,

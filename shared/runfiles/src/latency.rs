@@ -8,7 +8,7 @@ use crate::ReadError;
 use crate::nullable::nullable;
 use crate::read::{parse, to_text};
 
-/// Percentiles of one duration, milliseconds.
+/// Percentiles of one duration, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Percentiles {
     /// Number of measured durations.

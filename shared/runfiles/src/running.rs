@@ -35,11 +35,11 @@ pub struct Running {
 /// One view of a running deployment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunningView {
-    /// Height of the view's frames, pixels.
+    /// Height of the view's frames, in pixels.
     pub height: u32,
     /// Name of the camera.
     pub name: String,
-    /// Width of the view's frames, pixels.
+    /// Width of the view's frames, in pixels.
     pub width: u32,
 }
 

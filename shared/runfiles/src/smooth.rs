@@ -12,11 +12,11 @@ use crate::read::{parse, to_text};
 pub struct SmoothReport {
     /// Cutoff of the low-pass filter, Hz, if there is one.
     pub cutoff_hz: Option<f64>,
-    /// Delay of the positions, milliseconds; 0 for methods that look ahead.
+    /// Delay of the positions, in milliseconds; 0 for methods that look ahead.
     pub delay_ms: f64,
     /// Reasons to doubt the result, in words; an empty list is good.
     pub doubts: Vec<String>,
-    /// Maximum time between measurements that was filled, seconds.
+    /// Maximum time between measurements that was filled, in seconds.
     pub fill_s: f64,
     /// Name of the method: `rts`, `butterworth`, `kalman` or `none`.
     pub method: String,
@@ -26,7 +26,7 @@ pub struct SmoothReport {
     pub people: Vec<SmoothedPerson>,
     /// Frames per second: the inverse of the median time between two frames.
     pub rate_hz: Option<f64>,
-    /// Maximum distance of the frames' times from the uniform grid to which they were interpolated, milliseconds.
+    /// Maximum distance of the frames' times from the uniform grid to which they were interpolated, in milliseconds.
     pub resampled_ms: Option<f64>,
     /// Version of the file, [`crate::VERSION`].
     pub schema_version: u64,
@@ -35,7 +35,7 @@ pub struct SmoothReport {
 /// Smoothing of one person over the run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmoothedPerson {
-    /// Lengths of bones that were kept constant, by the names of both joints, metres.
+    /// Lengths of bones that were kept constant, by the names of both joints, in metres.
     pub bones: BTreeMap<String, f64>,
     /// Frames at which another person begins. Nothing was smoothed across them.
     pub frames_of_breaks: Vec<u64>,

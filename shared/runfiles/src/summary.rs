@@ -33,7 +33,7 @@ pub struct RunSummary {
 /// One view of the run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ViewSummary {
-    /// Width and height of the frames that were searched, pixels.
+    /// Width and height of the frames that were searched, in pixels.
     pub frame_size: [u32; 2],
     /// Name of the camera.
     pub name: String,
@@ -46,7 +46,7 @@ pub struct ViewSummary {
 pub struct Summary {
     /// Fit of every camera to the others, by name, since the last start of the process.
     pub calibration: BTreeMap<String, CameraFit>,
-    /// Cameras whose observations of one person contradict the rig, for an unclear reason or one other than an exchange.
+    /// Cameras whose observations of one person contradict the rig, if the reason is unclear or is not an exchange.
     #[serde(deserialize_with = "nullable")]
     pub contradicted: Option<Contradicted>,
     /// Size of the evidence that a view sent in shared memory, mean bytes per frame, by name, since the
@@ -75,7 +75,7 @@ pub struct Summary {
     /// Height of people in the searched frames, pixels, by name of the view. This is the median, over the results that used the view, of
     /// the longer side of the rectangle around a pose's parts. Null if there are none. Counted since the last start of the process.
     pub person_px: BTreeMap<String, Option<f64>>,
-    /// Root mean square reprojection error over all joints, pixels of the frame.
+    /// Root mean square reprojection error over all joints, in pixels of the frame.
     #[serde(deserialize_with = "nullable")]
     pub reprojection_px: Option<f64>,
     /// Number of frames of every view that were searched in full, and number searched only near the last pose, by
@@ -145,7 +145,7 @@ pub struct PersonSummary {
     pub joints: f64,
     /// Last frame with a skeleton.
     pub last_frame: u64,
-    /// Root mean square reprojection error over all joints, pixels of the frame.
+    /// Root mean square reprojection error over all joints, in pixels of the frame.
     #[serde(deserialize_with = "nullable")]
     pub reprojection_px: Option<f64>,
     /// Trust in the results of this person, since the last start of the process.
@@ -158,14 +158,14 @@ pub struct CameraFit {
     /// Standard error of [`CameraFit::offset_ms`].
     #[serde(default, deserialize_with = "nullable")]
     pub offset_error_ms: Option<f64>,
-    /// Time by which the camera's pictures were taken later than their times say, against the median of all cameras, milliseconds. Negative
-    /// if they were taken earlier; unknown while there is too little motion.
+    /// Time by which the camera's pictures were taken later than their times say, against the median of all cameras, in milliseconds.
+    /// Negative if they were taken earlier; unknown while there is too little motion.
     #[serde(default, deserialize_with = "nullable")]
     pub offset_ms: Option<f64>,
     /// True if the camera was found, at any time of the run, to be out of step with the others.
     #[serde(default)]
     pub out_of_step: bool,
-    /// Distance between the positions at which cameras see the same parts if this camera is one of them, pixels of its footage. Unknown
+    /// Distance between the positions at which cameras see the same parts if this camera is one of them, in pixels of its footage. Unknown
     /// with fewer than three cameras, and while too little was seen.
     #[serde(deserialize_with = "nullable")]
     pub residual_px: Option<f64>,
@@ -181,9 +181,9 @@ pub struct CameraFit {
 pub struct Exchanged {
     /// Names of the two cameras.
     pub cameras: [String; 2],
-    /// Median angle by which rays to the same part miss each other with the present footage, degrees.
+    /// Median angle by which rays to the same part miss each other with the present footage, in degrees.
     pub degrees: f64,
-    /// Median angle by which the rays miss each other if the two cameras are exchanged, degrees.
+    /// Median angle by which the rays miss each other if the two cameras are exchanged, in degrees.
     pub exchanged_degrees: f64,
     /// True if these two cameras are certain. In a ring of cameras, other pairs may fit almost as well.
     pub sure: bool,
@@ -192,12 +192,12 @@ pub struct Exchanged {
 /// Cameras whose observations of one person contradict the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contradicted {
-    /// Median angle by which rays to the same part miss each other, degrees.
+    /// Median angle by which rays to the same part miss each other, in degrees.
     pub degrees: f64,
     /// The two cameras whose exchange fits best, if any exchange fits better.
     #[serde(deserialize_with = "nullable")]
     pub likely: Option<[String; 2]>,
-    /// Maximum usual angle, degrees.
+    /// Maximum usual angle, in degrees.
     pub usual_degrees: f64,
 }
 

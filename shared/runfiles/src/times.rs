@@ -23,10 +23,10 @@ pub struct TimesLine {
 /// Times of one view of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ViewTimes {
-    /// Frame of the view's camera; `None` if none came.
+    /// Frame of the view's camera; `None` if no frame came.
     #[serde(deserialize_with = "nullable")]
     pub camera: Option<CameraTimes>,
-    /// Answer of the view's pose process; `None` if none came.
+    /// Answer of the view's pose process; `None` if no answer came.
     #[serde(deserialize_with = "nullable")]
     pub pose: Option<PoseTimes>,
 }
@@ -34,11 +34,11 @@ pub struct ViewTimes {
 /// A frame that a camera's process sent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CameraTimes {
-    /// Time at which the frame was taken, milliseconds.
+    /// Time at which the frame was taken, in milliseconds.
     pub captured_ms: f64,
     /// Number of restarts of the process.
     pub epoch: u32,
-    /// Time at which the frame was sent, milliseconds.
+    /// Time at which the frame was sent, in milliseconds.
     pub sent_ms: f64,
 }
 
@@ -47,6 +47,6 @@ pub struct CameraTimes {
 pub struct PoseTimes {
     /// Number of restarts of the process.
     pub epoch: u32,
-    /// Time at which the answer was sent, milliseconds.
+    /// Time at which the answer was sent, in milliseconds.
     pub sent_ms: f64,
 }

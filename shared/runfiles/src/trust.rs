@@ -12,7 +12,7 @@ pub struct Trust {
     /// Root mean square deviation of the bone lengths from those of real people, standard deviations; the median over the skeletons.
     #[serde(deserialize_with = "nullable")]
     pub body_deviation: Option<f64>,
-    /// Scatter of the bone lengths over the run, metres. This is the mean over the bones of the median absolute deviation, scaled to a
+    /// Scatter of the bone lengths over the run, in metres. This is the mean over the bones of the median absolute deviation, scaled to a
     /// standard deviation.
     #[serde(deserialize_with = "nullable")]
     pub bone_scatter_m: Option<f64>,
@@ -23,7 +23,7 @@ pub struct Trust {
     pub frames: u64,
     /// Share of these results whose body is implausible for a person.
     pub implausible: f64,
-    /// Share of the joints of the skeletons that were left out, because no body can have them there.
+    /// Share of the joints of the skeletons that were left out, because their positions are impossible for a human body.
     pub joints_implausible: f64,
     /// Share of the results in which the middle of the body is too far from that of the previous result for a person to have moved there.
     pub jumps: f64,
@@ -65,7 +65,7 @@ impl Kind {
     ];
 
     /// Returns the maximum tolerated value. The limits are chosen so that one person who is completely seen by calibrated cameras stays
-    /// below them: balancing and synthetic people reach at most two thirds of each.
+    /// below them: balancing and synthetic people reach at most two thirds of each limit.
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,
@@ -76,7 +76,7 @@ impl Kind {
         }
     }
 
-    /// Returns the minimum value that is impossible, however few results there are.
+    /// Returns the smallest value that is impossible regardless of the number of results.
     fn impossible(self) -> f64 {
         match self {
             Self::Reprojection => 0.25,
@@ -102,7 +102,7 @@ impl Trust {
     /// Minimum number of results that are judged.
     pub const MIN_FRAMES: u64 = 12;
 
-    /// Returns a number that ranks runs by their error, metres: the geometric mean of [`disagreement_m`](Self::disagreement_m) and
+    /// Returns a number that ranks runs by their error, in metres: the geometric mean of [`disagreement_m`](Self::disagreement_m) and
     /// [`bone_scatter_m`](Self::bone_scatter_m). It is not an error itself. A limit of 0.02 separates runs with many wrong limbs from other
     /// runs (docs/guide/run.md).
     pub fn expected_error_m(&self) -> Option<f64> {

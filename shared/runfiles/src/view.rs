@@ -18,7 +18,7 @@ pub struct ViewLine {
     /// Extent of the search in the frame (`full`, `tracked`); `None` if there was no pose.
     #[serde(deserialize_with = "nullable")]
     pub search: Option<String>,
-    /// Expected error of every part in this frame, pixels; `None` if none was predicted.
+    /// Expected error of every part in this frame, in pixels; `None` if none was predicted.
     #[serde(deserialize_with = "nullable")]
     pub sigma_px: Option<Vec<f64>>,
     /// Age of the expected errors that fusion used, in frames; `None` if it had none.
@@ -29,7 +29,7 @@ pub struct ViewLine {
     pub single: Option<SinglePose>,
     /// `ok`, or the reason why there is no pose of the view alone.
     pub status: String,
-    /// Time at which the frame was taken, seconds after frame 0 of the footage, if its rate is known.
+    /// Time at which the frame was taken, in seconds after frame 0 of the footage, if its rate is known.
     #[serde(deserialize_with = "nullable")]
     pub time_s: Option<f64>,
     /// Name of the camera.
@@ -72,7 +72,7 @@ pub struct FusedPose {
     pub parts: Vec<Part>,
 }
 
-/// The centre of a part, pixels of the footage.
+/// The centre of a part, in pixels of the footage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     /// Column, counted to the right.
@@ -88,7 +88,7 @@ pub struct Part {
 pub struct SinglePose {
     /// Number of candidates that the view had.
     pub candidates: u64,
-    /// Level of the pyramid, counted from 1; null with the method of networks.
+    /// Level of the pyramid, counted from 1; null with the network method.
     #[serde(deserialize_with = "nullable")]
     pub level: Option<u64>,
     /// Position and type of every part.
@@ -98,10 +98,10 @@ pub struct SinglePose {
     pub score: Option<f64>,
 }
 
-/// The centre of a part, pixels of the footage, and its type.
+/// The centre of a part, in pixels of the footage, and its type.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TypedPart {
-    /// Type of the part, counted from 1; null with the method of networks.
+    /// Type of the part, counted from 1; null with the network method.
     #[serde(rename = "type", deserialize_with = "nullable")]
     pub part_type: Option<u64>,
     /// Column, counted to the right.

@@ -37,9 +37,9 @@ pub enum BusError {
     Full {
         /// Name of the process.
         process: String,
-        /// Size of the memory that is needed, bytes.
+        /// Size of the memory that is needed, in bytes.
         needed_bytes: u64,
-        /// Size of the memory that is free, bytes.
+        /// Size of the memory that is free, in bytes.
         free_bytes: u64,
     },
     /// The process cannot be registered.

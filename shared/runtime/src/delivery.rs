@@ -24,7 +24,7 @@ pub struct Limits {
     /// Maximum number of subscribers that no publisher waits for ([`Bus::as_onlooker`](crate::Bus::as_onlooker)). Each may
     /// borrow one message at a time.
     pub onlookers: usize,
-    /// Queue length of a subscriber, messages.
+    /// Queue length of a subscriber, in messages.
     pub buffer: usize,
     /// Number of messages that one subscriber may borrow at the same time.
     pub borrowed: usize,
@@ -35,7 +35,7 @@ pub struct Limits {
 impl Limits {
     /// Returns the limits for one publisher that writes one message at a time.
     ///
-    /// * `buffer`: queue length of a subscriber, messages.
+    /// * `buffer`: queue length of a subscriber, in messages.
     /// * `borrowed`: number of messages that one subscriber may borrow at the same time.
     pub fn new(subscribers: usize, buffer: usize, borrowed: usize) -> Self {
         Self {

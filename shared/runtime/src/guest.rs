@@ -202,7 +202,7 @@ impl Guest {
         &self.namespace
     }
 
-    /// Returns true if the deployment is ending. Then drop this guest, its ports and their messages.
+    /// Returns true if the deployment is ending. In that case, drop this guest, its ports and their messages.
     pub fn is_over(&self) -> bool {
         running_supervisor(&self.namespace) != Some(self.supervisor)
     }

@@ -166,7 +166,7 @@ impl Health {
         self.counts.meter(|meter| meter.passed(passage));
     }
 
-    /// Records a duration, nanoseconds.
+    /// Records a duration, in nanoseconds.
     ///
     /// * `view`: view that the duration belongs to, if there is one.
     pub fn spent(&self, span: Span, view: Option<usize>, nanos: u64) {

@@ -38,7 +38,7 @@ impl Fault for LaunchError {
     }
 }
 
-/// Data about a deployment that its process needs.
+/// Data about a deployment that each of its processes needs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
     /// Location of the deployment's shared memory.

@@ -10,7 +10,7 @@ pub struct Mapped {
     pub file: PathBuf,
     /// Number of the file in its file system.
     pub inode: u64,
-    /// Offset in the file, bytes.
+    /// Offset in the file, in bytes.
     pub offset: u64,
     /// True if this process may write to the location.
     pub is_writable: bool,

@@ -73,13 +73,12 @@ pub fn free_space(path: &Path) -> io::Result<u64> {
     Ok(status.f_bavail * status.f_frsize)
 }
 
-/// Returns the peak physical memory of this process, bytes (`VmHWM`); `None` if the system does not report it.
+/// Returns the peak physical memory of this process, in bytes (`VmHWM`); `None` if the system does not report it.
 pub fn peak_memory() -> Option<u64> {
     memory_now().map(|[_, peak]| peak)
 }
 
-/// Returns the current (`VmRSS`) and peak (`VmHWM`) physical memory of this process, bytes; `None` if the system does
-/// not report it.
+/// Returns the current (`VmRSS`) and peak (`VmHWM`) physical memory of this process, in bytes; `None` if the system does not report it.
 pub(crate) fn memory_now() -> Option<[u64; 2]> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let bytes = |key: &str| -> Option<u64> {

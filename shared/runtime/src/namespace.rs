@@ -14,7 +14,7 @@ const SOCKET_NAME_LEN: usize = 1 + 39 + 6;
 const SOCKET_PATH_MAX: usize = 107;
 /// Characters of a prefix: `px`, eight hexadecimal digits, `_`.
 const PREFIX_LEN: usize = 11;
-/// Maximum length of the root directory's path, bytes.
+/// Maximum length of the root directory's path, in bytes.
 pub(crate) const ROOT_LEN_MAX: usize = SOCKET_PATH_MAX - SOCKET_NAME_LEN - PREFIX_LEN;
 const NAME_LEN_MAX: usize = 32;
 /// File with the description of a running deployment.
@@ -36,9 +36,9 @@ pub enum NamespaceError {
     RootTooLong {
         /// The directory.
         root: PathBuf,
-        /// Length of its path, bytes.
+        /// Length of its path, in bytes.
         len: usize,
-        /// Maximum length, bytes.
+        /// Maximum length, in bytes.
         max: usize,
     },
     /// The path is not absolute, or contains characters that iceoryx2 does not accept in a path.

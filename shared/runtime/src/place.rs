@@ -48,7 +48,7 @@ impl Place {
         Some(bytes)
     }
 
-    /// Returns the numbers of the last note; `None` if there is no note, or if it has another number of them.
+    /// Returns the numbers of the last note; `None` if there is no note, or if it has a different number of values.
     pub fn noted<const N: usize>(&mut self) -> Option<[u64; N]> {
         let bytes = self.last()?;
         let (numbers, []) = bytes.as_chunks() else {

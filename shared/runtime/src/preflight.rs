@@ -16,7 +16,7 @@ const DESCRIPTORS: u64 = 40;
 /// Number of open files per topic in the process that keeps the topic alive; 6.6 were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;
 
-/// Smallest stack of the main thread, bytes.
+/// Smallest stack of the main thread, in bytes.
 const STACK: u64 = 1 << 20;
 
 /// Reason why the system has no room for a deployment.
@@ -28,9 +28,9 @@ pub enum PreflightError {
         .needed_bytes.div_ceil(1_000_000), .free_bytes / 1_000_000
     )]
     TooLarge {
-        /// Size of all pools, bytes.
+        /// Size of all pools, in bytes.
         needed_bytes: u64,
-        /// Size of the free memory, bytes.
+        /// Size of the free memory, in bytes.
         free_bytes: u64,
         /// The largest topic, with its size.
         largest: String,
@@ -38,7 +38,7 @@ pub enum PreflightError {
     /// A process needs more open files than its limit allows.
     #[error("deployment needs {needed} open files in one process, the limit is {limit} open files")]
     Descriptors {
-        /// Number of open files of the process that needs most.
+        /// Number of open files of the process that needs the most.
         needed: u64,
         /// Maximum number of open files.
         limit: u64,
@@ -46,7 +46,7 @@ pub enum PreflightError {
     /// The limit for the stack of a process is too small.
     #[error("the limit for the stack of a process is {} KB, but it needs {} KB", .limit / 1024, STACK / 1024)]
     Stack {
-        /// Maximum size of the stack, bytes.
+        /// Maximum size of the stack, in bytes.
         limit: u64,
     },
     /// The file system of shared memory cannot be queried.
@@ -120,7 +120,7 @@ fn check_descriptors(n_topics: u64, limit: u64) -> Result<(), PreflightError> {
     Err(PreflightError::Descriptors { needed, limit })
 }
 
-/// Returns the size of the shared memory that a deployment with these topics needs, bytes.
+/// Returns the size of the shared memory that a deployment with these topics needs, in bytes.
 pub fn needed_bytes(topics: &[TopicPlan]) -> u64 {
     let pools = topics.iter().map(TopicPlan::pool_bytes);
     let pools = pools.fold(0, u64::saturating_add);

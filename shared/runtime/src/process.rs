@@ -89,9 +89,9 @@ const BEGINNING: Duration = Duration::from_secs(10);
 /// The process ends when its supervisor ends. A panic is logged and ends the process. Call this function once, from the main
 /// thread.
 ///
-/// A service ends in three steps. After it has sent the end of stream, it calls [`Health::finished`]. Then it
-/// sends the end of stream again for every new receiver, so that a restarted receiver gets it as well. Once all processes have
-/// finished, the supervisor requests them to stop.
+/// A service ends in three steps. After it has sent the end of stream, it calls [`Health::finished`]. Then it sends the end of stream again
+/// for every new receiver, so that a restarted receiver gets it as well. Once all processes have finished, the supervisor asks them to
+/// stop.
 ///
 /// * `body`: the service. It returns soon after [`Service::stop`] is requested. The kind of its [`Failure`]
 ///   tells the supervisor whether to try again ([`ExitKind::is_permanent`]).

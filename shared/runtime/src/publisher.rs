@@ -46,9 +46,9 @@ pub enum SendError {
     TooLong {
         /// Name of the topic.
         topic: Arc<str>,
-        /// Requested length, elements.
+        /// Requested length, in elements.
         len: usize,
-        /// Maximum length, elements.
+        /// Maximum length, in elements.
         max_len: usize,
     },
     /// Stop was requested while the sender waited for a slow receiver.
@@ -169,7 +169,7 @@ impl<E: Element, H: Header> SlicePublisher<E, H> {
         })
     }
 
-    /// Returns the maximum length of an array, elements.
+    /// Returns the maximum length of an array, in elements.
     pub fn max_len(&self) -> usize {
         self.port.max_len
     }

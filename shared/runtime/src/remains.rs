@@ -26,7 +26,7 @@ pub struct Remains {
     pub processes: Vec<String>,
     /// Number of files of the deployment, including shared memory.
     pub n_files: u64,
-    /// Memory that the files take, bytes.
+    /// Memory that the files take, in bytes.
     pub bytes: u64,
 }
 

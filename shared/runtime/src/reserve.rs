@@ -22,7 +22,7 @@ use rustix::io::Errno;
 /// The magic number of tmpfs (statfs(2)).
 const TMPFS_MAGIC: u64 = 0x0102_1994;
 
-/// Last size that was refused, bytes; 0 if none was refused.
+/// Last size that was refused, in bytes; 0 if none was refused.
 static REFUSED: AtomicU64 = AtomicU64::new(0);
 /// Number of refused sizes.
 static N_REFUSED: AtomicU64 = AtomicU64::new(0);

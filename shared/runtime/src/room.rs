@@ -8,7 +8,7 @@ use rustix::process::{Resource, getrlimit};
 use crate::memory::free_shared_memory;
 use crate::reserve::{Refused, n_refused, refused};
 
-/// Memory for queues and management of one process, bytes: ten times the measured size.
+/// Memory for queues and management of one process, in bytes: ten times the measured size.
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
 /// Remedy if there is no room.
@@ -32,7 +32,7 @@ pub(crate) fn no_room() -> Option<String> {
     })
 }
 
-/// Free memory at the last failure of the transport, bytes; the maximum value if nothing has failed.
+/// Free memory at the last failure of the transport, in bytes; the maximum value if nothing has failed.
 static FREE_AT_FAILURE: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Records the free memory at a failure of the transport, which need not state its reason. Call this at once: the failed operation

@@ -168,7 +168,7 @@ fn lock_memory() -> Option<Denied> {
     })
 }
 
-/// Returns the amount of memory that this process may lock, bytes; `None` if there is no limit.
+/// Returns the amount of memory that this process may lock, in bytes; `None` if there is no limit.
 fn memory_limit() -> Option<u64> {
     let limit = getrlimit(Resource::Memlock).current?;
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

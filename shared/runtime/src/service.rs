@@ -27,7 +27,7 @@ use failure::Fault;
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);
 const IN_FLUX_PAUSE: Duration = Duration::from_millis(10);
 
-/// Attribute of a service: maximum length of an array, elements.
+/// Attribute of a service: maximum length of an array, in elements.
 const MAX_LEN: &str = "parallax.max-len";
 /// Attribute of a service: number of arrays that a publisher may write at the same time.
 const LOANED: &str = "parallax.loaned";
@@ -206,7 +206,7 @@ pub(crate) fn open_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<Wake
 
 /// The parts of a topic's plan for which iceoryx2 has no field.
 pub(crate) struct Extras {
-    /// Maximum length of an array, elements.
+    /// Maximum length of an array, in elements.
     pub(crate) max_len: usize,
     /// Number of arrays that a publisher may write at the same time.
     pub(crate) loaned: usize,

@@ -295,8 +295,8 @@ impl Port {
 
     /// Connects to the existing publishers.
     fn connect(&self) -> Result<(), PortError> {
-        // The publishers are listed before connecting, so that only connected ones are acknowledged. A new one may
-        // appear in the meantime.
+        // The publishers are listed before connecting, so that only connected publishers are acknowledged. A new publisher may appear in
+        // the meantime.
         let publishers = self.publishers();
         let connected = self.reader.port().update_connections();
         connected.inspect_err(note_room).map_err(|source| PortError::Connection {

@@ -51,7 +51,7 @@ impl TopicPlan {
     ///
     /// The array starts on a cache line, because the size of the header is a multiple of a cache line.
     ///
-    /// * `max_len`: maximum length of an array, elements.
+    /// * `max_len`: maximum length of an array, in elements.
     pub fn slices<E: Element, H: Header>(
         topic: String,
         delivery: Delivery,
@@ -106,7 +106,7 @@ impl TopicPlan {
         self.limits
     }
 
-    /// Returns the maximum length of an array, elements; 1 for messages.
+    /// Returns the maximum length of an array, in elements; 1 for messages.
     pub fn max_len(&self) -> usize {
         self.max_len
     }
@@ -138,12 +138,12 @@ impl TopicPlan {
         self.usual_chunks.map_or(chunks, |usual_chunk| usual_chunk.min(chunks))
     }
 
-    /// Returns the maximum size of one message, bytes.
+    /// Returns the maximum size of one message, in bytes.
     pub fn message_bytes(&self) -> u64 {
         self.chunk_bytes as u64
     }
 
-    /// Returns the size of the shared memory of all publishers of the topic, bytes. The result saturates.
+    /// Returns the size of the shared memory of all publishers of the topic, in bytes. The result saturates.
     pub fn pool_bytes(&self) -> u64 {
         let chunks = (self.limits.publishers as u64).saturating_mul(self.chunks() as u64);
         chunks.saturating_mul(self.chunk_bytes as u64)
@@ -252,12 +252,12 @@ fn create_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<WakeUp, BusEr
     })
 }
 
-/// Size of a cache line, and of the widest vector register, bytes.
+/// Size of a cache line, and of the widest vector register, in bytes.
 const CACHE_LINE: usize = 64;
-/// Size of iceoryx2's own header before the user header, with its alignment, bytes.
+/// Size of iceoryx2's own header before the user header, with its alignment, in bytes.
 const TRANSPORT_HEADER_BYTES: usize = 64;
 
-/// Returns the size of one chunk, bytes.
+/// Returns the size of one chunk, in bytes.
 fn chunk_bytes(header: usize, payload: usize) -> usize {
     (TRANSPORT_HEADER_BYTES + header + payload).next_multiple_of(CACHE_LINE)
 }

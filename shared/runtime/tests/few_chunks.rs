@@ -45,8 +45,8 @@ fn full(
     (publisher, subscriber)
 }
 
-/// Returns the mapped memory in the pool of the deployment's only publisher, bytes. This is its mapping
-/// in the sender or in the receiver, whichever is larger.
+/// Returns the mapped memory in the pool of the deployment's only publisher, in bytes. This is its mapping in the sender or in the
+/// receiver, whichever is larger.
 fn mapped(deployment: &Deployment) -> usize {
     let files = shared_memory(deployment.namespace()).into_iter();
     let is_pool = |text: &String| std::path::Path::new(text).extension() == Some("data".as_ref());

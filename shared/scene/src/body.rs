@@ -66,9 +66,9 @@ pub(crate) fn side_of(bone: usize) -> f64 {
 
 /// Flexion, abduction and twist of every joint in degrees; the values of the root are ignored.
 ///
-/// Flexion: the trunk, neck and head nod forward, arms and legs swing forward, elbows and knees fold, and
-/// toes rise. Abduction: limbs move away from the middle, collars up, and the trunk bends to the right. Twist is the
-/// opposite of inward rotation (the front of the limb turns outward); the trunk turns left.
+/// Flexion: the trunk, neck and head nod forward, arms and legs swing forward, elbows and knees fold, and toes rise. Abduction: limbs move
+/// away from the middle, collars rise, and the trunk bends to the right. Twist is the opposite of inward rotation (the front of the limb
+/// turns outward); the trunk turns left.
 pub(crate) type Angles = [[f64; 3]; N_BONES];
 
 /// Clamps angles to the limits of the joints.

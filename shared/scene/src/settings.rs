@@ -152,7 +152,7 @@ impl Address {
         text.starts_with(SCHEME)
     }
 
-    /// Reads an address. Missing keys have the values of [`Settings::default`], and 300 frames.
+    /// Reads an address. Missing keys have the values of [`Settings::default`]; the default number of frames is 300.
     ///
     /// # Errors
     ///

@@ -77,7 +77,7 @@ impl BodyShape {
         })
     }
 
-    /// Reduces the distances of a grid of points to those from every solid in turn.
+    /// Reduces every distance in a grid of points to the distance from the nearest solid, one solid after the other.
     pub(crate) fn fill(&self, grid: &mut Grid) {
         for piece in &self.pieces {
             let [low, high] = piece.solid.bounds();

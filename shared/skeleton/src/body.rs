@@ -1,8 +1,8 @@
 //! Human bodies: how long people's bones are, and how this limits a skeleton found in space.
 //!
-//! The pictures show where joints may be; this crate decides which of these can be a person. It knows the lengths of
-//! bones as shares of the stature, with their spread among people and the published source of every number
-//! ([`Kind::proportion`]). It answers five questions:
+//! The pictures show where joints may be; this module decides which of these joints can belong to a person. It knows the lengths of bones
+//! as shares of the stature, with their spread among people and the published source of every number ([`Kind::proportion`]). It answers
+//! five questions:
 //!
 //! | question | answer |
 //! |---|---|

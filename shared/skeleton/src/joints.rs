@@ -5,7 +5,7 @@
 pub struct Joint {
     /// Name in the data set.
     pub name: &'static str,
-    /// The joint is the mean of the centres of these parts (0-based).
+    /// Indices of the parts whose mean centre is the joint, counted from 0.
     pub parts: &'static [usize],
 }
 

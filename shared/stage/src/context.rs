@@ -50,7 +50,7 @@ impl core::fmt::Debug for Context<'_> {
 impl<'a> Context<'a> {
     /// Creates a context.
     ///
-    /// * `now`: returns the time, nanoseconds of a monotonic clock.
+    /// * `now`: returns the time, in nanoseconds of a monotonic clock.
     pub fn new(session: u64, now: &'a dyn Fn() -> u64, account: &'a dyn Account) -> Self {
         Self {
             session,
@@ -64,7 +64,7 @@ impl<'a> Context<'a> {
         Self::new(service.session(), &now_nanos, service.health())
     }
 
-    /// Returns the time of the clock, nanoseconds.
+    /// Returns the time of the clock, in nanoseconds.
     pub fn now(&self) -> u64 {
         (self.now)()
     }

@@ -39,7 +39,7 @@ impl Turn {
         &self.stamp
     }
 
-    /// Returns the time at which work on the next message began, nanoseconds.
+    /// Returns the time at which work on the next message began, in nanoseconds.
     pub fn received_at(&self) -> u64 {
         self.received_at.get()
     }
@@ -49,7 +49,7 @@ impl Turn {
         self.received_at.set(now);
     }
 
-    /// Returns the time that the frame waited in this process, nanoseconds.
+    /// Returns the time that the frame waited in this process, in nanoseconds.
     pub fn waited(&self) -> Option<u64> {
         let sent_at = self.last_sent_at?;
         Some(self.received_at.get().saturating_sub(sent_at))
@@ -89,7 +89,7 @@ impl<T> Frame<'_, T> {
     /// Returns the message of an optional input, with its age in frames. If there is none for this frame, returns the input's last message
     /// while it is fresh.
     ///
-    /// * `captured_at`: capture time of the view's frame, nanoseconds.
+    /// * `captured_at`: capture time of the view's frame, in nanoseconds.
     pub fn latest(&self, slot: usize, captured_at: u64) -> Option<(u64, &T)> {
         match self.item(slot) {
             Some(item) => Some((0, &item.value)),

@@ -28,7 +28,7 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
         Self { service, publisher }
     }
 
-    /// Sends a message about a frame. Returns the send time, nanoseconds.
+    /// Sends a message about a frame. Returns the send time, in nanoseconds.
     ///
     /// * `view`: view or pair for the stamp of the message; 0 for a message about all views.
     ///

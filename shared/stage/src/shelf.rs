@@ -80,7 +80,8 @@ impl<S> Shelf<S> {
 }
 
 /// Returns the index of the frame that is released first. A slow stage processes every n-th frame, where n is a power of two. The frame
-/// that is released is therefore the one divisible by the smallest power of two, and the oldest of several.
+/// that is released is therefore the one that is divisible only by the smallest power of two. If there are several such frames, it is the
+/// oldest.
 fn least_needed(steps: &[u64]) -> usize {
     let keys = steps.iter().enumerate();
     let least = keys.min_by_key(|(_, step)| (step.trailing_zeros(), **step));

@@ -1,6 +1,6 @@
 //! Values on the command line.
 
-/// A box: left, top, right, bottom, pixels.
+/// A box: left, top, right, bottom, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outline(
     /// Left, top, right, bottom.
@@ -29,7 +29,7 @@ pub fn outline(text: &str) -> Result<Outline, String> {
     })
 }
 
-/// Parses a frame rate on the command line, frames per second.
+/// Parses a frame rate on the command line, in frames per second.
 ///
 /// # Errors
 ///

@@ -72,7 +72,7 @@ pub enum WireError {
     Future {
         /// Name of the time stamp.
         field: &'static str,
-        /// Time by which the time stamp is ahead of the clock, nanoseconds.
+        /// Time by which the time stamp is ahead of the clock, in nanoseconds.
         ahead_nanos: u64,
     },
     /// The frame number is too large.

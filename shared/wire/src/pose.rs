@@ -125,7 +125,7 @@ pub fn candidates_from_message(
         .collect()
 }
 
-/// Returns the time from the instant of the frame until the picture of the view was taken, seconds.
+/// Returns the time from the instant of the frame until the picture of the view was taken, in seconds.
 ///
 /// # Errors
 ///

@@ -7,7 +7,7 @@ use crate::error::{count, equal, finite};
 
 /// Writes predicted errors, or that there are none. The caller fills in stamp and timing.
 ///
-/// * `sigma_px`: expected error of every part, pixels of the frame.
+/// * `sigma_px`: expected error of every part, in pixels of the frame.
 ///
 /// # Errors
 ///
@@ -53,7 +53,7 @@ pub fn sigma_from_message(
 
 /// Adds the thresholds that came with a prediction.
 ///
-/// * `tau_px`: threshold of every part, pixels of the frame; or empty.
+/// * `tau_px`: threshold of every part, in pixels of the frame; or empty.
 ///
 /// # Errors
 ///
@@ -88,7 +88,7 @@ pub fn tau_from_message(
 ///
 /// * `side`: 0 for the first view, 1 for the second.
 /// * `age`: age of the prediction, frames.
-/// * `sigma_px`: expected error of every part, pixels of the frame.
+/// * `sigma_px`: expected error of every part, in pixels of the frame.
 ///
 /// # Errors
 ///

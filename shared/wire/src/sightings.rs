@@ -1,4 +1,4 @@
-//! The people that a view sees with the method of networks, and their maps.
+//! The people that a view sees with the network method, and their maps.
 
 use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES, NO_COLOUR, Status, ViewPose};
 use pipeline::{ExtraKeypoint, Sighting, Sightings};
@@ -10,7 +10,7 @@ use crate::{
     skew_from_message,
 };
 
-/// Maximum distance of a position from the first pixel, pixels.
+/// Maximum distance of a position from the first pixel, in pixels.
 const MOST_PX: f64 = 1e6;
 /// Maximum number of columns or rows of a map.
 const MOST_CELLS: u32 = 1 << 16;

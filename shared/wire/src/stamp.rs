@@ -17,7 +17,7 @@ pub struct Expected {
     pub session: u64,
     /// View of the topic; 0 for messages about all views.
     pub view: usize,
-    /// Current time, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Current time, `CLOCK_MONOTONIC`, in nanoseconds.
     pub now_nanos: u64,
 }
 

@@ -33,9 +33,9 @@ pub struct Frame<'a> {
 /// Position of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Position in the world frame of the calibration, metres.
+    /// Position in the world frame of the calibration, in metres.
     pub in_world: [f64; 3],
-    /// Standard deviation along one axis, metres.
+    /// Standard deviation along one axis, in metres.
     pub deviation_m: f64,
 }
 

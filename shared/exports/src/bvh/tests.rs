@@ -48,7 +48,7 @@ fn read(text: &str) -> (Vec<Joint>, Vec<Vec<f64>>) {
     (joints, frames)
 }
 
-/// Returns the positions of all joints by forward kinematics, centimetres.
+/// Returns the positions of all joints by forward kinematics, in centimetres.
 fn places(joints: &[Joint], frame: &[f64]) -> Vec<Point3<f64>> {
     let mut values = frame.iter().copied();
     let mut next = || values.next().unwrap();

@@ -19,7 +19,7 @@ pub struct Page<'a> {
     pub outcome: &'a Outcome,
     /// True if the poses of the cameras were requested too.
     pub has_rig: bool,
-    /// Corners of the board's outline, in order around the board, metres.
+    /// Corners of the board's outline, in order around the board, in metres.
     pub outline: [Point2<f64>; 4],
     /// Description of the input: key and value.
     pub about: &'a [(String, String)],

@@ -1,4 +1,5 @@
-//! The clocks of cameras as one HTML page: the result, the reasons for or against trusting it, and the cost of every pair over its offset.
+//! The clocks of cameras as one HTML page: the result, the reasons for or against trusting it, and for every pair of cameras a curve of the
+//! cost against the offset.
 
 use core::fmt::Write as _;
 
@@ -123,7 +124,7 @@ fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {
     put!(out, "</svg>\n");
 }
 
-/// Draws the offsets of a pair: that of all cameras together, its best and its second best.
+/// Draws the offsets of a pair: the one that follows from all cameras together, the pair's best one, and its second best one.
 fn marks(out: &mut Html, pair: &PairReport, x: impl Fn(f64) -> f64) {
     let bottom = TOP + HEIGHT;
     for (offset_s, style) in [

@@ -47,7 +47,7 @@ impl Html {
     }
 }
 
-/// Adds to markup. The arguments are a literal, in brackets the variables that its braces name, and then the other values.
+/// Adds to markup. The arguments are a literal, then in brackets the variables that are named in its braces, and then the other values.
 ///
 /// `put!(out, "<text x=\"{x:.1}\">{}</text>", [x], name)`
 #[macro_export]

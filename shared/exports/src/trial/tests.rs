@@ -11,7 +11,7 @@ fn people(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Vec<Trial>, Trial
     all.finish("x", rate_hz)
 }
 
-/// Returns the trial of the only person.
+/// Returns the trial of a run, which has exactly one person.
 fn gathered(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Trial, TrialError> {
     let [trial] = <[Trial; 1]>::try_from(people(lines, rate_hz)?).unwrap();
     Ok(trial)

@@ -58,7 +58,7 @@ fn pixels(it: &LevelLayout) -> f64 {
     (it.image_size[0] * it.image_size[1]) as f64
 }
 
-/// Returns the multiplications and additions of resizing and halving; one double-precision operation counts as two.
+/// Returns the number of multiplications and additions of resizing and halving; one double-precision operation counts as two.
 fn shrinking(workload: &Workload) -> f64 {
     let [width, height] = workload.layout.image_size.map(|image_size| image_size as f64);
     let level = |(at, it): (usize, &LevelLayout)| {
@@ -74,8 +74,8 @@ fn shrinking(workload: &Workload) -> f64 {
     workload.layout.levels.iter().enumerate().map(level).sum()
 }
 
-/// Returns the operations of the features. Per pixel: the gradient in three planes, nine scalar products with comparisons, in double
-/// precision, and four shares. Per cell: 27 values under four norms.
+/// Returns the number of operations of the features. Each pixel takes the gradient in three planes, nine scalar products with comparisons
+/// in double precision, and four shares. Each cell takes 27 values under four norms.
 fn describing(workload: &Workload) -> f64 {
     let per_pixel = 2.0 * (3.0 * 9.0 + 9.0 * 7.0 + 10.0) + 4.0 * 2.0;
     let cell = (workload.model.spec().cell_px as f64).powi(2);
@@ -84,8 +84,8 @@ fn describing(workload: &Workload) -> f64 {
     levels.map(|level| pixels(level) * (per_pixel + per_cell / cell)).sum()
 }
 
-/// Returns the multiply-adds of the filters in the cheapest known form: by definition, or by tiles with a side of some
-/// cells that are multiplied point by point (without the transforms).
+/// Returns the number of multiply-adds of the filters in the cheapest known form: by definition, or by tiles with a side of some cells that
+/// are multiplied point by point (without the transforms).
 ///
 /// * `tiles`: sides of the available tiles, in cells.
 fn products(workload: &Workload, tiles: &[usize]) -> f64 {

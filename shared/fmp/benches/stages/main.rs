@@ -1,4 +1,4 @@
-//! Benchmark of every stage of the single-view method on one frame. It shows milliseconds, compared with the peak of the
+//! Benchmark of every stage of the single-view method on one frame. It prints times in milliseconds, compared with the peak rate of the
 //! machine, with the readable reference and with other programs.
 //!
 //! Workloads: 172 x 224 pixels with 26 parts, 6 types each and filters of 5 x 5 cells (PARSE) or

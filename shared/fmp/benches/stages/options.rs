@@ -65,7 +65,7 @@ impl Options {
         self.images.is_empty() || self.images.iter().any(|image| image == name)
     }
 
-    /// Returns the portable instruction set is slow where it lacks multiply-add, so it must be requested.
+    /// Returns true if an instruction set is to be measured. The portable set is slow where it lacks multiply-add, so it must be requested.
     pub(crate) fn wants_isa(&self, isa: Isa) -> bool {
         if self.isas.is_empty() {
             return self.quick || isa.name() != "portable" || Isa::available().len() == 1;

@@ -13,7 +13,7 @@ use crate::readable::Readable;
 use crate::stages::{Stage, Times};
 use crate::workload::Workload;
 
-/// Times per frame of other programs with the HumanEva model on two threads: image, program, in milliseconds.
+/// Times per frame of other programs with the HumanEva model on two threads: (image, program, milliseconds).
 const PEERS: [(&str, &str, f64); 3] = [
     ("172x224", "authors", 1120.0),
     ("172x224", "PartsBasedDetector", 389.0),

@@ -1,6 +1,6 @@
 //! Parallax's own model file: a header with a checksum, followed by the model, bit for bit.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 0..8 | `PLXMODEL` |
 //! | 8..12 | version, u32, little-endian: 1 |

@@ -42,7 +42,7 @@ impl Solver {
     pub fn bound_of(&self, best: f32, largest: &[f32]) -> Bound {
         let mut begun = vec![false; largest.len()];
         let mut own = 0.0;
-        // In the order in which a sweep visits the parts.
+        // The values are added in the order in which a sweep visits the parts.
         for part in (0..largest.len()).rev() {
             let edge = self.model.spec().parts[part].edge.as_ref();
             for part in [Some(part), edge.map(|edge| edge.parent)].into_iter().flatten() {

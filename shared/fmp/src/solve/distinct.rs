@@ -89,7 +89,7 @@ impl Solver {
     }
 }
 
-/// Roots with no better neighbour among the eight around them, and no equal neighbour before them.
+/// Returns the roots with no better neighbour among the eight around them, and no equal neighbour before them.
 fn peaks(roots: &[Root]) -> Vec<Root> {
     let Some(last) = roots.last() else {
         return Vec::new();

@@ -122,7 +122,7 @@ impl IncrementalSolver<'_> {
         self.order.len()
     }
 
-    /// Selects the levels that may hold the best pose, and those whose planes will be kept.
+    /// Selects the levels that may contain the best pose, and those whose planes will be kept.
     #[expect(
         single_use_lifetimes,
         reason = "anonymous lifetimes in `impl Trait` are unstable"

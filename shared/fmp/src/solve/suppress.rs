@@ -7,11 +7,12 @@ use crate::{Layout, Model, Pose, Responses};
 const MOST: usize = 1000;
 
 impl Solver {
-    /// Every pose whose root scores at least the threshold, without those that overlap a better pose.
+    /// Returns every pose whose root scores at least the threshold, except those that overlap a better pose.
     ///
     /// This is the reference programs' rule: of the 1000 best candidates, a candidate is dropped if it overlaps a picked one by more than
-    /// `overlap`. The overlap of two candidates is the largest share of a box of the picked candidate that the same box of the other
-    /// covers. It is taken over all parts and the rectangle around all parts. The result is sorted best first; ties are resolved as in
+    /// `overlap`. The overlap of two candidates is the largest share of a box of the picked candidate that the corresponding box of the
+    /// other candidate covers. It is taken over all parts and the rectangle around all parts. The result is sorted best first; ties are
+    /// resolved as in
     /// [`Self::best`].
     ///
     /// # Panics
@@ -22,8 +23,8 @@ impl Solver {
         suppress(&self.model, evidence.layout(), poses, settings)
     }
 
-    /// Every pose whose root scores at least `threshold`, but at most the `max` best, sorted best first;
-    /// ties are resolved as in [`Self::best`]. Most are neighbours of others: see [`Self::candidates`].
+    /// Returns the poses whose root scores at least `threshold`, but at most the `max` best, sorted best first; ties are resolved as in
+    /// [`Self::best`]. Most of these poses are neighbours of other poses: see [`Self::candidates`].
     ///
     /// # Panics
     ///

@@ -1,7 +1,7 @@
 //! From the second frame on, only the results allocate memory, on any thread.
 //!
-//! This test runs without the test harness, because the harness's own thread allocates and the counter
-//! covers all threads: those of a pool do most of the work.
+//! This test runs without the test harness, because the harness's own thread allocates memory. The counter covers all threads, because the
+//! threads of a pool do most of the work.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../single_view/common.rs"]

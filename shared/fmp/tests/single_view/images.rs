@@ -186,8 +186,8 @@ fn extractor_and_solver_give_the_result_of_the_reference() {
         (best.level, &best.parts)
     );
     assert!((f64::from(found.pose.score) - best.score).abs() < 1e-4);
-    // Plain sums are as exact as single precision allows. Tiles round more, in proportion to the
-    // largest responses: 1.3e-5 of the largest response was measured here.
+    // Plain sums are as accurate as single precision allows. Tiles round more, in proportion to the largest responses: 1.3e-5 of the
+    // largest response was measured here.
     let mut plain = vec![f32::NAN; found.layout.n_responses()];
     Extractor::direct(Arc::clone(&model)).responses(image, &found.layout, &mut plain);
     let largest = plain.iter().fold(0.0_f32, |largest, it| largest.max(it.abs()));

@@ -11,7 +11,7 @@ use crate::other_view::OtherViews;
 
 const SIZES: [[usize; 2]; 5] = [[9, 20], [17, 7], [4, 35], [6, 6], [1, 1]];
 
-/// Sequences of terms made from few seeds, so that terms often stay the same or return.
+/// Sequences of terms made from few seeds, so that terms often stay the same or recur.
 fn times(n_parts: usize) -> impl Strategy<Value = Vec<(OtherViews, Guess)>> {
     let scale = prop_oneof![Just(0.0_f32), Just(0.25), Just(1.0), Just(1000.0)];
     let gain = prop_oneof![Just(-1.0_f32), Just(0.0), Just(0.125)];

@@ -92,8 +92,8 @@ fn both(
 
 /// Returns the maximum difference between the response of the scope and that of the whole image, for every response.
 ///
-/// It is the bound of [`FilterBank::correlate`] for both, with the largest possible values of features:
-/// four clipped entries, half of their sum; eighteen, weighted as texture; 1.
+/// It is the bound of [`FilterBank::correlate`] for both, with the largest possible feature values. An orientation feature is half of the
+/// sum of four clipped entries, a texture feature is a weighted sum of eighteen, and the padding feature is 1.
 fn bounds(model: &Model, layout: &Layout, scope: &Scope) -> Vec<f64> {
     let filters = &model.spec().filters;
     let templates: Vec<_> = filters

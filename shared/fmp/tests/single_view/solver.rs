@@ -33,7 +33,7 @@ fn all_poses(model: &Model, level: u16, [rows, cols]: [usize; 2]) -> Vec<Pose> {
     all.into_iter().map(pose).collect()
 }
 
-/// Equation 1 in double precision, straight from the model.
+/// Equation 1 in double precision, computed directly from the model.
 fn energy(
     model: &Model,
     evidence: &Responses<'_>,

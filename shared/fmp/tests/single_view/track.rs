@@ -47,7 +47,7 @@ impl Scene {
         scope == whole
     }
 
-    /// Returns the frames, out of ten at a frame rate, that are searched in full if all scores equal the first.
+    /// Returns which of ten frames, at a given frame rate, are searched in full if all scores equal the first.
     fn full_at(rate_hz: f64) -> Vec<u64> {
         let mut scene = Self::new(Some(TrackSettings {
             full_every: 1000,
@@ -119,7 +119,7 @@ fn the_search_margin_grows_with_the_time_since_the_last_pose() {
     let of = (&*scene.model, &scene.layout);
     scene.tracker.update(of, (first, &whole), Some(&pose));
     let [x1, _, x2, _] = pose.bounding_box(&scene.model, &scene.layout);
-    // At least half a side of the box, and one more side for every half second.
+    // The search distance is one side of the box per half second, but at least half a side.
     for (seconds, share) in [(0.01, 0.5), (0.2, 0.5), (0.25, 0.5)] {
         let scope = scene.tracker.scope(&scene.layout, at(seconds));
         let begin = (x1 - share * (x2 - x1)).floor().max(0.0);

@@ -22,7 +22,7 @@ pub enum OverlayError {
         /// Cause of the error.
         source: io::Error,
     },
-    /// The picture cannot be encoded, because it has no pixel.
+    /// The picture cannot be encoded, because it is empty (has no pixels).
     #[error("cannot encode {}", path.display())]
     Encode {
         /// Path of the file.

@@ -7,10 +7,10 @@ use super::{Canvas, Colour, SHADOW};
 const SIZE: RasterHeight = RasterHeight::Size16;
 const WEIGHT: FontWeight = FontWeight::Regular;
 
-/// Height of a line of text, pixels.
+/// Height of a line of text, in pixels.
 pub const TEXT_HEIGHT: usize = 16;
 
-/// Returns the width of a line of text, pixels.
+/// Returns the width of a line of text, in pixels.
 pub fn text_width(text: &str) -> usize {
     text.chars().count() * get_raster_width(WEIGHT, SIZE)
 }
@@ -22,7 +22,7 @@ impl Canvas {
         self.enlarged(at, text, colour, 1.0);
     }
 
-    /// Draws text that is scaled with the picture: by the number of its rows / 480, rounded, and at least 1.
+    /// Draws text that is scaled with the picture: by its number of rows divided by 480, rounded, but at least by 1.
     pub fn label(&mut self, at: [f64; 2], text: &str, colour: Colour) {
         let times = (self.size().height as f64 / 480.0).round().max(1.0);
         self.enlarged(at, text, colour, times);

@@ -11,7 +11,7 @@ use super::exif;
 use crate::turn::{Rotation, Turn};
 use crate::{FootageError, Size};
 
-/// Maximum size of a decoded image, bytes. Without a limit, a header of 30 bytes may claim any size.
+/// Maximum size of a decoded image, in bytes. Without a limit, a header of 30 bytes may claim any size.
 const MAX_BYTES: u64 = 1 << 29;
 
 /// Options for reading images.

@@ -44,9 +44,9 @@ pub(crate) struct Log {
 /// Log entry of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameTime {
-    /// Presentation time of the frame, seconds.
+    /// Presentation time of the frame, in seconds.
     pub(crate) time_s: f64,
-    /// Size of the frame in the format of this output, bytes.
+    /// Size of the frame in the format of this output, in bytes.
     pub(crate) bytes: u64,
 }
 
@@ -86,7 +86,7 @@ impl Log {
 /// Separates the lines of ffmpeg's `framecrc` output from error messages.
 struct Lines {
     times: SyncSender<FrameTime>,
-    /// Unit of time from the log's header, seconds.
+    /// Unit of time from the log's header, in seconds.
     unit_s: f64,
     /// The error messages.
     kept: Vec<u8>,

@@ -60,8 +60,8 @@ fn numbers_of(paths: &[PathBuf]) -> Option<Vec<u64>> {
         let numbers: Vec<u64> = numbers.collect::<Option<_>>()?;
         numbers.is_sorted_by(|a, b| a < b).then_some(numbers)
     };
-    // Names may contain several ascending numbers, such as a number and a time. The one with the smallest gaps is used, and the last of
-    // equal ones.
+    // Names may contain several ascending numbers, such as a number and a time. The numbers with the smallest gaps are used; in a tie, the
+    // last ones.
     let rising = (0..first.len()).rev().filter_map(column);
     rising.min_by_key(|numbers| numbers[numbers.len() - 1] - numbers[0])
 }

@@ -24,9 +24,9 @@ pub(super) struct Probe {
     pub(super) n_frames: u64,
     /// Number of frames according to the duration in the header.
     pub(super) n_promised: u64,
-    /// Presentation times, seconds after the first frame, if frames are not equally spaced.
+    /// Presentation times, in seconds after the first frame, if frames are not equally spaced.
     pub(super) times_s: Option<Vec<f64>>,
-    /// Time of the first frame in the decoder, seconds; `None` if it is known only after the first frame has been decoded.
+    /// Time of the first frame in the decoder, in seconds; `None` if it is known only after the first frame has been decoded.
     pub(super) origin_s: Option<f64>,
     /// True if pictures are coded from other pictures.
     pub(super) is_inter: bool,
@@ -146,7 +146,7 @@ fn tag(stream: &Value) -> Turn {
     }
 }
 
-/// Returns the time at which the decoder shows the first frame, seconds.
+/// Returns the time at which the decoder shows the first frame, in seconds.
 ///
 /// If frames are not decoded in their order, some containers have only the times of decoding, which the decoder shifts.
 fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {

@@ -15,7 +15,7 @@ use crate::{FootageError, SourceSpec, is_image};
 /// The sound of a video, with all channels mixed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedSound {
-    /// Time of the first sample, seconds after the first frame.
+    /// Time of the first sample, in seconds after the first frame.
     pub begins_s: f64,
     /// The samples.
     pub samples: Vec<i16>,
@@ -23,7 +23,7 @@ pub struct RecordedSound {
 
 /// Reads the whole sound of footage; returns `None` for images and for videos without sound.
 ///
-/// * `rate_hz`: sample rate to which the sound is converted, hertz.
+/// * `rate_hz`: sample rate to which the sound is converted, in hertz.
 ///
 /// # Errors
 ///

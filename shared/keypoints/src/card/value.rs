@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Method to refine a maximum of a map.
+/// Method of refining a maximum of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Refine {

@@ -7,19 +7,19 @@ use crate::files::names::{NameSet, NamesError};
 pub const MAX_PEOPLE: usize = 1000;
 /// Maximum number of frames of a file, according to their numbers.
 pub const MAX_FRAMES: u64 = 10_000_000;
-/// Maximum distance of a keypoint from the top-left pixel, pixels.
+/// Maximum distance of a keypoint from the top-left pixel, in pixels.
 const FARTHEST_PX: f64 = 1e6;
 
 /// The keypoints of one person, as another program found them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SeenKeypoints {
-    /// Keypoints in the order of the names. Each has a position, pixels of the footage with the centre of the top-left pixel at (0, 0),
+    /// Keypoints in the order of the names. Each has a position, in pixels of the footage with the centre of the top-left pixel at (0, 0),
     /// and a score from 0 to 1. `None` for a keypoint that was not found, or not labelled.
     pub keypoints: Vec<Option<Keypoint>>,
 }
 
 impl SeenKeypoints {
-    /// Returns the box around the keypoints that were found with a score above 0: left, top, right, bottom, pixels.
+    /// Returns the box around the keypoints that were found with a score above 0: left, top, right, bottom, in pixels.
     pub fn outline(&self) -> Option<[f64; 4]> {
         crate::window::outline(&self.keypoints)
     }

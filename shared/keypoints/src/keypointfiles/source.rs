@@ -11,7 +11,7 @@ use crate::keypointfiles::error::KeypointFileError;
 use crate::keypointfiles::folder;
 use crate::keypointfiles::order::pelvis_off;
 
-/// Maximum size of the file of one frame, and of the file of all frames, bytes.
+/// Maximum size of the file of one frame, and of the file of all frames, in bytes.
 const MOST_OF_FRAME: u64 = 16 << 20;
 const MOST_OF_FILM: u64 = 1 << 30;
 /// Number of files with people that are read to find out which 25 keypoints they have.

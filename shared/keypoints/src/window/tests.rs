@@ -143,13 +143,15 @@ fn udp_card(udp: bool) -> Card {
     card
 }
 
-/// Returns the column or row of the input at one of the picture, by the matrix of mmpose's `get_udp_warp_matrix` without a rotation.
+/// Maps a column or row of the picture to the corresponding one of the input, by the matrix of mmpose's `get_udp_warp_matrix` without a
+/// rotation.
 fn warped(x: f64, centre: f64, size: f64, side: f64) -> f64 {
     let scale = (side - 1.0) / size;
     scale * x + scale * (-0.5 * (2.0 * centre) + 0.5 * size)
 }
 
-/// Returns the column or row of the picture at a cell of a map, as mmpose's `UDPHeatmap` decodes it and its estimator converts it back.
+/// Maps a column or row of a map to the corresponding one of the picture, as mmpose's `UDPHeatmap` decodes it and its estimator converts it
+/// back.
 fn decoded(cell: f64, cells: f64, [centre, size, side]: [f64; 3]) -> f64 {
     let in_input = cell / (cells - 1.0) * side;
     in_input / side * size + centre - 0.5 * size

@@ -13,7 +13,7 @@ use crate::rts::{FREEDOM, GATE, weight};
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
 
 /// Number of filters. The next constants are the jerk density of the calmest filter and the step to the next one, as common logarithms
-/// relative to the joint's expectation. Most people are a hundred times more restless running than standing.
+/// relative to the joint's expectation. Most people are a hundred times more restless when they run than when they stand.
 const N_MODELS: usize = 6;
 const CALMEST: f64 = -1.0;
 const APART: f64 = 1.0;

@@ -19,18 +19,18 @@ const SIZED: &str = "a matrix of counts for every part, as large as its types";
 
 /// The consistency parameters of one model.
 ///
-/// As a file it is one object of JSON; all fields must be there, others are refused.
+/// The file is a single JSON object; all fields are required, and others are refused.
 ///
-/// | field | what |
+/// | field | content |
 /// |---|---|
 /// | `format`, `version` | `"parallax-consistency"`, 1 |
 /// | `model` | `fingerprint` (16 hexadecimal digits, FNV-1a of the model file) and `shape`: `n_types` of every part, `mirror` of every part, from 0 |
-/// | `learned` | how many `instants` and `views` it was learned from, and how many were held out |
+/// | `learned` | number of `instants` and `views` used for learning, and number of held-out instants |
 /// | `weights` | `alpha`, `beta`, `max_distance_cells` (or null: no cap), `appearance`: `"joint"` or `"lift"` |
-/// | `tau_tenths` | of every part the median error of the single view, in tenths of the person's size |
-/// | `smoothing` | observations of types that have nothing to do with each other, added to every table |
+/// | `tau_tenths` | median error of every part in the single view, in tenths of the person's size |
+/// | `smoothing` | number of observations of independent types that are added to every table |
 /// | `ring` | tables by angle: entry `i` of `n` for angles from `i` to `i + 1` times `180 / n` degrees, from the first view to the second counter-clockwise as seen from above; [`Counts`] |
-/// | `rigs` | `name` and `pairs` of rigs that were learned by name: `cameras` (two names), `counts` |
+/// | `rigs` | `name` and `pairs` of every rig that was learned by name: `cameras` (two names), `counts` |
 /// | `joints` | `set` (`parse14`, `umpm15`, `humaneva20`) and `weights`: a row of as many numbers as the model has parts for every joint; empty if nothing was learned |
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -87,7 +87,7 @@ pub struct Weights {
     pub alpha: f64,
     /// Weight of the appearance term.
     pub beta: f64,
-    /// Distance at which the geometric term is capped, cells.
+    /// Distance at which the geometric term is capped, in cells.
     pub max_distance_cells: Option<f64>,
     /// The values of the appearance term.
     pub appearance: Appearance,

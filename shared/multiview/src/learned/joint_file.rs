@@ -20,12 +20,12 @@ const SUM_TOLERANCE: f64 = 1e-6;
 ///
 /// The file is a single JSON object; all fields are required, and others are refused.
 ///
-/// | field | what |
+/// | field | content |
 /// |---|---|
 /// | `format`, `version` | `"parallax-joints"`, 1 |
-/// | `model` | 16 hexadecimal digits: FNV-1a of the model file with which it was learned |
+/// | `model` | 16 hexadecimal digits: FNV-1a of the model file with which the joints were learned |
 /// | `joints` | the joints: `name`, in the order of `parse14`, and `weights`, one per part of the model, which sum to 1 |
-/// | `learned` | how it was learned: `reach` and `ridge`, and for every data set (`sets`) its `name`, its `people`, those `found`, and the mean error before and after (`error_before`, `error_after`): percent of the person's size, at most 10 each, of people left out in turn |
+/// | `learned` | settings and results of the learning: `reach`, `ridge`, and for every data set (`sets`) its `name`, the number of `people`, the number of people `found`, and the mean error before and after (`error_before`, `error_after`). Errors are in percent of the person's size, are limited to 10 each, and are measured on people who were left out in turn |
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointFile {
@@ -158,7 +158,7 @@ impl JointFile {
 
     /// Returns the map from the 26 parts to the joints of a set. All joints of the set must be made of joints of `skeleton::PARSE14`.
     ///
-    /// * Returns `None` for a set with a part that is not a joint there.
+    /// * Returns `None` for a set with a part that is not a joint of `skeleton::PARSE14`.
     pub fn map(&self, set: &JointSet) -> Option<Arc<JointMap>> {
         let of_part = |part: &usize| {
             let joint = (0..self.joints.len()).find(|i| own(*i) == *part)?;

@@ -14,7 +14,7 @@ use crate::learned::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights
 pub struct Settings {
     /// Number of bins of half the circle.
     pub n_bins: usize,
-    /// Maximum error at which the type of a part counts, also for its parent; in tenths of the person's size.
+    /// Maximum error of a part and of its parent at which the type of the part counts, in tenths of the person's size.
     pub max_error: f32,
     /// Maximum mean error of a person who is used for the joint map, in tenths of the person's size.
     pub max_mean_error: f32,
@@ -38,7 +38,7 @@ impl Default for Settings {
 pub struct ViewObservation {
     /// Type of every part.
     pub types: Vec<u8>,
-    /// Centres of all parts, in pixels; parts are named as by the model.
+    /// Centres of all parts, in pixels; parts have the names of the model.
     pub centres: Vec<[f64; 2]>,
     /// Error of every part, in tenths of the person's size.
     pub errors: Vec<f32>,
@@ -163,7 +163,7 @@ impl Learner {
         self.named[at].counts.add(&self.shape, part, types, exchanged);
     }
 
-    /// Returns a type counts if its part and the parent part, to which the type is relative, are right.
+    /// Returns true if a part and its parent are right. Only then does the type of the part count, because it is relative to the parent.
     fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
         let right = |part: usize| {

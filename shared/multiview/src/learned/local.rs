@@ -7,7 +7,7 @@ use skeleton::{MIRROR, N_PARTS, PARENT, PARSE14};
 const N_JOINTS: usize = 14;
 /// Parts of shoulders and hips; for each of these, the opposite part is used as well.
 const ACROSS_TRUNK: [usize; 4] = [2, 9, 14, 21];
-/// Maximum error that counts, as a share of the person's size; a joint beyond it was not found at all.
+/// Maximum error that counts, as a share of the person's size; a joint with a larger error was not found at all.
 const LIMIT: f64 = 0.1;
 /// Maximum number of rounds of reweighting, and the change of weights at which the rounds end.
 const MOST_ROUNDS: usize = 50;
@@ -163,7 +163,7 @@ fn left_out(settings: Local, sets: &[Vec<Marked>]) -> Vec<f64> {
     sums.iter().map(|(sum, n)| sum / f64::max(*n, 1.0)).collect()
 }
 
-/// A joint of one person. Everything is relative to its own part, in units of the person's size.
+/// A joint of one person. All positions are relative to the joint's own part, in units of the person's size.
 struct Sample {
     around: [DVector<f64>; 2],
     joint: [f64; 2],

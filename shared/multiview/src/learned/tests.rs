@@ -86,7 +86,7 @@ fn the_order_of_two_views_does_not_matter() {
 #[test]
 fn views_from_behind_have_tables_of_their_own() {
     let mut learner = learner();
-    // The right arm has type 1, the left one type 2, as each picture names the sides.
+    // The right arm has type 1 and the left arm type 2; sides are named as in each picture.
     let side = |value: usize| if value < 14 { 1 } else { 2 };
     let (front, back) = (observation(side, 0.1, false), observation(side, 0.1, true));
     add_views(&mut learner, [&front, &back], 175.0, 100);

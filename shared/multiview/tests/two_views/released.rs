@@ -20,7 +20,7 @@ fn parts(pose: &Pose) -> (u16, &[fmp::Placement]) {
     (pose.level, &pose.parts)
 }
 
-/// Returns true if the last poses of both views equal those of four iterations before, but not of two.
+/// Returns true if the last poses of both views equal those of four iterations earlier, but not those of two iterations earlier.
 fn cycles(estimate: &PairEstimate) -> bool {
     let [.., a, b, c, d, e, f] = &estimate.iterations[..] else {
         return false;

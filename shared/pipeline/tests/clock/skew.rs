@@ -16,7 +16,7 @@ enum By {
     Widening,
     /// Each point is moved to the instant by its own velocity.
     Moving,
-    /// Each point is moved, and its deviation grows by the error of the move: what a run does.
+    /// Each point is moved, and its deviation grows by the error of the move, as in a run.
     Both,
 }
 

@@ -6,10 +6,10 @@ use messages::{
     NO_VIEW, Span,
 };
 
-/// Longest measurable duration, nanoseconds: an hour.
+/// Longest measurable duration, in nanoseconds: an hour.
 const LONGEST_NANOS: u64 = 3_600_000_000_000;
 
-/// The times of one frame in a process, nanoseconds.
+/// The times of one frame in a process, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Passage {
     /// Time from the sending of the frame's message to the start of the work, if there was a message.

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use messages::{MAX_ROWS, Metrics};
 
-/// The time window of the rates, nanoseconds.
+/// The time window of the rates, in nanoseconds.
 const REACH_NANOS: u64 = 5_000_000_000;
-/// Shortest time from which a rate is computed, nanoseconds.
+/// Shortest time from which a rate is computed, in nanoseconds.
 const LEAST_NANOS: u64 = 200_000_000;
 
 /// Rates over the last five seconds, or since the start.

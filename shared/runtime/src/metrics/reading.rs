@@ -70,9 +70,9 @@ pub struct Reading {
     pub pid: u32,
     /// Number of restarts of the process.
     pub restarts: u32,
-    /// Time at which the process started, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the process started, `CLOCK_MONOTONIC`, in nanoseconds.
     pub began_at_nanos: u64,
-    /// Time at which the message was sent, `CLOCK_MONOTONIC`, nanoseconds.
+    /// Time at which the message was sent, `CLOCK_MONOTONIC`, in nanoseconds.
     pub at_nanos: u64,
     /// Number of messages received.
     pub n_received: u64,
@@ -82,11 +82,11 @@ pub struct Reading {
     pub sent_millihertz: u64,
     /// Number of messages or frames lost, in the order of [`Cause::ALL`].
     pub n_dropped: [u64; N_CAUSES],
-    /// Size of the evidence sent, bytes.
+    /// Size of the evidence sent, in bytes.
     pub evidence_bytes: u64,
-    /// Physical memory, bytes; 0 if the system does not report it.
+    /// Physical memory, in bytes; 0 if the system does not report it.
     pub memory_bytes: u64,
-    /// Peak physical memory, bytes.
+    /// Peak physical memory, in bytes.
     pub peak_memory_bytes: u64,
     /// Current and maximum length of the queue of frames or results, if there is a queue.
     pub queue: Option<[u32; 2]>,
@@ -111,7 +111,7 @@ pub struct ViewName {
     pub name: String,
 }
 
-/// Statistics of the durations of one stage, nanoseconds.
+/// Statistics of the durations of one stage, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timed {
     /// Stage that was measured.

@@ -32,7 +32,7 @@ pub enum Denied {
     /// The process may not lock memory, or only a part of it.
     #[error("cannot lock memory{}", limit(.limit_bytes.as_ref()))]
     Memory {
-        /// Maximum amount of memory, bytes; `None` if the limit is not the reason.
+        /// Maximum amount of memory, in bytes; `None` if the limit is not the reason.
         limit_bytes: Option<u64>,
         /// Cause of the error.
         #[source]

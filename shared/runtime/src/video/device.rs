@@ -26,7 +26,7 @@ pub struct VideoAbout {
 pub struct VideoWish {
     /// Pixel formats, best first. The first one that the device offers is used.
     pub formats: Vec<FourCc>,
-    /// Width and height, pixels.
+    /// Width and height, in pixels.
     pub size: Option<[u32; 2]>,
     /// Pictures per second.
     pub rate_hz: Option<f64>,
@@ -37,7 +37,7 @@ pub struct VideoWish {
 pub struct VideoMode {
     /// Format of the pixels.
     pub format: FourCc,
-    /// Width and height, pixels.
+    /// Width and height, in pixels.
     pub size: [u32; 2],
     /// Bytes from one row to the next; 0 for formats without rows.
     pub bytes_per_row: u32,

@@ -21,11 +21,11 @@ pub struct VideoFormat {
 /// A size, or a range of sizes, with its rates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoSize {
-    /// Minimum width and height, pixels.
+    /// Minimum width and height, in pixels.
     pub least: [u32; 2],
-    /// Maximum width and height, pixels. Equal to `least` for a single size.
+    /// Maximum width and height, in pixels. Equal to `least` for a single size.
     pub most: [u32; 2],
-    /// Pictures per second, the fastest first. A range has its two ends.
+    /// Pictures per second, the fastest first. For a range of rates, these are its two ends.
     pub rates_hz: Vec<f64>,
 }
 
@@ -77,7 +77,7 @@ pub struct VideoControl {
     pub value: Option<i32>,
     /// Number and name of each choice of a menu.
     pub choices: Vec<(u32, String)>,
-    /// True if the control cannot be set, now or ever.
+    /// True if the control cannot be set at the moment, or not at all.
     pub is_fixed: bool,
 }
 

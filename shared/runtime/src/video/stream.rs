@@ -21,11 +21,11 @@ const N_BUFFERS: u32 = 6;
 pub struct VideoPicture<'a> {
     /// Bytes of the picture, in the format of the stream.
     pub bytes: &'a [u8],
-    /// Time at which the kernel received the picture, `CLOCK_MONOTONIC`, nanoseconds; `None` if the driver uses another clock.
+    /// Time at which the kernel received the picture, `CLOCK_MONOTONIC`, in nanoseconds; `None` if the driver uses another clock.
     pub at_nanos: Option<u64>,
     /// Number of the picture from the driver, which also counts lost pictures.
     pub sequence: u32,
-    /// True if the driver marked it as damaged.
+    /// True if the driver marked the picture as damaged.
     pub is_damaged: bool,
     /// True if all buffers were full before this picture was read. The next picture may then be lost for lack of a buffer.
     pub was_full: bool,

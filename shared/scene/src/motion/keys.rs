@@ -203,7 +203,7 @@ fn grab(it: Stance, phase: i64, random: &mut Random) -> Stance {
     }
 }
 
-/// Returns the way of leaning. It stays the same for a whole performance because the furniture does not move.
+/// Returns the variant of leaning. It stays the same for a whole performance because the furniture does not move.
 fn leaning_variant(actor: &Actor) -> u64 {
     actor.random.fork("lean").bits() % 3
 }

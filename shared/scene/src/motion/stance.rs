@@ -9,7 +9,7 @@ use crate::subject::Subject;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stance {
     pub(super) angles: Angles,
-    /// Direction that the person faces, radians from x to y.
+    /// Direction that the person faces, in radians from x to y.
     pub(super) heading: f64,
     /// Rotations of the pelvis in degrees: forward, to the right, and about the person's own axis.
     pub(super) pitch: f64,

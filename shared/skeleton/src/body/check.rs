@@ -21,7 +21,7 @@ const SIDES_DIFFER: f64 = 0.02;
 /// computed from a single frame is not used: the bones of a wrong skeleton disagree, which would make it acceptable.
 const STATURE_SPREAD: f64 = 0.08;
 
-/// Standard deviation of a reach, as a share of it, for people and joint places; our own choice.
+/// Standard deviation of a reach, as a share of the reach, due to differences between people and between joint placements; our own choice.
 const REACH_SPREAD: f64 = 0.06;
 
 /// Maximum contribution of a single bone to [`Verdict::deviation`], in standard deviations.

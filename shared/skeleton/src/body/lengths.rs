@@ -11,7 +11,8 @@ pub const MAX_FRAMES: usize = 240;
 /// Number of frames after which a length counts as learned.
 pub const MIN_FRAMES: usize = 30;
 
-/// Number of successive frames with correlated errors, which count as one: half a second at 30 frames per second; our own choice.
+/// Number of successive frames whose errors are correlated, so that they count as one frame: half a second at 30 frames per second; our own
+/// choice.
 const ALIKE: f64 = 15.0;
 
 /// A learned length.

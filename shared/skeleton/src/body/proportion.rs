@@ -81,7 +81,7 @@ impl Proportion {
         }
     }
 
-    /// Returns the stature at which a bone has this length, metres: the inverse of [`length`](Self::length).
+    /// Returns the stature at which a bone has this length, in metres: the inverse of [`length`](Self::length).
     pub fn stature(&self, length: f64) -> f64 {
         let [child, adult] = CHILD_AND_ADULT;
         if length <= self.child * child {
@@ -139,16 +139,15 @@ impl Kind {
     /// | trunk | D&C: shoulders at 0.818 of the stature, hips at 0.530; the base of the neck 0.012 higher (our choice) |
     /// | head | the remainder to 1 above hips and trunk: 0.170 |
     /// | shoulder width | ANSUR II: 0.2328, less 0.01 on either side to the centre of the joint (our choice) |
-    /// | hip width | centres 72 % of the iliac spines' distance apart (Bell, Pedersen & Brand 1990), of some 24 cm: 0.100 |
+    /// | hip width | 72 % of the distance between the iliac spines (Bell, Pedersen & Brand 1990), which is about 24 cm: 0.100 |
     /// | shoulder to neck | half the width, and 0.02 higher: 0.110 |
     ///
-    /// The shares of children are our own. They add up to 1 from ankle (0.045 above the floor) to vertex. The head is
-    /// about a fifth of the stature, where adults have 0.13 (D&C), plus a neck. The sitting height is about 0.57 of the stature
-    /// at three years and 0.52 for adults (Fredriks et al. 2005), so the legs are shorter by a ninth. The arms are shorter by a
-    /// twentieth.
+    /// The shares of children are our own. They add up to 1 from ankle (0.045 above the floor) to vertex. The head is about a fifth of the
+    /// stature, whereas in adults it is 0.13 (D&C) plus a neck. The sitting height is about 0.57 of the stature at three years and 0.52 for
+    /// adults (Fredriks et al. 2005), so the legs are shorter by a ninth. The arms are shorter by a twentieth.
     ///
-    /// `place` and `posture` are our own. Data sets differ most in the points they call hips, neck and top of the head.
-    /// Backs bend, heads nod and shoulders shrug, whereas limbs keep their lengths except for the skin under markers.
+    /// `place` and `posture` are our own. Data sets differ most in the points that they call hips, neck and top of the head. Backs bend,
+    /// heads nod and shoulders shrug, whereas limbs keep their lengths except for the skin under markers.
     pub const fn proportion(self) -> Proportion {
         let [adult, child, people, place, posture] = match self {
             Self::UpperArm => [0.186, 0.178, 0.032, 0.045, 0.02],

@@ -38,7 +38,7 @@ pub(crate) fn between(a: usize, b: usize, length: impl Fn(Kind) -> f64) -> f64 {
         if is_hip(ends[0]) && is_hip(ends[1]) {
             return sum + length(Kind::HipWidth);
         }
-        // The end that is farther from the neck moves; between a leg and an arm, both move in the end.
+        // The end that is farther from the neck moves; between a leg and an arm, both ends move eventually.
         let far = usize::from(RANK[ends[1]] > RANK[ends[0]]);
         let Some((next, kind)) = TOWARDS_NECK[ends[far]] else {
             return sum;

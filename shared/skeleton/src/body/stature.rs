@@ -6,9 +6,9 @@ use crate::body::proportion::{Kind, MEASUREMENT_SD};
 
 /// Minimum and maximum stature of a person, in metres.
 ///
-/// Our own choice. Below the minimum is a child of one or two years, who can hardly stand (WHO Child Growth Standards 2006: the
-/// median at two years is about 0.86 m). Above the maximum are men taller than all but a handful alive (ANSUR II: men
-/// 1.756 ± 0.069 m, women 1.629 ± 0.064 m).
+/// Our own choice. A child of one or two years, who can hardly stand, is below the minimum (WHO Child Growth Standards 2006: the median at
+/// two years is about 0.86 m). Only a handful of living people are above the maximum (ANSUR II: men 1.756 ± 0.069 m, women 1.629 ± 0.064
+/// m).
 pub const STATURES: [f64; 2] = [0.80, 2.30];
 
 /// Minimum number of bones for any statement about a person.
@@ -50,7 +50,7 @@ pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
     Some(Stature { metres, sd })
 }
 
-/// Only the median, which is needed many times per frame.
+/// Returns only the stature itself (the median), which is needed many times per frame.
 pub(crate) fn median_of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<f64> {
     Votes::new(lengths).map(|votes| votes.median())
 }

@@ -15,9 +15,9 @@ pub struct Received {
     pub session: u64,
     /// Frame of the message; 0 for heartbeats.
     pub frame: u64,
-    /// Time at which the message was sent, nanoseconds; 0 if unknown.
+    /// Time at which the message was sent, in nanoseconds; 0 if unknown.
     pub sent_at: u64,
-    /// Says that the message carries a result, or why it has none. Heartbeats always carry a result.
+    /// States whether the message carries a result, and if not, why. Heartbeats always carry a result.
     pub status: Status,
     /// For heartbeats and for pictures of cameras, which are numbered: the epoch of the process, and the number of messages that it has
     /// sent in this epoch.

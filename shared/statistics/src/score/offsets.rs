@@ -31,7 +31,7 @@ const BONES: [&[usize]; N_JOINTS] = [
     &[12],
 ];
 
-/// The joints of every row, of both sides.
+/// Name and joints of every row, with the joints of both sides.
 const ROWS: [(&str, &[usize]); 8] = [
     ("head", &[13]),
     ("neck", &[12]),

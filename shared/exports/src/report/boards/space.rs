@@ -123,7 +123,7 @@ fn outlines(out: &mut Html, frame: &Frame, boards: Vec<[Vector2<f64>; 4]>) {
     }
 }
 
-/// Draws a line of a round length.
+/// Draws a scale bar whose length is a round number.
 fn ruler(out: &mut Html, scale: f64) {
     let metres = [
         0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0,

@@ -36,7 +36,7 @@ pub struct Eye {
 pub struct Moment {
     /// Number of the frame.
     pub frame: u64,
-    /// Time at which the frame was taken, seconds since the first frame.
+    /// Time at which the frame was taken, in seconds since the first frame.
     pub seconds: f64,
     /// Positions of the joints that were found.
     pub found: Vec<Option<Point>>,

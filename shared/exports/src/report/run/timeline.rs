@@ -6,7 +6,7 @@ use crate::report::html::{Html, put};
 /// An event during the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
-    /// Time of the event, seconds since the first frame.
+    /// Time of the event, in seconds since the first frame.
     pub seconds: f64,
     /// Name of the event, in a word or two.
     pub what: String,

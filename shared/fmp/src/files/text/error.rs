@@ -80,7 +80,7 @@ pub enum TextError {
         /// Maximum accepted value.
         max: usize,
     },
-    /// A part is anchored at another level than its parent.
+    /// A part is anchored at a different level from its parent.
     #[error(
         "{place}: `defs_anchor` puts spring {spring} at {got} octaves from its parent, expected 0"
     )]

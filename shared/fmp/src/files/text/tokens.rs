@@ -78,8 +78,7 @@ impl<'a> Tokens<'a> {
         Ok(value)
     }
 
-    /// Returns the upper bound of the number of remaining tokens; limits the memory reserved for a count in the
-    /// file.
+    /// Returns an upper bound of the number of remaining tokens, which limits the memory reserved for a count in the file.
     pub(super) fn at_most(&self) -> usize {
         self.rest.len().div_ceil(2)
     }
