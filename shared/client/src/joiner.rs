@@ -47,7 +47,7 @@ pub(crate) struct Joiner<P> {
     pending: BTreeMap<u64, Gathered<P>>,
     /// Number of the first frame that may still be given to the caller.
     next: u64,
-    /// Number of parts that came after their frame, and of frames that were given up.
+    /// Number of parts that arrived after their frame, and of frames that were given up.
     pub(crate) n_late: u64,
 }
 
@@ -115,7 +115,7 @@ impl<P> Joiner<P> {
     /// Returns the frames that need not wait any longer, in order. Frames before them stop waiting, too; if skeletons are requested, frames
     /// without a skeleton are given up.
     ///
-    /// The skeleton is the last message about a frame. When it arrives, all other parts are there or will never come.
+    /// The skeleton is the last message about a frame. When it arrives, all other parts have arrived or will never arrive.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<Gathered<P>> {
         let last = self
             .pending
@@ -201,7 +201,7 @@ mod tests {
         joiner.add_skeletons(Box::new(skeletons(4)), now);
         assert_eq!(joiner.take(now).len(), 0, "too late");
         assert_eq!(joiner.n_late, 2);
-        // The result says that a view is missing.
+        // The result states that a view is missing.
         joiner.add_pose(1, pose(6), now);
         joiner.add_skeletons(Box::new(skeletons(6)), now);
         let given = joiner.take(now);

@@ -21,10 +21,10 @@ pub struct Moment {
     pub skeletons: Option<Skeletons>,
     /// The requested views, in the order of the deployment.
     pub views: Vec<ViewMoment>,
-    /// True if all requested parts are there.
+    /// True if all requested parts are available.
     pub is_complete: bool,
     /// Number of frames between the previous moment and this one that were not given to the caller. The pipeline skipped them, they were
-    /// lost with a process, or newer ones replaced them. 0 for the first moment of a run.
+    /// lost with a process, or newer frames replaced them. 0 for the first moment of a run.
     pub n_missed: u64,
 }
 

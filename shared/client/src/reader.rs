@@ -47,10 +47,10 @@ pub enum State {
 pub struct Losses {
     /// Messages of another run, or with impossible counts or numbers.
     pub refused: u64,
-    /// Parts that came after their frame, and frames whose requested skeleton did not come.
+    /// Parts that arrived after their frame, and frames whose requested skeleton did not arrive.
     pub late: u64,
-    /// Moments that were dropped because newer ones came before the caller took them. When the deployment ends, moments that
-    /// hold its pictures are dropped as well.
+    /// Moments that were dropped because newer moments arrived before the caller took them. When the deployment ends, moments that hold its
+    /// pictures are dropped as well.
     pub passed_over: u64,
 }
 
@@ -127,7 +127,7 @@ impl Client {
         })
     }
 
-    /// Returns the next moment; `None` if none came in time, or while the deployment does not run.
+    /// Returns the next moment; `None` if none arrived in time, or while the deployment does not run.
     ///
     /// # Errors
     ///

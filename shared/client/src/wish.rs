@@ -12,7 +12,7 @@ pub struct Wish {
     pub(crate) cameras: Option<Vec<String>>,
     /// Maximum number of moments that may wait for the caller.
     pub(crate) waiting: usize,
-    /// Longest wait for the parts of a frame, if no message says that they will not come.
+    /// Longest wait for the parts of a frame, if no message states that they will not arrive.
     pub(crate) patience: Duration,
 }
 
@@ -48,9 +48,9 @@ impl Wish {
 
     /// Also requests the picture of every view.
     ///
-    /// With [`Self::skeletons`], the picture is a copy. With [`Self::views`], it stays in the memory of its sender. A client can then
-    /// hold only one picture of a view at a time: until a [`Moment`](crate::Moment) is dropped, later frames come without their pictures.
-    /// The deployment cannot be restarted while a picture is held.
+    /// With [`Self::skeletons`], the picture is a copy. With [`Self::views`], it stays in the memory of its sender. A client can then hold
+    /// only one picture of a view at a time: until a [`Moment`](crate::Moment) is dropped, later frames are returned without their
+    /// pictures. The deployment cannot be restarted while a picture is held.
     #[must_use]
     pub fn with_pictures(mut self) -> Self {
         self.pictures = true;
@@ -66,7 +66,7 @@ impl Wish {
 
     /// Requests every frame in order, instead of the newest frame only.
     ///
-    /// * `most`: maximum number of moments that may wait for the caller, at least 1. If more come, the oldest moment is dropped and
+    /// * `most`: maximum number of moments that may wait for the caller, at least 1. If more arrive, the oldest moment is dropped and
     ///   counted.
     #[must_use]
     pub fn every_frame(mut self, most: usize) -> Self {

@@ -33,7 +33,7 @@ pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamer
     canvas.label([2.0, 2.0], text.trim_end(), CENTRE);
 }
 
-/// Returns the trial whose status is that of the frame: a trial with a person in it, if there is one.
+/// Returns the trial whose status is used as the status of the frame: a trial with a person in it, if there is one.
 fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
     let is_there = |trial: &&Trial| trial.slots[slot].points.iter().any(Result::is_ok);
     trials.iter().find(is_there).or(trials.first())
@@ -67,7 +67,7 @@ fn ellipse(canvas: &mut Canvas, seen: &Seen, width: f64, side: Side) {
     let Some([xx, xy, yy]) = seen.covariance else {
         return;
     };
-    // An ellipse that is larger than the picture shows nothing, and takes long to draw.
+    // An ellipse that is larger than the picture is of no use, and takes long to draw.
     let size = canvas.size();
     let longest = (size.width + size.height) as f64;
     if (DEVIATIONS * (xx + yy).sqrt()).total_cmp(&longest).is_gt() {

@@ -1,9 +1,9 @@
 //! GLB (glTF 2.0, binary): a skinned skeleton with its animation; metres, y up.
 //!
-//! The nodes are those of the tree of this crate. Their rotations and positions are the measured ones of every frame, so that joints have
+//! The nodes are the nodes of this crate's tree. Their rotations and positions are the measured ones of every frame, so that joints have
 //! the positions of the run and bones have their measured lengths. Every bone has a piece of the skin on a separate node. This node is
-//! scaled to nothing if an end of the bone was not seen, because glTF would otherwise interpolate. Standard deviations and gaps
-//! of all points are in the extras of the animation.
+//! scaled to nothing if an end of the bone was not seen, because glTF would otherwise interpolate. Standard deviations and gaps of all
+//! points are in the extras of the animation.
 
 mod mesh;
 mod store;
@@ -182,7 +182,7 @@ fn mesh(pieces: &[Piece]) -> Mesh {
     mesh
 }
 
-/// Returns the skin: all nodes of the tree, then those of the pieces.
+/// Returns the skin: all nodes of the tree, then the nodes of the pieces.
 fn skin(store: &mut Store, rest: &[Vector3<f64>; N_NODES], pieces: &[Piece]) -> Value {
     let of_tree = rest.iter().map(|place| Matrix4::new_translation(&-place));
     let of_pieces = pieces.iter().map(|piece| {

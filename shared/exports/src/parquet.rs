@@ -13,7 +13,7 @@ use crate::sink::{Notes, Sink};
 use crate::tables::{state, views};
 use crate::{Point, Trial};
 
-/// The columns: those of the long CSV.
+/// The columns, which are the same as in the long CSV.
 const SCHEMA: &str = "message pose3d {
     REQUIRED INT64 frame;
     OPTIONAL DOUBLE time_s;

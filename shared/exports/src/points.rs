@@ -12,7 +12,7 @@ const C3D_CAMERAS: u32 = 0x7f;
 /// Finest step of C3D's residuals, in millimetres.
 const FINEST_MM: f64 = 0.01;
 
-/// Returns the frame rate. The table of formats says that it is needed, and the caller has checked that it is known.
+/// Returns the frame rate. The table of formats states that it is needed, and the caller has checked that it is known.
 pub(crate) fn rate(trial: &Trial) -> io::Result<f64> {
     let unknown = || io::Error::new(io::ErrorKind::InvalidInput, "the frame rate is not known");
     trial.rate_hz.ok_or_else(unknown)

@@ -1,7 +1,7 @@
 //! HTML pages about runs and rigs, and the parts that all pages share: one style, and one method of escaping text.
 //!
-//! Every page is a single HTML file without other resources: no font, no picture, no style from elsewhere. The only
-//! script is that of [`run`], which draws the skeleton in space.
+//! Every page is a single HTML file without other resources: no font, no picture, no style from elsewhere. The only script is the script of
+//! [`run`], which draws the skeleton in space.
 //!
 //! Markup is a separate type that accepts only constants of the program, numbers and escaped text. Templates were considered but not used.
 //! Most of the content of these pages is SVG, which is made in loops from numbers with a fixed number of digits; templates would not

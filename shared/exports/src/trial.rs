@@ -62,7 +62,7 @@ pub struct Slot {
     pub points: Vec<Result<Point, Gap>>,
 }
 
-/// One person of a run. All trials of a run have the same slots. If the person is not there, the slot has no points.
+/// One person of a run. All trials of a run have the same slots. If the person is absent, the slot has no points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Name of the run in the files.
@@ -84,7 +84,7 @@ pub struct Trial {
     pub first_frame: u64,
     /// Distance between the frame numbers of two neighbouring places.
     pub frame_step: u64,
-    /// Direction against gravity, if the rig knows it.
+    /// Direction against gravity, if the rig states it.
     pub up_in_world: Option<UnitVector3<f64>>,
     /// Frames on the grid.
     pub slots: Vec<Slot>,
@@ -244,7 +244,7 @@ struct Gathered {
 impl Gathering {
     /// Starts without lines.
     ///
-    /// * `views`: the cameras in the order of the run. Other cameras that lines name come after them.
+    /// * `views`: the cameras in the order of the run. Other cameras that occur in the lines are appended.
     pub fn new(views: Vec<String>) -> Self {
         Self {
             views,

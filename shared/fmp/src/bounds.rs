@@ -25,7 +25,7 @@ impl Bound {
 }
 
 impl Bounds {
-    /// Creates the bounds from those of some levels; the other levels are unknown.
+    /// Creates the bounds from the bounds of some levels; the other levels are unknown.
     ///
     /// * `n_levels`: number of levels, offered or not.
     pub(crate) fn of_some(n_levels: usize, found: Vec<(u16, Bound)>) -> Self {

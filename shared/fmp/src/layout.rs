@@ -62,8 +62,8 @@ impl Layout {
     /// Lays out the pyramid (Yang & Ramanan's `featpyramid`: `interval` levels per octave, no
     /// upsampled octave).
     ///
-    /// The number of levels is `1 + floor(log2(min(width, height) / (5 cell_px)) * interval)`. The response maps of all
-    /// filters of a level have the same size, that of the largest filter.
+    /// The number of levels is `1 + floor(log2(min(width, height) / (5 cell_px)) * interval)`. The response maps of all filters of a level
+    /// have the same size: the size for the largest filter.
     ///
     /// # Errors
     ///

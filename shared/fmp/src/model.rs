@@ -238,7 +238,7 @@ impl Model {
         ]
     }
 
-    /// Detection threshold: the trained one, but never above -1 (the reference programs' rule).
+    /// Detection threshold: the trained threshold, but never above -1 (the reference programs' rule).
     pub fn detection_threshold(&self) -> f64 {
         self.0.threshold.min(-1.0)
     }

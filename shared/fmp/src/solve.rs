@@ -76,7 +76,7 @@ pub struct Solver {
     isa: Isa,
     /// The message rule of every part; `None` for the root.
     rules: Vec<Option<MessageRule>>,
-    /// Number of score planes before those of each part, followed by the total.
+    /// Number of score planes before the planes of each part, followed by the total number.
     first_planes: Vec<usize>,
     /// This is a list instead of a [`Pool`]: the best-fitting workspace for a level is taken, which a queue cannot search for.
     workspaces: Mutex<Vec<Workspace>>,

@@ -125,7 +125,7 @@ impl VideoWriter {
         }
     }
 
-    /// Returns an error with the encoder's message, or with `why` if there is none.
+    /// Returns an error with the encoder's message, or with `why` if there is no message.
     fn failed(&mut self, why: &str) -> FootageError {
         drop(self.stdin.take());
         let said = self.log.finish();

@@ -47,7 +47,7 @@ impl PixelFormat {
         }
     }
 
-    /// Returns the format with these four letters. `JPEG` also stands for JPEG files.
+    /// Returns the format with these four letters. `JPEG` is also accepted for JPEG files.
     pub fn of_letters(letters: [u8; 4]) -> Option<Self> {
         let is_jpeg = letters == *b"JPEG";
         let of = |known: &Self| known.letters() == letters || (is_jpeg && *known == Self::Jpeg);

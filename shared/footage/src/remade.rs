@@ -26,7 +26,8 @@ impl RemadeStream {
     /// Starts a decoder.
     ///
     /// * `name`: name of the stream in error messages.
-    /// * `pieces`: the bytes of a head, followed by those of its pictures in order ([`Piece`](crate::Piece)). A separate thread reads them.
+    /// * `pieces`: the bytes of a head, followed by the bytes of its pictures in order ([`Piece`](crate::Piece)). A separate thread reads
+    ///   them.
     ///
     /// # Errors
     ///
@@ -77,7 +78,7 @@ impl RemadeStream {
     ///
     /// # Panics
     ///
-    /// Panics if the length of `rgb` is not that of a picture.
+    /// Panics if the length of `rgb` does not match the size of a picture.
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<Option<i64>, FootageError> {
         assert_eq!(
             rgb.len(),

@@ -81,8 +81,8 @@ struct Told {
     unix: i64,
 }
 
-/// Distinguishes times of a camera from the times at which packets were written. Times of a camera have a constant distance to
-/// those of the stream.
+/// Distinguishes times of a camera from the times at which packets were written. Times of a camera have a constant distance to the times of
+/// the stream.
 #[derive(Debug, Default)]
 struct Offsets(Vec<i64>);
 

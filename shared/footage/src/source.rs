@@ -277,8 +277,8 @@ impl Reader {
     }
 }
 
-/// Returns the size of the pictures of footage as they are stored, and the turn in the tag of the first one. This is faster than opening
-/// the footage.
+/// Returns the size of the pictures of footage as they are stored, and the turn in the tag of the first picture. This is faster than
+/// opening the footage.
 ///
 /// # Errors
 ///
@@ -323,13 +323,13 @@ impl Clock {
         (self.index, listed.copied().or_else(by_rate))
     }
 
-    /// Sets the index to that of the frame that was read, if there was one.
+    /// Sets the index to the index of the frame that was read, if a frame was read.
     fn set(&mut self, index: Option<u64>) -> bool {
         self.index = index.unwrap_or(self.index);
         index.is_some()
     }
 
-    /// Advances by one frame if there was one, and returns `was_there`.
+    /// Advances by one frame if a frame was read, and returns `was_there`.
     fn tick(&mut self, was_there: bool) -> bool {
         if was_there {
             self.index = self.index.saturating_add(self.step);

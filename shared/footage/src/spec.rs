@@ -13,7 +13,7 @@ pub struct PictureNumbers {
     pub step: u64,
 }
 
-/// Footage as named by the user, and the choice of its frames.
+/// Footage as specified by the user, and the choice of its frames.
 ///
 /// Frames are counted from 0 in the order of the footage. The frames that are read are `start`,
 /// `start + step`, `start + 2 step`, ..., at most `count` of them.

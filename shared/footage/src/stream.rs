@@ -321,7 +321,7 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
         "-vsync"
     };
     let common = ["-map", "0:v:0", mode, "passthrough", "-autoscale", "0"];
-    // With more threads, the copying of the pixels holds a picture back until the next one comes.
+    // With more threads, the step that copies the pixels holds a picture back until the next picture arrives.
     let alone = ["-threads", "1"];
     let shrink = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
     let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
@@ -370,7 +370,7 @@ impl LiveStream {
     ///
     /// # Panics
     ///
-    /// Panics if the length of `rgb` is not that of a frame of the size with which the stream was opened.
+    /// Panics if the length of `rgb` does not match the size with which the stream was opened.
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<StreamFrame, FootageError> {
         assert_eq!(
             rgb.len(),

@@ -178,7 +178,7 @@ fn frames_of_an_irregular_video_keep_their_own_times() {
     }
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), 6);
-    // Frames 3, 4, 5 come a second late.
+    // Frames 3, 4, 5 are a second late.
     let late = "setpts=(N/25+gte(N\\,3))/TB";
     let options = ["-vf", late, "-fps_mode", "vfr", "-c:v", "png"];
     for name in ["irregular.mkv", "irregular.mov"] {

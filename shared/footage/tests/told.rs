@@ -170,8 +170,8 @@ fn frames_that_an_edit_list_cuts_off_are_none() {
         &[PNG, &["-video_track_timescale", "100"]].concat(),
     );
     let (_, all) = frames(&spec(&whole));
-    // The edit list begins at the third frame and shows four frames of 40 ms. The units of the film are milliseconds, those of the track
-    // 10 ms.
+    // The edit list begins at the third frame and shows four frames of 40 ms. The unit of the film is a millisecond, and the unit of the
+    // track is 10 ms.
     let edit = [160_u32.to_be_bytes(), 8_u32.to_be_bytes()];
     let trimmed = patch(&whole, "trimmed.mov", (b"elst", 8), edit.as_flattened());
     let (info, shown) = frames(&spec(&trimmed));

@@ -7,7 +7,7 @@ use crate::card::{Layout, ListField, ListUnit, Refine, Score};
 pub struct Keypoint {
     /// Column and row, in pixels of the network's input.
     pub at: [f64; 2],
-    /// Confidence of the network. It is from 0 to 1 if the network gives a share or log-odds, otherwise in the network's own unit.
+    /// Confidence of the network. It is from 0 to 1 if the network returns a share or log-odds, otherwise in the network's own unit.
     pub score: f64,
 }
 
@@ -38,7 +38,7 @@ pub struct HeatMaps<'a> {
     values: &'a [f32],
     layout: Layout,
     n: usize,
-    /// Number of maps of the output: those of the keypoints, then others.
+    /// Number of maps of the output: the maps of the keypoints, then other maps.
     channels: usize,
     rows: usize,
     columns: usize,
@@ -246,7 +246,7 @@ impl<'a> SimCc<'a> {
         Ok(Self { axes, bins, n })
     }
 
-    /// Returns the values of a keypoint along an axis, where axis 0 is that of the columns.
+    /// Returns the values of a keypoint along an axis, where axis 0 is the axis of the columns.
     ///
     /// # Panics
     ///

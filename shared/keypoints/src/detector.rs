@@ -11,7 +11,8 @@ mod centres;
 
 /// The card of a network that finds the boxes of people.
 ///
-/// The whole picture is resized to fit into the input, with its top-left corner in that of the input. The rest is filled with a colour.
+/// The whole picture is resized to fit into the input, with its top-left corner in the top-left corner of the input. The rest is filled
+/// with a colour.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DetectorCard {

@@ -227,8 +227,8 @@ const HEAD_TOP: f64 = 1.6;
 pub struct Way {
     /// Numbers of the keypoints, and weights that sum to 1.
     pub row: Vec<(usize, f64)>,
-    /// Standard deviation along one axis that this rule adds to that of its keypoints. It is a share of the height of the person's box
-    /// enlarged by a quarter.
+    /// Standard deviation along one axis that this rule adds to the standard deviation of its keypoints. It is a share of the height of the
+    /// person's box enlarged by a quarter.
     pub spread: f64,
 }
 
@@ -289,8 +289,8 @@ pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     PARSE14.joints.iter().map(|joint| ways(joint.name)).collect()
 }
 
-/// Returns the best rule of every joint as a weighted sum of keypoints, if all of them are there. It is the first rule of [`joint_ways`];
-/// `None` for a joint that does not follow from keypoints.
+/// Returns the best rule of every joint as a weighted sum of keypoints, if all of these keypoints exist. It is the first rule of
+/// [`joint_ways`]; `None` for a joint that does not follow from keypoints.
 pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
     let ways = joint_ways(names).into_iter();
     ways.map(|ways| Some(ways.into_iter().next()?.row)).collect()

@@ -15,12 +15,11 @@ const MOST_SLENDER: f64 = 4.0;
 ///
 /// * Usually, `u = (x - c) W / s + W / 2`: lengths are counted in pixels. The left edge of the box maps to the centre of the
 ///   first pixel, and its right edge to one pixel beyond the centre of the last (mmpose's plain recipe).
-/// * If the card says `udp = true`, `u = (x - c) (W - 1) / s + (W - 1) / 2`. Unbiased data processing (Huang et al. 2020)
-///   counts lengths in steps between pixel centres, and `W` pixels have `W - 1` steps. The edges of the box map to
-///   the centres of the first and the last pixel, and its middle to the middle between them (mmpose's `TopdownAffine` with
-///   `use_udp`). The shape of the box is still that of the input, `W / H`, so the steps across and down differ a
-///   little. The corner cells of the maps are on the corner pixels ([`HeatMaps::step`](crate::HeatMaps::step)), and therefore on the
-///   edges of the box.
+/// * If the card has `udp = true`, `u = (x - c) (W - 1) / s + (W - 1) / 2`. Unbiased data processing (Huang et al. 2020) counts lengths in
+///   steps between pixel centres, and `W` pixels have `W - 1` steps. The edges of the box map to the centres of the first and the last
+///   pixel, and its middle to the middle between them (mmpose's `TopdownAffine` with `use_udp`). The shape of the box is still that of the
+///   input, `W / H`, so the steps across and down differ a little. The corner cells of the maps are on the corner pixels
+///   ([`HeatMaps::step`](crate::HeatMaps::step)), and therefore on the edges of the box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
     /// Middle of the window in the picture, in pixels.
@@ -135,7 +134,7 @@ impl Window {
         self.step
     }
 
-    /// Writes the input of the network: the window, sampled bilinearly and prepared as the card says.
+    /// Writes the input of the network: the window, sampled bilinearly and prepared as the card specifies.
     ///
     /// * `rgb`: the picture, row major, red first; `size` is its width and height.
     /// * `values`: three values for every pixel of the input, all of which are written.
@@ -179,8 +178,8 @@ pub fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
     })
 }
 
-/// Returns the colour at a point, interpolated between four pixels; `fill` is the colour outside the picture. The result has the same bits
-/// as that of [`sample_anywhere`], but the function does not check for every pixel whether it is in the picture.
+/// Returns the colour at a point, interpolated between four pixels; `fill` is the colour outside the picture. The result is bit-identical
+/// to the result of [`sample_anywhere`], but the function does not check for every pixel whether it is in the picture.
 pub(crate) fn sample(rgb: &[u8], size: [usize; 2], [x, y]: [f64; 2], fill: f32) -> [f32; 3] {
     let [width, height] = size;
     if !(x >= 0.0 && y >= 0.0 && x + 1.0 < width as f64 && y + 1.0 < height as f64) {

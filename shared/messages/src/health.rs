@@ -39,7 +39,7 @@ pub struct Health {
     pub finished: u32,
     /// Processor time of all threads of the process, milliseconds, modulo 2^32; 0 if the system does not report it.
     pub cpu_millis: u32,
-    /// Total amount of work, if the process knows it (for `capture`, the number of frames in the footage); otherwise 0.
+    /// Total amount of work, if it is known (for `capture`, the number of frames in the footage); otherwise 0.
     pub n_total: u64,
     /// Number of frames that the processor computed because the GPU was lost.
     pub n_without_gpu: u64,

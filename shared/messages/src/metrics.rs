@@ -9,14 +9,14 @@ pub const MAX_ROWS: usize = 24;
 pub const MAX_NAME: usize = 32;
 /// Number of causes in [`Metrics::n_dropped`].
 pub const N_CAUSES: usize = 5;
-/// Stands for the view index where a number belongs to no view, or to all views.
+/// Value of the view index for a number that belongs to no view, or to all views.
 pub const NO_VIEW: u32 = u32::MAX;
-/// Stands for the queue length of a process without a queue.
+/// Value of the queue length for a process without a queue.
 pub const NO_QUEUE: u32 = u32::MAX;
-/// Stands for the number of people if a process does not count them.
+/// Value of the number of people for a process that does not count them.
 pub const NO_PEOPLE: u32 = u32::MAX;
 
-/// Stands for a measurement of a camera that does not exist yet.
+/// Value of a measurement of a camera that does not exist yet.
 pub const UNMEASURED: i64 = i64::MIN;
 
 /// The metrics of a process since its last start.

@@ -5,7 +5,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_NAME, Stamp, Status, Timing};
 
-/// Stands for the picture's number if the camera does not number its pictures.
+/// Value of the picture's number if the camera does not number its pictures.
 pub const NO_SEQUENCE: u64 = u64::MAX;
 
 /// The user header of a picture of a live camera in its original form, for recordings.

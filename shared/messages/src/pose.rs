@@ -89,7 +89,7 @@ pub struct ViewPose {
     pub skew_nanos: i64,
     /// Region that was searched.
     pub searched: Searched,
-    /// Number of extra keypoints per candidate: all keypoints that any view of the deployment knows.
+    /// Number of extra keypoints per candidate: all keypoints that any view of the deployment provides.
     pub n_keypoints: u32,
     /// The candidates. With the paper's method, they have cells. With the network method, they have a score only; `joints` and `heats` have
     /// the rest.
@@ -158,7 +158,7 @@ pub struct PairPose {
     pub n_hypotheses: u32,
     /// Indices of the two views, ascending.
     pub views: [u32; 2],
-    /// The hypothesis of the same facing, then that of opposite facing. There is only one if facing is not decided.
+    /// The hypothesis of same facing, then the hypothesis of opposite facing. There is only one if facing is not decided.
     pub hypotheses: [PairHypothesis; 2],
     /// Bit `v` is set if the pose of view `v` arrived in time.
     pub views_present: u32,

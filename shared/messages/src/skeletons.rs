@@ -124,7 +124,7 @@ pub struct SkeletonMessage {
     pub sides_margin: f64,
     /// Height of the person when standing upright, from the lengths of the bones, in metres; 0 if it is not known.
     pub stature_m: f64,
-    /// Root mean square deviation of the bone lengths from those of real people, in standard deviations.
+    /// Root mean square deviation of the bone lengths from the bone lengths of real people, in standard deviations.
     pub body_deviation: f64,
     /// The joints of the person.
     pub joints: [Joint3d; MAX_JOINTS],

@@ -114,7 +114,8 @@ fn projected(found: &[Estimate], bones: &[([usize; 2], f64)]) -> Option<Projecte
                 return None;
             }
             let along = bone / now;
-            // The linearisation starts at the unprojected position: least squares from there.
+            // The linearisation is about the current position, but the least squares displacement is measured from the unprojected
+            // position.
             let moved = (positions[*b] - found[*b].position) - (positions[*a] - found[*a].position);
             off[nth] = now - length - along.dot(&moved);
             for (joint, sign) in [(*a, -1.0), (*b, 1.0)] {

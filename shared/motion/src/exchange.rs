@@ -1,4 +1,4 @@
-//! Corrects joints that were exchanged with those of the other side of the body.
+//! Corrects joints that were exchanged with the joints on the other side of the body.
 
 use crate::joint_track::Track;
 use crate::recorded::{Recorded, Sides};
@@ -73,7 +73,7 @@ fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
 
 /// Decides an instant whose sides are uncertain, from all pairs together.
 ///
-/// * Returns 0 if it was kept as measured, 1 if exchanged, 2 if left out.
+/// * Returns 0 if the instant was kept as measured, 1 if it was exchanged, 2 if it was left out.
 fn unsure(
     recorded: &Recorded,
     pairs: &[[usize; 2]],

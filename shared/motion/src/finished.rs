@@ -155,7 +155,7 @@ fn person_report(person: &Person, frames: &[u64], found: &Report) -> SmoothedPer
     }
 }
 
-/// Returns the reasons to doubt the result; with several people, each reason names the person.
+/// Returns the reasons to doubt the result. If there are several people, each reason contains the person.
 fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
     let mut doubts = Vec::new();
     doubts.extend(run.cut.clone());

@@ -1,4 +1,4 @@
-//! One joint between measurements and smoothed track.
+//! State of one joint while its track is smoothed.
 
 use crate::noise::{Noise, Prior};
 use crate::rts::{self, Known, Usable};

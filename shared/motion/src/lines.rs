@@ -16,8 +16,8 @@ pub fn measured(line: &JointLine) -> Option<Measured> {
     })
 }
 
-/// Returns the certainty of a person's sides. They are certain unless the line says otherwise. If sides are labelled as seen in the
-/// pictures, they are undecided too, but consistent over all frames of a run.
+/// Returns the certainty of a person's sides. They are certain unless the line says otherwise. Sides that are labelled as they appear in
+/// the pictures are also undecided, but they are consistent over all frames of a run.
 pub fn sides(person: &PersonLine) -> Sides {
     if person.sides == Some(runfiles::Sides::Unsure) {
         Sides::Unsure

@@ -44,7 +44,7 @@ impl Smoother {
 
     /// Returns the joints at an instant.
     ///
-    /// * `time_s`: time of the instant; if it is not after the one before, everything starts anew.
+    /// * `time_s`: time of the instant; if it is not later than the previous instant, the smoother starts again without history.
     /// * `measured`: measurements in the order of the names; joints missing at the end count as not measured.
     /// * `sides`: certainty of the sides; if they are uncertain, joints with a side are left out.
     pub fn step(

@@ -1,4 +1,4 @@
-//! A person over time: as measured, and as smoothed.
+//! A person over time: the measurements, and the smoothed result.
 
 use nalgebra::Vector3;
 
@@ -57,7 +57,7 @@ pub struct Recorded {
 /// Reason why the instants cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TimesError {
-    /// An instant is not after the one before.
+    /// An instant is not later than the previous instant.
     #[error("instant {at} at {time_s} s is not after the instant before, which is at {before_s} s")]
     Order {
         /// Index of the instant, counted from 0.
@@ -122,7 +122,7 @@ impl Recorded {
         move |joint, at| is_some_sure && others[joint].is_some() && self.sides[at] == Sides::Unsure
     }
 
-    /// Counts the instants with uncertain sides if the method does not decide them: kept, exchanged, left out.
+    /// Counts the instants with uncertain sides, for a method that does not decide the sides. The counts are: kept, exchanged, left out.
     pub(crate) fn unsure(&self) -> [usize; 3] {
         let n = self.sides.iter().filter(|side| **side == Sides::Unsure).count();
         if self.sides.contains(&Sides::Sure) {
@@ -218,7 +218,7 @@ pub struct Report {
 pub struct Counts {
     /// Instants at which the joint was measured and used.
     pub measured: usize,
-    /// Instants at which the joint was measured as the other side's joint.
+    /// Instants at which the joint was measured under the name of the joint on the other side.
     pub exchanged: usize,
     /// Instants at which the joint was not measured, but filled.
     pub filled: usize,

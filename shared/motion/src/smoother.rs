@@ -32,7 +32,7 @@ impl Default for Settings {
 
 /// Smooths a person's joints, using all measurements before and after.
 ///
-/// 1. If the person suddenly changes to another person, everything starts anew.
+/// 1. If the person suddenly changes to another person, the smoother starts again without history.
 /// 2. The jerk density and the scale of the covariances are estimated for every joint from the measurements.
 /// 3. Every joint is smoothed; measurements that contradict all others are rejected. Joints with a side are left out if the sides
 ///    are uncertain.

@@ -77,7 +77,7 @@ fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
     }
 }
 
-/// Returns the whole of a short track, or parts of a long one.
+/// Returns the whole of a short track, or windows of a long track.
 fn windows<'a>(stretches: &[(&'a [f64], &'a [Usable])]) -> Vec<(&'a [f64], &'a [Usable])> {
     let n: usize = stretches.iter().map(|stretch| stretch.0.len()).sum();
     if n <= N_WINDOWS * WINDOW {

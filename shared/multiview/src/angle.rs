@@ -19,7 +19,7 @@ pub struct AngleTables {
 }
 
 impl AngleTables {
-    /// Creates the tables of the whole circle from those of one half.
+    /// Creates the tables of the whole circle from the tables of one half.
     ///
     /// * `half`: the `i`-th of `n` tables is for angles from `i` to `i + 1` times `180 / n`
     ///   degrees.

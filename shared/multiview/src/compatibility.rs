@@ -40,7 +40,7 @@ pub enum CompatibilityError {
         /// The expected part, counted from 1.
         expected: usize,
     },
-    /// A field is not a probability, and not all of its row is NaN.
+    /// A field is not a probability, although some values of its row are not NaN.
     #[error("line {line}, column {column}: `{got}` is not a probability from 0 to 1")]
     Probability {
         /// Line number, counted from 1.
@@ -114,11 +114,10 @@ impl Compatibility {
 
     /// Computes `p(type in first view, type in second view)` from both conditionals.
     ///
-    /// With `R = p(b | a)` and `Q = p(a | b)`, the marginal `p(a)` satisfies `p(a) = p(a) R Q`. It
-    /// is the stationary distribution of the chain that goes from a type of the first view to one
-    /// of the second and back. Then `p(b) = p(a) R`, and both `p(a) R` and `p(b) Q` are the joint
-    /// distribution. If the tables contradict each other, these are two joints with the same
-    /// marginals, and the result is their mean. Types that did not occur get 0.
+    /// With `R = p(b | a)` and `Q = p(a | b)`, the marginal `p(a)` satisfies `p(a) = p(a) R Q`. It is the stationary distribution of the
+    /// chain that goes from a type of the first view to a type of the second view and back. Then `p(b) = p(a) R`, and both `p(a) R` and
+    /// `p(b) Q` are the joint distribution. If the tables contradict each other, these are two joints with the same marginals, and the
+    /// result is their mean. Types that did not occur get 0.
     ///
     /// If the types form groups that never occur together, the tables do not determine the
     /// frequency of the groups. Every group is then weighted by its number of types in the first
@@ -178,7 +177,7 @@ impl Compatibility {
         Self::of(self.values.iter().map(DMatrix::transpose).collect())
     }
 
-    /// Returns the table whose part `i` is part `parts[i]` of this one.
+    /// Returns the table whose part `i` is part `parts[i]` of this table.
     pub(crate) fn permuted(&self, parts: &[usize]) -> Self {
         Self::of(parts.iter().map(|&part| self.values[part].clone()).collect())
     }
@@ -284,7 +283,7 @@ fn without_unseen(
     mut second: DMatrix<f64>,
     mut first: DMatrix<f64>,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    // Every round removes at least one type, until none is left to be removed.
+    // Every round removes at least one type, until there is nothing to remove.
     for _ in 0..2 * second.nrows() {
         clear_unseen(&first, &mut second);
         clear_unseen(&second, &mut first);

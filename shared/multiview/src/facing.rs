@@ -95,7 +95,7 @@ impl Default for FacingSettings {
 /// The decision of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facing {
-    /// The views that see the person from another side than the first view.
+    /// The views that see the person from a different side than the first view.
     pub exchanges: Exchanges,
     /// Index of the chosen hypothesis.
     pub hypothesis: usize,

@@ -63,10 +63,9 @@
 //! ([`SwitchBy::Support`]): 76.7 / 120, with consensus 78.1 / 117. So the rule of eq. 6 costs ten points. Even without this rule, the
 //! benefit of knowing all errors is small here: B 62.2 / 189, with consensus 65.8 / 181.
 //!
-//! With [`SwitchBy::Worse`], the better of two bad views continues to support the other. Errors that
-//! are expected everywhere then do not separate all views. A network that expects too many errors needs
-//! this rule: of the correctly placed parts of the real person, the shipped network
-//! (`person.quality.onnx`) expects seven in ten to be off. The network is only used if configured.
+//! With [`SwitchBy::Worse`], the better of two bad views continues to support the other. If large errors are expected everywhere, the views
+//! then still support each other. A network that expects too many errors needs this rule: of the correctly placed parts of the real person,
+//! the shipped network (`person.quality.onnx`) expects seven in ten to be off. The network is only used if configured.
 //!
 //! # The same on more instants
 //!

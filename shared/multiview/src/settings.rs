@@ -26,9 +26,9 @@ pub enum SwitchBy {
     /// an unreliable one, and does not follow it. Each view then has its own energy. The energy of
     /// a pair is the mean of both, and may fall during the optimisation.
     Support,
-    /// The error of the support, if the support is also the worse of the two views (each relative to its
-    /// thresholds). The better of two unreliable views continues to support the other, so that
-    /// errors that are expected everywhere do not separate all views. Energies are defined as for
+    /// The error of the support, if the support is also the worse of the two views (each relative to its thresholds). The better of two
+    /// unreliable views continues to support the other, so that the views still support each other if large errors are expected everywhere.
+    /// Energies are defined as for
     /// [`Self::Support`].
     Worse,
 }

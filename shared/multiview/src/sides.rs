@@ -57,7 +57,7 @@ impl SidesFilter {
     ///
     /// * `front`: direction in which the skeleton faces according to its labels, as a unit vector; `None` if
     ///   unknown.
-    /// * `evidence`: log-likelihood ratio of the labels over the exchanged ones, from this frame alone, in nats.
+    /// * `evidence`: log-likelihood ratio of the labels over the exchanged labels, from this frame alone, in nats.
     pub fn decide(
         &mut self,
         settings: &SidesSettings,
@@ -81,7 +81,7 @@ impl SidesFilter {
     }
 }
 
-/// Returns the log-odds of this frame's labels that follow from those of the last frame's labels.
+/// Returns the log-odds of this frame's labels that follow from the log-odds of the last frame's labels.
 ///
 /// * `cosine`: cosine of the angle between the two directions. A person who seems to have turned by a right
 ///   angle may have turned to either side.

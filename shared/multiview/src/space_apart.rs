@@ -21,8 +21,8 @@ fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -
     pairs.iter().map(of_pair).sum()
 }
 
-/// Returns the better of a solution and the solutions in which the right or the left arm or leg is kept away from the other one, if both
-/// are at one place.
+/// Returns the better of a solution and the solutions in which the right or the left arm or leg is kept away from the other, if both are at
+/// the same place.
 ///
 /// * `first`: the best solution on the tree.
 /// * Returns the solution, and the places that its joints are kept away from.

@@ -7,7 +7,7 @@ use crate::space_places::Choices;
 use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
 use crate::space_view::{N, SpaceView, unary};
 
-/// Number of places along each axis of the coarsest grid, and of the finer ones.
+/// Number of places along each axis of the coarsest grid, and (below) of the finer grids.
 const COARSEST: usize = 5;
 const FINER: usize = 3;
 /// Maximum number of grids per resolution around the solution.

@@ -48,7 +48,7 @@ pub struct BoneLength {
 pub struct SpaceSettings {
     /// Weight of the springs (mu).
     pub springs: f64,
-    /// Maximum cost of a bone, as a number of standard deviations; the cost is half of their square.
+    /// Number of standard deviations at which the cost of a bone is capped; the cost is half of the square of this number.
     pub cap: f64,
     /// Cost of placing the right and the left joint of a pair at the same point.
     pub apart: f64,

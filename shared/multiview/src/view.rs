@@ -28,9 +28,8 @@ pub struct ViewPlan {
 impl ViewPlan {
     /// Prepares a view.
     ///
-    /// A part's centre is that of its first type's filter. In a model that mixes filter sizes
-    /// within one part, the centres of the other types are off by at most half the difference, in
-    /// cells.
+    /// A part's centre is the centre of its first type's filter. In a model that mixes filter sizes within one part, the centres of the
+    /// other types are off by at most half the difference, in cells.
     ///
     /// * `camera`: the camera of the frame from which the pyramid is built, after resizing and
     ///   rotation.

@@ -18,12 +18,12 @@ pub enum NoJoint {
     Implausible,
 }
 
-/// Assessment of a skeleton as a body.
+/// Assessment of how plausible a skeleton is as a human body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Body {
     /// Standing height estimated from the bone lengths, in metres; `None` if too few bones are known.
     pub stature_m: Option<f64>,
-    /// Root mean square deviation of the bone lengths from those of people, in standard deviations.
+    /// Root mean square deviation of the bone lengths from the mean lengths of people, in standard deviations.
     pub deviation: f64,
     /// Reason why the skeleton is not that of a person; if set, no joint has a position.
     pub nobody: Option<Reason>,

@@ -14,7 +14,7 @@ use crate::{
     SpaceStepSettings, WhoSettings, WhoStep,
 };
 
-/// Settings of all steps except those of the views.
+/// Settings of all steps except the single-view steps.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NetworkEstimatorSettings {
     /// Settings of the step that identifies people.

@@ -175,7 +175,7 @@ impl Estimator {
         }
     }
 
-    /// Returns the results of all pairs that have one.
+    /// Returns the results of all pairs that have a result.
     fn pairs(
         &self,
         answers: &[Option<ViewResult>],

@@ -51,7 +51,7 @@ const N_RANKED: usize = 32;
 /// has room for the same number.
 const N_STARTS: usize = 2;
 
-/// Unit in which the views of a frame are solved.
+/// Number of views of a frame that are solved together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Views {
     /// Views are solved in pairs whose poses are then combined: the paper's method.
@@ -358,7 +358,7 @@ impl FuseStep {
         }
     }
 
-    /// Returns the tables of a pair: its own tables, or those for the angle between the views at the person.
+    /// Returns the tables of a pair: its own tables, or the tables for the angle between the views at the person.
     fn tables(&self, pair: [usize; 2], views: [&ViewInput<'_>; 2]) -> Option<&TypeTables> {
         let mut own = self.tables.of_pairs.iter();
         if let Some(own) = own.find(|table| [table.0, table.1] == pair) {

@@ -63,7 +63,7 @@ impl Candidate {
 pub(crate) struct Candidates {
     /// The poses from the view's pairs, or the view's own pose if it is in no pair; never empty.
     pub(crate) poses: Vec<Candidate>,
-    /// Number of these poses that come from pairs.
+    /// Number of poses that result from pairs.
     pub(crate) n_pairs: usize,
     /// Score of the view's own best candidate.
     pub(crate) single_score: f64,

@@ -250,7 +250,7 @@ impl Looks<'_> {
         is_new
     }
 
-    /// Looks at a person of the previous frame in the same box and in a wider box, unless somebody is already known there. Keeps the best
+    /// Looks at a person of the previous frame in the same box and in a wider box, unless a person is already known there. Keeps the best
     /// sighting if it is good.
     fn see_wider(&self, track: &Track, memory: &mut NetworkMemory) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
@@ -265,7 +265,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks around the old box of a person last seen many frames ago, unless somebody is already known there. Keeps a person who is seen
+    /// Looks around the old box of a person last seen many frames ago, unless a person is already known there. Keeps a person who is seen
     /// well and whose score is not much below the usual one.
     ///
     /// * `around`: the box, enlarged for the time that has passed.
@@ -288,7 +288,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at a person of the previous frame, unless somebody is already known there. If the person has moved far, looks closer, which
+    /// Looks at a person of the previous frame, unless a person is already known there. If the person has moved far, looks closer, which
     /// takes some time. If the person lies down or gets up, looks with the picture rotated. Keeps a person who is seen well.
     ///
     /// * `before`: the sighting of the person in the previous frame.

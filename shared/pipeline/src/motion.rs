@@ -14,7 +14,7 @@ type Points = Vec<Option<Point2<f64>>>;
 #[derive(Debug, Clone)]
 pub(crate) struct AtInstant {
     pub(crate) views: Vec<Option<FusedView>>,
-    /// Standard deviations to add to those of the parts, in pixels.
+    /// Standard deviations to add to the standard deviations of the parts, in pixels.
     pub(crate) more_px: Vec<Vec<f64>>,
 }
 

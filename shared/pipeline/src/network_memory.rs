@@ -47,7 +47,7 @@ pub struct NetworkMemory {
     last: Option<u64>,
     /// True if the last frame is so recent that nobody has left the box.
     pub(crate) is_soon: bool,
-    /// Number of frames since the last one, and the maximum number of frames without a look at a person who stands still; `None` if the
+    /// Number of frames since the last frame, and the maximum number of frames without a look at a person who stands still; `None` if the
     /// frame rate is unknown.
     pub(crate) hold: Option<Hold>,
     /// Time since the last frame as a multiple of the maximum gap between frames, if it is more than 1. People are then first
@@ -60,7 +60,7 @@ pub struct NetworkMemory {
 /// How long a person who stands still can be held without a look.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hold {
-    /// Number of frames from the last one to this one.
+    /// Number of frames from the last frame to this frame.
     pub(crate) gap: u64,
     /// Maximum number of frames from one look to the next.
     pub(crate) most: u64,

@@ -1,8 +1,8 @@
 //! The single-view step with a network: pixels in, people and the maps of their joints out.
 //!
-//! A network that looks at one person needs a box. While a person is seen well, the box for the next frame is that of the pose,
-//! widened. From time to time, and if nobody is seen well, a detector searches for boxes. Keypoints found by another program go through
-//! the same step, without a picture.
+//! A network that looks at one person needs a box. While a person is seen well, the box for the next frame is the widened box of the pose.
+//! From time to time, and if nobody is seen well, a detector searches for boxes. Keypoints found by another program go through the same
+//! step, without a picture.
 
 use kernels::Rgb8View;
 use keypoints::{Keypoint, Way};
@@ -38,7 +38,7 @@ pub struct NetworkSettings {
     /// Search interval while people are near each other, and for [`Self::find_every`] frames afterwards. A briefly hidden person is then
     /// found again soon. It also applies after one of several people was lost or found.
     pub find_every_of_several: u64,
-    /// Number of frames by which the second regular search comes earlier. With different phases, the views do not all search in the same
+    /// Number of frames by which the second regular search is earlier. With different phases, the views do not all search in the same
     /// frame.
     pub find_phase: u64,
     /// Minimum mean heat of the joints of a person who is seen well, 0 to 1.
@@ -111,9 +111,9 @@ impl NetworkStep {
     /// Looks at a frame, and stores the result in the memory ([`Self::sightings`], [`Self::evidence`]).
     ///
     /// People who stand still are held. In a frame with a search, the detector's boxes come before the boxes of the previous frame, so that
-    /// no box shrinks or drifts unnoticed. A person whose pose was much worse than usual is also looked at in a wider box, and the better
-    /// sighting is kept. The step looks at up to twice as many people as it keeps, and keeps the largest. While somebody is seen, empty
-    /// boxes are skipped in some searches.
+    /// a box that shrinks or drifts is noticed. A person whose pose was much worse than usual is also looked at in a wider box, and the
+    /// better sighting is kept. The step looks at up to twice as many people as it keeps, and keeps the largest. While a person is seen,
+    /// empty boxes are skipped in some searches.
     ///
     /// # Errors
     ///
@@ -282,7 +282,7 @@ fn front_of(sighting: &Sighting, seen: &Seen) -> FrontEvidence {
     seen.front.filter(|_| is_told).unwrap_or_default()
 }
 
-/// Finds boxes around people, in pixels. Certain and large boxes come first, because the frame has room for only a few.
+/// Finds boxes around people, in pixels. Certain and large boxes come first, because only a few boxes are used per frame.
 fn find(
     detector: &Detector,
     image: Rgb8View<'_>,

@@ -44,8 +44,8 @@ pub(crate) struct Person {
     pub lines_px: Vec<Option<Line>>,
     /// Middle of the trunk, in metres in the world.
     pub place: Point3<f64>,
-    /// Sum over the views of how clearly they see the person. Each view contributes the amount by which its candidate's score exceeds those
-    /// of the weakest third of the view's candidates. The contribution shrinks with the distance from the projected person.
+    /// Sum over the views of how clearly they see the person. Each view contributes the amount by which its candidate's score exceeds the
+    /// scores of the weakest third of the view's candidates. The contribution shrinks with the distance from the projected person.
     pub strength: f64,
     /// Size in the pictures, in pixels of the frame: longer side of the rectangle around the parts, averaged over the views
     /// that see the person.
@@ -112,7 +112,7 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    /// Returns the candidates of every view that show a person other than the followed one, as bits.
+    /// Returns the candidates of every view that show a person other than the followed one, as bit sets.
     ///
     /// A view that sees only other people leaves nothing out: the followed person may be hidden there, or badly found.
     ///
@@ -141,7 +141,7 @@ impl Found {
 }
 
 impl Found {
-    /// Returns the views that see other people but not this person, as bits.
+    /// Returns the views that see other people but not this person, as bit sets.
     pub(crate) fn without(&self, followed: usize) -> u64 {
         let is_seen = |view: usize| self.people[followed].candidates[view].is_some();
         let sees_others =
@@ -156,10 +156,10 @@ impl Found {
 /// Finds the people of a frame; the person whom most views see most clearly comes first.
 ///
 /// Each pair of candidates of two views is placed in space by the midlines. A plausible person is searched for in the other views until
-/// nothing changes. The strongest group is the first person. Each other group is a person if it is apart from all earlier ones in space,
-/// and in all pictures but one. A person must be seen by three views, or by both views of a rig with two, and be at least 0.28 times as
-/// strong as the first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this method is our
-/// own.
+/// nothing changes. The strongest group is the first person. Each other group is a person if it is apart from all earlier people in space,
+/// and in all pictures except at most one. A person must be seen by three views, or by both views of a rig with two, and be at least 0.28
+/// times as strong as the first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this
+/// method is our own.
 ///
 /// * `cameras`, `views`: the cameras of the views, and the candidates of each view.
 pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {

@@ -152,7 +152,7 @@ impl PersonStep {
             else {
                 continue;
             };
-            // A restarted process can repeat a frame and see other people than those whose maps arrived before.
+            // A restarted process can repeat a frame and see different people from those whose maps arrived earlier.
             let (Some(sighting), Some(maps), true) = (
                 answer.people.get(candidate),
                 maps.get(candidate),

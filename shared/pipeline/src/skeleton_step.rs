@@ -37,7 +37,7 @@ pub enum Kept {
 pub struct Skeleton {
     /// The joints of the joint set, each with its position or the reason why it has none.
     pub joints: Vec<Result<Triangulated, NoJoint>>,
-    /// Assessment of the joints as a body; `None` if it was not requested, or nothing was found.
+    /// Assessment of how plausible the joints are as a human body; `None` if it was not requested, or if nothing was found.
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
@@ -93,8 +93,8 @@ impl SkeletonStep {
         }
     }
 
-    /// Begins a frame whose pictures may have been taken at other times than its instant ([`ViewResult::skew_s`]). The points
-    /// of the views are then moved to the instant. Without this call, or if all pictures were taken at the instant, nothing is moved.
+    /// Begins a frame whose pictures may not have been taken at its instant ([`ViewResult::skew_s`]). The points of the views are then
+    /// moved to the instant. Without this call, or if all pictures were taken at the instant, nothing is moved.
     ///
     /// * `instant_s`: instant of the frame, in seconds; `None` if the frame rate is unknown.
     pub fn begin(&mut self, instant_s: Option<f64>) {
@@ -173,7 +173,8 @@ impl SkeletonStep {
         }
     }
 
-    /// Returns the poses of the views at the instant of the frame, and the deviations to be added to those of their parts, in pixels.
+    /// Returns the poses of the views at the instant of the frame, and the standard deviations to add to the standard deviations of their
+    /// parts, in pixels.
     fn at_instant<'a>(
         &mut self,
         answers: &[Option<ViewResult>],
@@ -187,7 +188,7 @@ impl SkeletonStep {
         )
     }
 
-    /// Assesses the joints as a body.
+    /// Assesses how plausible the joints are as a human body.
     fn as_body(
         &mut self,
         joints: Vec<Result<Triangulated, TriangulateError>>,
@@ -326,7 +327,7 @@ impl SkeletonStep {
         (0..self.space.plans.len()).map(of_view).collect()
     }
 
-    /// Returns the poses of every view under a facing assignment: one per pair, or that of all views.
+    /// Returns the poses of every view under a facing assignment: one per pair, or the pose that was solved with all views.
     ///
     /// A view that was not fused keeps its own best pose, unless that pose may belong to another person.
     fn candidates(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<Candidates>> {

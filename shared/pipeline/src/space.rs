@@ -218,7 +218,7 @@ pub(crate) struct Judged {
 pub(crate) struct Seen {
     /// The direction in which the skeleton faces according to its labels.
     pub(crate) front: Option<Vector3<f64>>,
-    /// Log-likelihood ratio of the labels over the exchanged ones, in nats.
+    /// Log-likelihood ratio of the labels over the exchanged labels, in nats.
     pub(crate) log_ratio: f64,
 }
 

@@ -12,7 +12,7 @@ use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
-/// Maximum number of people whose bone lengths and sides are remembered; those seen longest ago are forgotten first.
+/// Maximum number of people whose bone lengths and sides are remembered; the people who were seen longest ago are forgotten first.
 const MOST_REMEMBERED: usize = 32;
 
 /// A solved person of a frame.
@@ -63,8 +63,8 @@ impl SpaceStep {
         }
     }
 
-    /// Begins a frame whose pictures may have been taken at other times than its instant ([`Sightings::skew_s`]). The points
-    /// of the views are then moved to the instant. Without this call, or if all pictures were taken at the instant, nothing is moved.
+    /// Begins a frame whose pictures may not have been taken at its instant ([`Sightings::skew_s`]). The points of the views are then moved
+    /// to the instant. Without this call, or if all pictures were taken at the instant, nothing is moved.
     ///
     /// * `instant_s`: instant of the frame, in seconds; `None` if the frame rate is unknown.
     pub fn begin(&mut self, instant_s: Option<f64>) {

@@ -8,7 +8,7 @@ const INWARD: f64 = 0.5;
 pub(crate) const MUCH_WORSE: f32 = 1.5;
 /// Weight of a new score in the usual score.
 const NEW_SCORE: f32 = 0.1;
-/// Amount by which a box is enlarged to check for more of a person, as a share of the longer side.
+/// Amount by which a box is enlarged to check whether it contains more of a person, as a share of the longer side.
 const WIDER: f64 = 0.25;
 /// Amount by which a box is enlarged for a person who may have moved on, and its maximum, as shares of the longer side. It applies per
 /// maximum gap between frames (0.4 s); in that time, a running person moves by half of the body height.

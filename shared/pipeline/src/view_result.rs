@@ -24,8 +24,8 @@ pub struct ViewResult {
 }
 
 impl ViewResult {
-    /// Returns true if the evidence covers all poses of the result. It may not: a restarted process can repeat a frame with a different
-    /// search window from that of the evidence that arrived before.
+    /// Returns true if the evidence covers all poses of the result. The evidence may not cover them: a restarted process can repeat a frame
+    /// with a different search window from that of the evidence that arrived before.
     pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
         self.candidates.iter().all(|pose| evidence.covers(pose))
     }

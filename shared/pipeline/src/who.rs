@@ -10,7 +10,7 @@ use crate::sighting::{Sighting, Sightings};
 
 /// Size of a network's window around a person, as a multiple of the longer side of the box around the joints.
 const WINDOW: f64 = 1.25;
-/// Number of ids reserved per process: a restarted process without memory starts after them, so no id is used twice.
+/// Number of ids reserved per process: a restarted process without memory starts after the reserved ids, so no id is used twice.
 const IDS_OF_A_PROCESS: u64 = 1000;
 
 /// A person of a frame.
@@ -118,7 +118,7 @@ impl WhoStep {
 
     /// Returns the people of the next frame.
     ///
-    /// * `time_s`: time at which the frame was taken, in seconds; not before that of the last frame.
+    /// * `time_s`: time at which the frame was taken, in seconds; not earlier than the time of the last frame.
     /// * `answers`: the sightings of each view.
     pub fn run(&mut self, time_s: f64, answers: &[Option<Sightings>]) -> FramePeople {
         let views: Vec<View> = answers.iter().map(|seen| view(seen.as_ref())).collect();

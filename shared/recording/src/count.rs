@@ -11,7 +11,7 @@ pub(crate) const NAME: &str = "parallax.counts";
 pub struct Count {
     /// Number of messages written to the file.
     pub recorded: u64,
-    /// Number of messages that were sent but not recorded, because they came faster than they could be received or written.
+    /// Number of messages that were sent but not recorded, because they arrived faster than they could be received or written.
     pub lost: u64,
 }
 

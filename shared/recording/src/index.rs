@@ -61,7 +61,7 @@ pub struct Damage {
 pub struct Recording {
     /// Metadata of the recording.
     pub about: Result<About, AboutError>,
-    /// Topics by name, without those that this program does not know.
+    /// Topics by name, except the topics that this program does not know.
     pub tracks: BTreeMap<String, Track>,
     /// Numbers of recorded and of lost messages of every topic whose counts the file contains.
     pub counts: BTreeMap<String, Count>,

@@ -259,7 +259,7 @@ mod tests {
             let [head, elements] = split_skeletons(&skeletons);
             let mut data = Vec::new();
             encode(Kind::Skeletons, head, elements, &mut data);
-            // The layout is that of memory, with the count directly before the list.
+            // The layout is the same as in memory, with the count directly before the list.
             let n_bytes = core::mem::offset_of!(Skeletons, people) + elements.len();
             assert_eq!(data[PREAMBLE.len()..], bytes_of(&*skeletons)[..n_bytes]);
             let got = Message::parse(Kind::Skeletons, &data).unwrap();

@@ -38,7 +38,7 @@ pub enum ReadError {
 /// The chunks of one file that were read last. Messages of the same chunk are read and checked together.
 #[derive(Debug, Default)]
 pub struct Buffer {
-    /// Chunks in order of use; the last used one comes first.
+    /// Chunks in order of use, the last used one first.
     chunks: [Loaded; 2],
 }
 

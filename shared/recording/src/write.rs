@@ -34,12 +34,11 @@ pub enum WriteError {
 
 /// Writes a recording.
 ///
-/// A chunk of the file ends when a message of a later frame comes. One changed byte or a
-/// killed run costs one chunk, and a replay can do without one frame. A frame of more than 4 MiB has several chunks. The writer keeps in
-/// memory the current chunk, and an index entry of some hundred bytes for every chunk before it.
+/// A chunk of the file ends when a message of a later frame arrives. One changed byte or a killed run costs one chunk, and a replay can do
+/// without one frame. A frame of more than 4 MiB has several chunks. The writer keeps in memory the current chunk, and an index entry of
+/// some hundred bytes for every chunk before it.
 ///
-/// Every chunk has a checksum. The metadata of the run has one, too, and is in the file twice, at its beginning
-/// and at its end.
+/// Every chunk has a checksum. The metadata of the run also has a checksum, and is in the file twice, at its beginning and at its end.
 pub struct Writer<W: Write> {
     out: mcap::Writer<NoSeek<BufWriter<Gate<W>>>>,
     keeper: Keeper,

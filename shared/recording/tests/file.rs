@@ -63,7 +63,7 @@ fn written(sent: &[Sent], flush_every: usize) -> Vec<u8> {
     file
 }
 
-/// Checks the messages of a file, in its order, against the sent ones. Returns their number.
+/// Checks the messages of a file, in the order of the file, against the sent messages. Returns their number.
 fn held(recording: &Recording, file: &[u8], sent: &[Sent]) -> usize {
     let mut found = Vec::new();
     for (nth, name) in topics().iter().enumerate() {

@@ -40,7 +40,7 @@ pub struct FrameLine {
 /// A person of a line.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PersonLine {
-    /// Deviation of the bone lengths from those of real people, in standard deviations; `None` if there is no body.
+    /// Deviation of the bone lengths from the bone lengths of real people, in standard deviations; `None` if there is no body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_deviation: Option<f64>,
     /// Margin of the decision about which views see the person from the same side; `None` if it was
@@ -127,7 +127,7 @@ fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Erro
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
-    /// Left and right were not decided: they are those of the pictures.
+    /// Left and right were not decided: they are named as they appear in the pictures.
     AsSeen,
     /// Left and right are certain.
     Sure,

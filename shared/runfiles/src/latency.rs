@@ -17,9 +17,9 @@ pub struct Percentiles {
     pub max_ms: f64,
     /// Median duration.
     pub p50_ms: f64,
-    /// Duration below which 999 of 1000 measurements are; the longest one if there are fewer measurements.
+    /// Duration that 999 of 1000 measurements do not exceed; the longest duration if there are fewer measurements.
     pub p99_9_ms: f64,
-    /// Duration below which 99 of 100 measurements are.
+    /// Duration that 99 of 100 measurements do not exceed.
     pub p99_ms: f64,
 }
 

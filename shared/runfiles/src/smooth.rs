@@ -66,7 +66,7 @@ pub struct SmoothedJoint {
     pub absent: usize,
     /// Factor of the joint's covariances; `None` if the method does not estimate it.
     pub covariance_scale: Option<f64>,
-    /// Number of frames in which the joint was measured as the joint of the other side.
+    /// Number of frames in which the joint was measured under the name of the joint on the other side.
     pub exchanged: usize,
     /// Number of frames that were filled.
     pub filled: usize,

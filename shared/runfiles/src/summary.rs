@@ -158,18 +158,18 @@ pub struct CameraFit {
     /// Standard error of [`CameraFit::offset_ms`].
     #[serde(default, deserialize_with = "nullable")]
     pub offset_error_ms: Option<f64>,
-    /// Time by which the camera's pictures were taken later than their times say, against the median of all cameras, in milliseconds.
-    /// Negative if they were taken earlier; unknown while there is too little motion.
+    /// Time by which the camera's pictures were taken later than their timestamps state, relative to the median of all cameras, in
+    /// milliseconds. Negative if they were taken earlier; unknown while there is too little motion.
     #[serde(default, deserialize_with = "nullable")]
     pub offset_ms: Option<f64>,
-    /// True if the camera was found, at any time of the run, to be out of step with the others.
+    /// True if, at any time of the run, the camera seemed not to be synchronised with the others.
     #[serde(default)]
     pub out_of_step: bool,
     /// Distance between the positions at which cameras see the same parts if this camera is one of them, in pixels of its footage. Unknown
     /// with fewer than three cameras, and while too little was seen.
     #[serde(deserialize_with = "nullable")]
     pub residual_px: Option<f64>,
-    /// True if the camera was found, at any time of the run, not to be where the calibration says.
+    /// True if, at any time of the run, the camera seemed not to be at its calibrated position.
     pub suspected: bool,
     /// [`CameraFit::residual_px`] of the other cameras without this one.
     #[serde(deserialize_with = "nullable")]

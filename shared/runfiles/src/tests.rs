@@ -47,8 +47,8 @@ fn a_frame_without_a_result_says_why_and_a_joint_without_a_position_too() {
     assert!(joints(partial).values().any(is_missing));
 }
 
-/// Checks that each field of an object, if it is replaced by a text or left out, gives an error that names it. Fields that may be missing
-/// are excepted.
+/// Checks that each field of an object, if it is replaced by a text or left out, gives an error that contains its name. Fields that may be
+/// missing are not checked.
 fn assert_strict<T: Serialize>(
     text: &str,
     may_be_missing: &[&str],

@@ -23,10 +23,10 @@ pub struct TimesLine {
 /// Times of one view of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ViewTimes {
-    /// Frame of the view's camera; `None` if no frame came.
+    /// Frame of the view's camera; `None` if no frame arrived.
     #[serde(deserialize_with = "nullable")]
     pub camera: Option<CameraTimes>,
-    /// Answer of the view's pose process; `None` if no answer came.
+    /// Answer of the view's pose process; `None` if no answer arrived.
     #[serde(deserialize_with = "nullable")]
     pub pose: Option<PoseTimes>,
 }

@@ -9,7 +9,8 @@ use crate::nullable::nullable;
 /// Measures of the quality of results, computed from the results alone. Shares are from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trust {
-    /// Root mean square deviation of the bone lengths from those of real people, standard deviations; the median over the skeletons.
+    /// Root mean square deviation of the bone lengths from the bone lengths of real people, standard deviations; the median over the
+    /// skeletons.
     #[serde(deserialize_with = "nullable")]
     pub body_deviation: Option<f64>,
     /// Scatter of the bone lengths over the run, in metres. This is the mean over the bones of the median absolute deviation, scaled to a
@@ -25,7 +26,7 @@ pub struct Trust {
     pub implausible: f64,
     /// Share of the joints of the skeletons that were left out, because their positions are impossible for a human body.
     pub joints_implausible: f64,
-    /// Share of the results in which the middle of the body is too far from that of the previous result for a person to have moved there.
+    /// Share of the results in which the middle of the body is farther from the middle in the previous result than a person can have moved.
     pub jumps: f64,
     /// Distance of the joints' reprojections from the views' observations, as a share of the person's height in the frames: root
     /// mean square over all joints.

@@ -21,7 +21,7 @@ pub struct ViewLine {
     /// Expected error of every part in this frame, in pixels; `None` if none was predicted.
     #[serde(deserialize_with = "nullable")]
     pub sigma_px: Option<Vec<f64>>,
-    /// Age of the expected errors that fusion used, in frames; `None` if it had none.
+    /// Age of the expected errors that fusion used, in frames; `None` if fusion used none.
     #[serde(deserialize_with = "nullable")]
     pub sigma_used: Option<u16>,
     /// The best pose of the view alone. Parts have the side of the image, as in the model.
@@ -40,7 +40,7 @@ pub struct ViewLine {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", try_from = "String")]
 pub enum Facing {
-    /// Towards the camera: sides of the body are those of the model.
+    /// Towards the camera: the sides of the body are named as in the model.
     Front,
     /// Away from the camera: left and right were exchanged.
     Behind,

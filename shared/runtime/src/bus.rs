@@ -17,7 +17,7 @@ use crate::topic::{Topic, TopicPlan};
 use crate::{Copies, Namespace, Progress, free_shared_memory, private};
 use failure::Stop;
 
-/// Default time that a sender waits for a receiver without room.
+/// Default time that a sender waits for a receiver that has no room.
 const PATIENCE: Duration = Duration::from_mins(2);
 
 /// A process's connection to the shared memory of its deployment. It creates the ports of the process.
@@ -75,7 +75,7 @@ impl Bus {
         })
     }
 
-    /// Sets the time that a sender waits for a receiver without room before it fails. The default is two minutes.
+    /// Sets the time that a sender waits for a receiver that has no room before it fails. The default is two minutes.
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
@@ -84,7 +84,7 @@ impl Bus {
 
     /// Sets whether waiters of this bus poll without pause instead of sleeping until a message arrives.
     ///
-    /// A receiver that polls occupies a core, and a message arrives in one or two microseconds. The default is to sleep.
+    /// A receiver that polls occupies a core, but receives messages within one or two microseconds. The default is to sleep.
     #[must_use]
     pub fn with_spin(mut self, spins: bool) -> Self {
         self.spins = spins;
@@ -225,7 +225,7 @@ pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
         std::fs::create_dir_all(parent).map_err(directory)?;
     }
     if !path.exists() {
-        // The file is replaced in one step, so that no process ever reads half of it.
+        // The file is replaced in one step, so that no process ever reads an incomplete file.
         files::replace(&path, namespace.config_text().as_bytes()).map_err(directory)?;
     }
     // If a node died before it had written its configuration, its clean-up uses the global configuration of the cleaning process

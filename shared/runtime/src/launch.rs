@@ -8,7 +8,7 @@ use tracing::Level;
 use crate::{Delivery, Namespace, NamespaceError, Scheduling};
 use failure::{ExitKind, Fault};
 
-/// Reason why the arguments of a service are not those of a supervisor.
+/// Reason why the arguments of a service were not written by a supervisor.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LaunchError {
     /// A required flag is missing.

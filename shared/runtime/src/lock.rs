@@ -1,4 +1,4 @@
-//! The lock of a deployment. Only one run is possible at a time, and it starts and ends without leftover files.
+//! The lock of a deployment. Only one run is possible at a time. There are no leftover files when it starts or ends.
 
 use core::time::Duration;
 use std::fs::{self, File};

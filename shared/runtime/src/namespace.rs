@@ -8,7 +8,7 @@ use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
 
 use failure::{ExitKind, Fault};
 
-/// Length of the longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
+/// Length of the longest file name that iceoryx2 creates below the root: `/`, 39 digits, `.event`.
 const SOCKET_NAME_LEN: usize = 1 + 39 + 6;
 /// Bytes of `sun_path` without the closing NUL (unix(7)).
 const SOCKET_PATH_MAX: usize = 107;

@@ -11,7 +11,7 @@ use failure::{ExitKind, Fault};
 
 /// Maximum number of onlookers at the same time.
 const ONLOOKERS: usize = 4;
-/// Number of open files of every process, without those of its topics.
+/// Number of open files of every process, not counting the files of its topics.
 const DESCRIPTORS: u64 = 40;
 /// Number of open files per topic in the process that keeps the topic alive; 6.6 were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;

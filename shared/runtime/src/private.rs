@@ -76,7 +76,7 @@ pub enum PrivacyError {
     Unmarked {
         /// The directory.
         path: PathBuf,
-        /// Number of files and directories in it.
+        /// Number of files and directories in the directory.
         n_files: usize,
     },
     /// The file or directory cannot be read, created, or closed to others.

@@ -1,4 +1,4 @@
-//! Lists deployments: those that run, and those of which only files are left.
+//! Lists deployments: running deployments, and dead deployments that have left files behind.
 
 use std::fs::{self, Metadata};
 use std::io;

@@ -29,7 +29,7 @@ pub enum Action {
     Chair,
     /// Picking things up and putting them on a shelf.
     Grab,
-    /// Leaning on a table, with the hands on the knees, against a pillar.
+    /// Leaning: on a table, on the own knees, or against a pillar.
     Lean,
     /// Working at a table.
     Table,

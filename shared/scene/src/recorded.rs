@@ -66,7 +66,7 @@ const HEAD_JOINT: usize = 13;
 /// Share of the postures whose lowest point may be below the floor, because recordings are not exact.
 const BELOW_FLOOR: f64 = 0.05;
 
-/// A recording transferred to a subject, with the directions of the recording and the lengths of the subject.
+/// A recording transferred to a subject, with the bone directions of the recording and the bone lengths of the subject.
 ///
 /// The path is scaled like the legs, moved to the middle of the room, and put on the floor. Joint limits are
 /// not applied.
@@ -187,7 +187,7 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
 
 /// Returns the rotations of the two bones of a limb, which hang down at rest, from the positions of its three joints.
 ///
-/// The axis of the hinge between them follows from the bend; for a straight limb, it is that of the trunk.
+/// The axis of the hinge between them follows from the bend; for a straight limb, the axis of the trunk is used.
 ///
 /// * `fold`: 1 if the hinge folds backward, -1 if forward.
 fn hinged(
@@ -210,7 +210,7 @@ fn hinged(
     [upper, turned(down, lower, upper * Vector3::y())]
 }
 
-/// Returns the rotation that takes `from` to the direction of `along`, and the y axis as close to `left` as possible.
+/// Returns the rotation that maps `from` to the direction of `along`, and the y axis as close to `left` as possible.
 fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQuaternion<f64> {
     let basis = |along: Vector3<f64>, left: Vector3<f64>| {
         let along = unit(along, Vector3::z());

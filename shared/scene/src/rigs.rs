@@ -172,7 +172,7 @@ fn umpm() -> Result<Rig, RigChoiceError> {
     )?)
 }
 
-/// Returns the rotation that takes z to `up`.
+/// Returns the rotation that maps z to `up`.
 fn upright(up: &UnitVector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&Vector3::z(), up).unwrap_or_else(|| {
         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI)

@@ -23,7 +23,7 @@ pub struct Settings {
     pub seed: u64,
     /// Number of frames per second.
     pub rate_hz: f64,
-    /// Folder of photographs to use instead of the room; every camera gets a random one.
+    /// Folder of photographs to use instead of the room; every camera gets a random photograph.
     pub backdrop: Option<PathBuf>,
     /// The flaws of the cameras.
     pub flaws: Flaws,

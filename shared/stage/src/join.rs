@@ -17,7 +17,7 @@ pub use last::Last;
 pub struct Joined<T> {
     /// Number of the frame.
     pub frame: u64,
-    /// One entry per input; `None` if no message came in time.
+    /// One entry per input; `None` if no message arrived in time.
     pub items: Vec<Option<T>>,
 }
 
@@ -62,7 +62,8 @@ struct Input {
 }
 
 impl Input {
-    /// Returns true if the input's sender was restarted after a frame began, and has had time to send what it still knows of the frame.
+    /// Returns true if the input's sender was restarted after a frame began, and has had time to send the messages that it still has about
+    /// the frame.
     fn has_forgotten(&self, began_at: u64, now: u64) -> bool {
         self.restarted_at
             .is_some_and(|at| began_at < at && now.saturating_sub(at) >= TAKEN_UP_NANOS)
@@ -70,7 +71,7 @@ impl Input {
 
     /// Returns true if the input has been silent for too long.
     ///
-    /// * `patience`: limit without a living sender, and limit with one.
+    /// * `patience`: the limit without a living sender, and the limit with a living sender.
     fn silent_since(&self, began_at: u64, now: u64, patience: [u64; 2]) -> bool {
         let elapsed = |at: u64| now.saturating_sub(at);
         let silence = elapsed(began_at.max(self.received_at.unwrap_or(0)));

@@ -83,7 +83,7 @@ pub(crate) enum EndStamp {
     Input,
 }
 
-/// Sends the end of a stream, with the stamp of the input's end if there is one, otherwise with that of the session.
+/// Sends the end of a stream, with the stamp of the input's end if there is one, otherwise with the stamp of the session.
 type SendEnd = dyn Fn(Option<Stamp>, u64) -> Result<(), SendError>;
 
 /// An output of any message type.
@@ -120,7 +120,7 @@ impl Outgoing {
         }
     }
 
-    /// Creates an output of arrays. It has no end of stream, because arrays belong to messages that have one.
+    /// Creates an output of arrays. It has no end of stream, because arrays belong to messages that have an end of stream.
     pub(crate) fn arrays<E: Element, H: Header>(
         publisher: &Rc<SlicePublisher<E, H>>,
         n_receivers: usize,

@@ -47,8 +47,8 @@ pub enum Sender {
 }
 
 impl Sender {
-    /// Checks the session, the sender and the times of a message. The end of a worker's stream
-    /// names no pair, so the number of the pair is not checked.
+    /// Checks the session, the sender and the times of a message. The end of a worker's stream contains no pair, so the number of the pair
+    /// is not checked.
     pub(crate) fn check<M: Stamped>(
         self,
         message: &M,

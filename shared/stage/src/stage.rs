@@ -23,7 +23,7 @@ use crate::shelf::{HELD_REALTIME, Shelf};
 use crate::slots::Slots;
 use crate::{Context, Frame, Held, Item, Output, Port, Sender, Stamped, Turn};
 
-/// Interval at which deadlines are checked while no message comes.
+/// Interval at which deadlines are checked while no message arrives.
 const TICK: Duration = Duration::from_millis(20);
 
 /// The inputs and outputs of a process, and its loop.
@@ -428,7 +428,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         self.end_with(n_connected, send_end)
     }
 
-    /// Waits until a message comes or some time has passed.
+    /// Waits until a message arrives or some time has passed.
     ///
     /// # Errors
     ///

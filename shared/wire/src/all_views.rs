@@ -7,7 +7,7 @@ use pipeline::{AllViewsHypothesis, AllViewsResult, PairResult};
 use crate::error::{equal, index};
 use crate::{WireError, pair_to_message};
 
-/// Writes the result of all views, or that there is none. The caller fills in stamps and timing.
+/// Writes the result of all views, or the fact that there is no result. The caller fills in stamps and timing.
 ///
 /// Message `v - 1` is about view `v` and the first view of the result. Each message contains the energy of all views.
 /// It has no result if view `v` was not solved, or is the first view itself.

@@ -8,7 +8,7 @@ use pipeline::PairResult;
 use crate::error::{count, equal, finite, index};
 use crate::{WireError, pose_from_message, pose_to_message};
 
-/// Writes the result of a pair, or that there is none. The caller fills in stamp and timing.
+/// Writes the result of a pair, or the fact that there is no result. The caller fills in stamp and timing.
 ///
 /// The message contains only the length of [`PairEstimate::iterations`].
 ///

@@ -143,7 +143,7 @@ pub fn skew_from_message(message: &ViewPose) -> Result<f64, WireError> {
 ///
 /// # Errors
 ///
-/// Returns a [`WireError`] if there is more evidence than there is room for candidates, or if a number is not finite.
+/// Returns a [`WireError`] if there are more entries than the message has room for candidates, or if a number is not finite.
 pub fn front_to_message(message: &mut ViewPose, front: &[FrontEvidence]) -> Result<(), WireError> {
     count("front", front.len(), MAX_CANDIDATES)?;
     for (candidate, (slot, evidence)) in message.front.iter_mut().zip(front).enumerate() {

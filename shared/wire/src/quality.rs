@@ -5,7 +5,7 @@ use messages::{MAX_PARTS, PairPose, Status, ViewQuality};
 use crate::WireError;
 use crate::error::{count, equal, finite};
 
-/// Writes predicted errors, or that there are none. The caller fills in stamp and timing.
+/// Writes predicted errors, or the fact that there are none. The caller fills in stamp and timing.
 ///
 /// * `sigma_px`: expected error of every part, in pixels of the frame.
 ///

@@ -59,7 +59,7 @@ pub fn sightings_to_message(
 
 /// Reads the people that a view sees; `None` unless the status is [`Status::OK`] and there is a person.
 ///
-/// * `n_extras`: number of extra keypoints of a person. The last people may lack them, because the room in a message is limited.
+/// * `n_extras`: number of extra keypoints of a person. The last people may lack extra keypoints, because the room in a message is limited.
 ///
 /// # Errors
 ///

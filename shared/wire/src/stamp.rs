@@ -106,7 +106,7 @@ impl Expected {
     }
 }
 
-/// Checks a frame against its pixels. A frame without an image may have any number of them.
+/// Checks a frame against its pixels. A frame without an image may have any number of pixels.
 ///
 /// * `n_bytes`: number of bytes of the received pixels.
 ///

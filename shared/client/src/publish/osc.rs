@@ -107,7 +107,7 @@ mod tests {
     use super::*;
     use crate::publish::json::tests::frame;
 
-    /// Returns the address and the argument bytes of each message of a bundle, read as the specification says.
+    /// Returns the address and the argument bytes of each message of a bundle, parsed according to the specification.
     fn messages(bundle: &[u8]) -> Vec<(String, Vec<u8>)> {
         assert_eq!(&bundle[..8], b"#bundle\0");
         let mut rest = &bundle[16..];

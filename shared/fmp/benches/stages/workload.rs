@@ -21,7 +21,7 @@ pub(crate) struct Workload {
 }
 
 impl Workload {
-    /// Returns the three workloads of the benchmark; for a quick check, a single small one.
+    /// Returns the three workloads of the benchmark, or a single small workload for a quick check.
     pub(crate) fn all(quick: bool) -> Vec<Self> {
         if quick {
             return vec![Self::new([48, 52], 3, ["", ""])];

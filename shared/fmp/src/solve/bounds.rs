@@ -5,14 +5,14 @@ use super::{ExtraTerms, Solver};
 use crate::{Bound, Bounds, Responses, Spring, Springs};
 
 impl Bound {
-    /// Bound of a level on which the messages have been computed without terms.
+    /// Creates the bound of a level on which the messages have been computed without terms.
     ///
     /// * `edges`: see [`Solver::most_of_edges`].
     pub(super) fn of(sweep: &Sweep<'_>, edges: f64) -> Self {
         Self::of_own(sweep.highest(), sweep.own() + edges)
     }
 
-    /// Bound of a level with a known sum of the largest own scores and of the edges.
+    /// Creates the bound of a level from the known sum of the largest own scores and of the edges.
     fn of_own(best: f32, size: f64) -> Self {
         Self {
             best,

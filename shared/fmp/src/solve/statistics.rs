@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Sums over all solutions of all [`IncrementalSolver`](crate::IncrementalSolver)s of a solver.
 ///
-/// An entry is one value of a max-sum message: that of one part for one cell of its parent. With several
-/// threads, the counters depend on timing; the results do not.
+/// An entry is one value of a max-sum message: the value of one part for one cell of its parent. With several threads, the counters depend
+/// on timing; the results do not.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SolveStatistics {
     /// Number of solutions.

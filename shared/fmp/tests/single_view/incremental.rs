@@ -137,7 +137,7 @@ impl ExtraTerms for OnOnePart {
 }
 
 proptest! {
-    /// The bounds come from another process, and may be wrong.
+    /// The bounds were received from another process, and may be wrong.
     #[test]
     fn wrong_bounds_do_not_panic(
         seed in any::<u64>(),

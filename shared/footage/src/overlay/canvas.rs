@@ -66,7 +66,7 @@ impl Canvas {
         is_inside.then(|| Self::from_rgb(part, &pixels.concat()))
     }
 
-    /// Returns the picture as a JPEG file; `None` if it is too large for one.
+    /// Returns the picture as a JPEG file; `None` if it is too large for the format.
     ///
     /// * `quality`: percent.
     pub fn jpeg(&self, quality: u8) -> Option<Vec<u8>> {
@@ -216,7 +216,7 @@ impl Canvas {
         Ok(png)
     }
 
-    /// Writes a PNG. A reader of `path` sees the old file or the new one, never a part.
+    /// Writes a PNG. A reader of `path` sees the old file or the new one, never a part of it.
     ///
     /// # Errors
     ///

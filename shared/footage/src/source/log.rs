@@ -8,8 +8,8 @@ use std::time::Duration;
 
 /// Maximum number of bytes kept of a log, because a damaged video could fill a disk with its log.
 const MAX_BYTES: usize = 16 << 10;
-/// Capacity of the queue of times. It must hold the times of the frames between two frames that are read, and those that the decoder
-/// is ahead.
+/// Capacity of the queue of times. It must hold the times of the frames between two frames that are read, and the times of the frames by
+/// which the decoder is ahead.
 const MAX_TIMES: usize = 1 << 14;
 /// Time to wait for the time of a frame that has been read.
 const PATIENCE: Duration = Duration::from_secs(1);

@@ -142,7 +142,7 @@ impl Video {
         self.log.complaints()
     }
 
-    /// Reads the pixels of the next frame of the decoder. Returns true if there was one.
+    /// Reads the pixels of the next frame of the decoder. Returns true if there was a frame.
     fn fill(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
         let mut filled = 0;
         while filled < rgb.len() {
@@ -167,7 +167,7 @@ impl Video {
     /// Returns true if a frame does not depend on a frame that failed to decode. After a failure, this is the case from the next key frame
     /// on.
     ///
-    /// * `next`: the expected index, which follows that of the frame before.
+    /// * `next`: the expected index, which follows the index of the previous frame.
     fn is_whole(&mut self, index: u64, next: u64) -> Result<bool, FootageError> {
         if !self.probe.is_inter {
             return Ok(true);

@@ -11,7 +11,7 @@ pub enum Refine {
     /// The maximum is moved by a quarter of a cell towards the higher neighbour.
     #[default]
     Quarter,
-    /// The maximum is that of a parabola through logarithms (DARK: Zhang et al. 2020, without its smoothing).
+    /// The maximum is the maximum of a parabola through logarithms (DARK: Zhang et al. 2020, without its smoothing).
     Parabola,
 }
 

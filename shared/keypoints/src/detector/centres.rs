@@ -2,7 +2,7 @@
 
 use super::PersonBox;
 
-/// Maximum absolute logarithm of a side. No network gives a larger one for a picture of 2048 pixels.
+/// Maximum absolute logarithm of a side. No network returns a larger logarithm for a picture of 2048 pixels.
 const MOST_LOGARITHM: f64 = 8.0;
 
 /// Returns the boxes of the cells that are higher than their neighbours, in pixels of the input. Of equal neighbours, the first one counts.

@@ -121,7 +121,7 @@ impl NameSet {
         self.names.len()
     }
 
-    /// Returns the number of keypoints of a person in the file: the named ones, and those after them that are not read.
+    /// Returns the number of keypoints of a person in the file: the named keypoints, and the keypoints after them, which are not read.
     pub fn n_in_file(&self) -> usize {
         self.in_file
     }

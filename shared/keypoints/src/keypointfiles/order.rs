@@ -1,8 +1,8 @@
 //! Checks whether 25 keypoints without names are arranged like those of `body-25`.
 //!
-//! OpenPose has two sets of 25 keypoints, and files do not say which one they use: `body-25`, and `body-25b` of its experimental model. The
-//! first set has a pelvis in the middle of the hips. The second set has an elbow, a wrist and a hip in place of the pelvis and the hips,
-//! which are apart from each other.
+//! OpenPose has two sets of 25 keypoints, and files do not state which of them they use: `body-25`, and `body-25b` of its experimental
+//! model. The first set has a pelvis in the middle of the hips. The second set has an elbow, a wrist and a hip in place of the pelvis and
+//! the hips, which are apart from each other.
 
 use crate::BODY_25;
 use crate::files::SeenKeypoints;

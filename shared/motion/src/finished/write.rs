@@ -49,7 +49,7 @@ pub(super) fn all(
     files::replace(&path, text.as_bytes()).map_err(|error| in_file(&path, &error))
 }
 
-/// Returns the line of an instant with smoothed joints; people who were not measured at this instant come last.
+/// Returns the line of an instant with smoothed joints; people who were not measured at this instant are last.
 fn smoothed_line(mut line: FrameLine, at: usize, run: &Run, motions: &[Motion]) -> FrameLine {
     let smoothed = |person: &Person, motion: &Motion, measured: Option<PersonLine>| {
         let joints = person.recorded.joints.iter().zip(&motion.joints);

@@ -21,7 +21,7 @@ const APART: f64 = 1.0;
 const CALM_S: f64 = 0.1;
 /// Time for which measurements count in the weights, in seconds.
 const MEMORY_S: f64 = 2.0;
-/// Maximum time without a measurement before a joint starts anew, in seconds.
+/// Maximum time without a measurement before the filters of a joint are restarted, in seconds.
 const FORGET_S: f64 = 1.0;
 /// Minimum and maximum plausible scale of covariances.
 const SCALES: [f64; 2] = [1e-2, 1e2];
@@ -120,7 +120,7 @@ impl Models {
         )
     }
 
-    /// Starts anew from a measurement.
+    /// Restarts the filters from a measurement.
     fn begin(&mut self, measured: Option<(Vector3<f64>, Matrix3<f64>)>) -> Smoothed {
         let Some((position, covariance)) = measured else {
             return Err(Absent::Gap);

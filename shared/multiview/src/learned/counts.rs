@@ -162,7 +162,7 @@ impl Counts {
     }
 }
 
-/// Lift of two types: the logarithm of their frequency over that of independent types.
+/// Lift of two types: the logarithm of their frequency over the frequency of independent types.
 fn lift(joint: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, cols) = (joint.column_sum(), joint.row_sum());
     DMatrix::from_fn(joint.nrows(), joint.ncols(), |a, b| {

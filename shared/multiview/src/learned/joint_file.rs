@@ -57,7 +57,7 @@ pub struct JointRow {
 pub struct JointsLearned {
     /// Maximum number of bones between a joint's own part and a part that determines its position.
     pub reach: usize,
-    /// Cost of a weight on other parts than the joint's own.
+    /// Cost of a weight on parts other than the joint's own.
     pub ridge: f64,
     /// The data sets from which the joints were learned.
     pub sets: Vec<LearnedSet>,

@@ -1,4 +1,4 @@
-//! Learns the positions of joints relative to the parts around them from annotated people, some of whom are badly found.
+//! Learns the positions of joints relative to the parts around them from annotated people, some of whom are detected badly.
 
 use nalgebra::{DMatrix, DVector};
 use skeleton::{MIRROR, N_PARTS, PARENT, PARSE14};
@@ -29,7 +29,7 @@ pub struct Marked {
 pub struct Local {
     /// Maximum number of bones between the joint's own part and a part that determines its position.
     pub reach: usize,
-    /// Cost of a weight on other parts than the joint's own: squared, per person, in units of the person's size.
+    /// Cost of a weight on parts other than the joint's own: squared, per person, in units of the person's size.
     pub ridge: f64,
 }
 

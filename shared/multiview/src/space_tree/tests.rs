@@ -233,7 +233,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
         as_seen: true,
         ..SpaceSettings::default()
     };
-    // The body is flat and symmetric: facing x and facing y look alike from here except for the names.
+    // The body is flat and symmetric: facing x and facing y look the same from here except for the names.
     let mut flat = STANDING.map(|[_, y, z]| [0.0, y, z]);
     for [right, left] in LIMBS.into_iter().flatten() {
         flat[right] = [0.0, -flat[left][1], flat[left][2]];

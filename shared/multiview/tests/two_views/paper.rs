@@ -57,7 +57,7 @@ pub(crate) fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
 }
 
 proptest! {
-    /// The bounds come from another process.
+    /// The bounds were received from another process.
     #[test]
     fn correct_bounds_change_nothing_and_wrong_bounds_do_not_panic(
         seed in any::<u64>(),

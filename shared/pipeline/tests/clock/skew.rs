@@ -64,7 +64,7 @@ fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
     1e3 * sum / n
 }
 
-/// Returns the position of a point as used, and its deviation.
+/// Returns the position of a point that is used for the estimate, and its deviation.
 fn used(
     (at, sigma_px): (Point2<f64>, f64),
     velocity: Option<Velocity>,

@@ -1,4 +1,4 @@
-//! Cameras whose pictures were taken at other times than their timestamps say.
+//! Tests with cameras whose pictures were not taken at the times of their timestamps.
 
 use geometry::{Camera, RigWatch, Step, StepWatch};
 use nalgebra::{Isometry3, Vector3};
@@ -10,7 +10,7 @@ use crate::film::{Film, RATE_HZ};
 ///
 /// * `late_ms`: delay of every camera's pictures behind their timestamps at a frame, in milliseconds.
 /// * `skews_ms`: delay of the timestamps behind the instants, in milliseconds.
-/// * `calibrated`: the cameras as known to the watch.
+/// * `calibrated`: the cameras as assumed by the watch.
 fn watch(
     film: &mut Film,
     n_frames: u32,

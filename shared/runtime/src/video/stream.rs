@@ -113,7 +113,7 @@ impl VideoStream {
         }
     }
 
-    /// Returns the next picture; `None` if none comes within `patience`.
+    /// Returns the next picture; `None` if none arrives within `patience`.
     ///
     /// The previous picture goes back to the driver.
     ///
@@ -168,7 +168,7 @@ impl VideoStream {
         Ok(is_ready)
     }
 
-    /// Returns true if every buffer holds a picture, so that the driver has to lose the next one.
+    /// Returns true if every buffer holds a picture, so that the driver has to drop the next picture.
     fn is_full(&self) -> bool {
         const DONE: u32 = 4;
         let is_done = |index: usize| {
@@ -209,7 +209,7 @@ unsafe impl Send for Mapping {}
 
 impl Mapping {
     fn new(device: &VideoDevice, offset: u32, len: usize) -> io::Result<Self> {
-        // SAFETY: the kernel chooses a free address, so no Rust object is there.
+        // SAFETY: the kernel chooses a free address, so no Rust object uses it.
         let mapped = unsafe {
             mmap(
                 core::ptr::null_mut(),

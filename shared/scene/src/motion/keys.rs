@@ -22,7 +22,7 @@ fn beat_seconds(action: Action) -> f64 {
 pub(super) fn stance(actor: &Actor, action: Action, seconds: f64) -> Stance {
     let beats = seconds * actor.subject.style.tempo / beat_seconds(action);
     let nth = beats.floor();
-    // The first three quarters of a beat move to the next pose, the last quarter holds it.
+    // The first three quarters of a beat move to the next pose, and the last quarter keeps it.
     let share = ((beats - nth) / 0.75).min(1.0);
     let share = share * share * (3.0 - 2.0 * share);
     let nth = nth as i64;

@@ -105,7 +105,7 @@ pub(crate) fn lengths(joints: &Joints) -> [Option<f64>; N_BONES] {
     core::array::from_fn(|i| BONES[i].length(joints))
 }
 
-/// Replaces unusable joints by missing ones.
+/// Marks unusable joints as missing.
 pub(crate) fn clean(joints: &Joints) -> Joints {
     const FARTHEST: f64 = 1e6;
     let is_near = |point: &Point3<f64>| point.iter().all(|x| x.abs() < FARTHEST);

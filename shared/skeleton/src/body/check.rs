@@ -32,7 +32,7 @@ const MOST: f64 = 10.0;
 /// A skeleton is not a person's if
 ///
 /// * it has fewer than [`MIN_BONES`] bones,
-/// * its stature is outside [`STATURES`], or more than 28 % from that of the learned lengths, or
+/// * its stature is outside [`STATURES`], or differs by more than 28 % from the stature that follows from the learned lengths, or
 /// * more than half of its bones are impossible.
 ///
 /// Otherwise, every impossible bone loses its worst joint, until the rest is possible. The worst joint is the one that also makes other
@@ -89,7 +89,7 @@ pub(crate) struct Expected {
     pub(crate) spread: f64,
 }
 
-/// Returns the expected length of a kind of bone: the learned length if there is one, otherwise that of people of this stature.
+/// Returns the expected length of a kind of bone: the learned length if there is one, otherwise the mean length of people of this stature.
 pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> Expected {
     let proportion = kind.proportion();
     if let Some(Learned { metres, sd }) = lengths.and_then(|length| length.of_kind(kind)) {
@@ -110,7 +110,7 @@ struct Judgement<'a> {
     /// Deviation of every bone's length from the expected length, in standard deviations.
     z: [Option<f64>; N_BONES],
     learned: Option<&'a Lengths>,
-    /// Stature from which the expected lengths are derived, in metres; limited to those of people.
+    /// Stature from which the expected lengths are derived, in metres; limited to the statures of people.
     expected_of: f64,
 }
 
@@ -160,8 +160,8 @@ impl<'a> Judgement<'a> {
         })
     }
 
-    /// Returns the possible statures, in metres: those of people, and near the stature given by the learned lengths of the present
-    /// bones.
+    /// Returns the possible statures, in metres: the statures of people, limited to those near the stature that follows from the learned
+    /// lengths of the present bones.
     fn statures(&self) -> [f64; 2] {
         let learned = |bone: usize| self.learned.and_then(|learned| learned.bone(bone));
         let lengths =
@@ -233,7 +233,7 @@ impl<'a> Judgement<'a> {
         self.reaches(joints, found);
     }
 
-    /// Calls `found` for joints that are too far apart for the missing bones between them.
+    /// Calls `found` for every two joints that are too far apart for the missing bones between them.
     fn reaches(&self, joints: &Joints, mut found: impl FnMut(Conflict)) {
         let pieces = reach::pieces(joints);
         let length = |kind| expected(kind, self.expected_of, self.learned).metres;

@@ -6,7 +6,7 @@ use crate::body::bone::{
 use crate::body::proportion::Kind;
 use crate::body::{Joints, N_JOINTS};
 
-/// The next joint towards the neck, and the kind of bone between them; a hip also has half the width of the hips.
+/// The next joint towards the neck, and the kind of bone between them; for a hip, half the width of the hips is added.
 const TOWARDS_NECK: [Option<(usize, Kind)>; N_JOINTS] = [
     Some((R_KNEE, Kind::LowerLeg)),
     Some((R_HIP, Kind::UpperLeg)),

@@ -19,7 +19,7 @@ const LEAST_VARIANCE: f64 = 1e-6;
 const STATURE_VARIANCE: f64 = 0.25;
 /// Stature assumed for a skeleton whose stature is unknown, in metres.
 const ANY_STATURE: f64 = 1.65;
-/// A bone that is off by more than this many standard deviations, including those of its joints, loses its pull.
+/// A bone that is off by more than this many standard deviations, including the uncertainty of its joints, loses its pull.
 const LOSS: f64 = 3.5;
 const MAX_ITERATIONS: usize = 10;
 /// The iteration ends if no joint moves by more than this, in metres.
@@ -95,7 +95,7 @@ struct Problem {
     /// The inverses of the covariances.
     weights: [Matrix3<f64>; N_JOINTS],
     rows: [Option<Row>; N_ROWS],
-    /// Squared residual above which a row loses its pull, in square metres.
+    /// Squared residual above which a row loses its effect, in square metres.
     losses: [f64; N_ROWS],
 }
 

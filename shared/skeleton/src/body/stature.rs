@@ -43,8 +43,8 @@ pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
         vote[0] = (vote[0] - metres).abs();
     }
     sorted.sort();
-    // The first factor converts a median absolute deviation to a standard deviation, the second one converts to that of a median; both
-    // assume a normal distribution.
+    // The first factor converts a median absolute deviation to a standard deviation, the second factor converts this to the standard
+    // deviation of a median; both assume a normal distribution.
     let seen = 1.4826 * sorted.median() / n.sqrt();
     let sd = 1.2533 * (model * metres).max(seen);
     Some(Stature { metres, sd })

@@ -6,7 +6,7 @@ use crate::body::{Covariances, Joints, Kind, Lengths, MIN_FRAMES, N_JOINTS, chec
 
 pub(crate) const NO_COVARIANCES: Covariances = [None; N_JOINTS];
 
-/// Returns the mean body of a stature, standing: facing +x, left at +y, z up.
+/// Returns a mean body of a given stature that stands facing +x, with its left at +y and z up.
 pub(crate) fn standing(stature: f64) -> Joints {
     posed(stature, [[0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]], 0.0)
 }

@@ -1,4 +1,4 @@
-//! Chooses the frames that a stage processes if it cannot process all, so that all stages choose the same ones.
+//! Chooses the frames that a stage processes if it cannot process all frames, so that all stages choose the same frames.
 
 /// Number of consecutive frames that must be too slow, or fast, before the stride changes.
 const N_SLOW: u32 = 3;

@@ -30,7 +30,7 @@ impl<T> Last<T> {
         }
     }
 
-    /// Keeps the message of an input about a frame. Frames may come in any order.
+    /// Keeps the message of an input about a frame. Frames may arrive in any order.
     ///
     /// * `captured_at`: time at which the frame was captured, in nanoseconds.
     pub fn keep(&mut self, input: usize, frame: u64, captured_at: u64, item: T) {

@@ -60,7 +60,7 @@ pub struct Offset {
 
 /// Returns the mean offset of every joint.
 ///
-/// * `people`: found and true joints of every person, those of `skeleton::PARSE14`.
+/// * `people`: found and true joints of every person, in the order of `skeleton::PARSE14`.
 /// * Returns one row per joint; joints that were never found have no row.
 pub fn offsets<'a>(
     people: impl IntoIterator<Item = (Option<&'a [[f64; 2]; N_JOINTS]>, &'a [[f64; 2]; N_JOINTS])>,
