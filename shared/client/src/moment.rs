@@ -15,7 +15,7 @@ pub struct Moment {
     pub running: Arc<Running>,
     /// Number of the frame, the same in all views.
     pub frame: u64,
-    /// Time at which the frame was captured, nanoseconds of `CLOCK_MONOTONIC`.
+    /// Time at which the frame was captured, in nanoseconds of `CLOCK_MONOTONIC`.
     pub captured_at_nanos: u64,
     /// The people, if skeletons were requested. If there are none, [`Skeletons::status`] has the reason.
     pub skeletons: Option<Skeletons>,

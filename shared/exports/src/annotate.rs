@@ -11,7 +11,7 @@ pub const DEVIATIONS: f64 = 2.0;
 /// Number of points of an ellipse.
 const N_POINTS: usize = 40;
 
-/// Draws a frame on the picture of a view, with all people. If there are several, each has the number of the person.
+/// Draws a frame on the picture of a view, with all people. If there are several people, each is labelled with the person's number.
 pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamera) {
     for trial in trials {
         let at = person(canvas, trial, slot, view);

@@ -22,7 +22,7 @@ use store::Store;
 
 /// Length at rest of a bone that was never seen, in metres.
 const UNSEEN_M: f64 = 0.2;
-/// Length up to which a bone is not drawn, metres, because matrices divide by the length.
+/// Length up to which a bone is not drawn, in metres, because matrices divide by the length.
 const SHORTEST_M: f64 = 1e-4;
 /// Size of a keypoint's mark, in metres.
 const MARK_M: f64 = 0.02;
@@ -355,7 +355,7 @@ impl Animation {
     }
 }
 
-/// Returns the standard deviations, metres, in the order of the frames, and the gaps as numbers of first and last frames.
+/// Returns the standard deviations, in metres, in the order of the frames, and the gaps as numbers of first and last frames.
 fn extras(trial: &Trial) -> Value {
     let of_point = |(nth, label): (usize, String)| {
         let deviations: Vec<Option<f64>> = (0..trial.slots.len())

@@ -99,7 +99,7 @@ pub(crate) fn anchor(node: usize) -> Option<usize> {
 /// The tree in one frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Posed {
-    /// Measured positions of the nodes' landmarks, metres, y up.
+    /// Measured positions of the nodes' landmarks, in metres, with y up.
     pub(crate) seen: [Option<Point3<f64>>; N_NODES],
     /// Rotation of every node relative to its parent.
     pub(crate) turn: [UnitQuaternion<f64>; N_NODES],

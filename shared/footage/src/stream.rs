@@ -91,7 +91,7 @@ pub struct StreamFrame {
     /// Time at which the frame was taken by the clock of the camera, in nanoseconds since 1970 began. `None` if the camera does not report
     /// it; RTSP cameras report it some seconds after they were opened.
     pub unix_nanos: Option<i64>,
-    /// Time of the frame in the decoder, nanoseconds, even if the decoder invented it. It equals
+    /// Time of the frame in the decoder, in nanoseconds, even if the decoder invented it. It equals
     /// [`Piece::nanos`](crate::Piece::nanos) to a millisecond.
     pub label_nanos: i64,
 }

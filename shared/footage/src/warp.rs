@@ -45,7 +45,7 @@ pub enum WarpError {
         /// Size of the output.
         output_size: Size,
     },
-    /// The map is singular, not finite, or its translation is too large.
+    /// The map is singular or not finite, or its translation is too large.
     #[error("the map from output to source is singular or unbounded: {map:?}")]
     BadMap {
         /// Map that was refused.

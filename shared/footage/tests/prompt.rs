@@ -14,7 +14,7 @@ const SIZE: Size = Size {
     width: 64,
     height: 48,
 };
-/// Number of pictures before the last one. A decoder reads some of them to identify the stream, and may lose the first.
+/// Number of pictures before the last one. A decoder reads some of them to identify the stream, and may lose the first picture.
 const N: usize = 40;
 /// Number of bytes of the picture after the last one, sent at one byte per second: far longer than the test takes.
 const N_BYTES: u64 = 120;

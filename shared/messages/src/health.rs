@@ -37,7 +37,7 @@ pub struct Health {
     pub peak_memory_bytes: u64,
     /// 1 once the process has reached the end of the stream and forwarded it.
     pub finished: u32,
-    /// Processor time of all threads of the process, milliseconds, modulo 2^32; 0 if the system does not report it.
+    /// Processor time of all threads of the process, in milliseconds, modulo 2^32; 0 if the system does not report it.
     pub cpu_millis: u32,
     /// Total amount of work, if it is known (for `capture`, the number of frames in the footage); otherwise 0.
     pub n_total: u64,

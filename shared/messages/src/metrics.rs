@@ -99,7 +99,7 @@ pub struct CameraCounts {
     pub rate_microhertz: u64,
     /// Time from the common instant until the last used picture was taken, in nanoseconds; negative if it was taken earlier.
     pub off_grid_nanos: i64,
-    /// Median of `off_grid_nanos` over the last pictures, nanoseconds, or [`UNMEASURED`].
+    /// Median of `off_grid_nanos` over the last pictures, in nanoseconds, or [`UNMEASURED`].
     pub skew_nanos: i64,
     /// Rate at which the camera falls behind the common instants, parts per billion, or [`UNMEASURED`]. Negative for a camera
     /// that is faster.

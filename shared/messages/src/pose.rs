@@ -17,9 +17,9 @@ pub struct PoseMessage {
     pub level: u16,
     /// Number of valid entries of the arrays.
     pub n_parts: u16,
-    /// Column of every part, response cells.
+    /// Column of every part, in response cells.
     pub x: [u16; MAX_PARTS],
-    /// Row of every part, response cells.
+    /// Row of every part, in response cells.
     pub y: [u16; MAX_PARTS],
     /// Type of every part, counted from 0.
     pub mixture: [u8; MAX_PARTS],
@@ -85,7 +85,7 @@ pub struct ViewPose {
     pub height: u32,
     /// Size of the responses that were sent as evidence, in bytes; 0 without a subscriber.
     pub evidence_bytes: u64,
-    /// Time from the instant of the frame until the picture was taken, nanoseconds, as in [`FrameHeader`](crate::FrameHeader).
+    /// Time from the instant of the frame until the picture was taken, in nanoseconds, as in [`FrameHeader`](crate::FrameHeader).
     pub skew_nanos: i64,
     /// Region that was searched.
     pub searched: Searched,

@@ -13,7 +13,7 @@ use crate::{MAX_JOINTS, MAX_KEYPOINTS, MAX_PARTS, MAX_PEOPLE, MAX_VIEWS, Stamp, 
 pub struct Joint3d {
     /// Position in the world frame of the rig, in metres.
     pub in_world: [f64; 3],
-    /// Covariance `[xx, xy, xz, yy, yz, zz]`, metres^2.
+    /// Covariance `[xx, xy, xz, yy, yz, zz]`, in square metres.
     pub covariance: [f64; 6],
     /// Root mean square distance of the joint's reprojections from the observations that were used, in pixels.
     pub reprojection_px: f64,
@@ -51,7 +51,7 @@ pub struct FusedView {
 pub struct Sides(pub u32);
 
 impl Sides {
-    /// Left and right were not decided: they are those of the pictures.
+    /// Left and right were not decided: they are named as they appear in the pictures.
     pub const AS_SEEN: Self = Self(0);
     /// Left and right were decided with certainty.
     pub const SURE: Self = Self(1);

@@ -8,8 +8,8 @@ use crate::recorded::{Counts, Joint, Motion, Recorded, Report};
 use crate::rts::Usable;
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
 
-/// Maximum time without a measurement of a joint, in seconds. After a longer time, the joint is smoothed anew, because earlier measurements
-/// carry no information.
+/// Maximum time without a measurement of a joint, in seconds. After a longer time, the joint is smoothed separately, because earlier
+/// measurements carry no information.
 const SPLIT_S: f64 = 1.0;
 
 /// Settings of the smoother.

@@ -7,12 +7,12 @@ use crate::Compatibility;
 /// The energy of the terms between two views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EnergyKind {
-    /// The paper's energy: squared point-to-line distances in both directions, joint type table, and a part
-    /// switched off if either view is expected to be off (see [`SwitchBy`]).
+    /// The paper's energy: squared point-to-line distances in both directions, and a joint type table. A part is switched off if its
+    /// expected error in either view is too large (see [`SwitchBy`]).
     #[default]
     Paper,
-    /// The energy of the authors' program: normalised heat maps, conditional type tables, and a part switched
-    /// off by the supporting view alone.
+    /// The energy of the authors' program: normalised heat maps and conditional type tables. A part is switched off if its expected error
+    /// in the supporting view is too large.
     Released,
 }
 

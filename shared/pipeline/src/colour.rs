@@ -44,7 +44,7 @@ pub(crate) fn trunk_colour(
     (values[0].len() > DOWN * ACROSS / 2).then(|| values.map(median))
 }
 
-/// Returns the share of a sample between two limits.
+/// Returns the position of a sample between two limits, as a share.
 fn at_share([first, last]: [f32; 2], nth: usize, n: usize) -> f32 {
     first + (last - first) * nth as f32 / (n - 1) as f32
 }

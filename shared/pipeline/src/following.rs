@@ -17,7 +17,7 @@ pub enum Follow {
     Last,
     /// The person who is largest in the pictures.
     Largest,
-    /// The person whom most views see, and most clearly.
+    /// The person that most views see, and that they see most clearly.
     Clearest,
 }
 

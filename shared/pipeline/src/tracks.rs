@@ -79,7 +79,7 @@ impl Track {
     /// Returns where to look for a person next.
     ///
     /// The result is the box around the pose, but sides move inward step by step. So if a pose leaves out the head or a leg in one frame,
-    /// the next box still contains it. A pose that is much worse than usual moves no side.
+    /// the next box still contains it. A pose that is much worse than usual does not move any side.
     ///
     /// * `looked_at`: the box of this frame, and the rotation of the picture; `usual_score`: usual score of the person's poses; `None` for
     ///   a new person.

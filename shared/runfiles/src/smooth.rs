@@ -10,7 +10,7 @@ use crate::read::{parse, to_text};
 /// The file `smooth.json`: report on how `pose3d-smooth.jsonl` was made.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmoothReport {
-    /// Cutoff of the low-pass filter, Hz, if there is one.
+    /// Cutoff of the low-pass filter, in Hz, if there is one.
     pub cutoff_hz: Option<f64>,
     /// Delay of the positions, in milliseconds; 0 for methods that look ahead.
     pub delay_ms: f64,
@@ -70,7 +70,7 @@ pub struct SmoothedJoint {
     pub exchanged: usize,
     /// Number of frames that were filled.
     pub filled: usize,
-    /// Spectral density of the joint's jerk, m²/s⁵; `None` if the method does not use it.
+    /// Spectral density of the joint's jerk, in m²/s⁵; `None` if the method does not use it.
     pub jerk_m2_s5: Option<f64>,
     /// Number of frames that were measured.
     pub measured: usize,

@@ -72,7 +72,7 @@ pub struct Summary {
     pub frames_with_views_missing: u64,
     /// The followed person and the other people in view, since the last start of the process.
     pub people: People,
-    /// Height of people in the searched frames, pixels, by name of the view. This is the median, over the results that used the view, of
+    /// Height of people in the searched frames, in pixels, by name of the view. This is the median, over the results that used the view, of
     /// the longer side of the rectangle around a pose's parts. Null if there are none. Counted since the last start of the process.
     pub person_px: BTreeMap<String, Option<f64>>,
     /// Root mean square reprojection error over all joints, in pixels of the frame.
@@ -96,7 +96,7 @@ pub struct Summary {
 /// The people in view.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct People {
-    /// All people that had a skeleton, by id.
+    /// All people who had a skeleton, by id.
     pub each: Vec<PersonSummary>,
     /// Rule that selects the followed person: `last`, `largest` or `clearest`.
     pub follow: String,

@@ -9,7 +9,7 @@ use crate::nullable::nullable;
 /// Measures of the quality of results, computed from the results alone. Shares are from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trust {
-    /// Root mean square deviation of the bone lengths from the bone lengths of real people, standard deviations; the median over the
+    /// Root mean square deviation of the bone lengths from the bone lengths of real people, in standard deviations; the median over the
     /// skeletons.
     #[serde(deserialize_with = "nullable")]
     pub body_deviation: Option<f64>,
@@ -17,7 +17,7 @@ pub struct Trust {
     /// standard deviation.
     #[serde(deserialize_with = "nullable")]
     pub bone_scatter_m: Option<f64>,
-    /// Mean distance of the views' observations from the joints in space, metres, where each distance counts at most 0.3.
+    /// Mean distance of the views' observations from the joints in space, in metres, where each distance counts at most 0.3.
     #[serde(deserialize_with = "nullable")]
     pub disagreement_m: Option<f64>,
     /// Number of results in which a person was found, with a plausible or an implausible body.

@@ -340,7 +340,7 @@ fn spin() -> ! {
     }
 }
 
-/// Returns the processor time that this process has used, milliseconds, modulo 2^32.
+/// Returns the processor time that this process has used, in milliseconds, modulo 2^32.
 fn cpu_millis() -> u32 {
     let used = clock_gettime(ClockId::ProcessCPUTime);
     let millis = used.tv_sec * 1000 + used.tv_nsec / 1_000_000;

@@ -63,9 +63,9 @@ impl Service {
 
     /// Returns the time to wait for receivers before the first message.
     ///
-    /// All processes of a deployment start at the same time, but some take longer than others. A restarted process finds the others
-    /// running. With lossless delivery, a late receiver would miss earlier messages. A sender therefore waits for receivers to start as
-    /// long as it waits for room.
+    /// All processes of a deployment start at the same time, but some take longer than others. A restarted process finds the other
+    /// processes already running. With lossless delivery, a late receiver would miss earlier messages. A sender therefore waits for
+    /// receivers to start as long as it waits for room.
     ///
     /// * `deadline`: the patience after the start, and for receivers that were given up.
     pub fn patience_at_start(&self, deadline: Duration) -> Patience {

@@ -63,7 +63,7 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
 
     /// Records the latencies of a message that has just been sent.
     ///
-    /// * `waited`: time that the frame waited in this process, nanoseconds, if it is not recorded elsewhere.
+    /// * `waited`: time that the frame waited in this process, in nanoseconds, if it is not recorded elsewhere.
     pub fn account(&self, turn: &Turn, sent_at: u64, waited: Option<u64>) {
         self.service.health().passed(&Passage {
             waiting: waited,

@@ -16,7 +16,7 @@ pub trait Receive<M> {
     /// Returns a [`ReceiveError`] on failure.
     fn receive(&self) -> Result<Option<M>, ReceiveError>;
 
-    /// Returns the identifiers of the ports that may send. A restarted sender has a new one.
+    /// Returns the identifiers of the ports that may send. A restarted sender has a new identifier.
     fn senders(&self) -> Vec<u128>;
 }
 
@@ -140,7 +140,7 @@ impl<R> Port<R> {
         self.sender == Sender::All
     }
 
-    /// Returns the identifiers of the ports that may send. A restarted sender has a new one.
+    /// Returns the identifiers of the ports that may send. A restarted sender has a new identifier.
     pub fn senders<M>(&self) -> Vec<u128>
     where
         R: Receive<M>,

@@ -87,7 +87,7 @@ pub fn tau_from_message(
 /// Adds the prediction for one of the two views of a pair.
 ///
 /// * `side`: 0 for the first view, 1 for the second.
-/// * `age`: age of the prediction, frames.
+/// * `age`: age of the prediction, in frames.
 /// * `sigma_px`: expected error of every part, in pixels of the frame.
 ///
 /// # Errors

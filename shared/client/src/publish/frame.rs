@@ -12,7 +12,7 @@ pub struct Frame<'a> {
     pub session: u64,
     /// Number of the frame.
     pub frame: u64,
-    /// Time at which the frame was captured, nanoseconds of `CLOCK_MONOTONIC`.
+    /// Time at which the frame was captured, in nanoseconds of `CLOCK_MONOTONIC`.
     pub captured_at_nanos: u64,
     /// Person's identity within the run, counted from 1; 0 in a frame without people.
     pub person: u64,

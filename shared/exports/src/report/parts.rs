@@ -18,7 +18,7 @@ pub fn begin(title: &str) -> Html {
     out
 }
 
-/// Writes the verdict: usable, or not, with the doubts.
+/// Writes the verdict (usable or not), with the doubts.
 ///
 /// * `good`, `bad`: texts without and with doubts.
 pub fn verdict(out: &mut Html, (good, bad): (&str, &str), doubts: &[String]) {

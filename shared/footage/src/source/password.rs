@@ -70,7 +70,7 @@ fn push_address(out: &mut String, address: &str) {
     }
 }
 
-/// Minimum length of a secret that is searched for, characters. A shorter text may occur anywhere.
+/// Minimum length of a secret that is searched for, in characters. A shorter text may occur anywhere.
 const SHORTEST: usize = 3;
 
 /// Removes the password of one address from a message, even if the message repeats only the password.

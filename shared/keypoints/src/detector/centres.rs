@@ -7,7 +7,7 @@ const MOST_LOGARITHM: f64 = 8.0;
 
 /// Returns the boxes of the cells that are higher than their neighbours, in pixels of the input. Of equal neighbours, the first one counts.
 ///
-/// * `values`: log-odds, then logarithms of the distances to left, top, right and bottom, cells, each of them `[rows, columns]`.
+/// * `values`: log-odds, then logarithms of the distances to left, top, right and bottom, in cells, each of them `[rows, columns]`.
 /// * `stride`: number of pixels per cell.
 /// * `least`: minimum score of a box.
 pub(super) fn boxes(

@@ -19,7 +19,7 @@ pub struct Run {
     pub times: Vec<f64>,
     /// The frame number of every instant.
     pub frames: Vec<u64>,
-    /// The people, by ascending id; all over the same instants.
+    /// The people, by ascending id; all of them have the same instants.
     pub people: Vec<Person>,
     /// Description of the part that is missing at the end of the file.
     pub cut: Option<String>,
@@ -149,7 +149,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     let mut people: BTreeMap<u64, Gathered> = BTreeMap::new();
-    // If there are never two people at once, all ids are one person, who gets another id after a gap or a jump.
+    // If there are never two people at once, all ids belong to one person, who gets another id after a gap or a jump.
     let (mut one, mut is_one) = (Gathered::default(), true);
     let path = folder.join(FrameLine::FILE);
     let cut = read_lines(folder, |nth, line| {

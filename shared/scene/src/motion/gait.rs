@@ -8,7 +8,7 @@ use crate::body::{FOOT, FOREARM, SHIN, THIGH, UPPER_ARM};
 
 /// Parameters of a gait.
 struct Gait {
-    /// Strides (two steps) per second, and length of a stride in heights of the person.
+    /// Strides (two steps) per second, and length of a stride in multiples of the person's height.
     hertz: f64,
     stride: f64,
     /// Centre and swing of the hips, and fold of the knees in swing and in stance, in degrees.

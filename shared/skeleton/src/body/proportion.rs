@@ -125,13 +125,13 @@ impl Kind {
     ///
     /// Sources, by their short names:
     ///
-    /// * *D&C*: Drillis & Contini (1966), Body segment parameters, as in figure 4.1 of Winter, *Biomechanics and Motor
-    ///   Control of Human Movement*: between joints.
-    /// * *ANSUR II*: Gordon et al. (2014), 2012 Anthropometric Survey of U.S. Army Personnel, Natick/TR-15/007: 4082
-    ///   men, 1986 women, between landmarks on the skin. `people` is the standard deviation of the share divided by its mean,
-    ///   over the shares of the individuals in its public data: upper arm 0.1909 ± 0.0062, forearm 0.1511 ± 0.0067, thigh
-    ///   0.2476 ± 0.0113, shank 0.2267 ± 0.0088, trunk 0.3052 ± 0.0154, biacromial breadth 0.2328 ± 0.0114, hip breadth
-    ///   0.2036 ± 0.0167. There is no value for the head; it uses the spread of the trunk.
+    /// * *D&C*: Drillis & Contini (1966), Body segment parameters, as in figure 4.1 of Winter, *Biomechanics and Motor Control of Human
+    ///   Movement*: lengths between joints.
+    /// * *ANSUR II*: Gordon et al. (2014), 2012 Anthropometric Survey of U.S. Army Personnel, Natick/TR-15/007: lengths between landmarks
+    ///   on the skin, of 4082 men and 1986 women. `people` is the standard deviation of the share divided by its mean, over the shares of
+    ///   the individuals in its public data: upper arm 0.1909 ± 0.0062, forearm 0.1511 ± 0.0067, thigh 0.2476 ± 0.0113, shank 0.2267 ±
+    ///   0.0088, trunk 0.3052 ± 0.0154, biacromial breadth 0.2328 ± 0.0114, hip breadth 0.2036 ± 0.0167. There is no value for the head; it
+    ///   uses the spread of the trunk.
     ///
     /// | kind | adult |
     /// |---|---|

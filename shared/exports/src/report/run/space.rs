@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-/// A point in space, metres in the world.
+/// A point in space, in metres in the world.
 pub type Point = [f64; 3];
 
 /// Everything that is drawn in space.
@@ -25,7 +25,7 @@ pub struct Space {
 pub struct Eye {
     /// Name of the camera.
     pub name: String,
-    /// Centre of the camera, metres in the world.
+    /// Centre of the camera, in metres in the world.
     pub at: Point,
     /// Viewing direction of the camera, of length 1.
     pub axis: Point,

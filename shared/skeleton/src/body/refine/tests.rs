@@ -8,7 +8,7 @@ fn depth_noise() -> Covariances {
     [Some(Matrix3::from_diagonal(&Vector3::new(25e-4, 1e-4, 1e-4))); N_JOINTS]
 }
 
-/// Returns the mean error of joints before and after, metres, over noisy frames of a person in all postures.
+/// Returns the mean error of joints before and after refinement, in metres, over noisy frames of a person in all postures.
 fn errors(body: impl Fn(&Joints) -> Joints, tall: f64, lengths: Option<&Lengths>) -> [f64; 2] {
     let mut random = fastrand::Rng::with_seed(11);
     let mut sum = [0.0; 2];
