@@ -38,11 +38,12 @@ pub struct Refined {
 
 /// Moves joints so that bones get their expected lengths, in proportion to the uncertainty of the joints.
 ///
-/// Minimises the squared Mahalanobis distances of the joints from their triangulated positions. To this sum, it adds for every bone `ρ(((|a
-/// - b| - expected) / spread)²)`. The expected length is the learned length. Its spread covers the remaining uncertainty and the effect of
-/// posture, at least 1.5 cm. If nothing was learned, the expected length is the bone's share of the stature, with the spread of people; the
-/// stature is then estimated along with the joints. The bones of the two sides are equal within 1.5 cm. The loss `ρ(s) = s / (1 + s / c²)`
-/// releases a bone that neither its spread nor the covariances of its joints explain, so that it does not drag its neighbours.
+/// Minimises the squared Mahalanobis distances of the joints from their triangulated positions. For every bone, it adds
+/// `ρ(((|a - b| - expected) / spread)²)`. The expected length is the learned length. Its spread covers the remaining uncertainty and the
+/// effect of posture, at least 1.5 cm. If nothing was learned, the expected length is the bone's share of the stature, with the spread of
+/// people; the stature is then estimated along with the joints. The bones of the two sides are equal within 1.5 cm. The loss
+/// `ρ(s) = s / (1 + s / c²)` releases a bone that neither its spread nor the covariances of its joints explain, so that it does not drag
+/// its neighbours.
 ///
 /// The method is Gauss-Newton with step halving. The normal equations are solved in the space of the bones, with 19 rows for up to 42
 /// coordinates. The covariances of the result are blocks of the inverse of the normal matrix. They are only as good as the given
