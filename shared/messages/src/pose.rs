@@ -106,8 +106,8 @@ pub struct ViewPose {
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
     /// Median colour of the trunk of every candidate: red, green and blue from 0 to 1, or [`NO_COLOUR`]. Used by the network method only.
     pub colours: [[f32; 3]; MAX_CANDIDATES],
-    /// The extra keypoints of one candidate after the other, for as many candidates as fit: `[column, row, standard deviation along one
-    /// axis]`, in pixels of the frame. The deviation is 0 for a keypoint that was not found.
+    /// The extra keypoints of one candidate after the other, for as many candidates as fit:
+    /// `[column, row, standard deviation along one axis]`, in pixels of the frame. The deviation is 0 for a keypoint that was not found.
     pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],
 }
 
