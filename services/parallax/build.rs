@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-/// Cargo features that make a difference to the user.
+/// Cargo features that `--version` reports.
 const FEATURES: [&str; 5] = ["gpu", "hosts", "libtorch", "ort", "parquet"];
 
 fn main() {

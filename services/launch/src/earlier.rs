@@ -34,7 +34,7 @@ const MANIFEST: &str = ".export.json";
 ///
 /// # Errors
 ///
-/// Fails if such a deployment is running, or its files in shared memory cannot be created.
+/// Fails if a deployment with the same name is running, or the files in shared memory cannot be created.
 pub fn check_name(deployment: &Deployment) -> Result<(), Failure> {
     if deployment.hosts.is_empty() {
         drop(Namespace::new(&deployment.name)?.acquire()?);
@@ -42,7 +42,7 @@ pub fn check_name(deployment: &Deployment) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a folder with results of an earlier run, or with files of the same names that no run has written.
+/// Refuses a folder with results of an earlier run, or with files of the same names that were not written by a run.
 ///
 /// * `force`: true to allow that the results of an earlier run are replaced. Files that were exported from them are removed. The results
 ///   themselves are kept until the new ones are complete.

@@ -27,7 +27,7 @@ pub struct Part {
     pub every: u64,
     /// Start in each camera's footage, in seconds.
     pub from_s: f64,
-    /// Duration in seconds; `None` up to the end.
+    /// Duration in seconds; `None` to use the footage up to its end.
     pub seconds: Option<f64>,
 }
 

@@ -19,13 +19,13 @@ pub(crate) struct FindEvery {
 impl FindEvery {
     /// Chooses the intervals.
     ///
-    /// * `rate_hz`: rate of the frames that are searched. It is not known for pictures in a folder, which may be of any time. In such
-    ///   pictures nobody is followed.
+    /// * `rate_hz`: rate of the frames that are searched. It is not known for pictures in a folder, which may have been taken at any time.
+    ///   Nobody is followed in such pictures.
     pub(crate) fn new(config: &Config, rate_hz: Option<f64>) -> Self {
         /// How fast people come and go depends on time, not on frames.
         const SECONDS: f64 = 0.5;
         const SECONDS_OF_SEVERAL: f64 = 0.125;
-        /// Not more often than this, because the network follows the people that it sees.
+        /// Minimum interval in frames. Shorter intervals are not needed, because the network follows the people that it sees.
         const OFTEN: f64 = 10.0;
         let each = match (config.find_every, rate_hz) {
             (Some(every), _) => [every; 2],

@@ -81,9 +81,9 @@ impl Planned {
         self.plan.processes.iter().map(|process| process.name.as_str())
     }
 
-    /// Returns the same run with the beginning that another host has set.
+    /// Returns the same run with the start time that another host has set.
     ///
-    /// * `session`: beginning of the run according to the host that fuses; `None` if the run begins here.
+    /// * `session`: start of the run according to the host that fuses; `None` if the run starts here.
     #[must_use]
     pub fn begun(mut self, session: Option<u64>) -> Self {
         self.plan.session = session.unwrap_or(self.plan.session);

@@ -288,7 +288,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let plans = prepared.plans();
-    // The process before waits for late views itself, so this one waits twice as long.
+    // The preceding process already waits for late views, so this process waits twice as long.
     let patience = 2 * resolved.patience();
     let n_consumers = topology.receivers_of(&topic::skeletons());
     if topology.has_maps() {

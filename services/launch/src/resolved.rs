@@ -36,7 +36,7 @@ pub struct Resolved {
     pub replay: Option<Replay>,
 }
 
-/// Key for the answers of `ffprobe`, beside the keys of [`Resolved`].
+/// Key for the answers of `ffprobe`, which are stored beside the keys of [`Resolved`].
 const ANSWERS: &str = "ffprobe";
 
 /// The services, in pipeline order.

@@ -16,14 +16,14 @@ use crate::resolved::Resolved;
 
 /// The largest ratio of two frame rates at which frames can be paired by number.
 const MAX_RATE_RATIO: f64 = 1.02;
-/// Minimum range of brightness over the cells of an image, of 255. Images with less contrast are not compared.
+/// Minimum range of brightness over the cells of an image, out of 255. Images with less contrast are not compared.
 const MIN_CONTRAST: f64 = 16.0;
 /// Warning about footage without a frame rate.
 const NO_RATE: &str = "the frame rate of the footage is not known: times, speeds and pose3d.trc are left out; \
     set `capture.frame_rate_hz`";
-/// If the brightest value of a picture is below this, of 255, the picture uses a small part of its range.
+/// If the brightest value of a picture is below this value (out of 255), the picture uses only a small part of the range.
 const LEAST_BRIGHTEST: u8 = 64;
-/// Two images look the same if their mean difference of brightness over the cells is below this, of 255.
+/// Two images look the same if their mean difference of brightness over the cells is below this value (out of 255).
 const MIN_DIFFERENCE: f64 = 1.0;
 /// Number of cells of the brightness grid, in each direction.
 const CELLS: usize = 32;
@@ -194,7 +194,7 @@ fn without_rate(resolved: &Resolved) -> Option<String> {
     })
 }
 
-/// Warns of live cameras with different rates. Their pictures are paired by time, so a slower camera only has no picture for some
+/// Warns of live cameras with different rates. Their pictures are paired by time, so a slower camera merely lacks a picture at some
 /// instants.
 fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<String>, Failure> {
     if ratio <= MAX_RATE_RATIO || resolved.deployment.capture.frame_rate_hz.is_some() {

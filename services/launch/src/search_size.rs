@@ -27,7 +27,7 @@ pub struct CameraSize {
     pub scale: f64,
     /// Width and height of the frames, in pixels.
     pub frame_size: [u32; 2],
-    /// Height of a person in the camera's image, in pixels. The person is in the space that the camera shares with others.
+    /// Height of a person in the camera's image, in pixels. The person is in the space that the camera shares with other cameras.
     pub person_px: Option<f64>,
     /// Height of the same person in the frames, in pixels.
     pub person_in_frame_px: Option<f64>,

@@ -188,7 +188,7 @@ impl Report {
     pub fn kind(&self) -> Option<ExitKind> {
         let budget = self.budget.as_ref();
         if budget.is_some_and(Budget::is_exceeded) {
-            // This also holds for an interrupted run, because live cameras always run until they are stopped.
+            // This also applies to an interrupted run, because live cameras always run until they are stopped.
             Some(ExitKind::Limit)
         } else if self.interrupted {
             Some(ExitKind::Interrupted)
@@ -213,7 +213,7 @@ impl Report {
                 || self.views.iter().any(|view| view.is_lost(self.is_lossless)))
     }
 
-    /// Returns the reasons in the results themselves not to trust them.
+    /// Returns the reasons, found in the results, not to trust the results.
     fn doubts(&self) -> Vec<Doubt> {
         let summary = self.recorded.summary();
         summary.map_or_else(Vec::new, |summary| summary.trust.doubts())

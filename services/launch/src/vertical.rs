@@ -27,8 +27,8 @@ const SAME_ROLL: f64 = 12.0;
 const NEAR_AXIS: f64 = 6.0;
 /// If two directions differ by less than this angle, in degrees, only one is tried.
 const SAME_DIRECTION: f64 = 10.0;
-/// Scores that differ by less than this count as equal. Of directions with equal scores the first is taken; that of level cameras
-/// comes first.
+/// Scores that differ by less than this count as equal. Among directions with equal scores, the first is used. The direction for level
+/// cameras comes first.
 const SAME_SCORE: f64 = 0.02;
 
 /// The upward direction that was found, and the reason for the choice.
@@ -114,7 +114,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     Ok(Some(found))
 }
 
-/// Returns the hypothesis with the highest score; of equal hypotheses, the first.
+/// Returns the hypothesis with the highest score; if several have the same score, the first of them.
 fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
     let score = |hypothesis: &Hypothesis| hypothesis.score.unwrap_or(f64::NEG_INFINITY);
     let best = tried.iter().map(score).fold(f64::NEG_INFINITY, f64::max);
@@ -273,7 +273,7 @@ impl<'a> Images<'a> {
 }
 
 impl<'a> View<'a> {
-    /// Reads the images. Returns `None` if the footage cannot be read; that is reported when it is read later.
+    /// Reads the images. Returns `None` if the footage cannot be read. The error is reported when the footage is read later.
     fn new(
         entry: &deployment::capture::Camera,
         camera: &'a Camera,

@@ -81,7 +81,7 @@ pub(crate) fn footage_failure(error: FootageError) -> Failure {
     Failure::new(ExitKind::Input, error)
 }
 
-/// The sights of the board by one camera.
+/// All sights of the board in the footage of one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// Width and height of the camera's pictures.
@@ -100,7 +100,7 @@ pub struct Seen {
     pub pictures: BTreeMap<usize, [usize; 2]>,
 }
 
-/// The sights of the board by all cameras.
+/// All sights of the board in the footage of all cameras.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Looked {
     /// The board that was found in the pictures.

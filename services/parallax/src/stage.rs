@@ -3,7 +3,7 @@
 use clap::builder::{MapValueParser, PossibleValue, PossibleValuesParser, TypedValueParser as _};
 use deployment::Stage;
 
-/// Describes the recorded messages that a replay from this stage sends, in addition to those of a replay from the stage before.
+/// Describes the recorded messages that a replay from this stage sends, but a replay from the previous stage does not.
 fn taken(from: Stage) -> &'static str {
     match from {
         Stage::Capture => "Start from the footage, and send no recorded messages",

@@ -37,7 +37,7 @@ fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let (found, truth) = (rig(&case.path("room.toml")), rig(&case.path("rig.toml")));
     for (found, truth) in found.cameras().iter().zip(truth.cameras()) {
-        // In the scene, the floor is at z = 0.
+        // The floor of the scene is at z = 0.
         let off = found.centre_in_world().z - truth.centre_in_world().z;
         assert!(off.abs() < 0.05, "{}: {off} m", found.name);
     }

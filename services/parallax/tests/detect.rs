@@ -91,7 +91,7 @@ fn a_picture_is_searched_with_its_orientation_tag_applied() {
         assert!(ended.stdout.contains(said), "{by:?}: {}", ended.stdout);
     }
 
-    // The calibration is of the upright picture, so a deployment applies the tag and reports this.
+    // The camera was calibrated with the upright picture, so a deployment applies the tag and reports this.
     fs::copy(case.path("turned.png"), case.path("a/0000.png")).unwrap();
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     for words in ["orientation tag", "camera \"a\"", "which is applied"] {

@@ -49,7 +49,7 @@ mod long {
             let empty = empty_room(&case, camera);
             for frame in (0..N_FRAMES).filter(|i| !THERE.contains(i)) {
                 let mut noisy = empty.clone();
-                // Noise is added, because identical pictures would be those of a frozen camera.
+                // Noise is added, because identical pictures would look like those of a frozen camera.
                 let mut random = fastrand::Rng::with_seed(frame as u64);
                 for value in noisy.iter_mut() {
                     *value = value.saturating_add(random.u8(..8));

@@ -117,7 +117,7 @@ fn check_positions(case: &Case) {
     }
 }
 
-/// Returns the content that other programs read from a folder, by format. Formats that Python cannot read are left out, and named.
+/// Returns the content that other programs read from a folder, by format. Formats that Python cannot read are left out, with a message.
 fn read_by_python<'a>(folder: &Path, formats: &[&'a str]) -> Vec<(&'a str, Value)> {
     const SCRIPT: &str = include_str!("export.py");
     let read = Command::new("python3")
@@ -168,7 +168,7 @@ fn check_with_python(case: &Case) {
     }
 }
 
-/// There are missing joints anywhere in a row, missing rows, and more frames than fit into 16 bits.
+/// The run has missing joints anywhere in a row, missing rows, and more frames than fit into 16 bits.
 #[test]
 fn programs_of_others_open_gaps_and_long_files() {
     let folder = tempfile::tempdir().unwrap();

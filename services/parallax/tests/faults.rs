@@ -68,7 +68,7 @@ impl Signalled {
         assert_eq!(counted + reasons.len() as u64, self.lines.len() as u64);
     }
 
-    /// Returns the views that are present in each frame without all views.
+    /// For each frame that lacks a view, returns the views that are present.
     fn incomplete(&self) -> Vec<&Value> {
         let views = self.lines.iter().map(|line| &line["views_present"]);
         views.filter(|view| **view != json!(["a", "b", "c"])).collect()
@@ -90,14 +90,14 @@ fn expected_errors() -> String {
     table
 }
 
-/// Sends a process a signal that asks it to end. No more may be lost than after a crash.
+/// Sends a process a signal that asks it to end. No more frames may be lost than after a crash.
 fn terminate(name: &str, victim: &str) -> Signalled {
     let run = Signalled::new(PACED, name, victim);
     let number = HashMap::from([("TERM", 15), ("INT", 2), ("HUP", 1)])[name];
     let message = format!("ended by signal {number}");
     assert!(run.stderr.contains(&message), "{}", run.stderr);
     run.assert_every_frame();
-    // The process continues for two seconds, then is restarted as after a crash.
+    // The process continues for two seconds, and is then restarted as after a crash.
     run.assert_reasons(&["process lost", "recorder lost"], 40);
     run
 }
@@ -171,7 +171,7 @@ fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
     let run = Signalled::new(PACED, "KILL", "fuse --index 0");
     run.assert_every_frame();
     assert_eq!(run.incomplete(), Vec::<&Value>::new());
-    // The other worker has one of the three pairs.
+    // The other worker solves one of the three pairs.
     let pairs = run.lines.iter().map(|line| &line["people"][0]["pairs"]);
     let pairs: Vec<&Value> = pairs.collect();
     assert!(

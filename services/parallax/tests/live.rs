@@ -44,7 +44,7 @@ fn assert_plausible(it: &Value) {
         "{it:#}"
     );
     let number = |key: &str| measured[key].as_f64().unwrap();
-    // There are 20 pictures per second. A loaded machine is behind and then catches up, so the last period may have none.
+    // There are 20 pictures per second. A loaded machine is behind and then catches up, so the last period may have no pictures.
     assert!(number("sent") / number("seconds") > 0.01, "{it:#}");
     assert!(number("sent_per_second") < 200.0, "{it:#}");
     for it in measured["times"].as_array().unwrap() {

@@ -209,7 +209,7 @@ fn found(case: &Case) -> Vec<(String, f64)> {
     frames.collect()
 }
 
-/// A third of a cell of the maps. The peaks of this artificial network are squares with a flat top.
+/// Largest accepted error, in metres: a third of a cell of the maps. The peaks of this artificial network are squares with a flat top.
 const NEAR_M: f64 = 0.035;
 
 #[track_caller]
@@ -231,9 +231,8 @@ fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
         let lines = std::fs::read_to_string(case.path("out/pose2d.jsonl")).unwrap();
         ["full", "tracked"].map(|name| lines.matches(&format!("\"search\":\"{name}\"")).count())
     };
-    // Pictures in a folder may be of any time, so boxes are searched in every picture. At 20 frames per second, boxes are searched in the
-    // first
-    // frame and in every tenth. The views take turns: their second search is in frames 10, 8, 5 and 3.
+    // Pictures in a folder may have been taken at any time, so boxes are searched in every picture. At 20 frames per second, boxes are
+    // searched in the first frame and in every tenth frame. The views take turns: their second searches are in frames 10, 8, 5 and 3.
     assert_eq!(searched(&[]), [160, 0]);
     assert_eq!(searched(&["--set", "capture.frame_rate_hz=20"]), [19, 141]);
 }
@@ -337,8 +336,8 @@ fn what_belongs_to_the_papers_method_is_refused_beside_a_network() {
     }
 }
 
-/// Returns the position of a keypoint in a frame: that of the joint with its name, or a point at the ankle, between the hips, or at the
-/// head.
+/// Returns the position of a keypoint in a frame: the position of the joint with the same name, or a point at the ankle, between the hips,
+/// or at the head.
 fn place(name: &str, frame: f64) -> Point3<f64> {
     let joints = joints_at(frame);
     let named = |name: &str| {
@@ -490,8 +489,8 @@ fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
     run(&case, &[]);
     errors.push(errors_mm(&case));
     let (without, told, untold) = (errors[0], errors[1], errors[2]);
-    // For joints and extra keypoints: largest error that remains if the skew is known, and factor by which it is larger otherwise.
-    // Joints and their velocities depend on evidence whose positions are rounded to cells.
+    // For joints and for extra keypoints: the largest error that remains if the skew is known, and the factor by which the error is larger
+    // if the skew is unknown. Joints and their velocities depend on evidence whose positions are rounded to cells.
     for (which, most, more) in [(0, 2.5, 1.5), (1, 2.5, 2.0)] {
         let [told, untold] = [told, untold].map(|mm| mm[which] - without[which]);
         assert!(told < most && untold > more * told, "{errors:?}");

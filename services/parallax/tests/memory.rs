@@ -79,7 +79,7 @@ fn a_pose_process_stays_under_300_megabytes_at_640x480() {
         }
     }
     let ended = case.run();
-    // There is nobody in noise, and the verdict says so. Only the memory is measured.
+    // Noise shows no person, as the verdict states. Only the memory is measured.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let summary = &report["recorded"]["summary"];

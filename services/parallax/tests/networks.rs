@@ -356,7 +356,7 @@ fn a_network_that_is_cut_short_or_gives_no_numbers_is_refused() {
     let case = case("network-broken");
     let bytes = network("Relu").file();
     case.write("short.onnx", &bytes[..bytes.len() / 2]);
-    // If the picture is black, this is the logarithm of 0.
+    // For a black picture, this network computes the logarithm of 0.
     case.write("log.onnx", network("Log").file());
     let with = |name: &str| {
         let card = ["--card", "card.toml"];

@@ -280,7 +280,7 @@ fn different_frame_rates_are_refused_with_both_numbers() {
 #[test]
 fn a_dry_run_fails_where_the_run_would_not_begin() {
     let case = Case::new("huge", &[2; 16], PLAIN);
-    // This is larger than the memory of usual machines: a frame has 0.8 GB, and exists seven times.
+    // These frames need more memory than usual machines have: a frame has 0.8 GB, and is stored seven times.
     case.edit(
         "deployment.toml",
         "upright",

@@ -37,9 +37,8 @@ fn an_interrupted_run_ends_cleanly() {
 
 #[test]
 fn signals_to_all_processes_at_once_end_the_run_in_order() {
-    // Signals as systemd sends them to a unit (to all processes, in any group), `timeout` to a command (twice), and a closing terminal to
-    // its
-    // processes (twice).
+    // Signals as they are sent by systemd to a unit (to all processes, in any group), by `timeout` to a command (twice), and by a closing
+    // terminal to its processes (twice).
     for (name, signals, to_all) in [
         ("unit", &["TERM"][..], true),
         ("timeout", &["TERM", "TERM"], false),

@@ -150,7 +150,7 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
         let found = step.run(answers, &[]).joints.into_iter();
         found.map(|joint| joint.unwrap().in_world).collect()
     };
-    // The first view has another frame than the other views.
+    // The first view answers for a different frame than the other views.
     let mut answers = answers(&plans, &[7, 0, 0, 0]);
     let unaware = joints(&answers, 1.0);
     let first = answers[0].take();

@@ -64,8 +64,8 @@ fn fast_stages_lose_no_frames() {
 
 #[test]
 fn slow_stages_process_fewer_frames_and_every_dropped_one_is_counted() {
-    // There are more frames per second than any machine can process. That slow views choose the same frames is tested with
-    // `stage::join::Cadence`. How soon they do so depends on the load of the machine.
+    // The footage has more frames per second than any machine can process. The tests of `stage::join::Cadence` check that slow views choose
+    // the same frames. How soon they do so depends on the load of the machine.
     let hurried = PACED.replace("= 20", "= 200");
     let more = format!("{LIVE}{hurried}size = [240, 320]\n");
     let case = Case::new("slow", &[300; 3], &more);
@@ -83,7 +83,7 @@ fn footage_without_a_frame_rate_ends_at_once_and_dropped_frames_are_counted() {
     let case = Case::new("unpaced", &[60; 2], LIVE);
     let ended = case.run();
     let run = Finished::new(&case, &ended);
-    // If no frame of both views was in time, there is no pose in space, and the report states this.
+    // If there was never a frame of both views in time, there is no pose in space, and the report states this.
     let is_empty = run.report["recorded"]["summary"]["frames_with_pose"] == 0;
     let expected = if is_empty { 7 } else { 0 };
     assert_eq!(ended.status.code(), Some(expected), "{:#}", run.report);

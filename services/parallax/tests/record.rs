@@ -146,7 +146,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
     let poses = &recording.tracks["view-pose/v8/1"].entries;
     let entry = poses.iter().find(|pose| pose.frame == Some(3)).unwrap();
-    // This is after stamp and times, in the content. Six changed bytes of a pose move a joint.
+    // This position is in the content, after the stamp and the times. Six changed bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
     file[at..at + 6].iter_mut().for_each(|byte| *byte ^= 0x15);
     case.write("run.mcap", &file);
@@ -212,7 +212,7 @@ fn a_sender_that_starts_after_the_last_result_is_not_blocked() {
     ];
     let patient = ["--set", patient[0], "--set", patient[1]];
     let mut started = case.start(&[&arguments[..], &patient].concat());
-    // The frames of this view are not used: all results exist before it starts.
+    // The frames of this view are not used, because all results exist before this process starts.
     let pid = started.pid_of("replay --stage capture --index 1");
     signal("STOP", pid.into());
     started.until("all results", |folder| {

@@ -73,7 +73,7 @@ fn an_unknown_deployment_name_is_refused() {
 #[test]
 fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
     let case = Case::new("stays", &[2; 2], "");
-    // The folder is first beside the deployments, then behind a link in place of their directory.
+    // First, the foreign folder is beside the deployments. Then a link replaces the directory of the deployments.
     let script = "mount -t tmpfs tmpfs /dev/shm\n\
         base=/dev/shm/px-$(id -u); name=$(sed -n 's/^name = \"\\(.*\\)\"/\\1/p' deployment.toml | head -n 1)\n\
         mkdir -m 700 $base; mkdir $base/photos $base/$name\n\

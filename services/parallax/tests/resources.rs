@@ -157,7 +157,7 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
             file.and_then(|file| file.set_len(0)).ok();
         }
     }
-    // Usually the run ends at once. It may also wait for a truncated file, and notices this after a minute.
+    // Usually the run ends at once. It may also wait for a truncated file, and notice this after a minute.
     let ended = started.wait_among_others();
     assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
     let causes = ["is gone or damaged", "has not answered the supervisor"];

@@ -147,7 +147,8 @@ fn what_tells_nothing_is_refused_and_nothing_is_written() {
     assert!(ended.stderr.contains("c7"), "{}", ended.stderr);
 }
 
-/// Writes a video with one picture in ten seconds, and with sounds that begin at some times. Without ffmpeg, returns false with a message.
+/// Writes a video with one picture every ten seconds, and with sounds that begin at some times. Without ffmpeg, returns false with a
+/// message.
 #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 fn video(case: &Case, name: &str, sounds_s: &[f64], length_s: f64) -> bool {
     let mut samples = vec![0_i16; (length_s * 8000.0) as usize];

@@ -1,4 +1,4 @@
-//! Tests of whole runs that use facts from the files of cameras: numbers with gaps, orientation tags.
+//! Tests of whole runs that use facts from the files of cameras, such as frame numbers with gaps and orientation tags.
 
 use std::fs;
 

@@ -80,7 +80,7 @@ impl Page {
         self.socket.send(Message::Text(text.into())).unwrap();
     }
 
-    /// Returns the result of `take` for the first message for which it has one.
+    /// Returns the first result that `take` returns for a message.
     fn until<T>(&mut self, what: &str, mut take: impl FnMut(&Message) -> Option<T>) -> T {
         let begin = Instant::now();
         loop {

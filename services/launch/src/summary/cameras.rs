@@ -63,7 +63,7 @@ pub(super) fn live(outcome: &Outcome) -> String {
     text
 }
 
-/// Returns the line on the pictures of a live camera.
+/// Returns the line about the pictures of a live camera.
 fn line((name, it): &(String, CameraCounts)) -> String {
     let mut parts = vec![format!(
         "{} pictures taken, {} lost by the camera, {} used",

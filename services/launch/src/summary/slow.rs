@@ -2,7 +2,7 @@
 
 use runfiles::Summary;
 
-/// The warning is given if a smaller share of the frames has a result.
+/// The warning is given if the share of frames with a result is below this.
 const MOST: f64 = 0.8;
 
 /// Returns a line with the number of frames that the machine had time for, and what would help. Returns `None` if it had time for most

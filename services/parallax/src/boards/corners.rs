@@ -19,8 +19,9 @@ type Corners = Vec<(usize, Point2<f64>)>;
 
 /// Reads a table of corners that this or another program has found.
 ///
-/// * `names`: the names of the cameras. A `cam_id` is one of these names, or the number at the end of one.
-/// * Returns the sights, and the points of the board by their numbers, in metres. A number that does not occur has the point (0, 0).
+/// * `names`: the names of the cameras. A `cam_id` is one of these names, or the number at the end of a name.
+/// * Returns the sights, and the points of the board in metres, indexed by their numbers. A number that does not occur has the point (0,
+///   0).
 ///
 /// # Errors
 ///

@@ -16,7 +16,7 @@ pub struct FrameTable {
 }
 
 impl FrameTable {
-    /// Returns the frames of a camera. The table has its name, or the number at the end of its name.
+    /// Returns the frames of a camera. The table lists the camera by its name, or by the number at the end of its name.
     pub fn of(&self, camera: &str) -> Option<&[usize]> {
         let digits =
             camera.len() - camera.trim_end_matches(|letter: char| letter.is_ascii_digit()).len();

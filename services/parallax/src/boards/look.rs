@@ -243,7 +243,7 @@ fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
     for it in raw.iter().flat_map(|camera| &camera.found) {
         votes[it.found.variant] += it.found.corners.len();
     }
-    // With equal votes the first variant wins: the board as the user named it.
+    // With equal votes, the first variant wins, which is the board that the user named.
     let best = (0..votes.len()).rev().max_by_key(|i| votes[*i]).unwrap_or(0);
     let variant = &finder.variants()[best];
     let cameras = raw.into_iter().enumerate().map(|(camera, raw)| {

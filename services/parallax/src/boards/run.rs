@@ -1,4 +1,4 @@
-//! From footage of a board to a rig: search the pictures, calibrate the cameras, judge the result.
+//! Computes a rig from footage of a board: searches the pictures, calibrates the cameras, and judges the result.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ const WORST: usize = 8;
 /// Number of pictures per camera that are searched for other boards if the named board is not found.
 const GUESSED_PICTURES: usize = 6;
 
-/// Number of pictures of each side of a board that prove a board with two sides. One camera sees both sides, or two cameras see one side
+/// Minimum number of pictures of each side that prove that a board has two sides. One camera sees both sides, or two cameras see one side
 /// each.
 const LEAST_OF_EACH: usize = 3;
 
@@ -33,7 +33,7 @@ pub struct BoardSettings {
     pub look: LookSettings,
     /// Table of corners to read instead of searching the pictures.
     pub corners: Option<PathBuf>,
-    /// Cameras whose intrinsics are kept. Cameras are matched by name.
+    /// Rig with intrinsics to keep. Its cameras are matched by name.
     pub known: Option<Rig>,
     /// Lens model to estimate.
     pub lens: LensKind,
@@ -43,7 +43,7 @@ pub struct BoardSettings {
     pub most_frames: usize,
     /// True if the user knows that all footage is mirrored.
     pub is_mirrored: bool,
-    /// Back of the board, if the user names it.
+    /// Back of the board, if the user specifies it.
     pub back: Option<Back>,
 }
 
@@ -52,15 +52,15 @@ pub struct BoardSettings {
 pub enum Back {
     /// The mirror image of the front: each corner is at the same place on both sides.
     Mirrored,
-    /// Blank: if codes look mirrored, the picture is mirrored.
+    /// Blank. If codes look mirrored, the picture is mirrored.
     Blank,
 }
 
 /// Explanation of mirrored codes.
 enum Mirrored {
-    /// Nothing is open: no mirrored codes were seen, an option explains them, or a camera saw both sides.
+    /// The explanation is known: no mirrored codes were seen, an option explains them, or a camera saw both sides.
     Known,
-    /// The board has two sides, or these cameras have mirrored pictures. The adjustment decides.
+    /// Either the board has two sides, or the pictures of these cameras are mirrored. The adjustment decides which.
     Asked(Vec<usize>),
 }
 
@@ -188,9 +188,9 @@ fn sighted(
     Ok((Some(looked), sights, points, sizes))
 }
 
-/// Explains mirrored codes. They are right if the back of the board has the mirror image of the front: a camera behind the board sees
-/// every corner at its place. In mirrored footage they are an error, unless the user says that the footage is mirrored. Then the board
-/// is replaced by its mirror image.
+/// Explains mirrored codes. Mirrored codes are right if the back of the board shows the mirror image of the front: a camera behind the
+/// board then sees every corner at its place. In mirrored footage, mirrored codes are an error, unless the user says that the footage is
+/// mirrored. The board is then replaced by its mirror image.
 fn mirrored(
     settings: &BoardSettings,
     looked: &Looked,
@@ -234,7 +234,7 @@ fn mirrored(
 }
 
 /// Returns true if the cameras that see the back of the board are behind it, according to the cameras that see the front. If instead the
-/// pictures are mirrored and the board has one side, every picture gives another camera position.
+/// pictures are mirrored and the board has one side, every picture gives a different camera position.
 fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
     let crosses = |pair: &&Together| {
         pair.cameras.iter().filter(|camera| behind.contains(camera)).count() == 1

@@ -18,7 +18,7 @@ use trials::bench::{self, Kind, Report};
 pub(crate) enum Command {
     /// Measure one hop between two processes, without a deployment.
     Transport(transport::Arguments),
-    /// Measure the latency of a deployment from picture to result, stage by stage, also after a camera has died.
+    /// Measure the latency of a deployment from picture to result, stage by stage, including after a camera has died.
     Latency(load::Arguments),
     /// Measure how many frames per second a deployment processes if no frame is dropped.
     Throughput(load::Arguments),

@@ -63,9 +63,8 @@ pub(crate) struct Input {
     /// The calibration file, or one file per camera.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Unit of length, if the format does not define it: m, cm, mm, ft, or in. For a calibration in squares of a board, the size of a
-    /// square,
-    /// such as 30mm.
+    /// Unit of length, if the format does not define it: m, cm, mm, ft, or in. If the calibration uses the squares of a board as its unit,
+    /// the size of a square, such as 30mm.
     #[arg(long)]
     unit: Option<Unit>,
     /// Upward direction in the world, if the file does not give it.
@@ -79,13 +78,13 @@ pub(crate) struct Input {
 /// Output formats.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum To {
-    /// Parallax's own.
-    Rig,
     /// Parallax's own rig file.
-    Pose2sim,
+    Rig,
     /// TOML of Pose2Sim, Caliscope and similar programs.
-    Anipose,
+    Pose2sim,
     /// TOML of anipose and `FreeMoCap`: as `pose2sim`, but in millimetres.
+    Anipose,
+    /// YAML of OpenCV.
     Opencv,
     /// One `.cal` file per camera.
     Humaneva,

@@ -69,7 +69,7 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file. If not given, four synthetic cameras are used.
     deployment: Option<PathBuf>,
-    /// The scenarios, separated by commas. If not given, all that the processes of the deployment allow.
+    /// The scenarios, separated by commas. If not given, all scenarios that the processes of the deployment allow.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Scenario::by_name)]
     scenario: Vec<Scenario>,
     /// List the scenarios and exit.
@@ -78,7 +78,7 @@ pub(crate) struct Arguments {
     /// Seed for the synthetic scene, and for the random choice of processes and cameras.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Length of the footage of every run, in seconds. On a busy machine, starting the processes uses up some of it.
+    /// Length of the footage of every run, in seconds. On a busy machine, starting the processes uses up some of this time.
     #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u32).range(4..=36_000))]
     seconds: u32,
     /// Length of the parts into which the report of kill-random divides a long run, in seconds.
@@ -102,11 +102,11 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For processes that results do
-    /// not name, the time until the process reports work.
+    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For a process that results do not
+    /// name, the time until it reports work.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while a process is missing that the other processes do not need, in milliseconds.
+    /// Longest pause between results while a process is missing, if the other processes do not need it, in milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }

@@ -110,8 +110,8 @@ struct Limits {
     /// up with 5 frames per second.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest pause between results while the killed camera is away, in milliseconds. The limit is for a machine that keeps up with
-    /// 5 frames per second.
+    /// Longest pause between results while the killed camera is missing, in milliseconds. The limit is for a machine that keeps up with 5
+    /// frames per second.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }

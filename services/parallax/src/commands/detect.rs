@@ -129,7 +129,7 @@ pub(crate) struct Arguments {
     /// Box around the person, in pixels of the picture: left, top, right, bottom. If not given, the detector finds the box.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, allow_hyphen_values = true)]
     outline: Option<Outline>,
-    /// Also show the network the mirror image of every person, and use the mean. This is more exact, and takes twice the time.
+    /// Also show the network the mirror image of every person, and use the mean. This is more accurate, but takes twice as long.
     #[arg(long)]
     mirror: bool,
     /// Detector of people (.onnx) that finds the boxes, in place of the shipped one.
@@ -147,7 +147,7 @@ impl Arguments {
     ///
     /// Fails if an option of the filters is given with a network, or the other way round.
     fn network(&self) -> Result<Option<&Path>, Failure> {
-        /// The first options of the list, this many, also choose the filters.
+        /// Number of options, from the first in the list, that also choose the filters.
         const N_IMPLY: usize = 3;
         let of_filters = [
             (self.joints.is_some(), "--joints"),

@@ -10,11 +10,11 @@ use rustix::process::{Resource, getrlimit};
 use serde_json::json;
 use terminal::output;
 
-/// Recommended shared memory, in bytes: twice that of four cameras of 640x480 pixels with the shipped network.
+/// Recommended shared memory, in bytes: twice as much as four cameras of 640x480 pixels need with the shipped network.
 const SHARED_MEMORY: u64 = 512 << 20;
-/// Open files of the process that has most, in a deployment of eight cameras.
+/// Recommended limit on open files. In a deployment of eight cameras, no process has more files open.
 const OPEN_FILES: u64 = 1024;
-/// Stack size of the main thread, in bytes.
+/// Recommended stack size of the main thread, in bytes.
 const STACK: u64 = 1 << 20;
 
 /// Options of `parallax doctor`.

@@ -60,7 +60,8 @@ pub(crate) struct Arguments {
     /// Trajectories to export: as found, or as smoothed by `parallax smooth`.
     #[arg(long, value_enum, default_value_t = Trajectories::Raw)]
     from: Trajectories,
-    /// Folder for the files. If not given, `export` in the folder of the run. For a recording, its name with `-export` appended.
+    /// Folder for the files. If not given, `export` in the folder of the run. For a recording, the default is its name with `-export`
+    /// appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Base name of the files.

@@ -15,7 +15,7 @@ use terminal::{Globals, output};
 use super::hosts;
 use disk_space::{Forecast, Growth, PerFrame};
 
-/// Number of epochs of the recording process for which files of an earlier recording are looked up.
+/// Files of an earlier recording are looked up for this many epochs of the recording process.
 const MAX_EPOCHS: u32 = 64;
 
 /// Options of `parallax record`.

@@ -156,7 +156,7 @@ fn subject(named: Option<&str>) -> Result<Subject, Failure> {
     Ok(Subject::Deployment(Some(named.to_owned())))
 }
 
-/// Returns true if a deployment of that name runs.
+/// Returns true if a deployment of this name is running.
 fn runs(name: &str) -> Result<bool, Failure> {
     let all = deployments(&Namespace::usual_base())?;
     let mut running = all.iter().filter(|deployment| deployment.supervisor.is_some());

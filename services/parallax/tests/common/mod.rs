@@ -114,7 +114,7 @@ impl Case {
         self.write(name, text.replace(from, to));
     }
 
-    /// Sets the method of networks with these keys of its section, in place of the paper's method.
+    /// Sets the method `network`, with these keys in its section, in place of the paper's method.
     pub(crate) fn set_network(&self, keys: &str) {
         let text = fs::read_to_string(self.path("deployment.toml")).unwrap();
         let mut table: toml::Table = toml::from_str(&text).unwrap();

@@ -68,10 +68,10 @@ pub(crate) struct Arguments {
     /// The lens model.
     #[arg(long, value_enum, default_value_t = Lens::Five)]
     lens: Lens,
-    /// Table that says which pictures were taken together, with the columns `sync_index` and `cam_id`.
+    /// Table that states which pictures were taken together, with the columns `sync_index` and `cam_id`.
     #[arg(long, value_name = "FILE")]
     timestamps: Option<PathBuf>,
-    /// Search every n-th frame. If not given, chosen by the length of the footage.
+    /// Search every n-th frame. If not given, N depends on the length of the footage.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
     /// Maximum number of pictures per camera that are searched for the board.
@@ -89,8 +89,8 @@ pub(crate) struct Arguments {
     /// Treat all footage as mirrored.
     #[arg(long)]
     mirrored: bool,
-    /// Back of the board: `mirrored` or `blank`. If not given, found from the pictures where possible. A mirrored back has the mirror image
-    /// of the front, corner on corner, for cameras on both sides.
+    /// Back of the board: `mirrored` or `blank`. If not given, it is determined from the pictures where possible. A mirrored back shows the
+    /// mirror image of the front, corner on corner, for cameras on both sides.
     #[arg(long, value_enum, conflicts_with = "mirrored")]
     back: Option<BackName>,
     /// File for the calibration. With --print, file for the board (.pdf or .svg); if not given, both kinds are written.

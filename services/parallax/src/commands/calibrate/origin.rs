@@ -39,7 +39,7 @@ Examples:
 pub(crate) struct Arguments {
     /// The rig: a calibration in any format.
     rig: PathBuf,
-    /// Footage of the board on the floor, one per camera of the rig: NAME=PATH, or a file with the name of the camera.
+    /// Footage of the board on the floor, one path per camera of the rig: NAME=PATH, or a file with the name of the camera.
     #[arg(value_name = "FOOTAGE", requires = "board")]
     footage: Vec<String>,
     /// The board.

@@ -94,7 +94,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
     Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
 }
 
-/// Fails if the scale of a rig is to be kept that has only lenses.
+/// Fails if the scale of the rig is to be kept, but the rig has only lenses.
 fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let rig = inputs::rig_of(&deployment)?;
@@ -227,7 +227,7 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
     })
 }
 
-/// Describes the origin of the vertical.
+/// Describes how the vertical was found.
 fn vertical(outcome: &Outcome) -> &'static str {
     match outcome.vertical {
         Vertical::Feet => "standing feet",

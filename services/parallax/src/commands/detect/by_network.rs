@@ -63,7 +63,7 @@ impl Detector<'_> {
     ///
     /// # Errors
     ///
-    /// As for the search: the inner failure concerns only the picture.
+    /// The inner failure concerns only this picture. The outer failure ends the command.
     pub(super) fn look(
         &self,
         eyes: &Eyes,
@@ -242,7 +242,7 @@ impl Person {
         })
     }
 
-    /// Also returns how the picture should be rotated.
+    /// Looks at the person in the rotated picture. Also returns how the picture should be rotated.
     fn turned(
         network: &PoseNetwork,
         picture: &Picture,

@@ -59,7 +59,7 @@ fn entry(field: &Field) -> Value {
     ])
 }
 
-/// Returns the type's name: that of `NumPy` for a number, the struct's own for a struct.
+/// Returns the `NumPy` name of a type of numbers, or the name of a struct.
 fn type_name(kind: Kind) -> &'static str {
     match kind {
         Kind::Number(numpy) => numpy,

@@ -123,7 +123,7 @@ impl Forecast {
         self.write_smaller(text)
     }
 
-    /// Adds how small the recording would be without evidence, and without pixels.
+    /// Appends the size of the recording without evidence, and its size without evidence and pixels.
     fn write_smaller(&self, text: &mut String) -> core::fmt::Result {
         let [pixels, evidence] = self.without;
         if !evidence {

@@ -160,7 +160,7 @@ fn keys_in(mut bytes: &[u8]) -> Vec<Key> {
                     bytes = &rest[n_bytes..];
                     in_sequence(&rest[..n_bytes])
                 }
-                // Alt with a key.
+                // A key that is pressed together with Alt.
                 [_, rest @ ..] => {
                     bytes = rest;
                     None
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn keys_without_an_action_are_passed_over_completely() {
-        // Home, F5, Control with right arrow, Alt with q, a, umlaut, a truncated sequence.
+        // The keys Home, F5, Ctrl+Right, Alt+Q, the letter a, an umlaut, and a truncated sequence.
         for bytes in [
             &b"\x1b[H"[..],
             b"\x1b[15~",

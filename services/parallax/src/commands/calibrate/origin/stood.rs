@@ -18,7 +18,7 @@ const MOST_OFF: f64 = 0.15;
 const LEAST_SEEN: usize = 50;
 
 /// Finds the floor, after checking that the run was made with this rig. If the run has several people, only the followed person is used.
-/// The followed person may change, because all of them stand on the same floor.
+/// The followed person may change, because all people stand on the same floor.
 ///
 /// * `rate_hz`: frames per second, if the run has no frame rate.
 pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
