@@ -25,8 +25,8 @@ impl Sequences {
     /// Reads sequences.
     ///
     /// * `hold_out`: subjects to hold out; if empty, the last quarter of the subjects.
-    /// * `every`, `frames`: takes the first frame and every `every`-th frame after it, at most `frames` of each sequence.
-    /// * `rig`: name of the rig, if all sequences are of one rig.
+    /// * `every`, `frames`: the first frame and every `every`-th frame after it are used, but at most `frames` frames of each sequence.
+    /// * `rig`: name of the rig, if all sequences were recorded with one rig.
     ///
     /// # Errors
     ///

@@ -1,7 +1,7 @@
 //! Training of the network that finds people in whole pictures.
 //!
 //! The pictures come from three sources: photographs of annotated people, photographs without people, and synthetic scenes. In the
-//! photographs of annotated people, a teacher (another detector) finds the people without marks.
+//! photographs of annotated people, a teacher (another detector) finds the people who are not marked.
 
 mod judge;
 mod photographs;
@@ -37,9 +37,9 @@ pub struct Sources {
     pub scenes: Scenes,
 }
 
-/// One in this many blocks of photographs, and one in this many subjects of scenes, is held out.
+/// One block of photographs out of this number is held out, and one subject of scenes out of this number.
 const KEPT: usize = 12;
-/// Number of consecutive photographs that are held out together: neighbours often show the same event.
+/// Number of consecutive photographs that are held out together, because neighbouring photographs often show the same event.
 const BLOCK: usize = 20;
 /// Margin for hands, feet and hair around the joints, on each side, as a share of the longer side of the box.
 const BEYOND: f64 = 0.05;

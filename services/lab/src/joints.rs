@@ -23,7 +23,7 @@ const FEWEST: usize = 20;
 pub struct Learned {
     /// Content of the file.
     pub file: JointFile,
-    /// Trials: reach, ridge, and the error in every data set on people who were left out.
+    /// Settings that were tried: reach, ridge, and the error in every data set on people who were left out.
     pub tried: Vec<multiview::learned::Tried>,
 }
 

@@ -14,7 +14,7 @@ use statistics::score::{
 };
 use training::datasets::{People, Person, Picture};
 
-/// Largest number of detections that are searched for the one on the person.
+/// Largest number of detections among which the one on the person is searched.
 const MOST: usize = 10_000;
 
 /// Smallest share of a person's box that a detection must cover to be on the person.
@@ -98,7 +98,7 @@ pub(crate) fn pictures(
     })
 }
 
-/// Refuses a model with another number of parts.
+/// Refuses a model that does not have 26 parts.
 ///
 /// # Errors
 ///

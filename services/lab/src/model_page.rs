@@ -18,8 +18,8 @@ use figure::Figure;
 ///
 /// * Every filter as a glyph: for each cell, the positive weights of its nine orientations, as strokes along
 ///   the edges that they respond to.
-/// * The whole body twice in an ordinary posture: as filters, and as a tree with springs. Springs are ellipses at a score of
-///   [`SPRING_COST`] below the best.
+/// * The whole body twice in an ordinary posture: as filters, and as a tree with springs. A spring is drawn as the ellipse on which the
+///   score is [`SPRING_COST`] below the best score.
 /// * For each part, the springs of all types and the biases of all pairs of types.
 ///
 /// Parts and types are counted from 1, as in everything that users see.

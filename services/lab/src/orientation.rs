@@ -44,7 +44,7 @@ pub struct Judged {
     pub n: usize,
     /// Share of people whose direction the network distinguishes from the opposite one, from 0 to 1.
     pub right: f64,
-    /// 95 % interval of that share (Wilson).
+    /// 95 % interval of `right` (Wilson).
     pub interval: [f64; 2],
     /// Mean surprise in nats; 0.693 if the network gives no information.
     pub surprise: f64,
@@ -55,7 +55,7 @@ pub struct Judged {
 pub struct Report {
     /// Number of photographs for training.
     pub n_photographs: usize,
-    /// Number of these photographs that show a person from behind.
+    /// Number of photographs for training that show a person from behind.
     pub n_behind: usize,
     /// Number of pictures of scenes for training.
     pub n_rendered: usize,

@@ -23,8 +23,8 @@ pub use train::{Pass, train};
 /// Sources of the people for training.
 #[derive(Debug)]
 pub struct People {
-    /// Photographs of annotated people. Left and right are sides of the body. If the choice has sides as seen, the marks do not
-    /// determine the direction in which a person faces.
+    /// Photographs of annotated people. Left and right are sides of the body. If the choice exchanges them for people seen from behind
+    /// (`Sides::Seen`), the marks do not determine the direction in which a person faces.
     pub photographs: Chosen,
     /// For each thread, the networks that help. The first adds missing joints and corrects wrong marks. The others add the keypoints that
     /// earlier networks do not have.
@@ -33,9 +33,9 @@ pub struct People {
     pub scenes: Scenes,
 }
 
-/// One in this many blocks of consecutive people, and one in this many subjects of scenes, is held out.
+/// One block of consecutive people out of this number is held out, and one subject of scenes out of this number.
 const KEPT: usize = 12;
-/// Number of consecutive people of a data set who are held out together: neighbours often show the same event.
+/// Number of consecutive people of a data set who are held out together, because neighbours in a data set often show the same event.
 const BLOCK: usize = 20;
 
 /// People for training, and held-out people, on whom the expected error is learned.

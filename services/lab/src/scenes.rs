@@ -40,11 +40,11 @@ pub(crate) struct Shown<'a> {
     pub(crate) source: String,
     /// The picture.
     pub(crate) picture: Rgb8View<'a>,
-    /// Joints of `skeleton::PARSE14` in the picture, pixels; not finite where they are not visible.
+    /// Joints of `skeleton::PARSE14` in the picture, in pixels; not finite where they are not visible.
     pub(crate) joints: Vec<[f64; 2]>,
-    /// Nose, heels and big toes in the picture, in the order of [`Scene::extras`], pixels; not finite behind the camera.
+    /// Nose, heels and big toes in the picture, in the order of [`Scene::extras`], in pixels; not finite behind the camera.
     pub(crate) extras: [[f64; 2]; N_EXTRAS],
-    /// The joints in world coordinates, metres.
+    /// The joints in world coordinates, in metres.
     pub(crate) in_world: Vec<[f64; 3]>,
     /// The camera.
     pub(crate) camera: &'a geometry::Camera,
@@ -83,7 +83,7 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
             height: between(0.8, 2.4),
         },
     };
-    // Half of the cameras are good ones.
+    // About half of the cameras are bad.
     let is_bad = between(0.0, 1.0) < 0.5;
     let flaws = Flaws {
         noise: between(1.0, 12.0),
@@ -101,7 +101,7 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
         passers: others(),
         action: Action::ALL[rng.usize(0..Action::ALL.len())],
         seed: rng.u64(1..1 << 32),
-        // One frame in three quarters of a second, so that no two frames show the same pose.
+        // One frame every three quarters of a second, so that no two frames show the same pose.
         rate_hz: 4.0 / 3.0,
         backdrop: scenes.backdrop.clone().filter(|_| is_photo),
         flaws: if is_bad { flaws } else { Flaws::default() },

@@ -30,17 +30,17 @@ pub struct Mean {
 pub struct Row {
     /// Name of the method.
     pub method: &'static str,
-    /// Distance from the true position, mm.
+    /// Distance from the true position, in mm.
     pub position_mm: Option<Mean>,
-    /// Error of the velocity by central differences, m/s.
+    /// Error of the velocity by central differences, in m/s.
     pub velocity_m_s: Option<Mean>,
-    /// Error of the acceleration by second differences, m/s².
+    /// Error of the acceleration by second differences, in m/s².
     pub acceleration_m_s2: Option<Mean>,
-    /// Change of the error between consecutive instants, mm.
+    /// Change of the error between consecutive instants, in mm.
     pub jitter_mm: Option<Mean>,
-    /// Delay of the method, ms.
+    /// Delay of the method, in ms.
     pub lag_ms: Option<Mean>,
-    /// Distance from the true position at instants without a measurement for which the method has a position, mm.
+    /// Distance from the true position at instants without a measurement for which the method has a position, in mm.
     pub filled_mm: Option<Mean>,
 }
 

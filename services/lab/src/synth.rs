@@ -52,7 +52,7 @@ pub struct Job {
     pub live: bool,
     /// Simulated flaws of the cameras.
     pub flaws: Flaws,
-    /// Delay of each camera's pictures after the nominal instants of the frames, milliseconds; at most one value for each camera of the
+    /// Delay of each camera's pictures after the nominal instants of the frames, in milliseconds; at most one value for each camera of the
     /// rig.
     pub skews_ms: Vec<f64>,
 }
@@ -62,7 +62,7 @@ pub struct Job {
 pub struct Done {
     /// The sequences, subject by subject.
     pub sequences: Vec<Written>,
-    /// Total time, seconds.
+    /// Total time, in seconds.
     pub seconds: f64,
 }
 

@@ -171,7 +171,7 @@ fn a_report_has_every_version_and_is_continued_after_an_interruption() {
     assert_eq!(again.status.code(), Some(2), "{}", again.stderr);
     assert!(again.stderr.contains("--resume"), "{}", again.stderr);
 
-    // The file as after `kill -9`: one complete frame, and half of another.
+    // The file looks as it does after `kill -9`: it has one complete frame, and half of another.
     let kept = fs::read_to_string(poses(&case)).unwrap();
     let lines: Vec<&str> = kept.lines().collect();
     let half = &lines[2][..lines[2].len() / 2];

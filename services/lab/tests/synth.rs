@@ -57,7 +57,7 @@ fn a_written_deployment_runs_and_a_live_scene_gives_the_same_bits() {
     let ended = synth(&case, &[&["files"], &SMALL[..]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let (ended, from_files) = run(&case, "files", &[]);
-    // The planted model finds no person in rendered pictures, so the run is degraded. The comparison is of the bits in the results.
+    // The planted model finds no person in rendered pictures, so the run is degraded. Only the bits of the results are compared.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert_eq!(from_files.lines().count(), 6, "three frames of two views");
 
@@ -194,7 +194,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(130), "{}", ended.stderr);
     for (frame, captured_ms) in shots() {
-        // Ten frames per second. The clock of a run starts before its cameras.
+        // The scene has ten frames per second. The clock of a run starts before its cameras.
         assert!(
             captured_ms >= 100.0 * frame,
             "frame {frame}: {captured_ms} ms"

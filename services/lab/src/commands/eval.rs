@@ -78,10 +78,10 @@ Examples:
     reason = "each is a switch of the command line"
 )]
 pub(crate) struct Arguments {
-    /// Sequences to evaluate, see below.
+    /// Sequences to evaluate; see below.
     #[arg(required = true, value_name = "SEQUENCE")]
     sequences: Vec<PathBuf>,
-    /// Model file; the shipped person model if not given.
+    /// Model file. If not given, the shipped person model.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Folder for the report.
@@ -131,7 +131,7 @@ pub(crate) struct Arguments {
     /// Largest number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Single pictures: the people to evaluate; all if not given.
+    /// Single pictures: the people to evaluate. If not given, all are used.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     only: Option<Selection>,
     /// Single pictures: the people to leave out.
@@ -140,7 +140,7 @@ pub(crate) struct Arguments {
     /// The part of each sequence to use: 0.8-1 is the last fifth.
     #[arg(long, value_name = "FROM-TO", value_parser = share)]
     share: Option<[f64; 2]>,
-    /// Several people: the views to use, counted from 0, separated by commas; all if not given.
+    /// Several people: the views to use, counted from 0, separated by commas. If not given, all are used.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     views: Vec<usize>,
     /// Evaluate all people in a finished run of the sequence; DIR is the folder with the run's results.
@@ -152,7 +152,7 @@ pub(crate) struct Arguments {
     /// Length of the blocks of frames that the bootstrap draws for confidence intervals.
     #[arg(long, value_name = "N", default_value_t = 1)]
     block: usize,
-    /// Number of threads; one per core if not given. It does not affect the numbers.
+    /// Number of threads, which does not affect the numbers. If not given, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Continue an interrupted run.

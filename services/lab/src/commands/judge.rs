@@ -63,7 +63,7 @@ pub(crate) struct Arguments {
     model: PathBuf,
     /// Data set of people with 14 joints; for a detector, a file of `train finder-pictures`.
     dataset: PathBuf,
-    /// The people to evaluate; all if not given.
+    /// The people to evaluate. If not given, all are used.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     only: Option<Selection>,
     /// The people to leave out.
@@ -79,13 +79,13 @@ pub(crate) struct Arguments {
     /// Also print the mean offset of every joint along and across its bone, with 95 % intervals.
     #[arg(long)]
     offsets: bool,
-    /// Card of a network; if not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
+    /// Card of a network. If not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
     #[arg(long, value_name = "CARD")]
     card: Option<PathBuf>,
-    /// Use the boxes that the shipped detector finds, instead of the boxes around the marked joints; for networks.
+    /// Use the boxes that the shipped detector finds, instead of the boxes around the marked joints. Only for networks.
     #[arg(long)]
     find_boxes: bool,
-    /// Evaluate the mirror image of every person too, and use the mean; for networks. More exact, but takes twice the time.
+    /// Evaluate the mirror image of every person too, and use the mean. Only for networks. This is more accurate, but takes twice as long.
     #[arg(long)]
     mirror: bool,
     /// Print JSON.

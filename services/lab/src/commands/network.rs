@@ -21,10 +21,11 @@ use terminal::{Outline, outline, output};
 /// Options of `model show` for networks.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Card of a network (.onnx); if not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
+    /// Card of a network (.onnx). If not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
     #[arg(long, value_name = "CARD", conflicts_with = "html")]
     card: Option<PathBuf>,
-    /// Picture to apply the network to: of one person for keypoints, or of people for a detector.
+    /// Picture to apply the network to. For a network that finds keypoints, the picture shows one person; for a detector, it may show
+    /// several.
     #[arg(
         long,
         value_name = "PICTURE",
@@ -32,7 +33,7 @@ pub(crate) struct Arguments {
         conflicts_with = "html"
     )]
     image: Option<PathBuf>,
-    /// Box around the person, in pixels of the picture: left, top, right, bottom; the whole picture if not given.
+    /// Box around the person, in pixels of the picture: left, top, right, bottom. If not given, the whole picture.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "image", allow_hyphen_values = true)]
     outline: Option<Outline>,
     /// Draw the joints and their maps, or the boxes of a detector, into this PNG file.

@@ -48,10 +48,10 @@ pub(crate) struct Arguments {
     /// Numbers of cameras, separated by commas.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "8,16,32,64", value_parser = clap::value_parser!(u16).range(1..=1024))]
     cameras: Vec<u16>,
-    /// Numbers of hosts, separated by commas, including the fusing one.
+    /// Numbers of hosts, separated by commas, including the fusing host.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,2,3,4", value_parser = clap::value_parser!(u16).range(1..=256))]
     hosts: Vec<u16>,
-    /// Views of the fusing host; if not given, views are spread evenly by work.
+    /// Views of the fusing host. If not given, views are spread evenly by work.
     #[arg(long, value_name = "N")]
     near: Option<u16>,
     /// Cores of each host.
@@ -60,31 +60,31 @@ pub(crate) struct Arguments {
     /// Frames per second.
     #[arg(long, value_name = "HZ", default_value_t = 30.0)]
     rate: f64,
-    /// Capacity of the network, megabits per second.
+    /// Capacity of the network, in megabits per second.
     #[arg(long, value_name = "MBIT", default_value_t = 1000.0)]
     network: f64,
-    /// Costs of a run: the output of `parallax run --json`; with several hosts, the output on the fusing host.
+    /// File with the costs of a run: the output of `parallax run --json`, on the fusing host if there are several hosts.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Processor time of `capture` for a frame of a view, milliseconds.
+    /// Processor time of `capture` for a frame of a view, in milliseconds.
     #[arg(long, value_name = "MS")]
     capture_ms: Option<f64>,
-    /// Processor time of `pose` for a frame of a view, milliseconds.
+    /// Processor time of `pose` for a frame of a view, in milliseconds.
     #[arg(long, value_name = "MS")]
     pose_ms: Option<f64>,
-    /// Processor time to encode a frame as JPEG, milliseconds.
+    /// Processor time to encode a frame as JPEG, in milliseconds.
     #[arg(long, value_name = "MS")]
     encode_ms: Option<f64>,
-    /// Processor time to decode a frame from JPEG, milliseconds.
+    /// Processor time to decode a frame from JPEG, in milliseconds.
     #[arg(long, value_name = "MS")]
     decode_ms: Option<f64>,
-    /// Processor time of fusion for each view of a frame, milliseconds.
+    /// Processor time of fusion for each view of a frame, in milliseconds.
     #[arg(long, value_name = "MS")]
     fuse_ms: Option<f64>,
-    /// Size of a frame as JPEG, bytes.
+    /// Size of a frame as JPEG, in bytes.
     #[arg(long, value_name = "N")]
     frame_bytes: Option<f64>,
-    /// Size of the poses of a view, bytes.
+    /// Size of the poses of a view, in bytes.
     #[arg(long, value_name = "N")]
     pose_bytes: Option<f64>,
     /// Print JSON.

@@ -28,7 +28,7 @@ Examples:
 pub(crate) struct Arguments {
     /// Folder with the results of a run.
     folder: PathBuf,
-    /// Sequence with the true joints, see below.
+    /// Sequence with the true joints; see below.
     #[arg(long, value_name = "TRUTH")]
     truth: PathBuf,
     /// Print JSON.

@@ -55,9 +55,9 @@ Examples:
 /// The file format of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// Lossless.
+    /// PNG, which is lossless.
     Png,
-    /// Smaller; most cameras use this format (quality 95).
+    /// JPEG, as most cameras write it (quality 95). The files are smaller.
     Jpg,
 }
 
@@ -85,8 +85,8 @@ pub(crate) struct Arguments {
     /// Number of other people who stand around the subject, at most 4.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     others: u64,
-    /// Number of other people who walk past the subject and each other, at most 4. The truth has the joints of all people, but masks
-    /// and visible joints of the subject only.
+    /// Number of other people who walk past the subject and each other, at most 4. The truth has the joints of all people, but masks and
+    /// visible joints only of the subject.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     passers: u64,
     /// Actions of the subjects: names separated by commas, or all.
@@ -95,7 +95,7 @@ pub(crate) struct Arguments {
     /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Frames per camera; if not given, 60, or the length of the recorded motion.
+    /// Frames per camera. If not given, 60, or the length of the recorded motion.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     frames: Option<u64>,
     /// Frames per second; at a lower rate, successive pictures differ more.
@@ -110,13 +110,13 @@ pub(crate) struct Arguments {
     /// Use photographs from this folder as the background, instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
-    /// Model for the deployment file; the shipped person model if not given.
+    /// Model for the deployment file. If not given, the shipped person model.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Write no pictures: the capture processes of the deployment render them during the run.
     #[arg(long)]
     live: bool,
-    /// Delay of each camera's pictures after the nominal instants of the frames, milliseconds, in the order of the rig: 0,5,11,16.
+    /// Delay of each camera's pictures after the nominal instants of the frames, in milliseconds, in the order of the rig: 0,5,11,16.
     /// Negative values mean earlier pictures. The deployment contains these times, and a run corrects the joints for them.
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true, value_parser = parse::skews)]
     skew_ms: Skews,
@@ -126,7 +126,7 @@ pub(crate) struct Arguments {
     /// Flaws of the cameras.
     #[command(flatten)]
     flaws: FlawArguments,
-    /// Number of threads; one per core if not given. It does not affect the files.
+    /// Number of threads, which does not affect the files. If not given, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print a summary as JSON.
@@ -142,10 +142,10 @@ type Skews = Vec<f64>;
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Flaws of the cameras")]
 struct FlawArguments {
-    /// Standard deviation of the noise, grey levels.
+    /// Standard deviation of the noise, in grey levels.
     #[arg(long, value_name = "LEVELS", default_value_t = 0.0)]
     noise: f64,
-    /// Standard deviation of the blur, pixels.
+    /// Standard deviation of the blur, in pixels.
     #[arg(long, value_name = "PX", default_value_t = 0.0)]
     blur: f64,
     /// Change of the exposure in stops; negative values are darker.
@@ -156,16 +156,16 @@ struct FlawArguments {
         allow_hyphen_values = true
     )]
     exposure: f64,
-    /// Largest clock offset of the cameras, except for the first, seconds.
+    /// Largest clock offset of the cameras, except for the first, in seconds.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     desync: f64,
-    /// Share of frames that a camera drops; each is replaced by the previous picture.
+    /// Share of frames that a camera drops. Each dropped frame is replaced by the previous picture.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     drop: f64,
-    /// Rotation error of every camera in rig.toml, degrees. The ground truth remains exact.
+    /// Rotation error of every camera in rig.toml, in degrees. The ground truth remains exact.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
     calibration_degrees: f64,
-    /// Position error of every camera in rig.toml, millimetres. The ground truth remains exact.
+    /// Position error of every camera in rig.toml, in millimetres. The ground truth remains exact.
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     calibration_mm: f64,
 }

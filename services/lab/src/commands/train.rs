@@ -105,10 +105,10 @@ pub(crate) struct Arguments {
     /// Random seed; overrides the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Number of threads; one per core if not given. It does not affect the model.
+    /// Number of threads, which does not affect the model. If not given, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-    /// Folder of images without people, to count false alarms after the training; the negatives if not given.
+    /// Folder of images without people, to count false alarms after the training. If not given, the negatives.
     #[arg(long, value_name = "DIR")]
     judge: Option<PathBuf>,
     /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.

@@ -51,15 +51,15 @@ pub struct Learning<'a> {
 pub struct Done {
     /// Content of the file.
     pub learned: Learned,
-    /// Number of bins, and the score of tables with this number on the part types of held-out people.
+    /// Number of bins, and the score of tables with this number of bins on the part types of held-out people.
     pub bins: Vec<(usize, Option<f64>)>,
     /// Ridge, and root mean square error of the joints of held-out people. The first entry is without a map.
     pub joints: Vec<(Option<f64>, f64)>,
-    /// Score with every view alone.
+    /// Score if every view is solved alone.
     pub single: Option<Point>,
     /// All weights that were tried, with their scores.
     pub surface: Vec<Point>,
-    /// Total time, seconds.
+    /// Total time, in seconds.
     pub seconds: f64,
 }
 
@@ -128,7 +128,7 @@ impl<'a> Learning<'a> {
             let mut sequence = sequence.clone();
             sequence.frames.retain(|_| {
                 seen += 1;
-                // True if the wanted share has grown by a whole instant.
+                // True if the number of instants to keep has grown by one.
                 seen * most / n > (seen - 1) * most / n
             });
             sequence
@@ -166,7 +166,7 @@ impl<'a> Learning<'a> {
         Ok(learners)
     }
 
-    /// Tries weights on held-out people: first for geometry, then for appearance with the best geometry.
+    /// Tries weights on held-out people: first for geometry, then for appearance with the best weight for geometry.
     fn choose(
         &self,
         held: &[Sequence],

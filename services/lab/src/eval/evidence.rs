@@ -19,7 +19,7 @@ use super::as_run::{self, AsRun};
 
 /// Error of a segment's ends above which the segment is not found, as a share of its length (eq. 13 of the paper).
 const GAMMA: f64 = 0.5;
-/// Largest error of a joint, metres; a missing joint has this error.
+/// Largest error of a joint, in metres; a missing joint has this error.
 const MOST_M: f64 = 2.0;
 /// Number of joints of the limbs, which are the first of `skeleton::PARSE14`.
 const N_LIMB_JOINTS: usize = 12;
@@ -54,7 +54,7 @@ pub struct EvidenceJob<'a> {
 struct Tally {
     /// Share of segments that were found, in percent, for each frame.
     found: Vec<Share>,
-    /// Errors of the joints of the limbs, millimetres, for each frame.
+    /// Errors of the joints of the limbs, in millimetres, for each frame.
     errors: Vec<Share>,
 }
 
@@ -67,17 +67,18 @@ pub struct EvidenceRow {
     pub method: &'static str,
     /// Number of frames.
     pub n_frames: usize,
-    /// Segments found (PCP3D), percent.
+    /// Segments found (PCP3D), in percent.
     pub pcp3d: f64,
     /// Confidence interval of `pcp3d`.
     pub pcp3d_interval: [f64; 2],
-    /// Mean error of the twelve joints of the limbs, millimetres.
+    /// Mean error of the twelve joints of the limbs, in millimetres.
     pub limbs_mm: f64,
     /// Confidence interval of `limbs_mm`.
     pub limbs_mm_interval: [f64; 2],
-    /// Difference in PCP3D between the last method of the table and this one, percentage points, and its interval over the same frames.
+    /// Difference in PCP3D between the last method of the table and the method of this row, in percentage points, and its interval over the
+    /// same frames.
     pub last_finds_more: [f64; 3],
-    /// Amount by which the last method's mean error is smaller than this one's, millimetres, and its interval.
+    /// Amount by which the last method's mean error is smaller than the mean error of this row, in millimetres, and its interval.
     pub last_errs_less_mm: [f64; 3],
 }
 

@@ -28,7 +28,8 @@ pub type Fusion = (multiview::Settings, PairTables);
 pub struct Job<'a> {
     /// The single-view model.
     pub model: Arc<Model>,
-    /// Returns the fusion settings of a sequence. The number is the mean over its views of frame pixels per pixel of the footage.
+    /// Returns the fusion settings of a sequence. The number is the scale of its frames: pixels of the frame per pixel of the footage, as
+    /// the mean over its views.
     pub fusion: &'a (dyn Fn(&Sequence, f32) -> Result<Fusion, Failure> + Sync),
     /// True to decide for every view whether the person is seen from the front or from behind.
     pub facing: bool,
@@ -46,9 +47,9 @@ pub struct Job<'a> {
     pub n_candidates: usize,
     /// Detector of the direction in which a person faces.
     pub orientation: Option<Arc<Detector>>,
-    /// Expected errors, pixels of the footage.
+    /// Expected errors, in pixels of the footage.
     pub sigma: Option<Table>,
-    /// Thresholds from the settings, pixels of the footage; empty if there are none.
+    /// Thresholds from the settings, in pixels of the footage; empty if there are none.
     pub tau_px: Vec<f32>,
     /// Network that predicts the errors.
     pub forecaster: Option<Mutex<Forecaster>>,

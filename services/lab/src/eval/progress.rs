@@ -7,7 +7,7 @@ use failure::Console;
 /// Time between two lines of progress if there is no bar.
 const EVERY: Duration = Duration::from_secs(10);
 
-/// Shows progress on a console: with a bar, or otherwise with a message now and then.
+/// Shows progress on a console: with a bar, or otherwise with a message every few seconds.
 pub(super) struct Progress<'a> {
     console: &'a dyn Console,
     begin: Instant,

@@ -67,7 +67,7 @@ pub struct SingleView<'a> {
     pub plan: &'a ViewPlan,
     /// The single-view candidates, at least one.
     pub found: &'a ViewEstimate,
-    /// Centres of the 26 parts in the best pose, pixels of the frame.
+    /// Centres of the 26 parts in the best pose, in pixels of the frame.
     pub centres: &'a [[f64; 2]],
 }
 
@@ -237,8 +237,7 @@ impl Bench {
             .iter()
             .map(|answer| {
                 let mut answer = answer.clone()?;
-                // Without adaptive selection there are no expected errors: the candidate with the best
-                // score comes first.
+                // Without adaptive selection, there are no expected errors, and the candidate with the best score comes first.
                 answer.sigma_px = answer.sigma_px.filter(|_| version.terms == Terms::Adaptive);
                 Some(answer)
             })

@@ -120,10 +120,11 @@ impl JointEvidence for NetworkView {
     }
 }
 
-/// Converts left and right from sides of the picture to sides of the body, in this frame alone. First, the solution in space shows which
-/// views have them exchanged relative to the others. Then the views' evidence about the front decides whether to exchange all of them.
+/// Converts left and right from sides of the picture to sides of the body, in this frame alone. First, the solution in space shows in which
+/// views left and right are exchanged relative to the other views. Then the views' evidence about the front decides whether to exchange all
+/// of them.
 ///
-/// * Returns the log-likelihood ratio of the choice to its opposite, nats; 0 without a solution.
+/// * Returns the log-likelihood ratio of the choice to its opposite, in nats; 0 without a solution.
 pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
     let settings = SpaceSettings {
         as_seen: true,
@@ -156,7 +157,7 @@ pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
     ratio.abs()
 }
 
-/// Returns the joints of `skeleton::PARSE14` in space, metres.
+/// Returns the joints of `skeleton::PARSE14` in space, in metres.
 ///
 /// * `limit_px`: limit for [`dropping`].
 pub fn joints_by(

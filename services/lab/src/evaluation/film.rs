@@ -12,7 +12,7 @@ pub struct FilmSettings {
     pub size: Option<[u32; 2]>,
     /// Pixels of a frame per pixel of the footage.
     pub scale: f64,
-    /// True to rotate frames upright, if the rig knows the vertical.
+    /// True to rotate frames upright, if the rig gives the vertical.
     pub upright: bool,
 }
 

@@ -41,10 +41,10 @@ impl Judged {
     }
 }
 
-/// Confidence intervals over pictures, percent; `None` if there are no pictures.
+/// Confidence intervals over pictures, in percent; `None` if there are no pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intervals {
-    /// Intervals of PCP by the two rules: the mean of both ends, and both ends.
+    /// Intervals of PCP by the two rules: [`PcpRule::MeanOfEnds`] and [`PcpRule::BothEnds`].
     pub pcp: [Option<[f64; 2]>; 2],
     /// Interval of PCK at each of [`PCK_SHARES`].
     pub pck: [Option<[f64; 2]>; 2],
@@ -80,7 +80,7 @@ impl Pictures {
         offsets(self.pairs(Judged::OnPerson), bootstrap)
     }
 
-    /// Returns the tables of the data set: PCP and PCK of both kinds of detection, percent.
+    /// Returns the tables of the data set: PCP and PCK of both kinds of detection, in percent.
     pub fn tables(&self, bootstrap: &Bootstrap) -> Vec<Table> {
         tables(self, bootstrap)
     }
@@ -165,7 +165,7 @@ mod tests {
         core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64])
     }
 
-    /// Three pictures. The person is detected in two of them; in one of these, the best detection is elsewhere.
+    /// Three pictures. The person is detected in two of them; in one of these two, the best detection is elsewhere.
     fn pictures() -> Pictures {
         let (here, there) = (Some(person(0.0)), Some(person(500.0)));
         Pictures {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use skeleton::{N_PARTS, PART_NAMES};
 use statistics::score::{area_under_roc, rank_correlation};
 
-/// Expected and true errors of one view: one number per part, pixels of the frame.
+/// Expected and true errors of one view: one number per part, in pixels of the frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Predicted {
@@ -23,11 +23,11 @@ pub struct Judgement {
     pub part: String,
     /// Number of evaluated views.
     pub n: usize,
-    /// Share of views in which the error is above the threshold, percent.
+    /// Share of views in which the error is above the threshold, in percent.
     pub above: Option<f64>,
-    /// Share of the views above the threshold in which the part is switched off, percent.
+    /// Share of the views above the threshold in which the part is switched off, in percent.
     pub caught: Option<f64>,
-    /// Share of the views below the threshold in which the part is switched off, percent.
+    /// Share of the views below the threshold in which the part is switched off, in percent.
     pub wasted: Option<f64>,
     /// Area under the ROC curve for "error above the threshold", predicted by the expected error divided by the threshold.
     pub auc: Option<f64>,

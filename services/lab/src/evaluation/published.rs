@@ -2,10 +2,10 @@
 
 use crate::evaluation::{Combining, Terms, Version};
 
-/// Data set, subject, action; then FMP, geometric, with appearance, with adaptive selection.
+/// Data set, subject and action; then the results of FMP, with geometry, with appearance, and with adaptive selection.
 type Row = (&'static str, &'static str, &'static str, [f64; 4]);
 
-/// PCP3D at 0.5, percent: the paper's tables on `HumanEva` and UMPM.
+/// PCP3D at 0.5, in percent: the paper's tables on `HumanEva` and UMPM.
 const PCP3D: [Row; 16] = [
     ("HumanEva", "S1", "Box", [77.34, 82.70, 83.87, 85.31]),
     ("HumanEva", "All", "Box", [67.14, 69.45, 70.23, 71.57]),
@@ -25,7 +25,7 @@ const PCP3D: [Row; 16] = [
     ("UMPM", "All", "Overall", [73.07, 75.91, 76.37, 80.04]),
 ];
 
-/// Returns the paper's value for a row of its tables, percent; `None` if it has none.
+/// Returns the paper's value for a row of its tables, in percent; `None` if it has none.
 ///
 /// The rows of UMPM are for all people, so the sequence of one subject represents its action.
 pub fn published(dataset: &str, subject: &str, action: &str, version: Version) -> Option<f64> {

@@ -51,9 +51,9 @@ pub struct Record {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameResult {
-    /// Joints of the sequence's joint set, metres; `None` for a joint that could not be triangulated.
+    /// Joints of the sequence's joint set, in metres; `None` for a joint that could not be triangulated.
     pub joints: Vec<Option<Point>>,
-    /// For each view, the 14 joints of `skeleton::PARSE14`, pixels of the footage; left and right are sides of
+    /// For each view, the 14 joints of `skeleton::PARSE14`, in pixels of the footage; left and right are sides of
     /// the body. `None` if no person was found.
     pub views: Vec<Option<Vec<[f64; 2]>>>,
     /// Single-view solutions of each pair, or of all views at once.

@@ -13,18 +13,18 @@ use crate::evaluation::{FrameResult, parse14};
 pub struct FrameScore {
     /// Errors of the twelve segments, as shares of their length ([`segment_errors`]).
     pub segments: Vec<Option<f64>>,
-    /// Errors of the joints, metres; infinite for a joint that was not found.
+    /// Errors of the joints, in metres; infinite for a joint that was not found.
     pub joints_m: Vec<Option<f64>>,
-    /// Errors of the joints after the best alignment, metres; empty if there is no alignment.
+    /// Errors of the joints after the best alignment, in metres; empty if there is no alignment.
     pub aligned_m: Vec<Option<f64>>,
     /// True if the body fits the truth better with left and right exchanged; `None` if there are no joints to compare.
     pub is_exchanged: Option<bool>,
-    /// For each view, the 14 joints that were found (if any) and the true ones, pixels of the footage. `None`
+    /// For each view, the 14 joints that were found (if any) and the true ones, in pixels of the footage. `None`
     /// if a true joint is unknown or behind the camera.
     pub views: Vec<Option<(Option<Joints>, Joints)>>,
     /// Single-view solutions of each pair, or of all views at once.
     pub iterations: Vec<u32>,
-    /// Number of these that had not converged.
+    /// Number of pairs (or of all-views solutions) that had not converged at the end.
     pub unsettled: u32,
     /// Total number of single-view solutions.
     pub solutions: u32,
@@ -32,7 +32,7 @@ pub struct FrameScore {
     pub on: Option<f64>,
 }
 
-/// The joints of `skeleton::PARSE14` in an image, pixels.
+/// The joints of `skeleton::PARSE14` in an image, in pixels.
 pub type Joints = [[f64; 2]; 14];
 
 /// Compares a result with the truth.
@@ -67,7 +67,7 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
 
 /// Returns true if the joints fit the truth better with left and right exchanged, by the sum of the distances.
 ///
-/// * `found`, `truth`: joints of `skeleton::PARSE14`, metres.
+/// * `found`, `truth`: joints of `skeleton::PARSE14`, in metres.
 /// * Returns `None` if no pair of left and right joints is both found and known.
 fn is_exchanged(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<bool> {
     let distance = |a: Point, b: Point| (Point3::from(a) - Point3::from(b)).norm();
@@ -86,7 +86,7 @@ fn is_exchanged(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<bool
 /// Returns the true joints in an image; `None` if a joint is unknown or behind the camera.
 ///
 /// * `offset`: calibrated pixel at the image's top-left pixel.
-/// * `joints`: joints of `skeleton::PARSE14`, metres.
+/// * `joints`: joints of `skeleton::PARSE14`, in metres.
 pub fn projected(camera: &Camera, offset: [f64; 2], joints: &[Option<Point>]) -> Option<Joints> {
     let mut pixels = [[0.0; 2]; 14];
     for (pixel, joint) in pixels.iter_mut().zip(joints) {

@@ -70,7 +70,7 @@ impl Stress {
 /// Covers half of a person with grey.
 ///
 /// * `rgb`: the picture, three bytes per pixel; `size` is its width and height.
-/// * `outline`: box of the person: left, top, right, bottom, pixels. A margin of 15 % of its height is added.
+/// * `outline`: box of the person: left, top, right, bottom, in pixels. A margin of 15 % of its height is added.
 /// * `nth`: selects the half: in turn left, right, upper or lower.
 pub fn cover_half(rgb: &mut [u8], size: [usize; 2], outline: [f64; 4], nth: usize) {
     const GREY: u8 = 127;

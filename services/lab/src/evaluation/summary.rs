@@ -5,18 +5,18 @@ use statistics::score::{Bootstrap, Changes, PcpRule, Report, Share};
 
 use crate::evaluation::{FrameScore, Judgement};
 
-/// Error in 3D up to which a joint counts as correct, metres.
+/// Error in 3D up to which a joint counts as correct, in metres.
 const PCK_M: f64 = 0.15;
 /// The paper's threshold in eq. 13.
 const GAMMA: f64 = 0.5;
 /// Number of thresholds in the curves: from 0 in steps of 0.05.
 const N_GAMMAS: usize = 21;
-/// Range of the histogram of changes in both directions, pixels; below, the number of its bins.
+/// Range of the histogram of changes in both directions, in pixels. `N_BINS` is the number of its bins.
 const REACH_PX: f64 = 50.0;
 const N_BINS: usize = 40;
-/// Change below which a joint counts as unchanged, pixels.
+/// Change below which a joint counts as unchanged, in pixels.
 const SAME_PX: f64 = 1.0;
-/// Deterioration above which a joint is also counted separately, pixels.
+/// Deterioration above which a joint is also counted separately, in pixels.
 const FAR_PX: f64 = 5.0;
 
 /// Scores of one sequence.
@@ -68,43 +68,43 @@ pub struct Group {
 /// The numbers of one version on one group.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Numbers {
-    /// Segments found (eq. 13 at 0.5), percent.
+    /// Segments found (eq. 13 at 0.5), in percent.
     pub pcp3d: Option<f64>,
     /// Confidence interval of `pcp3d` over frames.
     pub pcp3d_interval: Option<[f64; 2]>,
-    /// Gain over the first version, percentage points.
+    /// Gain over the first version, in percentage points.
     pub gain: Option<f64>,
     /// Confidence interval of `gain`, from frame-by-frame differences from the first version.
     pub gain_interval: Option<[f64; 2]>,
-    /// PCP3D of each segment, percent, in the order of `statistics::score::SEGMENT_NAMES`.
+    /// PCP3D of each segment, in percent, in the order of `statistics::score::SEGMENT_NAMES`.
     pub parts: Vec<Option<f64>>,
     /// PCP3D over the threshold: pairs of threshold and percent.
     pub curve: Vec<[f64; 2]>,
-    /// Mean error of the joints that were found, mm.
+    /// Mean error of the joints that were found, in mm.
     pub mpjpe_mm: Option<f64>,
     /// Confidence interval of `mpjpe_mm`.
     pub mpjpe_interval: Option<[f64; 2]>,
-    /// Mean error of the joints after the best alignment of every frame, mm.
+    /// Mean error of the joints after the best alignment of every frame, in mm.
     pub aligned_mpjpe_mm: Option<f64>,
-    /// Frames in which left and right of the whole body are exchanged, percent.
+    /// Frames in which left and right of the whole body are exchanged, in percent.
     pub exchanged: Option<f64>,
     /// Confidence interval of `exchanged`.
     pub exchanged_interval: Option<[f64; 2]>,
-    /// Joints with an error of at most 150 mm, percent; joints that were not found count as wrong.
+    /// Joints with an error of at most 150 mm, in percent; joints that were not found count as wrong.
     pub pck3d: Option<f64>,
-    /// Joints that could not be triangulated, percent.
+    /// Joints that could not be triangulated, in percent.
     pub lost: Option<f64>,
-    /// PCP in images by the mean of both ends, percent.
+    /// PCP in images by the mean of both ends, in percent.
     pub pcp2d: Option<f64>,
-    /// PCK in images at a tenth and a fifth of the person's size, percent.
+    /// PCK in images at a tenth and a fifth of the person's size, in percent.
     pub pck2d: Option<[f64; 2]>,
     /// Mean number of single-view solutions until a pair, or all views, converged.
     pub iterations: Option<f64>,
-    /// Share of these that did not converge, percent.
+    /// Share of pairs (or of all-views solutions) that did not converge, in percent.
     pub unsettled: Option<f64>,
     /// Single-view solutions per frame, over all pairs and hypotheses.
     pub solutions: Option<f64>,
-    /// Consistency terms that were switched off, percent.
+    /// Consistency terms that were switched off, in percent.
     pub off: Option<f64>,
     /// Changes from the first version, for each joint in each image.
     pub changes: ChangesOf,
@@ -113,14 +113,14 @@ pub struct Numbers {
 /// Improvements and deteriorations relative to the first version.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangesOf {
-    /// Joints in images that moved more than a pixel towards the truth, percent.
+    /// Joints in images that moved more than a pixel towards the truth, in percent.
     pub improved: f64,
-    /// Joints in images that moved more than a pixel away from the truth, percent.
+    /// Joints in images that moved more than a pixel away from the truth, in percent.
     pub deteriorated: f64,
-    /// Joints in images that moved more than five pixels away from the truth, percent.
+    /// Joints in images that moved more than five pixels away from the truth, in percent.
     pub deteriorated_5px: f64,
-    /// Bins of the histogram: lower edge in pixels (positive values are improvements), and percent. The outermost bins include all larger
-    /// changes.
+    /// Bins of the histogram: the lower edge in pixels (positive values are improvements), and the share of joints in percent. The
+    /// outermost bins include all larger changes.
     pub bins: Vec<[f64; 2]>,
 }
 
@@ -190,13 +190,13 @@ fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
     all
 }
 
-/// Returns the segments found in one frame (eq. 13), percent.
+/// Returns the segments found in one frame (eq. 13), in percent.
 fn correct(frame: &FrameScore) -> Share {
     let judged = frame.segments.iter().flatten();
     Share::of(judged.map(|judged| percent(*judged <= GAMMA)))
 }
 
-/// Returns the gain of one version over another in a frame, percentage points.
+/// Returns the gain of one version over another in a frame, in percentage points.
 fn gain(own: &FrameScore, first: &FrameScore) -> Share {
     let (own, first) = (correct(own), correct(first));
     Share {
@@ -205,7 +205,7 @@ fn gain(own: &FrameScore, first: &FrameScore) -> Share {
     }
 }
 
-/// Returns the errors of the joints that were found, mm.
+/// Returns the errors of the joints that were found, in mm.
 fn errors_mm(errors: &[Option<f64>]) -> Share {
     let found = errors.iter().flatten().filter(|error| error.is_finite());
     Share::of(found.map(|value| 1000.0 * value))
@@ -315,7 +315,7 @@ fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
 mod tests {
     use super::*;
 
-    /// Returns a frame in which the first `n_right` of twelve segments are within the threshold; the others exceed it by half.
+    /// Returns a frame in which the first `n_right` of twelve segments are within the threshold; the others exceed the threshold by half.
     fn frame(n_right: usize) -> FrameScore {
         let error = |nth: usize| Some(if nth < n_right { 0.25 } else { 0.75 });
         let truth = [[5.0, 5.0]; 14];

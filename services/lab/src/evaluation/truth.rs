@@ -26,7 +26,7 @@ const BETWEEN: [(usize, usize, usize, f64); 6] = [
     (12, 11, 13, 0.5),
 ];
 
-/// Returns the true positions of the 26 parts in an image, pixels; NaN where a joint is unknown.
+/// Returns the true positions of the 26 parts in an image, in pixels; NaN where a joint is unknown.
 ///
 /// * `joints`: joints of `skeleton::PARSE14`.
 fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
@@ -62,8 +62,8 @@ pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
 /// of 1, a part is switched off if its error exceeds a tenth of the person's size. If the model's left and
 /// right may be exchanged (a person seen from behind), the assignment with the smaller errors counts.
 ///
-/// * `centres`: centres of the 26 parts, pixels.
-/// * `joints`: the true joints of `skeleton::PARSE14`, pixels of the same image.
+/// * `centres`: centres of the 26 parts, in pixels.
+/// * `joints`: the true joints of `skeleton::PARSE14`, in pixels of the same image.
 /// * Returns `None` if a joint is unknown.
 pub fn part_errors(
     centres: &[[f64; 2]],
@@ -106,7 +106,7 @@ pub fn part_errors_and_facing(
     })
 }
 
-/// Returns the size of a person: the longer side of the rectangle around the joints, pixels.
+/// Returns the size of a person: the longer side of the rectangle around the joints, in pixels.
 pub fn size(joints: &[[f64; 2]]) -> f64 {
     let side = |axis: usize| {
         let values = joints.iter().map(|joint| joint[axis]);

@@ -17,7 +17,7 @@ use crate::person::read_options;
 /// Score of the teacher above which its box counts as a person; boxes with a lower score are ignored.
 const SURE: f64 = 0.4;
 /// Overlap above which a box of the teacher shows a marked person: the shared area as a share of the union of both boxes. A box of the
-/// teacher that is mostly within a marked box is also the marked person's.
+/// teacher that is mostly within a marked box also counts as the marked person's box.
 const SAME: f64 = 0.4;
 /// Invisible joints of manually marked people can be at any position, even outside the picture.
 const ANYWHERE_PX: f64 = 1e5;

@@ -12,11 +12,11 @@ use exports::report::{html, put};
 #[derive(Debug)]
 pub(super) struct Figure {
     types: Vec<usize>,
-    /// Top left corner of each filter, cells.
+    /// Top left corner of each filter, in cells.
     corner: Vec<[f64; 2]>,
     /// Spring of each part for the chosen types; `None` for the root.
     spring: Vec<Option<Ellipse>>,
-    /// Bounding box of the figure: left, top, width, height, cells.
+    /// Bounding box of the figure: left, top, width, height, in cells.
     frame: [f64; 4],
 }
 
@@ -146,10 +146,9 @@ impl Figure {
 }
 
 /// Returns the types of an ordinary posture. Each part has the type whose rest position is nearest to the mean rest position of all its
-/// types. The root has the type that fits these best. If types are equal, the first one is chosen.
+/// types. The root has the type that fits the types of its children best. Among equally good types, the first is chosen.
 ///
-/// The types with the largest sum of biases would show a rare posture: its filters gain most from each
-/// other.
+/// The types with the largest sum of biases would show a rare posture, whose filters gain most from each other.
 fn ordinary_types(model: &Model) -> Vec<usize> {
     let parts = &model.spec().parts;
     let mut types = vec![0; parts.len()];

@@ -10,9 +10,9 @@ use exports::report::{html, put};
 /// Rest position of a spring, and the ellipse on which it costs [`SPRING_COST`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ellipse {
-    /// Offset of the child from its parent, cells.
+    /// Offset of the child from its parent, in cells.
     pub(super) centre: [f64; 2],
-    /// Half axes, cells.
+    /// Half axes, in cells.
     pub(super) radius: [f64; 2],
 }
 

@@ -29,13 +29,13 @@ mod joint {
     pub(super) const HEAD: usize = 13;
 }
 
-/// Shortest trunk that is used, pixels.
+/// Shortest trunk that is used, in pixels.
 const MIN_TRUNK_PX: f64 = 10.0;
-/// Largest lean of a trunk for which the picture is not rotated, radians.
+/// Largest lean of a trunk for which the picture is not rotated, in radians.
 const MAX_LEAN: f64 = 0.35;
 /// Margin of the box around the parts, in trunk lengths, as in a search.
 const MARGIN: f64 = 0.25;
-/// Width of the shoulders, and below of the hips, of a person seen from the front, in trunk lengths.
+/// Width of the shoulders of a person seen from the front, in trunk lengths. `HIPS` is the width of the hips.
 const SHOULDERS: f64 = 0.62;
 const HIPS: f64 = 0.38;
 /// Sum of the bends of knees and elbows and the head's lean for a person seen from the side, in trunk lengths.
@@ -132,7 +132,7 @@ fn bounds(points: &[[f64; 2]], margin: f64) -> [f64; 4] {
     [x1 - margin, y1 - margin, x2 + margin, y2 + margin]
 }
 
-/// Returns the vector from the middle of the hips to the neck, pixels.
+/// Returns the vector from the middle of the hips to the neck, in pixels.
 fn trunk(joints: &[[f64; 2]]) -> [f64; 2] {
     let hips = middle(joints, joint::R_HIP, joint::L_HIP);
     [0, 1].map(|axis| joints[joint::NECK][axis] - hips[axis])

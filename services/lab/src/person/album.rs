@@ -20,7 +20,7 @@ pub(super) struct Gallery {
     people: Vec<Person>,
     joint_mirror: Vec<usize>,
     copies: Vec<Copied>,
-    /// Centres of the parts in every copy, pixels of the copy.
+    /// Centres of the parts in every copy, in pixels of the copy.
     parts: Vec<Vec<[f64; 2]>>,
     negatives: Vec<PathBuf>,
     stamp: u64,
@@ -77,7 +77,7 @@ impl Gallery {
         })
     }
 
-    /// Returns the centres of the parts in every copy, pixels of the copy.
+    /// Returns the centres of the parts in every copy, in pixels of the copy.
     pub(super) fn parts(&self) -> &[Vec<[f64; 2]>] {
         &self.parts
     }

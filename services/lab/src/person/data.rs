@@ -30,7 +30,7 @@ pub struct Chosen {
     pub without: Vec<String>,
     /// Meaning of left and right in the labels: `marked` or `seen`.
     pub sides: Vec<String>,
-    /// Angles of rotated copies, degrees, anticlockwise, separated by commas.
+    /// Angles of rotated copies, in degrees, anticlockwise, separated by commas.
     pub rotate: Vec<String>,
     /// True to train on mirror images too.
     pub with_mirror: bool,

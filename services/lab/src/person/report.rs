@@ -18,9 +18,9 @@ pub struct Report {
     left_out: BTreeMap<&'static str, usize>,
     /// Number of people with valid labels.
     n_sound: usize,
-    /// Number of these people who are large enough for training.
+    /// Number of people with valid labels who are large enough for training.
     n_people: usize,
-    /// Number of their images, including rotated and mirrored copies.
+    /// Number of images of people for training, including rotated and mirrored copies.
     n_images: usize,
     n_negatives: usize,
     n_unreadable: usize,
@@ -37,7 +37,7 @@ pub struct Report {
     pub(super) n_lost: Option<usize>,
     /// False alarms.
     pub(super) alarms: Option<Alarms>,
-    /// Total time, seconds.
+    /// Total time, in seconds.
     pub(super) seconds: f64,
 }
 

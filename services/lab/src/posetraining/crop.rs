@@ -6,7 +6,7 @@ use training::networks::pose::{FILL, MARGIN, SIDE, Shape, WINDOW};
 /// Position of the square in a picture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crop {
-    /// Centre of the square, pixels of the picture.
+    /// Centre of the square, in pixels of the picture.
     centre: [f64; 2],
     /// Pixels of the picture per pixel of the square.
     step: f64,
@@ -18,7 +18,7 @@ impl Crop {
     /// Returns the square around the joints with finite positions: the size of the network's window, with a margin. `None` if the joints
     /// have no extent.
     ///
-    /// * `angle`: clockwise rotation of the picture before cropping, radians.
+    /// * `angle`: clockwise rotation of the picture before cropping, in radians.
     pub(super) fn around(joints: &[[f64; 2]], angle: f64) -> Option<Self> {
         let turn = [angle.cos(), angle.sin()];
         let known = joints.iter().filter(|joint| joint.iter().all(|value| value.is_finite()));

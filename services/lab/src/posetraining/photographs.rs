@@ -19,7 +19,7 @@ use crate::person::{deal, read_options, sides_of};
 /// Pairs of joints that show whether a person is seen from behind: hips and shoulders, the right one first.
 const PAIRS: [[usize; 2]; 2] = [[2, 3], [8, 9]];
 const NECK: usize = 12;
-/// Length of the shortest trunk that is used, pixels of the square picture.
+/// Length of the shortest trunk that is used, in pixels of the square picture.
 const MIN_TRUNK: f32 = 8.0;
 /// Largest enlargement, in pixels of the network's window per pixel of the picture: smaller people show too little detail.
 const MOST_ENLARGED: f64 = 4.0;
@@ -207,7 +207,7 @@ fn in_picture([aside, towards]: [f32; 2], lean: f32) -> [f32; 3] {
     [aside * lean.cos(), aside * lean.sin(), towards]
 }
 
-/// Returns the angle of the trunk from upright, clockwise, radians.
+/// Returns the angle of the trunk from upright, clockwise, in radians.
 fn lean(joints: &[[f64; 2]; N_JOINTS]) -> f64 {
     let [right, left] = PAIRS[0].map(|pair| joints[pair]);
     let shoulders = PAIRS[1].map(|pair| joints[pair]);
@@ -236,7 +236,7 @@ fn length([x, y]: Point) -> f32 {
 }
 
 /// Returns the mean distance by which the left hip and shoulder are to the right of the right ones, in the upright picture. It is negative
-/// for a person seen from behind. Unmarked joints are the teacher's; `None` if neither source has them.
+/// for a person seen from behind. Joints without a mark are taken from the teacher; `None` if neither source has them.
 fn across(marks: &Marks) -> Option<f32> {
     let widths = PAIRS.iter().filter_map(|[right, left]| {
         let is_marked = [right, left].iter().all(|joint| marks.marked[**joint][0].is_finite());

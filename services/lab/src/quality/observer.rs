@@ -53,7 +53,7 @@ impl Observer {
 
     /// Makes a sample.
     ///
-    /// * `joints`: the true joints of `skeleton::PARSE14`, pixels of the picture.
+    /// * `joints`: the true joints of `skeleton::PARSE14`, in pixels of the picture.
     /// * `named`: group and source of the sample.
     ///
     /// # Errors

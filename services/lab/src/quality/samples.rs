@@ -33,7 +33,7 @@ pub struct Job {
     pub tile: TileShape,
 }
 
-/// Counts of samples and of pictures without one.
+/// Number of samples, and number of pictures without a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Made {
     /// Number of samples.

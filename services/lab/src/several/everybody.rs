@@ -15,7 +15,7 @@ use super::judge::{FOUND_M, Put, Score};
 use super::report::{ActorReport, measured, of_actor};
 use super::shelf::{N_TRUE, TruePerson};
 
-/// Mean distances of the joints up to which a person in the output is correct, millimetres; as in `VoxelPose`'s evaluation on Panoptic.
+/// Mean distances of the joints up to which a person in the output is correct, in millimetres; as in `VoxelPose`'s evaluation on Panoptic.
 const RIGHT_MM: [u32; 6] = [25, 50, 75, 100, 125, 150];
 
 /// Scores of a run.
@@ -25,12 +25,12 @@ pub struct Everybody {
     pub frames: usize,
     /// Results for each true person.
     pub people: Vec<ActorReport>,
-    /// Mean distance of the fourteen joints of the people who were found, millimetres.
+    /// Mean distance of the fourteen joints of the people who were found, in millimetres.
     pub mpjpe_mm: Option<Measured>,
     /// Average precision in percent, for each distance in millimetres up to which a person is correct. People are ordered by the standard
     /// deviations in the run's output.
     pub ap: BTreeMap<u32, f64>,
-    /// Share of the true people with a person of the output within half a metre, percent.
+    /// Share of the true people for whom the output has a person within half a metre, in percent.
     pub recall: f64,
     /// Number of id changes.
     pub switches: usize,
@@ -47,9 +47,9 @@ pub struct Everybody {
 /// A person in the output.
 struct Candidate {
     frame: usize,
-    /// Mean of the standard deviations in the output, metres.
+    /// Mean of the standard deviations in the output, in metres.
     sd_m: f64,
-    /// Mean distance to every true person, metres.
+    /// Mean distance to every true person, in metres.
     distances_m: Vec<f64>,
 }
 
@@ -74,7 +74,7 @@ struct Tally {
     score: Score,
     candidates: Vec<Candidate>,
     n_true: usize,
-    /// Distances of the people who were found, metres, for each frame.
+    /// Distances of the people who were found, in metres, for each frame.
     errors_m: Vec<Share>,
 }
 
@@ -157,7 +157,7 @@ fn joints(person: &PersonLine) -> Joints {
     })
 }
 
-/// Returns the mean of the standard deviations in the output, metres; infinite if there is no joint.
+/// Returns the mean of the standard deviations in the output, in metres; infinite if there is no joint.
 fn deviation(person: &PersonLine) -> f64 {
     let placed = person.joints.values().filter_map(|joint| joint.placed());
     let (mut sum, mut n) = (0.0, 0.0);
@@ -172,7 +172,7 @@ fn deviation(person: &PersonLine) -> f64 {
     if n > 0.0 { sum / n } else { f64::INFINITY }
 }
 
-/// Returns the mean distance of the joints, metres; infinite if half of them are unknown.
+/// Returns the mean distance of the joints, in metres; infinite if half of them are unknown.
 fn distance(put: &Joints, there: &Joints) -> f64 {
     let both = put.iter().zip(there);
     let each: Vec<f64> = both.filter_map(|(a, b)| Some(((*a)? - (*b)?).norm())).collect();
@@ -182,7 +182,7 @@ fn distance(put: &Joints, there: &Joints) -> f64 {
     each.iter().sum::<f64>() / each.len() as f64
 }
 
-/// Returns the area under the curve of precision over recall, percent. People of the output come in the order of their certainty. A person
+/// Returns the area under the curve of precision over recall, in percent. People of the output come in the order of their certainty. A person
 /// is correct if the nearest true person is close enough and was not matched before.
 fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f64 {
     let mut taken = std::collections::BTreeSet::new();
@@ -275,8 +275,8 @@ mod tests {
         assert_eq!(score.ids, 3);
         assert!((score.recall - 100.0 * 100.0 / 120.0).abs() < 1e-9);
         assert_eq!(score.ap[&50], 0.0);
-        // 100 of the 120 true people are correct, and 100 of 120 people in the output. Before the last frames, the share is slightly
-        // higher.
+        // 100 of the 120 true people are found correctly, and 100 of the 120 people in the output are correct. Before the last frames, the
+        // share is slightly higher.
         assert!((69.4..70.0).contains(&score.ap[&75]), "{:?}", score.ap);
     }
 }

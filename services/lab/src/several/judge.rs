@@ -21,7 +21,7 @@ const PARTS: [(&str, [usize; 2]); 10] = [
     ("head", [12, 13]),
     ("torso", [12, 14]),
 ];
-/// Largest mean distance of the joints at which a person of the output can be a true person, metres.
+/// Largest mean distance of the joints at which a person of the output can be a true person, in metres.
 pub(super) const FOUND_M: f64 = 0.5;
 /// Position of the ears between the neck and the top of the head, as in `keypoints::joint_ways`.
 const EARS: f64 = 1.0 / 1.8;
@@ -38,7 +38,7 @@ pub struct Put {
 }
 
 impl Put {
-    /// Takes the joints unchanged; the head extends from the neck to its top.
+    /// Takes the joints unchanged. The head extends from the neck to the top of the head.
     pub fn plain(id: u64, joints: &Joints) -> Self {
         let mut all = [None; N_TRUE];
         all[..14].copy_from_slice(joints);
@@ -82,7 +82,7 @@ pub struct Actor {
     pub parts: Vec<Share>,
     /// Correct parts over all frames, by the name of the part.
     pub by_part: BTreeMap<&'static str, Share>,
-    /// Distances of the twelve joints of the limbs, metres.
+    /// Distances of the twelve joints of the limbs, in metres.
     pub errors_m: Vec<Share>,
     /// Number of frames in which the person was found.
     pub n_found: usize,
@@ -136,7 +136,7 @@ impl Score {
 }
 
 impl Put {
-    /// Returns the mean distance of the joints, metres; `None` for fewer than four joints.
+    /// Returns the mean distance of the joints, in metres; `None` for fewer than four joints.
     fn distance(&self, person: &TruePerson) -> Option<f64> {
         let each = person.joints.iter().zip(&self.joints);
         let each = each.filter_map(|(a, b)| Some((a - (*b)?).norm()));

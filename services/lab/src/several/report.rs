@@ -30,11 +30,11 @@ pub struct ActorReport {
     pub frames: usize,
     /// Number of frames in which the person was found.
     pub found: usize,
-    /// Correct parts, percent.
+    /// Correct parts, in percent.
     pub pcp3d: Option<Measured>,
-    /// Correct parts by the name of the part, percent.
+    /// Correct parts by the name of the part, in percent.
     pub parts: BTreeMap<&'static str, f64>,
-    /// Mean distance of the twelve joints of the limbs, millimetres.
+    /// Mean distance of the twelve joints of the limbs, in millimetres.
     pub mpjpe_mm: Option<Measured>,
     /// Number of id changes.
     pub switches: usize,
@@ -47,7 +47,7 @@ pub struct Report {
     pub views: Vec<usize>,
     /// Number of frames.
     pub frames: usize,
-    /// Mean PCP3D of the first three actors, percent.
+    /// Mean PCP3D of the first three actors, in percent.
     pub mean_pcp3d: Option<Measured>,
     /// Results for each true person.
     pub actors: Vec<ActorReport>,
@@ -57,7 +57,7 @@ pub struct Report {
     pub ids: usize,
     /// Mean number of people in the output of a frame.
     pub put_out: f64,
-    /// Time of the association alone, milliseconds per frame: median and 99th percentile.
+    /// Time of the association alone, in milliseconds per frame: median and 99th percentile.
     pub association_ms: [f64; 2],
 }
 

@@ -70,7 +70,7 @@ pub enum ShelfError {
 pub struct TruePerson {
     /// Id of the person.
     pub id: usize,
-    /// The joints, metres.
+    /// The joints, in metres.
     pub joints: [Point3<f64>; N_TRUE],
 }
 
@@ -342,7 +342,7 @@ fn seen(candidates: &[Candidates], groups: &[Group]) -> View {
 
 /// Returns a candidate with its standard deviation; `None` if the confidence is too low.
 ///
-/// * `size`: size of the person in the picture, pixels.
+/// * `size`: size of the person in the picture, in pixels.
 fn placed([x, y, confidence]: [f64; 3], size: f64) -> Option<Keypoint> {
     let sd_px = (SD_SHARE * size / confidence.max(LEAST_CONFIDENCE).sqrt()).max(1.0);
     (confidence > LEAST_CONFIDENCE).then_some(Keypoint {
@@ -370,7 +370,7 @@ fn joint(candidates: &[Candidates], group: &Group, way: &Way, size: f64) -> Opti
     Some(joint)
 }
 
-/// Returns the longer side of the box around a person, pixels.
+/// Returns the longer side of the box around a person, in pixels.
 fn size(candidates: &[Candidates], group: &Group) -> f64 {
     let side = |axis: usize| {
         let each = group

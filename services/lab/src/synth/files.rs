@@ -19,9 +19,9 @@ const JPEG_QUALITY: u8 = 95;
 /// File format of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Lossless.
+    /// PNG, which is lossless.
     Png,
-    /// Smaller; most cameras use this format (quality 95).
+    /// JPEG, as most cameras write it (quality 95). The files are smaller.
     Jpg,
 }
 

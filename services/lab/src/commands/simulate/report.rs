@@ -39,7 +39,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
             "{n_frames} frames of {n_views} views: no costs can be computed"
         ));
     }
-    // Mean time of a process of this service, milliseconds per frame.
+    // Mean time of a process of this service, in milliseconds per frame.
     let mean = |service: &str| {
         let is_meant = |name: &str| {
             let rest = name.strip_prefix(service);

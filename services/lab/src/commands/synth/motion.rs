@@ -19,10 +19,10 @@ pub(super) struct MotionArguments {
     /// configs/markers. If not given, the first of these four tables whose markers are all in the file.
     #[arg(long, value_name = "TABLE", requires = "motion")]
     markers: Option<PathBuf>,
-    /// First and last frame, as numbered in the file; all frames if not given.
+    /// First and last frame, as numbered in the file. If not given, all frames.
     #[arg(long, value_name = "FIRST-LAST", requires = "motion", value_parser = frames)]
     motion_frames: Option<[u32; 2]>,
-    /// Longest gap in a marker's track that is interpolated linearly, seconds.
+    /// Longest gap in a marker's track that is interpolated linearly, in seconds.
     #[arg(long, value_name = "S", default_value_t = MotionOptions::default().max_gap_s, requires = "motion")]
     motion_gap: f64,
 }

@@ -38,16 +38,16 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Sequences to learn from, see below.
+    /// Sequences to learn from; see below.
     #[arg(required = true, value_name = "SEQUENCE")]
     sequences: Vec<PathBuf>,
-    /// Model file; the shipped person model if not given.
+    /// Model file. If not given, the shipped person model.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Held-out subjects, on which the weights are chosen, separated by commas; the last quarter of the subjects if not given.
+    /// Held-out subjects, on which the weights are chosen, separated by commas. If not given, the last quarter of the subjects.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     hold_out: Vec<String>,
     /// Largest number of instants of the held-out subjects for trying weights, evenly spaced.
@@ -74,7 +74,7 @@ pub(crate) struct Arguments {
     /// Largest number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Number of threads; one per core if not given. It does not affect the file.
+    /// Number of threads, which does not affect the file. If not given, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print the summary as JSON.
@@ -113,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// The settings of the learning.
+/// Returns the settings of the training.
 fn job(arguments: &Arguments, fingerprint: String) -> Job {
     Job {
         tries: arguments.tries,

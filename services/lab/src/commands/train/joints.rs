@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Number of threads; one per core if not given.
+    /// Number of threads. If not given, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print the result as JSON.

@@ -11,7 +11,7 @@ pub(super) struct Marked {
     /// Annotated people: folders or files, as for `train fmp`.
     #[arg(value_name = "DATASET", required = true)]
     datasets: Vec<PathBuf>,
-    /// People of a data set to train on; all if not given.
+    /// People of a data set to train on. If not given, all are used.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
     /// People of a data set to leave out, for example its test set.

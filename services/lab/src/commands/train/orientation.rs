@@ -35,13 +35,13 @@ pub(crate) struct Arguments {
     /// Annotated people: folders or files, as for `train fmp`.
     #[arg(value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// People of a data set to use; all if not given.
+    /// People of a data set to use. If not given, all are used.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
     /// People of a data set for the evaluation; they are left out of the training.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     judge: Vec<String>,
-    /// Number of synthetic scenes; each gives several pictures from every camera.
+    /// Number of synthetic scenes. Each scene gives several pictures from every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
     /// First and last number of the synthetic people in the scenes.
@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     /// Frames per camera in a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Folder of photographs without people, the background of every third scene instead of a room.
+    /// Folder of photographs without people. They replace the room as the background of every third scene.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Number of training passes over all people.
@@ -65,13 +65,13 @@ pub(crate) struct Arguments {
     /// Random seed.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Single-view model; the shipped person model if not given.
+    /// Single-view model. If not given, the shipped person model.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Number of threads; one per core if not given.
+    /// Number of threads. If not given, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print the result as JSON.

@@ -16,7 +16,7 @@ pub(super) struct People {
     /// Folder of images without people; the option can be repeated.
     #[arg(long, value_name = "DIR", required_unless_present = "print_settings")]
     negatives: Vec<PathBuf>,
-    /// People of a data set to train on; all if not given.
+    /// People of a data set to train on. If not given, all are used.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
     /// People of a data set to leave out, for example its test set.
@@ -32,7 +32,7 @@ pub(super) struct People {
     /// Do not train on mirrored images.
     #[arg(long)]
     no_mirror: bool,
-    /// Parts of the model and their positions between the joints, as TOML; if not given, the 26 published parts for 14 joints.
+    /// Parts of the model and their positions between the joints, as TOML. If not given, the 26 published parts for 14 joints.
     #[arg(long, value_name = "FILE")]
     skeleton: Option<PathBuf>,
     /// Kinds of bad labels that end the training, separated by commas, or `all`. People with other bad labels are left out.

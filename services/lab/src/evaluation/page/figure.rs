@@ -6,7 +6,7 @@ use statistics::score::SEGMENT_NAMES;
 use exports::report::html::Html;
 use exports::report::put;
 
-/// Colours of the versions. They can be told apart with colour blindness, and on light and dark backgrounds.
+/// Colours of the versions. People with colour blindness can distinguish them, on light and on dark backgrounds.
 const COLOURS: [&str; 8] = [
     "#d9503f", "#3a86c8", "#2f9e5b", "#9a6bd0", "#d98a00", "#1f9c95", "#d0568f", "#808894",
 ];
@@ -97,7 +97,7 @@ pub(super) fn tick(value: f64) -> String {
     }
 }
 
-/// Returns the smallest value at the top of an axis with four steps for which such labels are exact.
+/// Returns the smallest value at the top of an axis with four steps for which the labels of [`tick`] are exact.
 pub(super) fn top(most: f64) -> f64 {
     let tenth = 10_f64.powf(most.max(0.01).log10().floor());
     let steps = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];

@@ -41,13 +41,13 @@ pub(crate) struct Arguments {
     /// Teacher: a detector that finds all people in the photographs.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Option<PathBuf>,
-    /// Card of the teacher; if not given, the file beside it.
+    /// Card of the teacher. If not given, the file beside it.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Option<PathBuf>,
     /// Folder of photographs without people; they are also the background of every third scene.
     #[arg(long, value_name = "DIR")]
     empty: Option<PathBuf>,
-    /// Number of synthetic scenes; each gives several pictures from every camera.
+    /// Number of synthetic scenes. Each scene gives several pictures from every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
     /// First and last number of the synthetic people in the scenes.

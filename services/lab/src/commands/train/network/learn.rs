@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     people: Option<PathBuf>,
     #[command(flatten)]
     learning: Learning,
-    /// Network of this command to start from, instead of random weights; for more steps, or to add your own people.
+    /// Network from this command, with which to start instead of random weights. Use it to train for more steps, or to add your own people.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
 }

@@ -42,14 +42,14 @@ Example:
 pub(crate) struct Arguments {
     #[command(flatten)]
     people: Marked,
-    /// Teacher: a network that finds keypoints, to improve joints and sides. Repeat the option for a further network; it adds the keypoints
-    /// that earlier ones do not have.
+    /// Teacher: a network that finds keypoints, to improve joints and sides. Repeat the option for further networks. Each adds the
+    /// keypoints that earlier networks do not have.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Vec<PathBuf>,
-    /// Cards of the teachers, in the same order; if not given, the files beside them.
+    /// Cards of the teachers, in the same order. If not given, the files beside them.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Vec<PathBuf>,
-    /// Number of synthetic scenes; each gives several pictures from every camera.
+    /// Number of synthetic scenes. Each scene gives several pictures from every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
     /// First and last number of the synthetic people in the scenes.
@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     /// Frames per camera in a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Folder of photographs without people, the background of every third scene instead of a room.
+    /// Folder of photographs without people. They replace the room as the background of every third scene.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
     /// Random seed of the scenes.

@@ -74,7 +74,7 @@ pub(crate) struct Arguments {
     /// Initial weights: torchvision's VGG-16, as a .safetensors file.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Identity stored in the file; the file's name if not given.
+    /// Identity stored in the file. If not given, the file's name.
     #[arg(long, value_name = "TEXT")]
     identity: Option<String>,
     /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.
