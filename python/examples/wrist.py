@@ -1,4 +1,7 @@
-"""Prints the positions of a wrist in a running deployment, or the reason if it is missing: python wrist.py demo "right wrist"."""
+"""Prints the positions of a wrist in a running deployment, or the reason why it is missing.
+
+Usage: python wrist.py demo "right wrist"
+"""
 
 import sys
 import time

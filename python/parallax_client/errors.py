@@ -1,4 +1,4 @@
-"""Errors of reading deployments and files."""
+"""Errors that occur when deployments and files are read."""
 
 
 class ClientError(Exception):
@@ -6,12 +6,12 @@ class ClientError(Exception):
 
 
 class NotRunning(ClientError):
-    """The deployment does not run. `running` has the names of the running deployments."""
+    """The deployment is not running. `running` has the names of the running deployments."""
 
     def __init__(self, name, running):
         self.name, self.running = name, list(running)
         ones = "running: " + ", ".join(self.running) if self.running else "no deployment is running"
-        super().__init__(f"deployment {name!r} does not run; {ones}")
+        super().__init__(f"deployment {name!r} is not running; {ones}")
 
 
 class VersionMismatch(ClientError):
@@ -20,16 +20,16 @@ class VersionMismatch(ClientError):
     def __init__(self, name, what, theirs, ours):
         self.what, self.theirs, self.ours = what, theirs, ours
         super().__init__(
-            f"deployment {name!r} sends {what!r} version {theirs}, this package reads version {ours}: "
+            f"deployment {name!r} sends {what!r} version {theirs}, but this package reads version {ours}: "
             "install the package from the same version of Parallax"
         )
 
 
 class Full(ClientError):
-    """The largest number of programs already read the deployment."""
+    """The maximum number of programs is already reading the deployment."""
 
     def __init__(self, name, most, guests):
         self.most = most
         super().__init__(
-            f"{most} programs already read deployment {name!r}, which is the limit: {', '.join(guests)}"
+            f"{most} programs are already reading deployment {name!r}, which is the limit: {', '.join(guests)}"
         )

@@ -19,9 +19,9 @@ class Person:
     status      "ok", or the reason for a missing skeleton; None in frames without the person, [frame]
     sides       certainty of left and right: "sure", "unsure" or "as-seen"; None in frames without the person, [frame]
     joints      names of the joints
-    positions   positions in the world of the calibration, metres; NaN for a missing joint, [frame, joint, axis]
-    covariance  covariance of the positions, square metres; NaN for a missing joint, [frame, joint, axis, axis]
-    reprojection_px  reprojection error, pixels; NaN for a missing joint, [frame, joint]
+    positions   positions in the world of the calibration, in metres; NaN for a missing joint, [frame, joint, axis]
+    covariance  covariance of the positions, in square metres; NaN for a missing joint, [frame, joint, axis, axis]
+    reprojection_px  reprojection error, in pixels; NaN for a missing joint, [frame, joint]
     n_views     number of views from which the joint was located, [frame, joint]
     """
 
@@ -50,13 +50,13 @@ class Person:
 
     @property
     def deviation(self):
-        """Standard deviation of every joint along one axis, metres; NaN for a missing joint, [frame, joint]."""
+        """Standard deviation of every joint along one axis, in metres; NaN for a missing joint, [frame, joint]."""
         return np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3)
 
     def joint(self, name):
-        """Returns the positions of one joint, metres, [frame, axis]."""
+        """Returns the positions of one joint, in metres, [frame, axis]."""
         if name not in self.joints:
-            raise KeyError(f"no joint {name!r}; the joints are {', '.join(self.joints)}")
+            raise KeyError(f"there is no joint {name!r}; the joints are {', '.join(self.joints)}")
         return self.positions[:, self.joints.index(name)]
 
 
@@ -64,7 +64,7 @@ class Run:
     """A finished run.
 
     frames      numbers of the frames, [frame]
-    time_s      times of the frames in the footage, seconds; NaN if the frame rate is unknown, [frame]
+    time_s      times of the frames in the footage, in seconds; NaN if the frame rate is unknown, [frame]
     status      "ok" if there is a skeleton, otherwise the reason for its absence or "no result", [frame]
     reason      reason for a missing result, [frame]
     joints      names of the joints
@@ -105,7 +105,7 @@ class Run:
         """Returns `followed` if no frame has more than one person; otherwise raises an error."""
         if not self._is_one:
             identities = ", ".join(str(it) for it in self.people)
-            raise ClientError(f"{self.folder} has {len(self.people)} people: use one of `people`: {identities}")
+            raise ClientError(f"{self.folder} has {len(self.people)} people; use one of them from `people`: {identities}")
         return self.followed
 
     positions = property(lambda self: self.only.positions)
@@ -116,7 +116,7 @@ class Run:
     sides = property(lambda self: self.only.sides)
 
     def joint(self, name):
-        """Returns the positions of one joint of the only person, metres, [frame, axis]."""
+        """Returns the positions of one joint of the only person, in metres, [frame, axis]."""
         return self.only.joint(name)
 
     def to_pandas(self):
@@ -177,16 +177,16 @@ def _problem(line):
     """Returns the problem of a line; None if the line is valid."""
     lacks = {"frame", "status", "people"} - set(line if isinstance(line, dict) else ())
     if lacks:
-        return f"no {', '.join(sorted(lacks))}"
+        return f"missing fields: {', '.join(sorted(lacks))}"
     people = line["people"]
     if len(people) > layout.LIMITS["MAX_PEOPLE"]:
-        return f"{len(people)} people, but a frame has at most {layout.LIMITS['MAX_PEOPLE']}"
+        return f"the frame has {len(people)} people, but the limit is {layout.LIMITS['MAX_PEOPLE']}"
     for nth, person in enumerate(people):
         lacks = {"id", "status", "joints"} - set(person if isinstance(person, dict) else ())
         if lacks:
-            return f"person {nth} of the line has no {', '.join(sorted(lacks))}"
+            return f"person {nth} of the line has missing fields: {', '.join(sorted(lacks))}"
         if any(it["id"] == person["id"] for it in people[:nth]):
-            return f"two people with id {person['id']}, but ids in a frame must differ"
+            return f"two people have the id {person['id']}, but ids in a frame must differ"
     return None
 
 

@@ -1,7 +1,7 @@
 """Layouts of all messages, from `messages.json`. `parallax messages --json` generates this file from the Rust definitions.
 
-`dtype(name)` returns the NumPy type of a struct. It is built with the offsets and sizes in the file. If NumPy computes
-another size, this is an error.
+`dtype(name)` returns the NumPy type of a struct. It is built with the offsets and sizes in the file. A different
+size in NumPy is an error.
 """
 
 import ctypes
@@ -54,8 +54,8 @@ def dtype(name):
 
 @functools.lru_cache(maxsize=None)
 def ctype(name):
-    """Returns a ctypes struct with the name, size and alignment by which the transport distinguishes types. Its content
-    is bytes: messages are read through `dtype`."""
+    """Returns a ctypes struct with the name, size and alignment by which the transport distinguishes types. The struct
+    contains only bytes: messages are read through `dtype`."""
     layout = _STRUCTS[name]
     word = {4: ctypes.c_uint32, 8: ctypes.c_uint64}.get(layout["align"])
     if word is None:
@@ -72,5 +72,5 @@ def ctype(name):
 
 
 def alignment(name):
-    """Returns the alignment of a struct, bytes."""
+    """Returns the alignment of a struct, in bytes."""
     return _STRUCTS[name]["align"]

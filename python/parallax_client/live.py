@@ -30,7 +30,7 @@ class Joint(collections.namedtuple("Joint", "name position covariance deviation 
 
     @property
     def reason(self):
-        """Reason for a missing position; None if there is a position."""
+        """Reason for a missing position; None if the joint has a position."""
         return None if self.position is not None else layout.reason(self.status)
 
 
@@ -68,7 +68,7 @@ class Skeleton:
         try:
             number = self._running["joints"].index(name)
         except ValueError:
-            raise KeyError(f"no joint {name!r}; the joints are {', '.join(self._running['joints'])}") from None
+            raise KeyError(f"there is no joint {name!r}; the joints are {', '.join(self._running['joints'])}") from None
         if number >= int(self.message["n_joints"]):
             return Joint(name, None, None, None, None, 0, int(self.message["status"]))
         return _joint(name, self.message["joints"][number])
@@ -118,7 +118,7 @@ class Picture:
 class Moment:
     """All requested messages of one frame that have arrived.
 
-    `skeletons` is a copy of the message `Skeletons`. `people` has a `Skeleton` for each person, the followed person first.
+    `skeletons` is a copy of the message `Skeletons`. `people` has a `Skeleton` for each person; the followed person comes first.
     `poses` and `pictures` are dictionaries by camera. `n_missed` is the number of frames between this moment and the previous one.
     """
 
@@ -154,7 +154,7 @@ def connect(name, *, skeletons=True, poses=False, pictures=False, cameras=None, 
     returns one in the sender's memory.
     cameras: names of the cameras; None for all.
     every: true to receive every frame in order, with at most `most` of them waiting; false to receive the newest frame.
-    wait: true to wait for the deployment if it does not run; false to raise an error.
+    wait: true to wait for the deployment if it is not running; false to raise an error.
     """
     return Client(name, skeletons, poses, pictures, cameras, most if every else 1, wait)
 
@@ -184,7 +184,7 @@ class Client:
 
     @property
     def is_connected(self):
-        """True while the deployment runs and is read."""
+        """True while the deployment is running and is being read."""
         return self._run is not None
 
     def next(self, patience=None):
@@ -211,7 +211,7 @@ class Client:
     def picture(self, camera, patience=1.0):
         """Returns the newest picture of a camera in the sender's memory, for use in a `with` statement.
 
-        None if there is no picture in time. Do not hold it for long: only one picture of each camera can be held at a time.
+        Returns None if there is no picture in time. Do not hold the picture for long: only one picture of each camera can be held at a time.
         """
         port = self._in_place("frame", camera)
         return self._newest(port, lambda it: Picture(it.message, it.array, it), patience)
@@ -219,7 +219,7 @@ class Client:
     def latest_skeletons(self, patience=1.0):
         """Returns the newest message `Skeletons` in the sender's memory as a `Sample`, for use in a `with` statement.
 
-        None if there is no message in time.
+        Returns None if there is no message in time.
         """
         return self._newest(self._in_place("skeletons", None), lambda it: it, patience)
 

@@ -32,16 +32,16 @@ def root(name):
 
 
 def supervisor(folder):
-    """Returns the id of the process that runs a deployment; None if the deployment does not run or is about to end.
+    """Returns the id of the process that runs a deployment; None if the deployment is not running, or is about to end.
 
     The id comes from the kernel's list of locks. This list omits processes in other pid namespaces (containers). For these, the
-    transport's list of processes is searched for the supervisor's name; the id is that in the other namespace.
+    transport's list of processes is searched for the supervisor's name. The id is then the id in the other namespace.
     """
     if (folder / "ending").exists():
         return None
     try:
         about = os.stat(folder / "lock")
-        # The kernel returns the list page by page. If locks change meanwhile, a line can be missing, so it is read three times.
+        # The kernel returns the list page by page. If locks change meanwhile, a line can be missing, so the list is read three times.
         lines = [line for _ in range(3) for line in pathlib.Path("/proc/locks").read_text().splitlines()]
     except OSError:
         return None
@@ -56,7 +56,7 @@ def supervisor(folder):
 def _elsewhere(folder):
     try:
         import iceoryx2
-    except ImportError:  # then only the list of locks is available
+    except ImportError:  # only the list of locks is available then
         return None
     file = folder / "config" / "iceoryx2.toml"
     if not file.exists():
@@ -65,7 +65,7 @@ def _elsewhere(folder):
     try:
         config = iceoryx2.config.from_file(iceoryx2.FilePath.new(str(file)))
         nodes = iceoryx2.Node.list(iceoryx2.ServiceType.Ipc, config)
-    except (iceoryx2.ConfigCreationError, iceoryx2.NodeListFailure):  # the deployment ends meanwhile
+    except (iceoryx2.ConfigCreationError, iceoryx2.NodeListFailure):  # the deployment has ended meanwhile
         return None
     for node in nodes:
         details = node[0].details if isinstance(node, iceoryx2.NodeState.Alive) else None

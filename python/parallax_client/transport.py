@@ -21,7 +21,7 @@ class TooManyHeld(ClientError):
 
 
 class _Owner:
-    """Memory of a message. It is released when the last reference is gone, so no view can outlive it."""
+    """Memory of a message. The memory is released when the last reference is gone, so no view can outlive it."""
 
     def __init__(self, sample, pointer, n_bytes):
         self._sample = sample
@@ -90,7 +90,7 @@ class Port:
                     raise TooManyHeld(
                         "a held message must be released before another one can be received"
                     ) from None
-                raise ClientError(f"cannot receive: {error}") from None
+                raise ClientError(f"cannot receive messages: {error}") from None
         return None if sample is None else Sample(sample, self._message, self._elements)
 
     def _close(self):

@@ -59,13 +59,13 @@ def test_what_is_wrong_with_a_folder_is_said(tmp_path):
     with pytest.raises(ClientError, match="line 2"):
         read_folder(tmp_path)
     (tmp_path / "pose3d.jsonl").write_text('{"frame": 0}\n')
-    with pytest.raises(ClientError, match="no people, status"):
+    with pytest.raises(ClientError, match="missing fields: people, status"):
         read_folder(tmp_path)
     folder(tmp_path, more=range(2, 10))
-    with pytest.raises(ClientError, match="line 3: 9 people, but a frame has at most 8"):
+    with pytest.raises(ClientError, match="line 3: the frame has 9 people, but the limit is 8"):
         read_folder(tmp_path)
     folder(tmp_path, more=[5, 5])
-    with pytest.raises(ClientError, match="line 3: two people with id 5"):
+    with pytest.raises(ClientError, match="line 3: two people have the id 5"):
         read_folder(tmp_path)
 
 
@@ -77,5 +77,5 @@ def test_each_of_several_people_has_arrays_of_its_own(tmp_path):
     assert other.joint("head")[2].tolist() == [4, 2, 3] and np.isnan(other.positions[:2]).all()
     assert other.status.tolist() == [None, None, "ok"] and one.sides.tolist() == ["sure", None, "sure"]
     assert run.followed.joint("head")[2].tolist() == [4, 2, 3] and run.followed.id is None
-    with pytest.raises(ClientError, match="2 people: use one of `people`: 1, 4"):
+    with pytest.raises(ClientError, match="2 people; use one of them from `people`: 1, 4"):
         run.positions

@@ -30,9 +30,9 @@ def mapping_of(array):
 
 def test_skeletons_poses_and_pictures_of_a_frame_come_together_and_a_process_that_dies_comes_back(deploy):
     deployment = deploy()
-    with pytest.raises(parallax_client.NotRunning, match="does not run"):
+    with pytest.raises(parallax_client.NotRunning, match="is not running"):
         parallax_client.connect("no-such-deployment")
-    # The deployment does not run yet; the client connects to it when it starts.
+    # The deployment is not running yet; the client connects to it when it starts.
     with parallax_client.connect(deployment.name, poses=True, pictures=True, every=True, wait=True) as client:
         moment = next(it for it in client.moments(PATIENCE) if it.is_complete and it.people)
         assert set(moment.pictures) == set(moment.poses) == {it["name"] for it in client.running["views"]}
@@ -139,7 +139,7 @@ def test_the_folder_of_a_run_is_arrays(deploy):
 def test_a_deployment_of_another_pid_namespace_is_read(deploy):
     within = ["unshare", "--map-current-user", "--pid", "--fork", "--mount-proc"]
     if subprocess.run([*within, "true"], capture_output=True, check=False).returncode != 0:
-        pytest.skip("no pid namespace may be made here")
+        pytest.skip("a pid namespace cannot be created here")
     running = deploy()
     read = (
         "import os, sys, parallax_client\n"

@@ -12,7 +12,7 @@ const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// the class `scroll` do not count. `None` if there is no browser.
 ///
 /// * `folder`: folder for temporary files.
-/// * `width`: width of the page, pixels.
+/// * `width`: width of the page, in pixels.
 ///
 /// # Errors
 ///

@@ -111,7 +111,7 @@ impl Out {
         }
     }
 
-    /// A group, or a parameter of group 1.
+    /// Returns the bytes of a group, or of a parameter of group 1.
     fn entry(&self, name: &str, id: i8, body: &[u8]) -> Vec<u8> {
         let mut entry = vec![name.len() as u8, id as u8];
         entry.extend(name.as_bytes());

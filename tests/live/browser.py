@@ -119,7 +119,7 @@ def children_of(parent):
 
 
 def seconds_of(pid):
-    """Returns the processor time that a process has used, seconds."""
+    """Returns the processor time that a process has used, in seconds."""
     try:
         stat = open(f"/proc/{pid}/stat").read().rsplit(")", 1)[1].split()
     except OSError:

@@ -11,7 +11,7 @@ if os.environ.get("FILTERS"):
     SET += ["method=paper", "paper.search=tracked", "capture.scale=0.4", "capture.upright=true"]
     if carry == "poses":
         SET.append("paper.views=pairs")
-# Offsets of the hosts' monotonic clocks from the fusing host's clock, seconds.
+# Offsets of the hosts' monotonic clocks from the fusing host's clock, in seconds.
 CLOCKS = {"left": 5000, "right": 900000}
 LIMBS = [("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist")]
 LIMBS = [(f"{s} {a}", f"{s} {b}") for s in ("left", "right") for a, b in LIMBS] + [("neck", "head")]
@@ -89,7 +89,7 @@ def score(folder, truth):
 
 
 def latency(folder):
-    """Returns the median and 99th percentile of the latency from capture to result and of every stage's computing time, ms."""
+    """Returns the median and 99th percentile of the latency from capture to result and of every stage's computing time, in ms."""
     try:
         it = json.load(open(f"{folder}/latency.json"))
     except OSError:
@@ -304,7 +304,7 @@ def endurance(folder, processes):
 
 
 def processor_s(roots):
-    """Returns the processor time of all descendants of these processes, seconds."""
+    """Returns the processor time of all descendants of these processes, in seconds."""
     tick, total = os.sysconf("SC_CLK_TCK"), 0
     for it in descendants(roots):
         try:
@@ -335,7 +335,7 @@ def model(data):
         said = three(f"{data}/{file}.toml", folder, busy, far)
         it = state(folder)
         views = [view for host in it["hosts"] for view in host["views"]]
-        # The costs of codec and link are those of the run on several hosts.
+        # The costs of the codec and the link are taken from the run on several hosts.
         frame = sum(view["bytes"] for view in views) / max(sum(view["used"] for view in views), 1)
         median = lambda key: sum(view[key]["p50_ms"] for view in views) / len(views)
         told = [f"--{'pose' if carry == 'poses' else 'frame'}-bytes", str(frame)]

@@ -111,8 +111,8 @@ truth = reference(sys.argv[2])
 runs = {name: skeletons(f"{folder}/{name}/pose3d.jsonl") for name in ["originals", "files", "live", "replay"]}
 instants = shown(pictures(f"{folder}/live.mcap"))
 apart = [max(it) - min(it) for it in instants.values()]
-print(f"{len(instants)} instants with a picture of every camera; their pictures are {max(apart)} apart at most,",
-      f"{max(apart) / RATE_HZ / SLOWER * 1000:.1f} ms of the scene")
+print(f"{len(instants)} instants with a picture of every camera; the numbers of their pictures differ by at most {max(apart)},",
+      f"or {max(apart) / RATE_HZ / SLOWER * 1000:.1f} ms of the scene")
 errors = {}
 for name in ["originals", "files"]:
     frames = range(1, LAST)

@@ -18,10 +18,10 @@ use viewquality::orientation::{Detector, Network};
 use crate::shared_dir;
 
 pub(crate) const SIZE: [u32; 2] = [272, 480];
-/// Frames with an upright trunk; below, frames in which the person is mostly bent over.
+/// Frames with an upright trunk. `BENT` are frames in which the person is mostly bent over.
 const UPRIGHT: [usize; 5] = [0, 5, 10, 15, 20];
 const BENT: [usize; 7] = [5, 15, 25, 35, 45, 55, 65];
-/// Distance between the torso of a view's pose and the reference's above which the pose is on a wrong object, pixels.
+/// If the torso of a view's pose is further than this from the torso of the reference, in pixels, the pose is on a wrong object.
 const WRONG_PX: f64 = 40.0;
 
 /// Options of one row of the table.
@@ -56,7 +56,7 @@ impl Errors {
     }
 }
 
-/// Rows without any option, with each of the three options alone, and with all of them.
+/// Returns the rows without any option, with each of the three options alone, and with all of them.
 fn rows() -> [(&'static str, Switches); 7] {
     let row = |upright, facing, candidates| Switches {
         upright,
@@ -112,9 +112,9 @@ fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached()
     let [.., mean, consensus, at_once] = &reached[..] else {
         panic!("three rows with everything switched on")
     };
-    // Reached: 6.4 / 20.5 cm upright and 15.0 / 85.9 bent by the mean, 6.5 / 25.2 and 12.8 / 83.7 by consensus, 6.4 / 15.7 and
-    // 11.0 / 95.4 with all views at once. The goals are 7 / 15 and 17 / 50. The large errors are due to crossed legs and raised
-    // wrists in the upright frames, and to sides and poses unlike the training data in the bent ones.
+    // Values reached so far: 6.4 / 20.5 cm upright and 15.0 / 85.9 bent by the mean, 6.5 / 25.2 and 12.8 / 83.7 by consensus, 6.4 / 15.7
+    // and 11.0 / 95.4 with all views at once. The goals are 7 / 15 and 17 / 50. The large errors are due to crossed legs and raised wrists
+    // in the upright frames, and to sides and poses unlike the training data in the bent frames.
     for ([upright, bent], [upright_cm, bent_cm]) in [
         (mean, [7.5, 16.0]),
         (consensus, [8.0, 14.0]),

@@ -130,9 +130,9 @@ struct Fit {
     residual_px: f64,
     /// Median reprojection error of each camera.
     by_camera_px: Vec<f64>,
-    /// Median distance from the reference, metres.
+    /// Median distance from the reference, in metres.
     distance: f64,
-    /// Number of joints that could be triangulated, and of other joints.
+    /// Number of joints that could be triangulated, and number of all other joints.
     counts: [usize; 2],
 }
 
@@ -339,7 +339,7 @@ fn the_rolls_are_those_of_the_reference_runs() {
         .map(|c| geometry::upright_roll(c, &rig).unwrap().to_degrees())
         .collect();
     println!("{rolls:.1?} degrees");
-    // Computed at the mid-hip in one frame, which is not exactly the focus of the rig; the sign is opposite.
+    // These values were computed at the mid-hip in one frame, which is not exactly the focus of the rig. Their sign is opposite.
     let expect: [f64; 4] = [-11.8, 2.3, 0.8, 27.9];
     assert!(
         rolls.iter().zip(expect).all(|(roll, expect)| (roll - expect).abs() < 3.0),

@@ -1,8 +1,8 @@
 //! Alternating solutions of two real views. Bounds and threads do not change any result, and bounds save work.
 //!
-//! Prints a table: milliseconds per iteration, levels that remain after bounding, messages that are reused. The pairs and
-//! their settings are those of the accuracy tests. Both assumptions about facing are solved, the same and the
-//! exchanged one, as in a pipeline that decides between them.
+//! Prints a table: milliseconds per iteration, levels that remain after bounding, messages that are reused. The pairs and their settings
+//! are those of the accuracy tests. Every pair is solved under both assumptions about facing (the same or exchanged), as in a pipeline that
+//! decides between them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -106,7 +106,7 @@ impl Case<'_> {
         estimate_pair(self.solver, &settings, &input, evidence, self.start)
     }
 
-    /// Returns the shortest time of `n` iterations from the start, milliseconds.
+    /// Returns the shortest time of `n` iterations from the start, in milliseconds.
     fn fastest(&self, pool: &ThreadPool, n: usize) -> f64 {
         let run = |_| {
             let begin = Instant::now();

@@ -99,7 +99,7 @@ fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
     );
 }
 
-/// Returns the largest height of the person, and the spread of a leg's length, metres.
+/// Returns the largest height of the person, and the spread of a leg's length, in metres.
 fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
     let norm = |a: [f64; 3], b: [f64; 3]| {
         let square = (0..3).map(|i| (a[i] - b[i]).powi(2));

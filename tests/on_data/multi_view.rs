@@ -84,7 +84,7 @@ pub(crate) fn umpm(shared: &Path, name: &str, shift: f64) -> Camera {
     )
 }
 
-/// Returns the largest distance between our epipolar lines in B and those of a run, within the image, pixels.
+/// Returns the largest distance between our epipolar lines in B and those of a run, within the image, in pixels.
 fn lines_off(cameras: &[Camera; 2], run: &Value) -> f64 {
     let ours = geometry::epipolar::fundamental(&cameras[0], &cameras[1]);
     // Pixels in the run are counted from 1.
@@ -121,13 +121,13 @@ fn epipolar_lines_agree_with_the_runs() {
         )
     };
     println!("HumanEva: {:.1e} px, {:.1e} px", off(-1.0), off(0.0));
-    // The runs assumed that pixels of HumanEva's principal point are counted from 1, ...
+    // The runs assumed that the pixels of HumanEva's principal point are counted from 1.
     assert!(off(-1.0) < 1e-3 && off(0.0) > 0.3);
     let l_r = run_file(&shared, "umpm_mv_L_R");
     let off = |shift| lines_off(&["l", "r"].map(|name| umpm(&shared, name, shift)), &l_r);
     println!("UMPM: {:.1e} px, {:.1e} px", off(0.0), off(-1.0));
-    // ... and those of UMPM's from 0. UMPM's rotations have only six digits and are not exactly orthogonal; we
-    // orthogonalise them, but the runs did not.
+    // They assumed that the pixels of UMPM's principal point are counted from 0. UMPM's rotations have only six digits and are not exactly
+    // orthogonal; we orthogonalise them, but the runs did not.
     assert!(off(0.0) < 0.02 && off(-1.0) > 0.3);
 }
 

@@ -20,7 +20,7 @@ struct Outcome {
     truth: Joints,
     ours: Joints,
     theirs: Joints,
-    /// Joints of their best detection on the annotated person.
+    /// Joints of the reference program's best detection on the annotated person.
     theirs_covering: Joints,
     score_off: f64,
     same_level: bool,
@@ -62,7 +62,7 @@ fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
     let pcp = |report: &Report| {
         [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|rule| report.pcp(rule).percent())
     };
-    // The value recorded in the reference. Its PCK is only recorded for all 205 images: 73.1.
+    // This value is recorded in the reference. The reference records PCK only for all 205 images: 73.1.
     assert_eq!(
         pcp(&theirs).map(|value| (value * 10.0).round()),
         [713.0, 634.0]

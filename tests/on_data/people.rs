@@ -13,7 +13,7 @@ use crate::{balancing, shared_dir};
 /// Number of frames in each sample.
 const DRAWN: usize = 42;
 const N_SAMPLES: u64 = 20;
-/// Height of the person from the bones, in the rig that is part of the recording, metres.
+/// Height of the person from the bones, in the rig that is part of the recording, in metres.
 const HEIGHT_M: f64 = 1.652;
 
 /// Returns the joints in the order of a calibration, and for each joint the index of the one on the other side.
@@ -91,7 +91,7 @@ fn the_balancing_cameras_are_found_from_the_person_alone() {
             refused += 1;
             continue;
         }
-        // The person does not stand upright in any frame, and the result says so.
+        // The person does not stand upright in any frame, and the result states this.
         assert_eq!(outcome.vertical, Vertical::Leaning);
         let apart = calibration::differences(&outcome.cameras, rig.cameras(), false);
         let mean = |of: &dyn Fn(&calibration::Difference) -> f64| {
@@ -104,7 +104,7 @@ fn the_balancing_cameras_are_found_from_the_person_alone() {
     let way = Sorted::new(ways_mm).upper_median().unwrap();
     let turn = Sorted::new(turns).upper_median().unwrap();
     println!("{n} answered, {refused} refused: centres {way:.1} mm, rotations {turn:.2} degrees");
-    // The goal for rotations, 0.6 degrees, is missed: 0.9 is reached.
+    // The goal for rotations is 0.6 degrees, but only 0.9 degrees is reached.
     assert!(way < 40.0 && turn < 1.1, "{way} mm, {turn} degrees");
     assert!(refused <= 4, "{refused} of {N_SAMPLES} refused");
 }

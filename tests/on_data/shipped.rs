@@ -50,7 +50,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
     }
 }
 
-/// PCP by the mean of ends and by both ends, from `configs/models/person.md`.
+/// PCP by the mean of both ends, and by both ends separately, from `configs/models/person.md`.
 const CARD: [f64; 2] = [73.3, 67.4];
 
 #[test]
@@ -65,7 +65,7 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
     };
     let people = training::datasets::read(&shared.join("data/parse"), &options).unwrap();
     let mut memory = LookMemory::default();
-    // For each person, the overlap of the first and the last box with the true one; those boxes are too large, or shifted.
+    // For each person, the overlap of the first and the last box with the true box. These boxes are too large, or shifted.
     let mut shares = [Vec::new(), Vec::new()];
     for person in &people.people {
         let picture = Picture::read(&person.image).unwrap();

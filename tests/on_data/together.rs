@@ -32,20 +32,21 @@ const JOINTS: [Option<usize>; N_JOINTS] = [
 ];
 const HIPS: [usize; 2] = [2, 3];
 const NECK: usize = 12;
-/// Side of the square in which the people are, metres; below, their smallest distance.
+/// Side of the square in which the people are, in metres. `APART_M` is the smallest distance between people.
 const SQUARE_M: f64 = 3.6;
 const APART_M: f64 = 0.45;
-/// Distance from the middle line of a trunk within which the trunk hides joints behind it, metres.
+/// Distance from the middle line of a trunk within which the trunk hides joints behind it, in metres.
 const TRUNK_M: f64 = 0.15;
 /// Share of the joints that the detector misses.
 const MISSED: f64 = 0.1;
-/// Number of instants in a clip; below, the seconds between two instants.
+/// Number of instants in a clip.
 const N_INSTANTS: usize = 20;
 /// First instant that is evaluated.
 const FIRST: usize = 5;
+/// Time between two instants, in seconds.
 const STEP_S: f64 = 1.0 / 29.97;
 
-/// Joints of a person, metres.
+/// Joints of a person, in metres.
 type Body = [Option<Point3<f64>>; N_JOINTS];
 
 /// Motion and cameras of the data set.
@@ -307,7 +308,7 @@ fn two_to_eight_people_are_told_apart_in_the_views_of_real_cameras() {
     let Some(shared) = shared_dir() else { return };
     let motion = Motion::read(&shared.join("data/panoptic_motion"));
     assert_eq!((motion.cameras.len(), motion.clips.len()), (31, 6));
-    // For 60 draws: people, views, millimetres, and the smallest F1 of pairs.
+    // For 60 draws: number of people, number of views, error of the keypoints in millimetres, and the smallest F1 of pairs.
     for (n_people, n_views, noise_mm, least) in [
         (8, 5, 20.0, 0.994),
         (8, 5, 50.0, 0.988),

@@ -132,7 +132,7 @@ fn same(a: &Searched, b: &Searched) -> f64 {
     same.count() as f64 / (a.poses.len() * N_FRAMES) as f64
 }
 
-/// Returns the median and the 90th percentile of the distance between joints and the projected reference, pixels.
+/// Returns the median and the 90th percentile of the distance between joints and the projected reference, in pixels.
 fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched) -> [f64; 2] {
     let [width, height] = SIZE.map(|size| size as usize);
     let layout = fmp::Layout::new(model, width, height).unwrap();

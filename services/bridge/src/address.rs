@@ -29,7 +29,7 @@ pub enum LinkError {
         what: &'static str,
         /// Address of the link.
         address: String,
-        /// Reason of the failure.
+        /// Reason for the failure.
         message: String,
     },
     /// A name cannot be used.
@@ -37,7 +37,7 @@ pub enum LinkError {
     Use {
         /// Name that cannot be used.
         key: String,
-        /// Reason of the failure.
+        /// Reason for the failure.
         message: String,
     },
     /// This build has no link between hosts.

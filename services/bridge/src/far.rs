@@ -21,10 +21,10 @@ use crate::topics::Topics;
 
 /// Interval at which the host introduces itself, because the other host may have been restarted.
 const HELLO_EVERY: Duration = Duration::from_millis(500);
-/// Interval at which the end of a stream is sent until it is acknowledged, and longest time for which it is sent.
+/// Interval at which the end of a stream is sent until it is acknowledged. `END_PATIENCE` is the longest time for which it is sent.
 const END_EVERY: Duration = Duration::from_millis(300);
 const END_PATIENCE: Duration = Duration::from_secs(15);
-/// Longest sleep: first while a message waits for an acknowledgement, then otherwise.
+/// Longest sleep while a message waits for an acknowledgement. `LONG` is the longest sleep otherwise.
 const SHORT: Duration = Duration::from_millis(2);
 const LONG: Duration = Duration::from_millis(20);
 /// Maximum number of acknowledgements that wait to be read.
@@ -89,9 +89,9 @@ struct Lane {
     port: Port,
     /// Maps that are sent with the messages.
     evidence: Option<Evidence>,
-    /// End of the stream, once it was received.
+    /// End of the stream, once it has been received.
     end: Option<Item>,
-    /// Sequence from which an acknowledgement means that the end has arrived.
+    /// Lowest sequence whose acknowledgement shows that the end of the stream has arrived.
     end_sequence: Option<u64>,
     has_ended: bool,
     end_sent: Option<Instant>,
@@ -154,7 +154,7 @@ pub(crate) fn run(service: &Service, job: &Job, role: &Far) -> Result<(), Failur
     Ok(())
 }
 
-/// Fails if the other host has refused this one.
+/// Fails if the other host has refused this host.
 fn check(answer: &Mutex<Option<Answer>>) -> Result<(), Failure> {
     let answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(Answer::Refused(why)) = answer.as_ref() {
@@ -213,7 +213,7 @@ fn lanes(
 
 type Listening = (ChannelReceiver<Ack>, Arc<Mutex<Option<Answer>>>);
 
-/// Answers questions about the time at once. Stores acknowledgements and the last answer.
+/// Answers requests for the time at once. Stores acknowledgements and the last answer.
 fn listen(link: &Arc<Link>, job: &Job, origin: u64) -> Result<Listening, Failure> {
     let topics = Topics::of(&job.address.deployment);
     let host = &job.address.host;
@@ -316,7 +316,7 @@ impl Sending<'_> {
             let Some(end) = lane.end.as_ref().filter(|_| is_due && !lane.has_ended) else {
                 continue;
             };
-            // The end must not be sent before the last frame, because it would overtake it.
+            // The end must not be sent before the last frame, because the end would overtake the frame.
             if lane.end_sent.is_some()
                 || self.outbox.sent(index).n_offered == 0
                 || self.outbox.n_waiting() == 0

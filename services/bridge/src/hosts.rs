@@ -4,13 +4,13 @@
 //! |---|---|
 //! | a message of a view as bytes, checked | [`Packet`] |
 //! | questions and answers between two hosts | [`Signal`], [`Hello`], [`Answer`] |
-//! | offset of another host's clock from this one, with a bound | [`Clock`] |
+//! | offset of another host's clock from this host's clock, with a bound | [`Clock`] |
 //! | the maps of a view as Gaussians, after its poses | [`Maps`] |
-//! | messages that wait to be sent: the newest of every lane, with a limit on those under way | [`Outbox`] |
+//! | messages that wait to be sent: the newest of every lane, with a limit on the number under way | [`Outbox`] |
 //! | the frame of the run to which a message belongs, and the fate of frames without a message | [`Arrivals`] |
 //! | check that two hosts have the same files | [`Fingerprint`] |
 //!
-//! This module uses no socket, clock or file. The other modules of `services/bridge` use these.
+//! This module uses no socket, clock or file. Only the other modules of `services/bridge` do.
 
 mod arrivals;
 mod clock;

@@ -1,4 +1,4 @@
-//! Joins a run: checks that the host that fuses has the same files, and determines when its run began by this host's clock.
+//! Joins a run: checks that the host that fuses has the same files, and determines the time at which the run began, by this host's clock.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,7 +16,7 @@ use crate::topics::Topics;
 /// Number of time exchanges before a run.
 const N_EXCHANGES: usize = 12;
 const ASK_EVERY: Duration = Duration::from_millis(50);
-/// Interval of messages that the other host does not answer.
+/// Interval between messages to the user while the other host does not answer.
 const SAY_EVERY: Duration = Duration::from_secs(10);
 
 /// Error if a host cannot join the run.
@@ -25,7 +25,7 @@ pub enum JoinError {
     /// The link cannot be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// This host has other files than the host that fuses.
+    /// The files of this host differ from those of the host that fuses.
     #[error("the host that fuses refuses this one: {}", listed(.0))]
     Refused(Vec<Difference>),
 }
@@ -46,7 +46,7 @@ struct Heard {
     answer: Option<Answer>,
 }
 
-/// Waits for the host that fuses. Returns the time at which its run began by this host's clock, in nanoseconds; `None` on a stop request.
+/// Waits for the host that fuses. Returns the time at which the run began, in nanoseconds by this host's clock; `None` on a stop request.
 ///
 /// * `say`: called with messages for the user while the other host does not answer.
 ///

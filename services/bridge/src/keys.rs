@@ -36,7 +36,7 @@ pub enum KeyError {
     Make {
         /// Name of the host.
         host: String,
-        /// Reason of the failure.
+        /// Reason for the failure.
         message: String,
     },
     /// This build cannot create keys.

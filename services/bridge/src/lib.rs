@@ -4,7 +4,7 @@
 //! | host | what its bridge does | where |
 //! |---|---|---|
 //! | with cameras | sends frames as JPEG, or poses with their maps as Gaussians; the newest message wins | `far` |
-//! | that fuses | publishes them for the frames of its run, and reports why a message is missing | `near` |
+//! | that fuses | publishes the received messages for the frames of its run, and reports why a message is missing | `near` |
 //!
 //! The link uses Zenoh, behind the feature `zenoh`. The messages and the rules for them are in [`hosts`], which has no side effects.
 #![forbid(unsafe_code)]
@@ -45,7 +45,7 @@ pub const HAS_LINK: bool = cfg!(feature = "zenoh");
 ///
 /// # Errors
 ///
-/// Fails if the link cannot be opened, or another host has other files. Also fails with errors of the transport.
+/// Fails if the link cannot be opened, or the files of another host differ. Also fails with errors of the transport.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     if job.address.keys.is_none() {
         tracing::warn!(

@@ -25,7 +25,7 @@ use publish::{Publisher, Times};
 use remote::Remote;
 use report::Report;
 
-/// Interval at which the clocks of the other hosts are queried: first at the beginning, then later.
+/// Interval at which the clocks of the other hosts are queried at the beginning. `PING_EVERY` is the later interval.
 const PING_SOON: Duration = Duration::from_millis(100);
 const PING_EVERY: Duration = Duration::from_millis(500);
 const SOON: Duration = Duration::from_secs(10);
@@ -201,7 +201,7 @@ impl Receiving<'_> {
         let (service, job) = (self.service, self.job);
         let it = &mut self.views[index];
         let instant = clock.ours(arrived.head.instant_nanos);
-        // The clock is not known yet, or the host is wrong. Frames that have not begun are not given up because of this message.
+        // The clock is not known yet, or the host gives a wrong time. Frames that have not begun are not given up because of this message.
         let soon = now_nanos().saturating_add(job.period_nanos as u64 + FUTURE);
         if instant > soon && arrived.head.status != Status::END {
             remote.malformed(&"an instant in the future");

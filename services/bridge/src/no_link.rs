@@ -1,4 +1,4 @@
-//! Replacement for the link in a build without it: every function fails with this reason.
+//! Replacement for the link in a build without it: every function fails, because there is no link.
 
 use core::convert::Infallible;
 use core::time::Duration;

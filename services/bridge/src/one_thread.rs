@@ -1,8 +1,7 @@
 //! Environment variable that makes the link of a host run in one thread.
 
 /// Environment variable and its value, with which Zenoh reads from links and writes to them in one thread. Zenoh reads the variable once,
-/// so
-/// a process has to be started with it.
+/// so a process has to be started with it.
 ///
 /// By default, Zenoh reads and writes a TLS connection in two threads at the same time. Neither its TLS library nor Rust allows this
 /// (Zenoh's issue 2557, open in version 1.10.2). When a host died, the bridge of the fusing host wrote to a connection in which the other

@@ -18,7 +18,7 @@ pub struct Job {
     pub source: SourceSpec,
     /// For cameras with clocks of their own: the frame that belongs to each common instant. `source` then counts instants.
     pub timeline: Option<Timeline>,
-    /// The live camera, if it is one. Of `source`, only the choice of frames is then used.
+    /// The live camera, if the camera is live. Only the choice of frames in `source` is then used.
     pub live: Option<LiveJob>,
     /// Time from the beginning of the run to the first frame in real time, in nanoseconds. By then every process has started.
     pub lead_nanos: u64,

@@ -9,7 +9,7 @@ use runtime::{SendError, Service, SlicePublisher};
 use crate::job::Job;
 use crate::live::{Grid, LiveJob, Original, Originals};
 
-/// Number of pictures that are sent per iteration of the main loop, so that its own work is not delayed.
+/// Number of pictures that are sent per iteration of the main loop, so that the other work of the loop is not delayed.
 const MOST_IN_TURN: usize = 16;
 
 /// Sends original pictures to their topic.

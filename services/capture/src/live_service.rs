@@ -12,7 +12,7 @@ use crate::job::Job;
 use crate::kept::Kept;
 use crate::live::{Grid, LiveJob, Phase, Picture, Source};
 
-/// Time after its instant for which a late picture is awaited. Two periods are added to it.
+/// Time after an instant for which its picture is awaited. Two periods are added to this time.
 const PATIENCE_NANOS: u64 = 250_000_000;
 /// Longest wait for a picture, so that a stop request is noticed.
 const PAUSE: Duration = Duration::from_millis(20);
@@ -151,7 +151,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Sends that the next instant has no picture.
+    /// Sends the reason why the next instant has no picture.
     fn send_nothing(&mut self, status: Status) -> Result<(), Failure> {
         let index = self.index(self.at);
         self.say_why(index, status);

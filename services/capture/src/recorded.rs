@@ -232,7 +232,7 @@ impl RecordedFeed {
         };
         let label = match open.decoder.next_into(&mut self.rgb) {
             Ok(label) => label,
-            // The camera was set to another size. The following pictures cannot be used until the camera was opened again.
+            // The camera was set to another size. The following pictures cannot be used until the camera is opened again.
             Err(FootageError::SizeChanged { .. }) => None,
             Err(error) => return Err(error),
         };

@@ -130,7 +130,7 @@ impl Retimed {
         Ok(n)
     }
 
-    /// Returns the next picture. If the footage lacks frames, it belongs to a later instant. Returns `None` at the end.
+    /// Returns the next picture. If the footage lacks frames, the picture belongs to a later instant. Returns `None` at the end.
     ///
     /// # Errors
     ///

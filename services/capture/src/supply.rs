@@ -173,7 +173,7 @@ impl Supply {
     fn check(&mut self, index: u64, read: Read) -> Step {
         match read {
             Read::Picture(time_s) => {
-                // Not `self.pixels()`, which would borrow the guard as well.
+                // `self.pixels()` is not used here, because it would borrow the guard as well.
                 let fresh = self.feed.as_ref().map_or(&[][..], Retimed::pixels);
                 let pixels = self.held.as_deref().unwrap_or(fresh);
                 let wrong = self.guard.check(index, time_s, pixels);

@@ -1,6 +1,5 @@
 //! Fuses the candidates of all views. For people found by networks, sends the identities of people; by the paper's method, the poses of
-//! camera
-//! pairs.
+//! camera pairs.
 #![forbid(unsafe_code)]
 
 mod input;

@@ -36,7 +36,7 @@ impl FrameViews<'_> {
 pub(crate) struct Worker<'a> {
     pub(crate) service: &'a Service,
     pub(crate) job: &'a Job,
-    /// Evidence by view. Only views in a pair of this worker have it.
+    /// Evidence by view. Only views in a pair of this worker have evidence.
     pub(crate) evidence: Vec<Option<Held<f32, EvidenceHeader>>>,
     pub(crate) output: Output<'a, PairPose>,
 }

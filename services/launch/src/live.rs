@@ -36,7 +36,7 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// Fails if the deployment does not run, or its topics cannot be opened.
+    /// Fails if the deployment is not running, or its topics cannot be opened.
     pub fn open(namespace: &Namespace) -> Result<Self, Failure> {
         if !wait_for_description(namespace, STARTING) {
             let name = namespace.name().to_owned();
@@ -120,7 +120,7 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
 ///
 /// # Errors
 ///
-/// Fails if the deployment does not run, or has another version.
+/// Fails if the deployment is not running, or has another version.
 pub fn description(namespace: &Namespace) -> Result<Resolved, Failure> {
     let name = namespace.name();
     let text = namespace.description().map_err(|error| {

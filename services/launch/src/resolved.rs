@@ -74,8 +74,7 @@ impl Resolved {
     }
 
     /// Returns the rate of the common instants of live cameras, per second, before `frame_step`. The deployment sets it; otherwise it is
-    /// the
-    /// rate of the slowest camera.
+    /// the rate of the slowest camera.
     pub fn instants_hz(&self) -> f64 {
         let step = self.deployment.capture.frame_step as f64;
         let own = self.footage.iter().filter_map(|footage| footage.frame_rate_hz);

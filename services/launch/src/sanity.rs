@@ -40,8 +40,7 @@ fn check(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<Vec<String>, Fa
     check_number(deployment)?;
     if resolved.host.is_some() {
         // With several hosts, sources are not compared: devices of two machines may have the same name, and footage of another machine
-        // cannot
-        // be read.
+        // cannot be read.
         warnings.extend(check_cameras(deployment)?);
         return Ok(warnings);
     }

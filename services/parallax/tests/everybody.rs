@@ -24,8 +24,7 @@ fn joints(person: usize, frame: usize) -> [Point3<f64>; N] {
 }
 
 /// Writes the keypoints of all people in the layout of OpenPose, and a deployment that reads them. The order of people differs from frame
-/// to
-/// frame and from view to view.
+/// to frame and from view to view.
 fn write_keypoints(case: &Case, n_frames: usize) {
     let name = &case.name;
     let mut text = format!("name = {name:?}\nrig = \"rig.toml\"\noutput = \"out\"\n");

@@ -1,6 +1,5 @@
 //! Tests of deployments whose evidence comes from the maps of a network or from another program's keypoints. The person consists of
-//! fourteen
-//! dots, each in its own colour. A network with one layer finds them.
+//! fourteen dots, each in its own colour. A network with one layer finds them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;

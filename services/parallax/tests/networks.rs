@@ -30,8 +30,7 @@ names = ["head top", "left hip", "right hip"]
 "#;
 
 /// Returns a network with three maps that have a quarter of the input's sides. `operator` computes the maps from the means of red, green
-/// and
-/// blue.
+/// and blue.
 pub(crate) fn network(operator: &str) -> Network {
     let mut net = Network::default();
     let [width, height] = SIDES;

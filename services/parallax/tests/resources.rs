@@ -1,6 +1,5 @@
 //! Tests of runs without enough shared memory, file descriptors or a free name; of leftovers of other users; and that no network sockets
-//! are
-//! open.
+//! are open.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;

@@ -62,7 +62,7 @@ impl View<'_> {
         };
         let solved = now_nanos();
         let loan_nanos = outcome.as_ref().map_or(0, |found| found.loan_nanos);
-        // The evidence is sent first: a receiver of the candidates may rely on it.
+        // The evidence is sent first, because a receiver of the candidates may rely on it.
         if let Ok(found) = outcome
             && let Some(loan) = found.evidence
         {

@@ -1,4 +1,4 @@
-//! Converts `paper.errors` of a deployment to a selection of rows in its table.
+//! Converts the setting `paper.errors` of a deployment to a selection of rows in the table of expected errors.
 
 use deployment::paper::ErrorTable;
 use viewquality::Selection;

@@ -97,8 +97,7 @@ impl Foxglove {
     }
 
     /// Returns the Foxglove messages for one of Parallax's messages, each with the index of its topic. Messages about the cameras come
-    /// before
-    /// the first one.
+    /// before the first one.
     ///
     /// * `data`: the message as written to the recording.
     pub(crate) fn messages(&mut self, kind: Kind, data: &[u8]) -> Vec<(usize, String)> {

@@ -11,7 +11,7 @@ use crate::queue::queue;
 use crate::service::{Job, Recorder};
 use crate::writer::{Task, create, write_all};
 
-/// Interval at which messages are received. It is short, because the queues of pictures have space for one.
+/// Interval at which messages are received. It is short, because the queues of pictures have space for only one picture.
 const TURN: Duration = Duration::from_millis(4);
 /// Time to wait for the last heartbeats after the last result.
 const LAST_HEARTBEATS: Duration = Duration::from_millis(500);

@@ -58,8 +58,7 @@ impl Calibration {
             fit.residual_px = self.watch.residual_px(view).map(|value| value * scale);
             fit.without_px = self.watch.without_px(view).map(|value| value * scale);
             // If the footage of two cameras is exchanged, every camera contradicts the calibration. A late camera also contradicts it
-            // while a person
-            // walks. A moved camera does not look late.
+            // while a person walks. A moved camera does not look late.
             let is_named =
                 self.watch.is_reported(view) && self.exchanged.is_none() && !fit.out_of_step;
             if is_named && !fit.suspected {

@@ -186,7 +186,7 @@ impl Folder {
         names.sort();
         let outcomes = names.iter().map(|name| {
             let (from, to) = (self.part(name), self.dir.path().join(name));
-            // Renaming a folder does not replace another one, so that one is removed first.
+            // Renaming a folder does not replace another folder, so the other folder is removed first.
             if from.is_dir() {
                 remove_pictures(&to)?;
             }
@@ -219,8 +219,8 @@ fn cut_half_line(file: &mut File) -> io::Result<()> {
     file.set_len(0)
 }
 
-/// Removes a folder of pictures if a run has created it. This is the case if the folder has the mark of a run, or if it and its
-/// subfolders contain only numbered pictures. Of a link to a folder, only the link is removed.
+/// Removes a folder of pictures if a run has created it. This is the case if the folder has the mark of a run, or if it and its subfolders
+/// contain only numbered pictures. If the path is a link to a folder, only the link is removed.
 ///
 /// # Errors
 ///

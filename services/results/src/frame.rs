@@ -54,7 +54,7 @@ pub struct FusedRecord {
     pub status: Status,
     /// Times at which the message was received and sent.
     pub timing: Timing,
-    /// The views whose expected errors were used, each with the age of these in frames plus 1; 0 if none were used.
+    /// The views whose expected errors were used, each with the age of these errors in frames plus 1; 0 if no errors were used.
     pub sigma_ages: [(usize, u16); 2],
 }
 
@@ -95,8 +95,7 @@ pub struct FrameRecord {
 
 impl FrameRecord {
     /// Returns the followed person; `None` if there is nobody. Candidates of views have no identities, so the best candidate of each view
-    /// is
-    /// compared with this person.
+    /// is compared with this person.
     pub fn followed(&self) -> Option<&SkeletonMessage> {
         self.skeletons.followed()
     }

@@ -123,8 +123,7 @@ impl Gather {
     }
 
     /// Returns the record of a frame whose result has been received. Earlier frames without a result will not get one. Returns `None` if
-    /// the
-    /// frame is already complete, because a restarted sender may send a result again.
+    /// the frame is already complete, because a restarted sender may send a result again.
     pub(crate) fn result(&mut self, skeletons: Box<Skeletons>) -> Option<Settled> {
         let frame = skeletons.stamp.frame;
         let n_before = frame.checked_sub(self.next)?;
@@ -325,7 +324,7 @@ mod tests {
             gather.pose(0, &pose(frame));
         }
         gather.pose(1, &pose(8));
-        // Both views dropped frame 2, one view dropped frame 4.
+        // Both views dropped frame 2, and one view dropped frame 4.
         let got = gather.result(skeletons(6)).unwrap();
         let expected = [(0, "dropped, late"), (2, "dropped"), (4, "dropped, late")];
         assert_eq!(reasons(&got.absent), expected);
@@ -347,7 +346,7 @@ mod tests {
     fn frames_after_the_last_result_are_listed_up_to_the_end_of_footage() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.result(skeletons(0)).unwrap();
-        // The pose of frame 1 came too late. There is none of frame 2, and none of the other view.
+        // The pose of frame 1 came too late. There is no pose of frame 2, and no pose of the other view.
         gather.pose(0, &pose(1));
         for (view, end) in [(0, 3), (1, 2)] {
             let mut last = pose(end);

@@ -1,4 +1,4 @@
-//! Writes all files about frames, and at the end those about the run.
+//! Writes all files about frames, and at the end the files about the run.
 
 use std::fs;
 use std::io;
@@ -126,7 +126,7 @@ impl Output {
         self.tally.last_frame().map(|last_frame| last_frame.saturating_add(step))
     }
 
-    /// Writes frames without a result, with the reason. Also writes earlier frames about which no message came.
+    /// Writes frames without a result, with the reason. Also writes earlier frames for which no message came.
     pub fn absent(&mut self, absent: &[Absent]) {
         for it in absent {
             self.fill_up_to(it.frame);

@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn limbs_are_coloured_by_the_side_of_the_body() {
         let limbs = limbs(&scene());
-        // Right ankle to right knee; left hip to neck; neck to head.
+        // These limbs go from right ankle to right knee, from left hip to neck, and from neck to head.
         assert_eq!(limbs[0].side, Side::Right);
         assert_eq!(limbs[5].side, Side::Left);
         assert_eq!(limbs[13].side, Side::Centre);

@@ -13,8 +13,7 @@ const SAME_PERSON_M: f64 = 0.25;
 const MOST_M: f64 = 0.3;
 
 /// Returns the parts of a view's best candidate in pixels of the frame, once with the sides as named by the network or filters, and once
-/// with
-/// exchanged sides. Returns `None` if the view has no candidate, or is not sure enough of it.
+/// with exchanged sides. Returns `None` if the view has no candidate, or is not sure enough of it.
 pub(crate) fn readings(
     scene: &Scene,
     record: &FrameRecord,
@@ -59,8 +58,8 @@ pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
     counted.flatten().map(|counted| counted.min(MOST_M)).collect()
 }
 
-/// Returns the distances of a view's joints from those of the solution, in pixels of the frame and in metres. Only joints with both are
-/// returned.
+/// Returns the distances of a view's joints from those of the solution, in pixels of the frame and in metres. Only joints for which both
+/// distances are known are returned.
 fn distances(
     scene: &Scene,
     record: &FrameRecord,
@@ -158,7 +157,7 @@ mod tests {
             all.len() == 3 && all.iter().all(|value| *value < 1e-6),
             "{all:?}"
         );
-        // A view that saw a person a metre aside is left out.
+        // A view that saw a person one metre to the side is left out.
         let aside = Camera {
             camera_from_world: nalgebra::Isometry3::translation(0.5, 0.0, 3.0),
             ..scene.views[2].framing.camera().clone()

@@ -11,8 +11,8 @@ use crate::{FrameRecord, Scene};
 /// `single` names parts by the side of the image, as the model does. `fused` names them by the side of the body.
 /// The names differ if `facing` is `behind`. Types and levels are counted from 1, as in the reference program.
 ///
-/// `sigma_px` has the errors predicted for this frame. `sigma_used` tells which errors of the view fusion had in time:
-/// 0 for those of this frame, n for those of n frames before. Null means that there were none, and every part counted as usable.
+/// `sigma_px` has the errors predicted for this frame. `sigma_used` is the age, in frames, of the errors that fusion used for the view: 0
+/// for the errors of this frame. It is null if fusion had no errors in time. Every part then counted as usable.
 pub(crate) fn lines(scene: &Scene, record: &FrameRecord) -> impl Iterator<Item = ViewLine> {
     (0..scene.views.len()).map(|view| line(scene, record, view))
 }

@@ -44,8 +44,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
         ports.receive_inputs(&context, &mut gather, &writer)?;
         while let Some(skeletons) = ports.skeletons.receive_boxed(&context)? {
             // The inputs of a result were sent before it, so all of them can be received now. Expected errors are an exception: fusion may
-            // have
-            // received them first.
+            // have received them first.
             ports.receive_inputs(&context, &mut gather, &writer)?;
             let begin = Instant::now();
             while may_await && gather.awaits_quality(skeletons.stamp.frame) {

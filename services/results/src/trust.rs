@@ -47,7 +47,7 @@ pub(crate) struct Trusted {
 impl Trusted {
     /// Adds the person who is followed in a result. Warns once for each reason not to trust the results.
     ///
-    /// * `person`, `limbs` and the others: as for [`Trusted::count`].
+    /// The arguments are as for [`Trusted::count`].
     pub(crate) fn add(
         &mut self,
         person: Option<&SkeletonMessage>,

@@ -12,7 +12,7 @@ use tracing::Level;
 pub struct Plan {
     /// Program that runs every service: `executable service <service> <args>`.
     pub executable: PathBuf,
-    /// Standard input of every process, also after a restart. A file could have been removed in the meantime.
+    /// Standard input of every process, including after a restart. A file could have been removed in the meantime.
     pub given: Vec<u8>,
     /// Description of the deployment, which other programs of this user can read while it runs ([`Namespace::description`]).
     pub description: Vec<u8>,
@@ -44,8 +44,7 @@ pub struct ProcessSpec {
     /// Role, which decides what happens to the run without the process.
     pub role: Role,
     /// Names of the processes that send to this process. If all of them have been given up, this process is stopped. Otherwise its
-    /// receivers
-    /// would wait for a process that is alive but has nothing to send.
+    /// receivers would wait for a process that is alive but has nothing to send.
     pub senders: Vec<String>,
     /// Scheduling that the process requests from the system.
     pub scheduling: Scheduling,
@@ -121,7 +120,7 @@ impl Policy {
     /// Returns the pause before the next restart, or `None` if the process is to be given up.
     ///
     /// * `recent`: number of restarts within the window.
-    /// * `hasty`: how many times in a row the process died before [`Policy::steady_after`].
+    /// * `hasty`: number of consecutive deaths of the process before [`Policy::steady_after`].
     pub(crate) fn pause(&self, recent: usize, hasty: u32) -> Option<Duration> {
         if recent >= self.max_restarts {
             return None;

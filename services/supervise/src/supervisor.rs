@@ -120,7 +120,7 @@ pub fn run(
     let stall = Stall::watch(LONGEST_STALL, || failure::end_process(STALLED))
         .map_err(SuperviseError::Watch)?;
     let on_event = &mut |event: Event<'_>| stall.outside(|| on_event(event));
-    // Dropped in reverse order: ports, topics, bus, and last the lock, which removes every file.
+    // These are dropped in reverse order: ports, topics, bus, and finally the lock, which removes all files.
     let lock = plan.namespace.acquire()?;
     preflight(&plan.topics)?;
     let bus = Bus::open(&plan.namespace, SUPERVISOR, stop)?;
@@ -403,8 +403,7 @@ impl Supervisor<'_> {
     }
 
     /// Returns true if all processes have finished. Also returns true if one was given up or restarted and the others only wait, because
-    /// they
-    /// may never receive the end of the stream.
+    /// they may never receive the end of the stream.
     fn is_done(&self, now: Instant) -> bool {
         let was_lost = |watch: &Watch| watch.is_given_up() || watch.epoch > 0;
         let may_miss_end =
@@ -434,8 +433,8 @@ impl Supervisor<'_> {
             let now = Instant::now();
             let waited = now.saturating_duration_since(begin);
             let patient = waited < self.plan.policy.grace;
-            // Two signals at the same time may merge into one, and its sender may be the other process. So the
-            // signal is repeated.
+            // Two signals at the same time may merge into one signal, whose sender may be the other process. Therefore, the signal is
+            // repeated.
             if !is_repeated && REPEAT_STOP.contains(&waited) {
                 is_repeated = true;
                 self.watches.iter().filter_map(Watch::child).for_each(Child::terminate);

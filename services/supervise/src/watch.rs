@@ -33,7 +33,7 @@ pub(crate) struct Watch {
     at_work_since: Option<Instant>,
     /// True if the main loop ran before an earlier restart. Its input was then usable.
     has_worked: bool,
-    /// How many times in a row the process died before [`Policy::steady_after`].
+    /// Number of consecutive deaths of the process before [`Policy::steady_after`].
     n_hasty: u32,
     output: VecDeque<String>,
     /// Counts before the last restart.
@@ -220,7 +220,7 @@ impl Watch {
         true
     }
 
-    /// Keeps metrics, also of a killed process.
+    /// Stores metrics. They are kept even if the process is killed.
     pub(crate) fn note_metrics(&mut self, metrics: &Metrics) {
         self.measured = Some(*metrics);
     }
@@ -305,7 +305,7 @@ impl Watch {
         Sequel::Restart(pause)
     }
 
-    /// Records a regular end: the process had finished or was stopped.
+    /// Records a regular end of the process: it had finished, or was stopped.
     pub(crate) fn end(&mut self) {
         self.phase = Phase::Ended(if self.reports_finished() {
             State::Finished

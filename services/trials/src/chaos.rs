@@ -47,7 +47,7 @@ const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 /// Outcome of the scenarios.
 #[derive(Debug)]
 pub struct Outcome {
-    /// True if all limits held.
+    /// True if all limits were met.
     pub is_held: bool,
     /// The report as JSON, which is the content of `chaos.json`.
     pub json: Value,

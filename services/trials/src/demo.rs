@@ -24,10 +24,10 @@ use run::{Run, VICTIM};
 
 pub use options::{Limits, Options};
 
-/// Minimum time that a stage waits for a late view, milliseconds; see [`Options::setup`].
+/// Minimum time that a stage waits for a late view, in milliseconds; see [`Options::setup`].
 const DEADLINE_MS: u64 = 500;
 
-/// Default duration of the run, seconds.
+/// Default duration of the run, in seconds.
 const DEFAULT_S: f64 = 20.0;
 /// Smallest default number of frames.
 const MIN_FRAMES: u64 = 30;
@@ -73,7 +73,7 @@ const KILL_AFTER: f64 = 0.4;
 /// Outcome of the demo.
 #[derive(Debug)]
 pub struct Outcome {
-    /// True if all limits held.
+    /// True if all limits were met.
     pub is_held: bool,
     /// The report as JSON, which is the content of `report.json`.
     pub json: Value,

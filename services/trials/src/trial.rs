@@ -10,5 +10,5 @@ pub(crate) mod cost;
 
 pub(crate) mod limit;
 
-/// A point in the world, metres.
+/// A point in the world, in metres.
 pub(crate) type Point = [f64; 3];

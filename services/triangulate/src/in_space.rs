@@ -22,14 +22,13 @@ pub struct SpaceJob {
     /// Step that triangulates the extra keypoints.
     pub extras: ExtrasStep,
     /// Frames of the footage per second, if known. Without it, positions are not corrected for the time between the picture and the instant
-    /// of
-    /// its frame.
+    /// of its frame.
     pub frame_rate_hz: Option<f64>,
     /// Distance between used frames, at least 1.
     pub frame_step: u64,
     /// Number of processes that receive the result.
     pub n_consumers: usize,
-    /// Time that a view, or the process before, may be silent.
+    /// Time that a view, or the preceding process, may be silent.
     pub patience: Duration,
 }
 

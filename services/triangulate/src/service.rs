@@ -22,12 +22,11 @@ pub struct Job {
     pub plans: Vec<Arc<ViewPlan>>,
     /// Grouping of the views: solved in pairs, or all at once.
     pub views: Views,
-    /// The pairs of the deployment, assigned to the workers in turn. If all views are solved at once, the first view with each other
-    /// view.
+    /// The pairs of the deployment, assigned to the workers in turn. If all views are solved at once, the pairs of the first view with each
+    /// other view.
     pub pairs: Vec<[usize; 2]>,
     /// Frames of the footage per second, if known. Without it, positions are not corrected for the time between the picture and the instant
-    /// of
-    /// its frame.
+    /// of its frame.
     pub frame_rate_hz: Option<f64>,
     /// Number of fusion workers.
     pub n_workers: usize,

@@ -8,7 +8,7 @@ use std::time::Instant;
 use tungstenite::handshake::machine::TryParse as _;
 use tungstenite::handshake::server::Request;
 
-/// Largest size of a request, bytes.
+/// Largest size of a request, in bytes.
 const LARGEST_REQUEST: usize = 16 << 10;
 
 /// A connection with a fixed deadline, whatever the other end does.

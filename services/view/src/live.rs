@@ -13,9 +13,9 @@ use serde_json::{Value, json};
 use crate::board::{Board, Weight};
 use session::{Look, Session};
 
-/// Pause between two looks at the deployment while a page is open; shorter than the frame period of any camera.
+/// Pause between two checks of the deployment while a page is open; shorter than the frame period of any camera.
 const TURN: Duration = Duration::from_millis(12);
-/// Pause between two looks at the deployment while no page is open.
+/// Pause between two checks of the deployment while no page is open.
 const IDLE_TURN: Duration = Duration::from_millis(150);
 /// Pause between two attempts to find the deployment.
 const ABSENT: Duration = Duration::from_millis(250);

@@ -24,7 +24,7 @@ pub(crate) struct Moment {
     pub id: Option<u64>,
     /// The other people.
     pub others: Vec<Other>,
-    /// Position of every joint in world coordinates, metres; `None` for an unknown joint.
+    /// Position of every joint in world coordinates, in metres; `None` for an unknown joint.
     pub joints: Vec<Option<[f64; 3]>>,
     /// Covariance of every joint, square metres: xx, xy, xz, yy, yz, zz.
     pub spread: Vec<Option<[f64; 6]>>,
@@ -32,9 +32,9 @@ pub(crate) struct Moment {
     pub views: Vec<Seen>,
     /// Number of people that the views agree on; `None` if they were not counted.
     pub people: Option<u32>,
-    /// Height of the person standing upright, metres; `None` if unknown.
+    /// Height of the person standing upright, in metres; `None` if unknown.
     pub stature: Option<f64>,
-    /// Latency from capture to result, milliseconds; `None` if unknown.
+    /// Latency from capture to result, in milliseconds; `None` if unknown.
     pub latency_ms: Option<f64>,
 }
 
@@ -43,18 +43,18 @@ pub(crate) struct Moment {
 pub(crate) struct Other {
     /// Identity of the person.
     pub id: u64,
-    /// Position of every joint in world coordinates, metres; `None` for an unknown joint.
+    /// Position of every joint in world coordinates, in metres; `None` for an unknown joint.
     pub joints: Vec<Option<[f64; 3]>>,
-    /// Height of the person standing upright, metres; `None` if unknown.
+    /// Height of the person standing upright, in metres; `None` if unknown.
     pub stature: Option<f64>,
-    /// Joints in every view, pixels; `None` if a view has no pose.
+    /// Joints in every view, in pixels; `None` if a view has no pose.
     pub views: Vec<Option<Vec<[f64; 2]>>>,
 }
 
 /// Pose in one view.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Seen {
-    /// Joints, pixels; `None` if there is no pose.
+    /// Joints, in pixels; `None` if there is no pose.
     pub joints: Option<Vec<[f64; 2]>>,
     /// Reason why the view has no part in the result; `None` if it has one.
     pub why: Option<String>,
@@ -131,12 +131,12 @@ fn places(joints: &[Joint3d], is_somebody: bool) -> Vec<Option<[f64; 3]>> {
     joints.iter().map(place).collect()
 }
 
-/// Returns the height of a person, metres; `None` if unknown.
+/// Returns the height of a person, in metres; `None` if unknown.
 fn stature(person: &SkeletonMessage) -> Option<f64> {
     Some(rounded(person.stature_m, 1e3)).filter(|metres| *metres > 0.0)
 }
 
-/// Returns the joints in a view, pixels.
+/// Returns the joints in a view, in pixels.
 fn in_pixels(scene: &Scene, fused: &FusedView) -> Option<Vec<[f64; 2]>> {
     let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
     let joints = scene.joints_of(&fused.centres_px[..n_parts])?;

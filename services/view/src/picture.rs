@@ -3,9 +3,9 @@
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
-/// Longest side of a picture, pixels.
+/// Longest side of a picture, in pixels.
 pub(crate) const LONGEST: usize = 480;
-/// Quality of the JPEG files, percent.
+/// Quality of the JPEG files, in percent.
 const QUALITY: u8 = 72;
 /// Number of bytes before the JPEG file in a message to the page.
 const HEAD_BYTES: usize = 16;
@@ -13,7 +13,7 @@ const HEAD_BYTES: usize = 16;
 /// Returns a message to the page with one picture. It contains 1, the view, whether poses are drawn in the picture, five zeros, the number
 /// of the frame (64 bits, little endian), and a JPEG file. `None` if the picture has no pixels or cannot be encoded.
 ///
-/// * `size`: width and height, pixels.
+/// * `size`: width and height, in pixels.
 /// * `rgb`: `width * height * 3` bytes.
 /// * `is_drawn`: true if poses are already drawn in the picture.
 pub(crate) fn message(

@@ -35,7 +35,7 @@ pub(crate) struct Scene {
 pub(crate) struct View {
     /// Name of the camera.
     pub name: String,
-    /// Width and height of the pictures that coordinates refer to, pixels.
+    /// Width and height of the pictures that coordinates refer to, in pixels.
     pub size: [u32; 2],
     /// Camera with the calibration of those pictures; `None` if unknown.
     pub camera: Option<Camera>,
@@ -113,7 +113,7 @@ impl Scene {
 
     /// Returns the joints of a pose in a view; `None` if the pose has too few parts.
     ///
-    /// * `centres`: centres of the parts, pixels.
+    /// * `centres`: centres of the parts, in pixels.
     pub(crate) fn joints_of(&self, centres: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
         let last = self.joints.joints.iter().flat_map(|joint| joint.parts).max()?;
         (centres.len() > *last).then(|| self.joints.from_parts(centres))

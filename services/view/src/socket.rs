@@ -23,7 +23,7 @@ use crate::site::Site;
 
 /// Longest time that a page may take to accept a message.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Largest size of a message from a page, bytes.
+/// Largest size of a message from a page, in bytes.
 const LARGEST_QUESTION: usize = 16 << 10;
 /// Longest wait if the page requests nothing and nothing changes.
 const LONGEST_SLEEP: Duration = Duration::from_secs(10);

@@ -2,8 +2,8 @@
 
 use messages::Status;
 
-/// Tolerance in periods: beyond the middle between two instants, a message still belongs to the one that is next. Otherwise messages would
-/// jump between two instants if two clocks differ by half a period.
+/// Tolerance beyond the middle between two instants, in periods. Within it, a message still belongs to the instant that is due next.
+/// Without it, messages would jump between two instants if two clocks differ by half a period.
 const SLACK: f64 = 0.1;
 
 /// The instants of the run: `start + nth * period`, by this host's clock.
@@ -85,7 +85,7 @@ pub struct Tally {
 #[derive(Debug, Clone)]
 pub struct Arrivals {
     grid: Grid,
-    /// Time after its instant at which a frame is given up, in nanoseconds: first if its host answers, then if it does not.
+    /// Time after its instant at which a frame is given up, in nanoseconds: the first value if its host answers, the second if not.
     patience: [u64; 2],
     n_frames: u64,
     next: u64,
@@ -95,7 +95,8 @@ pub struct Arrivals {
 impl Arrivals {
     /// Creates the state of a view.
     ///
-    /// * `patience`: time after its instant at which a frame is given up, in nanoseconds: first if its host answers, then if it does not.
+    /// * `patience`: time after its instant at which a frame is given up, in nanoseconds: the first value if its host answers, the second
+    ///   if not.
     /// * `n_frames`: number of frames of the run.
     /// * `next`: the first frame that has not been published.
     pub fn new(grid: Grid, patience: [u64; 2], n_frames: u64, next: u64) -> Self {

@@ -31,7 +31,7 @@ impl Fingerprint {
         self.0.push((what.to_owned(), text.to_owned()));
     }
 
-    /// Returns the entries that differ, in the order of this fingerprint. Entries that only the other one has come last.
+    /// Returns the entries that differ, in the order of this fingerprint. Entries that only the other fingerprint has come last.
     pub fn differences(&self, other: &Self) -> Vec<Difference> {
         let find = |all: &Self, what: &str| {
             let found = all.0.iter().find(|entry| entry.0 == what);

@@ -15,7 +15,7 @@ pub struct Hello {
     pub version: u16,
     /// Name of the host.
     pub host: String,
-    /// Start of the host's bridge.
+    /// Start time of the host's bridge.
     pub origin: u64,
     /// Fingerprint of the host's files and settings.
     pub fingerprint: Fingerprint,
@@ -34,7 +34,7 @@ pub enum Answer {
 /// Facts about the run that a host with cameras needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Welcome {
-    /// Start of the bridge of the host that fuses.
+    /// Start time of the bridge of the host that fuses.
     pub origin: u64,
     /// Session of the run: the time from which its instants are counted, by the clock of the host that fuses, in nanoseconds.
     pub session: u64,

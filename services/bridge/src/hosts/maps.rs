@@ -1,8 +1,8 @@
 //! Format of a view's maps between two hosts: Gaussians, after the poses.
 //!
-//! All numbers are little endian. The number of people comes first (`u32`). For every person follow the position of the first cell and the
-//! distance between cells (two `f64` each), and the numbers of columns, rows and Gaussians (`u32` each). For every Gaussian follow its
-//! joint (`u32`), position, height and precision (six `f32`).
+//! All numbers are little endian. The number of people comes first (`u32`). Each person has the position of the first cell and the distance
+//! between cells (two `f64` each), and the numbers of columns, rows and Gaussians (`u32` each). Each Gaussian has its joint (`u32`),
+//! position, height and precision (six `f32`).
 
 /// Number of bytes per person, and per Gaussian.
 const PERSON: usize = 44;
@@ -32,7 +32,7 @@ pub struct PersonGaussians {
     pub cell_px: [f64; 2],
     /// Number of columns and rows.
     pub size: [u32; 2],
-    /// Gaussians of one joint after the other, the highest of each joint first.
+    /// Gaussians, ordered by joint. The highest Gaussian of each joint comes first.
     pub gaussians: Vec<Gaussian>,
 }
 

@@ -14,7 +14,7 @@ pub struct Parcel<T> {
     pub lane: usize,
     /// Number of the parcel in its lane, counted from 0.
     pub sequence: u64,
-    /// Number of parcels in the lane that newer ones overtook before they were sent.
+    /// Number of parcels in the lane that were overtaken by newer parcels before they were sent.
     pub n_overtaken: u64,
     /// Content of the message.
     pub item: T,
@@ -25,7 +25,7 @@ pub struct Parcel<T> {
 pub struct Sent {
     /// Number of parcels offered.
     pub n_offered: u64,
-    /// Number of parcels that newer ones overtook before they were sent.
+    /// Number of parcels that were overtaken by newer parcels before they were sent.
     pub n_overtaken: u64,
     /// Number of parcels passed to the link.
     pub n_sent: u64,

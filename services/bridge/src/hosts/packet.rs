@@ -51,7 +51,7 @@ pub struct Head {
     pub view: u32,
     /// Status of the result: good, or why it is missing.
     pub status: Status,
-    /// Start of the sending bridge, which identifies it. Sequences start again with each bridge.
+    /// Start time of the sending bridge, which identifies the bridge. Sequences start again with each bridge.
     pub origin: u64,
     /// Number of the message among those of this view and content, counted from 0.
     pub sequence: u64,
@@ -63,7 +63,7 @@ pub struct Head {
     pub captured_at_nanos: u64,
     /// Time at which the stage that created the message received its input.
     pub received_at_nanos: u64,
-    /// Time at which that stage sent the message.
+    /// Time at which the stage that created the message sent it.
     pub sent_at_nanos: u64,
     /// Time at which the packet was ready to be sent.
     pub packed_at_nanos: u64,
@@ -71,7 +71,7 @@ pub struct Head {
     pub skew_nanos: i64,
     /// Number of frames for which the camera's process had no time, since its run began.
     pub n_dropped: u64,
-    /// Number of messages of this view and content that newer ones overtook before they were sent, since the bridge started.
+    /// Number of messages of this view and content that were overtaken by newer messages before they were sent, since the bridge started.
     pub n_overtaken: u64,
     /// Width and height of the frame, in pixels; 0 without a picture.
     pub size: [u32; 2],
@@ -119,7 +119,7 @@ pub enum PacketError {
         /// Version of the other host.
         got: u16,
     },
-    /// The bytes differ from those that were sent.
+    /// The bytes differ from the bytes that were sent.
     #[error("hash {got:016x} of the content, expected {expected:016x}")]
     Hash {
         /// Hash of the received bytes.
@@ -278,7 +278,7 @@ fn most(field: &'static str, got: u64, expected: u64) -> Result<(), PacketError>
 
 /// Returns the hash of a head without its last field, and of a body.
 fn hash(head: &[u8], body: &[u8]) -> u64 {
-    // The body is hashed in units of eight bytes, because FNV byte by byte takes as long as a network.
+    // The body is hashed in units of eight bytes, because FNV would be too slow byte by byte.
     let words = body.chunks(8).fold(0xcbf2_9ce4_8422_2325_u64, |sum, word| {
         let mut bytes = [0; 8];
         bytes[..word.len()].copy_from_slice(word);

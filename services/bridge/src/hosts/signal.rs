@@ -13,14 +13,14 @@ const BYTES: usize = 56;
 pub enum Signal {
     /// Asks for the time of the other host.
     Ping {
-        /// Start of the asking bridge.
+        /// Start time of the asking bridge.
         origin: u64,
         /// Time at which the question was sent.
         asked_at: u64,
     },
     /// Answers a [`Self::Ping`].
     Pong {
-        /// Start of the answering bridge.
+        /// Start time of the answering bridge.
         origin: u64,
         /// Time at which the question was sent, copied from the question.
         asked_at: u64,
@@ -31,7 +31,7 @@ pub enum Signal {
     },
     /// Acknowledges a packet.
     Ack {
-        /// Start of the bridge that sent the packet.
+        /// Start time of the bridge that sent the packet.
         origin: u64,
         /// View of the packet.
         view: u32,

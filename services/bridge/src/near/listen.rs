@@ -43,7 +43,7 @@ impl Arrived {
         self.head.view as usize
     }
 
-    /// Returns true if the message accompanies another message of its frame, which is the one that is counted.
+    /// Returns true if the message accompanies another message of its frame. Only the other message is counted.
     pub(super) fn is_beside(&self) -> bool {
         self.head.content == Content::ViewQuality
     }
@@ -201,7 +201,7 @@ impl Decoder {
                 sequence: it.head.sequence,
             };
             let arrived = self.decode(it);
-            // The packet is acknowledged only now, so that the other host does not send faster than this one decodes.
+            // The packet is acknowledged only now, so that the other host does not send faster than this host decodes.
             self.link.send(&self.down, ack.to_bytes().to_vec(), true);
             if let Some(arrived) = arrived
                 && self.arrived.send(arrived).is_err()
@@ -273,7 +273,7 @@ pub(super) fn kind_of(content: Content) -> Option<Kind> {
     }
 }
 
-/// Receives answers to questions about the time, and questions of hosts that start.
+/// Receives answers to requests for the time, and the requests of hosts that start.
 fn hear_signals(
     link: &Arc<Link>,
     topics: &Topics,
@@ -305,7 +305,7 @@ fn hear_signals(
                 received_at,
                 answered_at,
             }) => {
-                // Only answers of the welcomed bridge are used. Earlier ones may be from another clock.
+                // Only answers of the welcomed bridge are used. Answers of earlier bridges may be from another clock.
                 if remote.state().welcomed == Some(of) {
                     remote.exchanged(Exchange {
                         asked_at,

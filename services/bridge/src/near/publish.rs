@@ -1,4 +1,4 @@
-//! Writes messages from other hosts into the shared memory of this one.
+//! Writes messages from other hosts into the shared memory of this host.
 
 use crate::hosts::{Content, Estimate, Head};
 use deployment::hosts::Carry;
@@ -165,7 +165,7 @@ impl Publisher {
                 quality,
                 evidence,
             } => {
-                // The evidence is sent first: a receiver of the candidates may rely on it.
+                // The evidence is sent first, because a receiver of the candidates may rely on it.
                 if let (Some(evidence), Some(maps)) = (evidence, &arrived.maps) {
                     send_maps(evidence, maps, (stamp, timing))?;
                 }
@@ -189,7 +189,7 @@ impl Publisher {
         Ok(())
     }
 
-    /// Sends that a frame has no message and why, or that the stream has ended.
+    /// Sends the reason why a frame has no message, or the end of the stream.
     pub(super) fn send_nothing(
         &self,
         service: &Service,

@@ -19,7 +19,7 @@ use crate::timing::Timing;
 struct Times {
     /// Time from the stage's send time until the message was encoded, on the other host.
     encode: Timing,
-    /// Transfer time from the other host to this one.
+    /// Transfer time from the other host to this host.
     network: Timing,
     /// Time until the message was decoded, on this host.
     decode: Timing,

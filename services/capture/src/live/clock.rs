@@ -8,8 +8,8 @@ const WINDOW_NANOS: u64 = 10_000_000_000;
 /// Change of the offset, in nanoseconds, that shows that the camera's clock was set.
 const JUMP_NANOS: u64 = 2_000_000_000;
 
-/// Shortest and longest plausible delay by a camera's clock, in nanoseconds. No picture arrives before it was taken,
-/// and one that comes much later is not awaited.
+/// Shortest and longest plausible delay by a camera's clock, in nanoseconds. No picture arrives before it was taken, and a picture that
+/// arrives much later is not awaited.
 const DELAYS_NANOS: [i64; 2] = [0, 150_000_000];
 /// Amount by which a trusted clock may exceed these limits, in nanoseconds, so that a short deviation does not matter.
 const SLACK_NANOS: i64 = 5_000_000;
@@ -87,8 +87,7 @@ pub(super) struct OwnClock {
 
 impl OwnClock {
     /// Returns the time at which a picture was taken, by `CLOCK_MONOTONIC`. It is never later than the arrival. Returns `None` while the
-    /// clock
-    /// is not trusted.
+    /// clock is not trusted.
     ///
     /// * `taken_unix`: time by the camera's clock, in nanoseconds since the beginning of 1970.
     /// * `arrived_unix`: time of arrival by this machine's clock, in nanoseconds since the beginning of 1970.

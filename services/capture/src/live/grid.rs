@@ -99,9 +99,8 @@ impl Grid {
     /// Returns the instant that a picture belongs to: `next` or a later one. Returns `None` if all near instants have a picture.
     ///
     /// The distance of a picture from its instant is at most half a period of the instants. If the camera is faster, it is at most half a
-    /// period of the camera. In either case a tolerance of a tenth is added. So cameras with the same rate keep their phase, and of a
-    /// faster
-    /// camera the nearest picture is used.
+    /// period of the camera. In both cases, a tenth of a period is added as a tolerance. Therefore, cameras with the same rate keep their
+    /// phase, and the nearest picture of a faster camera is used.
     pub(crate) fn place(&self, at_nanos: u64, next: u64) -> Option<u64> {
         let exact = self.exact(at_nanos);
         let reach = 0.5 * self.own_period().min(1.0) + SLACK;

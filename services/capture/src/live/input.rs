@@ -20,7 +20,7 @@ use super::originals::{KeptStream, Original, Originals};
 const PAUSE: Duration = Duration::from_millis(100);
 /// Time without a picture after which a device is opened again, in nanoseconds.
 const SILENCE_NANOS: u64 = 5_000_000_000;
-/// Gap between two times of a stream from which pictures count as missing, in periods.
+/// Minimum gap between two times of a stream at which pictures count as missing, in periods.
 const GAP: f64 = 1.5;
 
 /// One picture read from a camera.
@@ -195,7 +195,7 @@ impl Device {
     }
 }
 
-/// Returns how many numbers are missing between two; 0 if the camera has started to count again.
+/// Returns how many numbers are missing between two picture numbers; 0 if the camera has started to count again.
 fn missing(last: Option<u32>, now: u32) -> u64 {
     let gap = last.map_or(1, |last| now.wrapping_sub(last));
     let is_ahead = (1..1 << 31).contains(&gap);

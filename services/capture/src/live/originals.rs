@@ -167,9 +167,8 @@ impl KeptStream {
         }
     }
 
-    /// Returns the time at which the picture of a piece was taken. It is that of its decoded picture, or follows from the distance to the
-    /// last
-    /// one.
+    /// Returns the time at which the picture of a piece was taken. It is the time of the decoded picture, or follows from the distance to
+    /// the last decoded picture.
     fn taken_at(&self, nanos: i64) -> u64 {
         let is_it = |decoded: &&(i64, u64)| decoded.0.abs_diff(nanos) <= SAME_NANOS;
         if let Some(&(_, at)) = self.decoded.iter().find(is_it) {

@@ -17,8 +17,7 @@ pub(crate) struct Phase {
     /// Times and skews of pictures that are not part of a measurement yet, in nanoseconds.
     newest: Vec<(u64, i64)>,
     /// Times and skews of the measurements, in nanoseconds. When a camera drifts from one instant to the next, a whole period is added, so
-    /// that
-    /// its skew does not jump.
+    /// that its skew does not jump.
     measured: VecDeque<(u64, i64)>,
     /// Sum of the periods that were added so far, in nanoseconds.
     added: i64,
@@ -85,8 +84,7 @@ impl Phase {
     }
 
     /// Returns how fast the camera falls behind the instants, in parts per billion. It is negative for a camera that is too fast. Returns
-    /// `None`
-    /// if the camera was measured for too short a time.
+    /// `None` if the camera was measured for too short a time.
     pub(crate) fn drift_ppb(&self) -> Option<i64> {
         let ends = self.measured.front().zip(self.measured.back())?;
         if ends.1.0.saturating_sub(ends.0.0) < LEAST_NANOS {

@@ -1,4 +1,4 @@
-//! Reconstructs a recorded stream from a picture on.
+//! Reconstructs a recorded stream from a given picture on.
 
 use std::io;
 use std::path::Path;

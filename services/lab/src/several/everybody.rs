@@ -182,8 +182,8 @@ fn distance(put: &Joints, there: &Joints) -> f64 {
     each.iter().sum::<f64>() / each.len() as f64
 }
 
-/// Returns the area under the curve of precision over recall, in percent. People of the output come in the order of their certainty. A person
-/// is correct if the nearest true person is close enough and was not matched before.
+/// Returns the area under the curve of precision over recall, in percent. People of the output come in the order of their certainty. A
+/// person is correct if the nearest true person is close enough and was not matched before.
 fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f64 {
     let mut taken = std::collections::BTreeSet::new();
     let (mut n_right, mut points) = (0.0, Vec::new());

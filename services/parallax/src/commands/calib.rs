@@ -30,8 +30,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         input: Input,
         /// Poses that each view found alone: `pose2d.jsonl` of a run with one person and uncropped footage. Poses after fusion are not
-        /// used,
-        /// because they are projections of one solution and agree with any rig.
+        /// used, because they are projections of one solution and agree with any rig.
         #[arg(long, value_name = "FILE")]
         detections: Option<PathBuf>,
         /// Print JSON.

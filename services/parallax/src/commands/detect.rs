@@ -21,7 +21,7 @@ use terminal::{Outline, outline, output};
 use crate::describe::{self, NamedJoints, Placed};
 use by_network::Eyes;
 
-/// Default of `--size`: the longest side of a searched image, pixels.
+/// Default of `--size`: the longest side of a searched image, in pixels.
 const SIZE: usize = 1280;
 /// Default of `--overlap`.
 const OVERLAP: f64 = 0.1;
@@ -222,7 +222,7 @@ impl Arguments {
     }
 }
 
-/// Parses the longest side of a searched image, pixels.
+/// Parses the longest side of a searched image, in pixels.
 fn side(text: &str) -> Result<usize, String> {
     let side = text.parse().ok().filter(|value| (40..=65535).contains(value));
     side.ok_or_else(|| format!("expected 40 to 65535 pixels, got {text:?}"))

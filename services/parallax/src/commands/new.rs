@@ -45,8 +45,7 @@ pub(crate) struct Arguments {
     /// The folder to create.
     room: PathBuf,
     /// A camera: its name, and a video, a folder or pattern of pictures, or a live address. Give the option once per camera. `parallax
-    /// cameras`
-    /// lists video devices.
+    /// cameras` lists video devices.
     #[arg(long, value_name = "NAME=SOURCE", required = true)]
     camera: Vec<String>,
     /// A calibration of these cameras, in any format.

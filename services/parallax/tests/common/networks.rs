@@ -17,8 +17,7 @@ pub(crate) fn sides(n: [usize; 4]) -> Vec<Side> {
 }
 
 /// Returns a detector that finds the same box in every picture: left, top, right and bottom, in pixels of its input of 64 by 64. The score
-/// is
-/// `score` plus a ten-thousandth of the mean colour.
+/// is `score` plus a ten-thousandth of the mean colour.
 pub(crate) fn detector_of([left, top, right, bottom]: [f32; 4], score: f32) -> Network {
     let mut net = Network::default();
     net.inputs.push(("picture".to_owned(), sides([1, 3, 64, 64])));

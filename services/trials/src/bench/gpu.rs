@@ -25,7 +25,7 @@ const WARM_UP: usize = 3;
 /// Options of the benchmark of the GPU.
 #[derive(Debug, Clone)]
 pub struct Gpu {
-    /// Widths and heights of the frames, pixels.
+    /// Widths and heights of the frames, in pixels.
     pub sizes: Vec<[usize; 2]>,
     /// Numbers of views that are searched at the same time.
     pub views: Vec<usize>,
@@ -43,7 +43,7 @@ struct Row {
     size: [usize; 2],
     n_views: usize,
     rate_hz: f64,
-    /// Time from the picture to poses and evidence of all views, milliseconds.
+    /// Time from the picture to poses and evidence of all views, in milliseconds.
     spread: Option<Spread>,
 }
 

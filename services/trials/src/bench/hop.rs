@@ -25,7 +25,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 pub(super) struct Series {
     /// Name of the deployment.
     pub name: String,
-    /// Size of a message, bytes; at least 16.
+    /// Size of a message, in bytes; at least 16.
     pub bytes: usize,
     /// Number of measured messages.
     pub n_messages: u64,
@@ -46,7 +46,7 @@ pub(super) struct Measured {
     pub receiver: ReceiverReport,
     /// Number of messages whose location is known in both processes.
     pub n_compared: usize,
-    /// Number of these with the same location in both processes.
+    /// Number of compared messages with the same location in both processes.
     pub n_same_place: usize,
     /// Bytes copied by the ports of both processes.
     pub copied_bytes: u64,
@@ -182,7 +182,7 @@ fn no_report(child: &mut Child) -> Failure {
     Failure::new(ExitKind::Run, "the receiving process does not respond")
 }
 
-/// Returns the number of messages whose location is known in both processes, and how many of these have the same location.
+/// Returns the number of messages whose location is known in both processes, and how many of these messages have the same location.
 fn compare(sent: &[Spot], received: &[Spot]) -> (usize, usize) {
     let of = |message: u64| sent.iter().find(move |spot| spot.message == message);
     let pairs = received.iter().filter_map(|spot| Some((spot, of(spot.message)?)));

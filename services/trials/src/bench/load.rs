@@ -16,7 +16,7 @@ use crate::trial::limit;
 /// Kind of load benchmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// All cameras in real time; then the same with one camera killed.
+    /// All cameras in real time; then the same run with one camera killed.
     Latency,
     /// All cameras, with every frame processed as fast as possible.
     Throughput,

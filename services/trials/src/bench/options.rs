@@ -7,9 +7,9 @@ use std::path::PathBuf;
 pub struct Options {
     /// The deployment file; synthetic cameras if there is none.
     pub deployment: Option<PathBuf>,
-    /// Number of cameras. For a deployment file, the first ones are used, by default all; the default is 4 synthetic cameras.
+    /// Number of cameras, from the first in the deployment file; by default all. The default for synthetic cameras is 4.
     pub views: Option<usize>,
-    /// Length of the footage of every run, seconds.
+    /// Length of the footage of every run, in seconds.
     pub seconds: u32,
     /// Frames per second of synthetic cameras.
     pub rate_hz: f64,
@@ -25,10 +25,10 @@ pub struct Options {
     pub out: PathBuf,
     /// The name of the deployment, unique among those that run at the same time.
     pub name: String,
-    /// Largest median of the end-to-end latency in the run with all cameras, milliseconds.
+    /// Largest median of the end-to-end latency in the run with all cameras, in milliseconds.
     pub max_p50_ms: Option<f64>,
-    /// Largest 99th percentile of the same latency, milliseconds.
+    /// Largest 99th percentile of the end-to-end latency in the run with all cameras, in milliseconds.
     pub max_p99_ms: Option<f64>,
-    /// Smallest rate of results in the same run, per second.
+    /// Smallest rate of results in the run with all cameras, per second.
     pub min_rate_hz: Option<f64>,
 }

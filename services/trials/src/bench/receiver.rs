@@ -24,7 +24,7 @@ pub(super) struct Spot {
     pub message: u64,
     /// The inode of the file.
     pub inode: u64,
-    /// The offset in the file, bytes.
+    /// The offset in the file, in bytes.
     pub offset: u64,
 }
 

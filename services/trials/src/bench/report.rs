@@ -33,7 +33,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Returns true if all limits held.
+    /// Returns true if all limits were met.
     pub fn is_held(&self) -> bool {
         self.limits.iter().all(|limit| limit.held)
     }

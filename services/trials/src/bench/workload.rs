@@ -20,7 +20,7 @@ use crate::trial::injection::{Injector, ProcessFault};
 use crate::trial::results::{self, FrameResult};
 use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
 
-/// Time that a stage waits for a late view of synthetic cameras, milliseconds.
+/// Time that a stage waits for a late view of synthetic cameras, in milliseconds.
 const DEADLINE_MS: u64 = 500;
 /// Stages with computation, in pipeline order.
 const STAGES: [&str; 5] = ["capture", "pose", "quality", "fuse", "triangulate"];
@@ -79,11 +79,11 @@ pub(super) struct Measured {
     pub n_results: usize,
     /// Results per second, from the first result to the last.
     pub rate_hz: Option<f64>,
-    /// Time from the capture of the first picture to the result, milliseconds.
+    /// Time from the capture of the first picture to the result, in milliseconds.
     pub end_to_end: Option<Spread>,
-    /// Computing time of every stage over the whole run, milliseconds.
+    /// Computing time of every stage over the whole run, in milliseconds.
     pub stages: Vec<(&'static str, Spread)>,
-    /// Processor time of all processes over the whole run, seconds.
+    /// Processor time of all processes over the whole run, in seconds.
     pub cpu_seconds: f64,
     /// Number of frames and messages that were dropped.
     pub n_dropped: u64,
@@ -92,8 +92,8 @@ pub(super) struct Measured {
 }
 
 impl Measured {
-    /// Returns the processor time per result, milliseconds. `None` for a run with a killed camera, because results before the kill are not
-    /// counted.
+    /// Returns the processor time per result, in milliseconds. `None` for a run with a killed camera, because results before the kill are
+    /// not counted.
     pub(super) fn cpu_ms_per_result(&self) -> Option<f64> {
         let is_whole = self.n_results > 0 && !self.case.has_dead;
         is_whole.then(|| 1e3 * self.cpu_seconds / self.n_results as f64)
@@ -321,14 +321,14 @@ fn keep_views(deployment: &mut Deployment, n_views: usize) {
     }
 }
 
-/// Returns the processor time of all child processes that have ended, seconds.
+/// Returns the processor time of all child processes that have ended, in seconds.
 fn cpu_seconds_of_children() -> Result<f64, Failure> {
     let stat = fs::read_to_string("/proc/self/stat").or_fail(ExitKind::Run)?;
     let seconds = parse_stat(&stat).ok_or("/proc/self/stat has an unexpected format");
     seconds.or_fail(ExitKind::Run)
 }
 
-/// Returns the sum of fields 16 and 17 of `/proc/PID/stat` (`proc_pid_stat(5)`), seconds. Fields are counted from the end of the
+/// Returns the sum of fields 16 and 17 of `/proc/PID/stat` (`proc_pid_stat(5)`), in seconds. Fields are counted from the end of the
 /// name, which may contain any character.
 fn parse_stat(stat: &str) -> Option<f64> {
     let (_, fields) = stat.rsplit_once(") ")?;

@@ -27,13 +27,13 @@ pub(super) struct CameraFailure {
     pub camera: String,
     /// First frame of the fault, and first frame after it.
     pub span: [u64; 2],
-    /// For each cause, the number of results of these frames that name it as the reason for the missing view.
+    /// For each cause, the number of results of frames in `span` that name the cause as the reason for the missing view.
     pub flagged: Vec<(String, usize)>,
-    /// Number of results of these frames that use other views.
+    /// Number of results of frames in `span` that use other views.
     pub results_without_it: usize,
-    /// Longest time between two of these results.
+    /// Longest time between two results of frames in `span` that use other views.
     pub longest_pause_ms: Option<f64>,
-    /// Time from the last result of these frames to the first result that uses the camera again.
+    /// Time from the last result of a frame in `span` to the first result that uses the camera again.
     pub back_ms: Option<f64>,
 }
 

@@ -18,7 +18,7 @@ use crate::trial::limit::{at_most, none_of};
 
 /// Duration of the fault.
 const FAULT: Duration = Duration::from_secs(3);
-/// Longest time until the other host counts as gone, milliseconds. A host is gone after a silence of 1.2 s, and the machine may be busy.
+/// Longest time until the other host counts as gone, in milliseconds. A host is gone after a silence of 1.2 s, and the machine may be busy.
 const MAX_NOTICED_MS: f64 = 4000.0;
 /// Longest time to wait for the other host at the start.
 const PATIENCE: Duration = Duration::from_mins(2);

@@ -10,14 +10,14 @@ use crate::trial::cost::Cost;
 use crate::trial::injection::ProcessFault;
 use crate::trial::limit::{at_least, at_most, none_of};
 
-/// Longest time until a death is noticed, milliseconds.
+/// Longest time until a death is noticed, in milliseconds.
 const NOTICE_MS: f64 = 1000.0;
-/// Longest time from the hang limit until a hang is noticed, milliseconds.
+/// Longest time from the hang limit until a hang is noticed, in milliseconds.
 const LATE_MS: f64 = 1000.0;
 /// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
 /// not count.
 const MAX_UNACCOUNTED: u64 = 2;
-/// Factor by which a resource may grow; the following amounts are added.
+/// Factor by which a resource may grow. `MORE_BYTES` and `MORE_FILES` are added.
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
@@ -100,7 +100,7 @@ pub(super) fn once(
 pub(super) struct RandomKillsOutcome {
     /// Number of kills.
     pub n_kills: usize,
-    /// Downtimes of the processes that came back, milliseconds; `None` if none came back.
+    /// Downtimes of the processes that came back, in milliseconds; `None` if none came back.
     pub downtime_ms: Option<Spread>,
     /// Resources in use at the start and at the end; `None` if the run was too short.
     pub resources: Option<[ResourceUse; 2]>,
@@ -165,11 +165,11 @@ pub(super) fn random(
 /// Measurements of a run whose supervisor was killed, and of the next run.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SupervisorKillOutcome {
-    /// Time from the kill until the last process of the run had ended, milliseconds; `None` if some did not end.
+    /// Time from the kill until the last process of the run had ended, in milliseconds; `None` if some did not end.
     pub ended_ms: Option<f64>,
     /// Number of files left for the next run to remove.
     pub files: u64,
-    /// Time from the planning of the next run to its first result, milliseconds.
+    /// Time from the planning of the next run to its first result, in milliseconds.
     pub result_ms: Option<f64>,
 }
 

@@ -15,7 +15,7 @@ use super::testbed::Testbed;
 use super::verdict::Verdict;
 use crate::trial::limit::at_least;
 
-/// Rotation of the camera, degrees.
+/// Rotation of the camera, in degrees.
 const DEGREES: f64 = 2.0;
 
 /// Rotates a camera of a rig by `DEGREES` about a random axis perpendicular to its optical axis.

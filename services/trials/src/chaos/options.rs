@@ -13,9 +13,9 @@ pub struct Options {
     pub scenarios: Vec<Scenario>,
     /// Seed for the choice of processes and cameras, and for the synthetic scene.
     pub seed: u64,
-    /// Length of the footage of every run, seconds.
+    /// Length of the footage of every run, in seconds.
     pub seconds: u32,
-    /// Length of the parts in the report of a run with random kills, seconds.
+    /// Length of the parts in the report of a run with random kills, in seconds.
     pub part_seconds: u32,
     /// Folder for the report and the results.
     pub out: PathBuf,
@@ -28,9 +28,9 @@ pub struct Options {
 /// Configurable limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, milliseconds. For processes that
-    /// results do not name, the time until the process reports that it has worked.
+    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For a process that results do not
+    /// name, the time until it reports that it has worked.
     pub max_return_ms: f64,
-    /// Longest pause between results while a process is away that other processes do not depend on, milliseconds.
+    /// Longest pause between results while a process is missing, if other processes do not depend on it, in milliseconds.
     pub max_pause_ms: f64,
 }

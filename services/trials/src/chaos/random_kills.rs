@@ -38,8 +38,8 @@ pub(super) struct Kill {
 }
 
 impl Kill {
-    /// Returns the downtime, milliseconds. It ends when the process sends its first message that contributes to a
-    /// result. For processes that results do not name, it ends when the process reports that it has worked.
+    /// Returns the downtime, in milliseconds. It ends when the process sends its first message that contributes to a result. For a process
+    /// that results do not name, the downtime ends when the process reports that it has worked.
     ///
     /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
     pub(super) fn downtime_ms(

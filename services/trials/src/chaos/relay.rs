@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Longest sleep of a relay thread before it checks whether to end.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Size of the buffer for relayed data, bytes.
+/// Size of the buffer for relayed data, in bytes.
 const BYTES: usize = 1 << 16;
 
 /// The relay, which ends when it is dropped.

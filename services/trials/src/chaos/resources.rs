@@ -23,15 +23,15 @@ const MIN_SAMPLES: usize = 9;
 /// Resources in use at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub(super) struct ResourceUse {
-    /// Anonymous resident memory (`RssAnon`) of all processes except the supervisor, bytes.
+    /// Anonymous resident memory (`RssAnon`) of all processes except the supervisor, in bytes.
     pub memory_bytes: u64,
-    /// Anonymous resident memory of the supervisor, bytes.
+    /// Anonymous resident memory of the supervisor, in bytes.
     pub supervisor_memory_bytes: u64,
     /// Open file descriptors of all processes, including the supervisor.
     pub descriptors: u64,
     /// Files of the deployment, including those in shared memory.
     pub files: u64,
-    /// Allocated size of the deployment's files in shared memory, bytes.
+    /// Allocated size of the deployment's files in shared memory, in bytes.
     pub shared_bytes: u64,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct ResourceUse {
 pub(super) struct Measured {
     /// Resources of all processes.
     pub used: ResourceUse,
-    /// Anonymous resident memory of every process except the supervisor, in the order of the requested ids, bytes.
+    /// Anonymous resident memory of every process except the supervisor, in the order of the requested ids, in bytes.
     pub memory_bytes: Vec<u64>,
 }
 
@@ -51,7 +51,7 @@ struct Watched {
     epoch: u32,
     /// Time at which the process was started (`failure::now_nanos`).
     started_at: u64,
-    /// True if it has worked in this epoch.
+    /// True if the process has worked in this epoch.
     has_worked: bool,
 }
 
@@ -163,8 +163,8 @@ fn age_class(nanos: u64) -> u32 {
     (nanos / 1_000_000_000).checked_ilog2().map_or(0, |exponent| exponent + 1)
 }
 
-/// Returns the memory of all processes in two parts of a run, bytes. For each process, it is the mean over the age classes that the process
-/// had in both parts, with the median of each class. A process without a common age class is left out.
+/// Returns the memory of all processes in two parts of a run, in bytes. For each process, it is the mean over the age classes that the
+/// process had in both parts, with the median of each class. A process without a common age class is left out.
 fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
     let n_processes = parts.iter().flat_map(|part| part.iter());
     let n_processes = n_processes.map(|process| process.processes.len()).max().unwrap_or(0);
@@ -234,7 +234,7 @@ pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> Measured {
     }
 }
 
-/// Returns the allocated size of a file in shared memory, bytes. It is smaller than the file's length if some pages were never written.
+/// Returns the allocated size of a file in shared memory, in bytes. It is smaller than the file's length if some pages were never written.
 fn shared(name: &str) -> u64 {
     let found = fs::metadata(Path::new("/dev/shm").join(name));
     found.map_or(0, |file| file.blocks() * 512)
@@ -252,7 +252,7 @@ pub(super) fn shared_files(namespace: &Namespace) -> Vec<String> {
     names.filter(|name| name.starts_with(namespace.prefix())).collect()
 }
 
-/// Returns the anonymous resident memory of a process, bytes; 0 if it has ended.
+/// Returns the anonymous resident memory of a process, in bytes; 0 if it has ended.
 fn memory(pid: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"));

@@ -19,7 +19,7 @@ pub(super) struct Part {
     pub kills: usize,
     /// Number of results.
     pub results: usize,
-    /// Time from the capture of the first picture to the result, milliseconds.
+    /// Time from the capture of the first picture to the result, in milliseconds.
     pub end_to_end_ms: Option<Spread>,
     /// Median resources; `None` if there was no second in which all processes worked.
     #[serde(rename = "held")]

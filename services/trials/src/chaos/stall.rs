@@ -18,7 +18,7 @@ use crate::trial::limit::{at_least, at_most};
 
 /// Duration of the stop, nanoseconds.
 const STALL_NANOS: u64 = 3_000_000_000;
-/// Settings with which the supervisor does not treat the process as hung.
+/// Settings with which the supervisor does not treat the stopped process as hung.
 const NO_HANG_DETECTION: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];
 /// With realtime delivery, the smallest rate of results during the stop, as a share of the rate before it.
 const SHARE: f64 = 0.5;
@@ -40,7 +40,7 @@ pub(super) struct StallInjector {
 /// Measurements of the stop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct StallMeasurement {
-    /// Duration of the stop, milliseconds.
+    /// Duration of the stop, in milliseconds.
     pub stall_ms: f64,
     /// Results per second before and during the stop.
     pub rates_hz: [f64; 2],

@@ -18,7 +18,7 @@ use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, Synt
 
 /// Frames per second of the synthetic cameras.
 const RATE_HZ: f64 = 5.0;
-/// Time that a stage waits for a late view of the synthetic cameras, milliseconds.
+/// Time that a stage waits for a late view of the synthetic cameras, in milliseconds.
 const DEADLINE_MS: u64 = 500;
 
 /// The deployment under test.

@@ -26,7 +26,7 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    /// Returns true if all limits held.
+    /// Returns true if all limits were met.
     pub(super) fn is_held(&self) -> bool {
         self.limits.iter().all(|limit| limit.held)
     }

@@ -23,11 +23,11 @@ pub(super) struct Measured<'a> {
     pub score: &'a Score,
     /// Cost of the kill; `None` if no kill was planned.
     pub cost: Option<&'a Cost>,
-    /// Time that a stage waits for a late view, milliseconds.
+    /// Time that a stage waits for a late view, in milliseconds.
     pub deadline_ms: f64,
     /// Computing time relative to a machine that keeps up with 5 frames per second, at least 1.
     pub slowness: f64,
-    /// Interval between frames relative to 5 frames per second, at least 1.
+    /// Interval between frames relative to the interval at 5 frames per second, at least 1.
     pub spread: f64,
     /// Frame counts of every view.
     pub views: &'a [ViewReport],
@@ -99,8 +99,8 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     limits
 }
 
-/// Returns true if the camera was away so long that there must be results of the other views in the meantime. This is the case if it was
-/// away longer than the usual pauses between results and the deadline for a late view.
+/// Returns true if the camera was missing for so long that there must be results of the other views in the meantime. This is the case if it
+/// was missing for longer than the usual pauses between results and the deadline for a late view.
 fn needs_results_meanwhile(cost: &Cost, deadline_ms: f64) -> bool {
     let away = cost.back_ms.unwrap_or(f64::INFINITY);
     away > 2.0 * cost.usual_pause_ms.unwrap_or(0.0) + deadline_ms

@@ -23,13 +23,14 @@ const MIN_RATE_HZ: f64 = 0.25;
 /// for changes of the load.
 const SHARE: f64 = 0.5;
 
-/// Number of evaluations of the network for a person whose last frame is long ago, instead of one: three boxes, and a closer one.
+/// Number of times that the network is applied, instead of once, if the person's last frame is long ago: to three boxes, and to a closer
+/// box.
 const LOOKS: f64 = 4.0;
 
 /// Duration of a measurement.
 const SPAN: Duration = Duration::from_secs(2);
 
-/// Smallest number of measured frames; in these, every camera searches for the person once.
+/// Smallest number of measured frames; in these frames, every camera searches for the person once.
 const LEAST_FRAMES: u64 = 10;
 
 /// Renders frames of all cameras and finds the person in them, like the processes of the run.
@@ -123,15 +124,15 @@ pub(super) struct Machine {
     load: Option<f64>,
     n_cores: usize,
     n_cameras: usize,
-    /// Time for one frame of all cameras on all cores in which the person is searched for in the whole picture, seconds.
+    /// Time for one frame of all cameras on all cores in which the person is searched for in the whole picture, in seconds.
     search_s: f64,
-    /// Mean time for one frame in which the person is followed from the previous frame, seconds.
+    /// Mean time for one frame in which the person is followed from the previous frame, in seconds.
     followed_s: f64,
 }
 
 impl Machine {
-    /// Returns the mean time for one frame of all cameras on all cores, seconds. If the machine is too slow to follow the person from box
-    /// to box, the network is applied to more boxes: those around the last box, and a closer one.
+    /// Returns the mean time for one frame of all cameras on all cores, in seconds. If the machine is too slow to follow the person from
+    /// box to box, the network is applied to more boxes: to boxes around the last box, and to a closer box.
     fn frame_s(&self) -> f64 {
         if self.followed_s <= SHARE * FOLLOWED_S {
             self.followed_s

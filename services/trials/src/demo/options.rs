@@ -11,7 +11,7 @@ pub struct Options {
     pub out: PathBuf,
     /// Frames per camera. The default is the number in `seconds`, or otherwise in twenty seconds, but at least 30.
     pub frames: Option<u64>,
-    /// Duration of the run, seconds; ignored if `frames` is given.
+    /// Duration of the run, in seconds; ignored if `frames` is given.
     pub seconds: Option<u32>,
     /// Frames per second; by default as many as this machine can process, at most 5.
     pub rate_hz: Option<f64>,
@@ -21,7 +21,7 @@ pub struct Options {
     pub subject: u64,
     /// Seed of the motion, the room and the lighting.
     pub seed: u64,
-    /// Time that a stage waits for a late view, milliseconds; by default 500, or more on a slow machine.
+    /// Time that a stage waits for a late view, in milliseconds; by default 500, or more on a slow machine.
     pub deadline_ms: Option<u64>,
     /// True to kill a camera's process.
     pub kills: bool,
@@ -34,16 +34,15 @@ pub struct Options {
 /// Configurable limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Smallest share of frames with a result, percent.
+    /// Smallest share of frames with a result, in percent.
     pub min_results: f64,
-    /// Smallest share of results with a skeleton, percent.
+    /// Smallest share of results with a skeleton, in percent.
     pub min_skeletons: f64,
-    /// Smallest PCP3D at gamma 0.5 over all results, percent.
+    /// Smallest PCP3D at gamma 0.5 over all results, in percent.
     pub min_pcp3d: f64,
     /// Longest time until a result uses a frame of the killed camera again, milliseconds, on a machine that
     /// keeps up with 5 frames per second.
     pub max_return_ms: f64,
-    /// Longest pause between results while the killed camera is away, milliseconds, on a machine that keeps up with
-    /// 5 frames per second.
+    /// Longest pause between results while the killed camera is missing, milliseconds, on a machine that keeps up with 5 frames per second.
     pub max_pause_ms: f64,
 }

@@ -77,7 +77,7 @@ impl Report {
         }
     }
 
-    /// Returns true if all limits held.
+    /// Returns true if all limits were met.
     pub(super) fn is_held(&self) -> bool {
         self.limits.iter().all(|limit| limit.held)
     }

@@ -19,7 +19,7 @@ pub(super) struct Run<'a> {
     pub n_frames: u64,
     /// Frames per second.
     pub rate_hz: f64,
-    /// Time that a stage waits for a late view, milliseconds.
+    /// Time that a stage waits for a late view, in milliseconds.
     pub deadline_ms: f64,
     /// Speed of this machine, measured before or after the run, whichever is slower.
     pub machine: Option<Machine>,

@@ -17,17 +17,17 @@ pub(super) struct Score {
     /// PCP3D: percentage of segments whose mean end error is at most half their length. A segment that was not found
     /// counts as wrong. `None` if there are no results.
     pub pcp3d_percent: Option<f64>,
-    /// MPJPE: mean distance of the found joints from the truth, millimetres.
+    /// MPJPE: mean distance of the found joints from the truth, in millimetres.
     pub mpjpe_mm: Option<f64>,
-    /// Share of joints that were not found, percent.
+    /// Share of joints that were not found, in percent.
     pub lost_percent: Option<f64>,
-    /// PCP3D of every segment, percent.
+    /// PCP3D of every segment, in percent.
     pub segments: Vec<(&'static str, Option<f64>)>,
 }
 
 /// Compares results with the truth.
 ///
-/// * `pairs`: the found and the true joints of `skeleton::PARSE14` of each result, metres.
+/// * `pairs`: the found and the true joints of `skeleton::PARSE14` of each result, in metres.
 pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [Point])>) -> Score {
     let segments = segments(&PARSE14).map_or_else(Vec::new, Vec::from);
     // For each segment, the number of correct ones and the number of all.

@@ -20,11 +20,11 @@ pub(crate) struct Cost {
     pub last_frame: Option<u64>,
     /// First frame of the process with a result after the fault.
     pub first_frame: Option<u64>,
-    /// Number of frames between these two.
+    /// Number of frames between `last_frame` and `first_frame`.
     pub frames_lost: Option<u64>,
-    /// Number of results of the frames in between, from the other views.
+    /// Number of results, from the other views, of frames between `last_frame` and `first_frame`.
     pub results_without_it: usize,
-    /// Longest time between two results while the process was away.
+    /// Longest time between two results while the process was missing.
     pub longest_pause_ms: Option<f64>,
     /// Longest time between two results before the fault.
     pub usual_pause_ms: Option<f64>,
@@ -121,8 +121,8 @@ impl Cost {
     }
 }
 
-/// Returns the longest time between two consecutive results, milliseconds. The later of the two must have been sent in the given span, both
-/// ends included.
+/// Returns the longest time between two consecutive results, in milliseconds. The later of the two must have been sent in the given span,
+/// both ends included.
 fn longest_pause(results: &[FrameResult], from: f64, to: f64) -> Option<f64> {
     let pairs = results.windows(2).map(|pair| [pair[0].sent_ms, pair[1].sent_ms]);
     let inside = pairs.filter(|pair| pair[1] >= from && pair[1] <= to);

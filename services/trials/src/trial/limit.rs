@@ -2,7 +2,7 @@
 
 use exports::report::run::Limit;
 
-/// Returns a limit that holds if the number is at least the given one.
+/// Returns a limit that is met if the number is at least the given number.
 pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
     limit(
         what,
@@ -12,7 +12,7 @@ pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
     )
 }
 
-/// Returns a limit that holds if the number is at most the given one.
+/// Returns a limit that is met if the number is at most the given number.
 pub(crate) fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
     limit(
         what,
@@ -22,7 +22,7 @@ pub(crate) fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
     )
 }
 
-/// Returns a limit that holds if the list is empty.
+/// Returns a limit that is met if the list is empty.
 pub(crate) fn none_of(what: &str, got: &[String]) -> Limit {
     Limit {
         what: what.to_owned(),

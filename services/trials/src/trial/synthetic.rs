@@ -11,9 +11,9 @@ use super::Point;
 
 /// The default number of synthetic cameras.
 pub(crate) const N_CAMERAS: usize = 4;
-/// Radius of the ring of cameras, metres.
+/// Radius of the ring of cameras, in metres.
 const RADIUS: f64 = 4.2;
-/// Height of the cameras, metres.
+/// Height of the cameras, in metres.
 const HEIGHT: f64 = 1.5;
 /// Scale of the images relative to the ring's default: 320x240 pixels, so that two cores can render and process four views.
 const SCALE: f64 = 0.5;
@@ -64,7 +64,7 @@ pub(crate) struct SyntheticSetup<'a> {
     pub n_frames: u64,
     /// Number of cameras, evenly spaced on a ring.
     pub n_cameras: usize,
-    /// Time that a stage waits for a late view, milliseconds.
+    /// Time that a stage waits for a late view, in milliseconds.
     pub deadline_ms: u64,
     /// Method that finds the person.
     pub finder: Finder,

@@ -17,7 +17,7 @@ use crate::moment::{Moment, Other, Seen, in_view, in_world, spread};
 use crate::picture;
 use crate::scene::Scene;
 
-/// Longest line that is read, bytes; enough for hundreds of views.
+/// Longest line that is read, in bytes; enough for hundreds of views.
 const LONGEST_LINE: u64 = 4 << 20;
 /// Largest number of pixels in a picture that is read.
 const MOST_PIXELS: u64 = 64 << 20;

@@ -1,4 +1,4 @@
-//! Events in a deployment, as text lines for the user. They are derived from changes between two looks at the deployment.
+//! Events in a deployment, as text lines for the user. They are derived from changes between two checks of the deployment.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ const IN_A_ROW: u32 = 3;
 /// Shortest time between two reports of the losses of one process.
 const LOSSES: Duration = Duration::from_secs(10);
 
-/// State at the last look.
+/// State at the last check.
 #[derive(Debug)]
 pub(crate) struct Events {
     /// Status of the last frame of every view.
@@ -28,18 +28,18 @@ pub(crate) struct Events {
     has_refused: bool,
 }
 
-/// State of a process at the last look.
+/// State of a process at the last check.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     state: State,
     restarts: u32,
-    /// Time at which losses were last reported; the next field has the counts at that time.
+    /// Time at which losses were last reported. The next field has the counts at that time.
     told: Option<Instant>,
     dropped: [u64; Cause::ALL.len()],
 }
 
 impl Events {
-    /// Creates the state before the first look.
+    /// Creates the state before the first check.
     pub(crate) fn new(scene: &Scene) -> Self {
         Self {
             frames: vec![Status::OK; scene.views.len()],
@@ -57,7 +57,7 @@ impl Events {
         self.has_refused = true;
     }
 
-    /// Takes a result: reports when skeletons are missing, and when they are back.
+    /// Processes a result, and reports when skeletons are missing and when they are back.
     pub(crate) fn result(&mut self, board: &Board, moment: &Moment) {
         let Some(why) = &moment.why else {
             if self.n_without >= IN_A_ROW {
@@ -78,7 +78,7 @@ impl Events {
         }
     }
 
-    /// Takes a frame of a view: reports when its camera fails, and when it is back.
+    /// Processes a frame of a view, and reports when its camera fails and when it is back.
     pub(crate) fn frame(&mut self, board: &Board, scene: &Scene, view: usize, status: Status) {
         let Some(last) = self.frames.get_mut(view).filter(|frame| **frame != status) else {
             return;
@@ -92,7 +92,7 @@ impl Events {
         }
     }
 
-    /// Takes the state of the processes: reports processes that have died, are back or are silent, and losses.
+    /// Processes the state of all processes. Reports processes that have died, are back or are silent, and losses.
     pub(crate) fn processes(&mut self, board: &Board, snapshot: &Snapshot) {
         for process in &snapshot.processes {
             let name = &process.name;

@@ -20,7 +20,7 @@ use crate::scene::Scene;
 
 /// Time between two readings of the state of the processes.
 const STATE_PERIOD: Duration = Duration::from_millis(500);
-/// Longest pause between two looks at the cameras while there is no result.
+/// Longest pause between two checks of the cameras while there is no result.
 const PATIENCE: Duration = Duration::from_millis(90);
 
 /// Decision whether to continue following the deployment.
@@ -68,14 +68,14 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// Fails if the deployment does not run or has too many onlookers, or if its model or calibration cannot be read.
+    /// Fails if the deployment is not running or has too many onlookers, or if its model or calibration cannot be read.
     pub(crate) fn open(
         named: Option<&str>,
         pictures_per_second: u32,
         stop: &Stop,
     ) -> Result<Self, Failure> {
         let namespace = live::namespace(named)?;
-        // Fails if the deployment does not run, before any file is created in its folder.
+        // Fails if the deployment is not running, before any file is created in its folder.
         let live = Live::open(&namespace)?;
         let resolved = live::description(&namespace)?;
         let scene = Scene::of_frames(&resolved)?;
@@ -120,8 +120,8 @@ impl Session {
         })
     }
 
-    /// Puts new messages on the board. The cameras are read right after a result: reducing pictures takes time, and at this moment
-    /// the deployment is most likely to have some.
+    /// Puts new messages on the board. The cameras are read right after a result. Reducing pictures takes processor time, and the
+    /// deployment is most likely to have some to spare at this moment.
     ///
     /// # Errors
     ///
@@ -225,7 +225,7 @@ impl Session {
         match board.take_record() {
             Some(true) if self.tape.is_none() => {
                 let Some(run) = self.run else {
-                    // No process has reported yet; each reports every second.
+                    // No process has reported yet. Each process reports every second.
                     board.ask_again();
                     return;
                 };
