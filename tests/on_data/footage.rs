@@ -68,7 +68,7 @@ fn read(path: &str, width: usize) -> [Duration; 2] {
 #[test]
 fn all_frames_of_all_cameras_are_read() {
     let Some(shared) = shared_dir() else { return };
-    // cam02 is VP9; the others are H.264.
+    // The video of cam02 is VP9; all other videos are H.264.
     for (name, width) in [
         ("cam01", 1080),
         ("cam02", 1080),

@@ -1,8 +1,8 @@
 //! Alternating solutions of two real views. Bounds and threads do not change any result, and bounds save work.
 //!
-//! Prints a table: milliseconds per iteration, levels that remain after bounding, messages that are reused. The pairs and their settings
-//! are those of the accuracy tests. Every pair is solved under both assumptions about facing (the same or exchanged), as in a pipeline that
-//! decides between them.
+//! Prints a table: milliseconds per iteration, levels that remain after bounding, messages that are reused. The accuracy tests use the same
+//! pairs and settings. Every pair is solved under both assumptions about facing (the same or exchanged), as in a pipeline that decides
+//! between them.
 
 use std::path::Path;
 use std::sync::Arc;

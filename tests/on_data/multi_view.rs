@@ -84,7 +84,7 @@ pub(crate) fn umpm(shared: &Path, name: &str, shift: f64) -> Camera {
     )
 }
 
-/// Returns the largest distance between our epipolar lines in B and those of a run, within the image, in pixels.
+/// Returns the largest distance between our epipolar lines in B and the epipolar lines of a run, within the image, in pixels.
 fn lines_off(cameras: &[Camera; 2], run: &Value) -> f64 {
     let ours = geometry::epipolar::fundamental(&cameras[0], &cameras[1]);
     // Pixels in the run are counted from 1.

@@ -16,7 +16,7 @@ const N_SAMPLES: u64 = 20;
 /// Height of the person from the bones, in the rig that is part of the recording, in metres.
 const HEIGHT_M: f64 = 1.652;
 
-/// Returns the joints in the order of a calibration, and for each joint the index of the one on the other side.
+/// Returns the joints in the order of a calibration, and for each joint the index of the same joint on the other side.
 fn in_order(films: &[Film]) -> (Vec<Film>, Vec<usize>) {
     let set = NameSet::of_set("body-25b").unwrap();
     let names = set.names();

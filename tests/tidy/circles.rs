@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Path of a module below the crate's root; empty for `lib.rs` and `main.rs`.
 type Module = Vec<String>;
 
-/// For each name that a module re-exports, the module that it comes from, and its name there.
+/// For each name that a module re-exports, the module that defines it, and its name in that module.
 type Exports = BTreeMap<String, (Module, String)>;
 
 /// One name of a `use` declaration.

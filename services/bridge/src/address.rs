@@ -11,9 +11,9 @@ pub struct Address {
     pub host: String,
     /// Names of all hosts.
     pub hosts: Vec<String>,
-    /// Address of the host that fuses: name or number, and port.
+    /// Address of the fusing host: name or number, and port.
     pub address: String,
-    /// True if this host is the one that fuses.
+    /// True if this host is the fusing host.
     pub listens: bool,
     /// The keys; `None` if the deployment is insecure.
     pub keys: Option<KeyFiles>,

@@ -1,4 +1,4 @@
-//! The bridge of a host with cameras: takes messages of its views from shared memory, and sends the newest ones.
+//! The bridge of a host with cameras: takes messages of its views from shared memory, and sends the newest messages.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};

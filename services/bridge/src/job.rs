@@ -54,7 +54,7 @@ pub struct Far {
     pub jpeg_quality: u8,
 }
 
-/// The host that fuses.
+/// The fusing host.
 #[derive(Debug)]
 pub struct Near {
     /// The other hosts.
@@ -71,7 +71,7 @@ pub struct Near {
     pub file: PathBuf,
 }
 
-/// A host with cameras, as known to the host that fuses.
+/// A host with cameras, as known to the fusing host.
 #[derive(Debug, Clone)]
 pub struct NearHost {
     /// Name of the host.

@@ -1,4 +1,4 @@
-//! Joins a run: checks that the host that fuses has the same files, and determines the time at which the run began, by this host's clock.
+//! Joins a run: checks that the fusing host has the same files, and determines the time at which the run began, by this host's clock.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,12 +25,12 @@ pub enum JoinError {
     /// The link cannot be opened.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The files of this host differ from those of the host that fuses.
+    /// The files of this host differ from those of the fusing host.
     #[error("the host that fuses refuses this one: {}", listed(.0))]
     Refused(Vec<Difference>),
 }
 
-/// Lists the differences from the point of view of this host. The host that fuses wrote them from its own point of view.
+/// Lists the differences from the point of view of this host. the fusing host wrote them from its own point of view.
 pub(crate) fn listed(all: &[Difference]) -> String {
     let each = all.iter().map(|difference| {
         let (there, here) = (&difference.here, &difference.there);
@@ -46,7 +46,7 @@ struct Heard {
     answer: Option<Answer>,
 }
 
-/// Waits for the host that fuses. Returns the time at which the run began, in nanoseconds by this host's clock; `None` on a stop request.
+/// Waits for the fusing host. Returns the time at which the run began, in nanoseconds by this host's clock; `None` on a stop request.
 ///
 /// * `say`: called with messages for the user while the other host does not answer.
 ///

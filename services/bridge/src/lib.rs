@@ -3,8 +3,8 @@
 //!
 //! | host | what its bridge does | where |
 //! |---|---|---|
-//! | with cameras | sends frames as JPEG, or poses with their maps as Gaussians; the newest message wins | `far` |
-//! | that fuses | publishes the received messages for the frames of its run, and reports why a message is missing | `near` |
+//! | a host with cameras | sends frames as JPEG, or poses with their maps as Gaussians; the newest message wins | `far` |
+//! | the fusing host | publishes the received messages for the frames of its run, and reports why a message is missing | `near` |
 //!
 //! The link uses Zenoh, behind the feature `zenoh`. The messages and the rules for them are in [`hosts`], which has no side effects.
 #![forbid(unsafe_code)]

@@ -104,7 +104,7 @@ impl Link {
     }
 }
 
-/// Returns the settings of Zenoh. No host searches the network for other hosts or announces itself, and only the host that fuses
+/// Returns the settings of Zenoh. No host searches the network for other hosts or announces itself, and only the fusing host
 /// listens.
 fn config(address: &Address) -> Value {
     let text = |path: &Path| Value::from(path.display().to_string());
@@ -151,7 +151,7 @@ fn config(address: &Address) -> Value {
     config
 }
 
-/// Returns the access rules of the host that fuses. Every host may only send its own messages, according to the common name of its
+/// Returns the access rules of the fusing host. Every host may only send its own messages, according to the common name of its
 /// certificate. With the keys of one host, nobody can send messages for another host.
 fn access(address: &Address) -> Value {
     let topics = Topics::of(&address.deployment);

@@ -140,7 +140,7 @@ impl Checked {
 }
 
 /// Returns a body with poses and maps: the length of the poses (`u32`, little endian), the poses as in a recording, and the maps. Zeros at
-/// the end of the poses, which are most of them, are left out.
+/// the end of the poses are left out.
 pub(crate) fn join(poses: &[u8], maps: &[u8]) -> Vec<u8> {
     let end = poses.iter().rposition(|pose| *pose != 0).map_or(0, |index| index + 1);
     let mut body = Vec::with_capacity(4 + end + maps.len());

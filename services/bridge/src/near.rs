@@ -1,4 +1,4 @@
-//! The bridge of the host that fuses: publishes the messages of the other hosts for the frames of its run, and reports why a message is
+//! The bridge of the fusing host: publishes the messages of the other hosts for the frames of its run, and reports why a message is
 //! missing.
 
 mod listen;

@@ -14,12 +14,12 @@ impl Topics {
         format!("{}/data/{host}", self.0)
     }
 
-    /// Returns the name for signals to the host that fuses.
+    /// Returns the name for signals to the fusing host.
     pub(crate) fn up(&self, host: &str) -> String {
         format!("{}/up/{host}", self.0)
     }
 
-    /// Returns the name for signals from the host that fuses.
+    /// Returns the name for signals from the fusing host.
     pub(crate) fn down(&self, host: &str) -> String {
         format!("{}/down/{host}", self.0)
     }

@@ -10,8 +10,8 @@ use crate::info::FeedInfo;
 const SCHEME: &str = "blank://";
 /// Brightness of all pixels.
 const GREY: u8 = 128;
-/// Limits: longest side in pixels, number of frames, and lowest and highest frame rate per second. They are those of `[capture]` in a
-/// deployment.
+/// Limits: longest side in pixels, number of frames, and lowest and highest frame rate per second. `[capture]` in a deployment has the same
+/// limits.
 const MAX_SIDE: usize = 16_384;
 const MOST_FRAMES: u64 = 1_000_000_000_000;
 const RATES_HZ: [f64; 2] = [0.001, 1e5];

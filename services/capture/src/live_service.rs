@@ -34,7 +34,8 @@ struct Live<'a, 'b> {
     at: u64,
     /// Reason why pictures were refused since the last used one.
     refused: Option<Status>,
-    /// Reason why the last instant has no picture, if it has none; number of such interruptions by cause; and whether this one was logged.
+    /// Reason why the last instant has no picture, if it has none. The next fields are the number of interruptions by cause, and whether
+    /// the current interruption was logged.
     trouble: Option<Status>,
     said: Vec<(Status, u64)>,
     has_said: bool,
@@ -87,7 +88,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
     if let Some(kept) = &mut kept {
         kept.end()?;
     }
-    // Pictures that still wait have no instant any more.
+    // Pictures that still wait have no instant left.
     while let Some(picture) = it.source.next(Duration::ZERO) {
         it.counts.n_surplus += 1;
         it.source.give_back(picture);

@@ -20,7 +20,7 @@ struct Times {
     start: u64,
     step: u64,
     n_instants: u64,
-    /// Position of the next instant among the used ones.
+    /// Position of the next instant among the used instants.
     at: u64,
     /// Index of the next frame from the footage, and of the last one.
     next: u64,

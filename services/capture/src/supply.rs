@@ -40,7 +40,7 @@ pub(crate) struct Supply {
     /// True if frames follow a clock, so that a camera may come back.
     is_live: bool,
     feed: Option<Retimed>,
-    /// Position of the next frame among the used ones.
+    /// Position of the next frame among the used frames.
     at: u64,
     /// Index and time of a frame that was read too early.
     early: Option<(u64, Option<f64>)>,

@@ -14,7 +14,7 @@ use statistics::score::{
 };
 use training::datasets::{People, Person, Picture};
 
-/// Largest number of detections among which the one on the person is searched.
+/// Largest number of detections among which the detection on the person is searched.
 const MOST: usize = 10_000;
 
 /// Smallest share of a person's box that a detection must cover to be on the person.

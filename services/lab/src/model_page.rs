@@ -58,7 +58,7 @@ pub fn html(model: &Model) -> String {
 /// Loss of score on the ellipse that is drawn for a spring.
 pub const SPRING_COST: f64 = 0.05;
 
-/// Styles of this page, besides the common ones.
+/// Styles of this page, in addition to the common styles.
 const MORE_STYLE: &str = "
 body { max-width: 84em; }
 h3 { margin: 0 0 .5em; }

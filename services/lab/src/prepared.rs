@@ -1,4 +1,4 @@
-//! Files of prepared examples: the training examples of a network, and the held-out ones.
+//! Files of prepared examples: training examples of a network, and held-out examples.
 
 use std::io::{BufReader, Read as _, Write as _};
 use std::path::Path;

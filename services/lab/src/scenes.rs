@@ -56,7 +56,7 @@ pub(crate) struct Shown<'a> {
 /// Calls a function on every picture of all scenes, and returns the results in the order of the scenes, whatever the number of threads.
 ///
 /// * `make`: returns the result of one picture; `None` if the picture cannot be used.
-/// * `watch`: called with the number of pictures from a camera, and the number of unusable ones among them.
+/// * `watch`: called with the number of pictures from a camera, and the number of unusable pictures among them.
 pub(crate) fn of_pictures<T: Send>(
     scenes: &Scenes,
     make: impl Fn(&Shown<'_>) -> Result<Option<T>, Failure> + Sync,

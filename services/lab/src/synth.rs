@@ -99,7 +99,7 @@ impl Written {
 
 /// Writes all sequences, on rayon's current pool; the files do not depend on the number of threads.
 ///
-/// A single sequence is written to the folder itself. Several sequences have one folder each, and the annotated people of all of them are
+/// A single sequence is written to the folder itself. Several sequences have one folder each, and the annotated people of all sequences are
 /// beside these folders.
 ///
 /// # Errors

@@ -105,7 +105,7 @@ pub fn table(latency: &LatencyReport) -> String {
     text
 }
 
-/// Returns the latency percentiles of the measured stages, in pipeline order, then those of the end-to-end time.
+/// Returns the latency percentiles of the measured stages, in pipeline order, then the percentiles of the end-to-end time.
 pub fn rows(latency: &LatencyReport) -> impl Iterator<Item = (&'static str, Percentiles)> {
     let names = ["capture", "pose", "quality", "fuse", "triangulate"].into_iter();
     let stages = names.filter_map(|name| Some((name, *latency.stages.get(name)?)));

@@ -28,7 +28,7 @@ const EXPORT: &str = "export";
 /// Ending of the file that lists the exported files.
 const MANIFEST: &str = ".export.json";
 
-/// Refuses a deployment if another one with the same name is running. This check comes before checks that take long.
+/// Refuses a deployment if another deployment with the same name is running. This check comes before checks that take a long time.
 ///
 /// Deployments of several hosts get a name per host later. They are refused when their processes start.
 ///
@@ -45,7 +45,7 @@ pub fn check_name(deployment: &Deployment) -> Result<(), Failure> {
 /// Refuses a folder with results of an earlier run, or with files of the same names that were not written by a run.
 ///
 /// * `force`: true to allow that the results of an earlier run are replaced. Files that were exported from them are removed. The results
-///   themselves are kept until the new ones are complete.
+///   themselves are kept until the new results are complete.
 ///
 /// # Errors
 ///

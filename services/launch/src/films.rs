@@ -49,7 +49,7 @@ pub struct Films {
     pub films: Vec<Film>,
     /// Number of joints of a person.
     pub n_joints: usize,
-    /// For each joint, the joint on the other side of the body. Set if left and right follow the picture in some camera.
+    /// For each joint, the joint on the other side of the body. Set if some camera names left and right as seen in the picture.
     pub mirror: Option<Vec<usize>>,
     /// For each joint, the joint on the other side of the body.
     pub sides: Vec<usize>,

@@ -39,7 +39,7 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
 pub(crate) struct Found {
     /// Names of the keypoints other than the joints, each once, in the order of the cameras.
     pub(crate) extra: Vec<String>,
-    /// True if left and right of a network follow the picture.
+    /// True if a network names left and right as seen in the picture.
     pub(crate) as_seen: bool,
 }
 

@@ -86,8 +86,8 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     Ok(resolved)
 }
 
-/// Refuses cameras that the calibration lacks, and pictures whose size differs from the calibration. This check comes before checks
-/// that take long.
+/// Refuses cameras that the calibration lacks, and pictures whose size differs from the calibration. This check comes before checks that
+/// take a long time.
 fn check_names_and_sizes(
     resolved: &Resolved,
     is_here: &dyn Fn(usize) -> bool,

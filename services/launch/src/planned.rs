@@ -83,7 +83,7 @@ impl Planned {
 
     /// Returns the same run with the start time that another host has set.
     ///
-    /// * `session`: start of the run according to the host that fuses; `None` if the run starts here.
+    /// * `session`: start of the run according to the fusing host; `None` if the run starts here.
     #[must_use]
     pub fn begun(mut self, session: Option<u64>) -> Self {
         self.plan.session = session.unwrap_or(self.plan.session);

@@ -175,7 +175,7 @@ pub fn damaged(
         .map_err(|error| failure::in_file(file, &error))
 }
 
-/// Describes the damaged messages as text, and lists the first of them. Returns `None` if there are none.
+/// Describes the damaged messages as text, and lists the first messages. Returns `None` if there are none.
 pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     let chunks: BTreeSet<u64> = damaged.iter().map(|message| message.chunk).collect();
     let mut text = format!(

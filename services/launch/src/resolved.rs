@@ -25,7 +25,7 @@ pub struct Resolved {
     pub search_size: Option<SearchSize>,
     /// Names of the keypoints, other than the joints, that the networks and keypoint files of the cameras have. Each name occurs once.
     pub extra_keypoints: Vec<String>,
-    /// True if left and right of a network follow the picture. All views together then decide which side is the person's left.
+    /// True if a network names left and right as seen in the picture. All views together then decide which side is the person's left.
     pub sides_as_seen: bool,
     /// The host that runs here, in a deployment of several hosts.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,7 +50,7 @@ pub const SERVICES: [&str; 6] = [
 ];
 
 impl Resolved {
-    /// Returns the number of frames to use, which is that of the longest footage.
+    /// Returns the number of frames to use, which is the number of frames of the longest footage.
     pub fn n_frames(&self) -> u64 {
         self.footage.iter().map(|footage| footage.n_frames).max().unwrap_or(0)
     }

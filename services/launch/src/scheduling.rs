@@ -8,7 +8,7 @@ use supervise::ProcessSpec;
 /// because no stage waits for it.
 const POLLING: [&str; 4] = ["pose", "quality", "fuse", "triangulate"];
 
-/// Returns the scheduling that a process requests. Settings of the process take precedence over those of its service.
+/// Returns the scheduling that a process requests. Settings of the process take precedence over settings of its service.
 pub(crate) fn requested(settings: &Runtime, service: &str, process: &str) -> Scheduling {
     let policy = runtime::Policy::Fifo;
     let cores = settings.cores.get(process).or(settings.cores.get(service));

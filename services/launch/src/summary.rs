@@ -141,8 +141,8 @@ impl Report {
         &self.views
     }
 
-    /// Returns the processes that were restarted more often than faults were injected into them, and those that were given up. The list is
-    /// sorted.
+    /// Returns the processes that were restarted more often than faults were injected into them, and the processes that were given up. The
+    /// list is sorted.
     ///
     /// * `n_faults`: returns the number of faults injected into a process.
     pub fn unexpected_failures(&self, n_faults: impl Fn(&str) -> u32) -> Vec<String> {

@@ -28,7 +28,7 @@ const NEAR_AXIS: f64 = 6.0;
 /// If two directions differ by less than this angle, in degrees, only one is tried.
 const SAME_DIRECTION: f64 = 10.0;
 /// Scores that differ by less than this count as equal. Among directions with equal scores, the first is used. The direction for level
-/// cameras comes first.
+/// cameras is tried first.
 const SAME_SCORE: f64 = 0.02;
 
 /// The upward direction that was found, and the reason for the choice.
@@ -114,7 +114,7 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure>
     Ok(Some(found))
 }
 
-/// Returns the hypothesis with the highest score; if several have the same score, the first of them.
+/// Returns the hypothesis with the highest score; if several have the same score, the first is returned.
 fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
     let score = |hypothesis: &Hypothesis| hypothesis.score.unwrap_or(f64::NEG_INFINITY);
     let best = tried.iter().map(score).fold(f64::NEG_INFINITY, f64::max);

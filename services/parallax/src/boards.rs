@@ -88,7 +88,7 @@ pub struct Seen {
     pub size: [u32; 2],
     /// Number of pictures that were searched.
     pub n_pictures: usize,
-    /// All frames in which the board was found, including inverted and mirrored ones.
+    /// All sights of the board, including sights in inverted and mirrored pictures.
     pub sights: Vec<Sight>,
     /// Number of pictures in which black and white are exchanged.
     pub n_inverted: usize,
@@ -105,7 +105,7 @@ pub struct Seen {
 pub struct Looked {
     /// The board that was found in the pictures.
     pub board: Board,
-    /// Difference between this board and the one that the user named, if any.
+    /// Difference between this board and the board that the user named, if any.
     pub note: Option<String>,
     /// Corner points of the board, in metres.
     pub layout: Layout,

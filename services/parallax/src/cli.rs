@@ -112,7 +112,7 @@ pub(crate) enum Command {
     /// Show the state of a deployment that runs on several machines, or create its keys.
     #[command(subcommand)]
     Hosts(hosts::Command),
-    /// List running deployments and the shared memory left by dead ones, or show the processes of one deployment.
+    /// List running deployments and the shared memory left by dead deployments, or show the processes of one deployment.
     Status(deployments::StatusArguments),
     /// Watch the processes of a running deployment: rates, times, lost messages, memory.
     Top(top::Arguments),

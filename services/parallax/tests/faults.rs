@@ -212,7 +212,7 @@ fn a_suspended_pose_process_is_detected_and_no_frame_is_lost() {
     let run = Signalled::new(PACED, "STOP", "pose --index 1");
     assert!(run.stderr.contains("sent no heartbeat"), "{}", run.stderr);
     run.assert_every_frame();
-    // The view may be missing in at most two frames: the one that the process was processing, and the next one.
+    // The view may be missing in at most two frames: the frame that the process was processing, and the next frame.
     let without = run.incomplete();
     assert!(without.len() <= 2, "{without:?}");
     assert!(

@@ -1,5 +1,5 @@
-//! Tests of a person who stands on the hands, a person who lies, and a person who runs while frames are half a second apart. They cover a
-//! whole run, from rendered pictures to skeletons.
+//! Tests with a person in a handstand, a lying person, and a person who runs while frames are half a second apart. They cover a whole run,
+//! from rendered pictures to skeletons.
 #![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -22,7 +22,7 @@ const RIGHT_WRIST: usize = 6;
 /// Box of the detector, in pixels of its input.
 const BOX: [f32; 4] = [8.0, 6.0, 46.0, 58.0];
 
-/// A person who stands with one arm raised, in metres with z up: the joints of `skeleton::PARSE14`.
+/// Joints of `skeleton::PARSE14` of a person who stands with one arm raised, in metres, with z up.
 const STANDING: [[f64; 3]; N] = [
     [0.02, -0.12, 0.08],
     [0.04, -0.11, 0.49],
@@ -140,7 +140,7 @@ pub(crate) fn without_a_wrist(joint: usize) -> usize {
     if joint == RIGHT_WRIST { N } else { joint }
 }
 
-/// Returns the picture of a camera in a frame: dots on grey. Later joints are in front of earlier ones.
+/// Returns the picture of a camera in a frame: dots on grey. Later joints are in front of earlier joints.
 pub(crate) fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
     let [width, height] = SIZE.map(|size| size as usize);
     let mut canvas = Canvas::new(Size::new(width, height), [128; 3]);
@@ -455,7 +455,7 @@ fn what_keypoints_have_beside_the_joints_is_written_by_name() {
     assert!(trc.contains("\tleft_heel\t"), "{trc}");
 }
 
-/// Returns the mean distance of the joints from the truth in all frames except the first, in millimetres, and that of the extra keypoints.
+/// Returns the mean distances of the joints and of the extra keypoints from the truth in all frames except the first, in millimetres.
 fn errors_mm(case: &Case) -> [f64; 2] {
     let found = found(case);
     let joints: f64 = found[1..].iter().map(|frame| frame.1).sum();

@@ -17,7 +17,7 @@ fn frames(lines: &[Value]) -> Vec<u64> {
 
 #[test]
 fn an_interrupted_run_ends_cleanly() {
-    // The signal goes only to the parent, as with `kill`, or to all processes at once, as from a terminal.
+    // The signal is sent only to the parent, as by `kill`, or to all processes at once, as by a terminal.
     for (name, sign) in [("int-one", 1), ("int-all", -1)] {
         let case = Case::new(name, &[400; 2], PACED);
         let mut started = case.start(&["run", "deployment.toml"]);

@@ -13,7 +13,7 @@ use common::{Case, Ended, PACED, PLAIN, Started};
 use runtime::Namespace;
 use serde_json::{Value, json};
 
-/// A user other than the one who runs the tests.
+/// User id of a user who does not run the tests.
 const OTHER: u32 = 65_534;
 
 /// Checks that no process of a run was ended by a memory fault.
@@ -271,7 +271,7 @@ mod long {
     fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("filled", &[300; 3], &more);
-        // The processes are children of the run. One of them is killed when there is no space to start another.
+        // The processes are children of the run. One of these processes is killed when there is no space to start another.
         let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
             \"$PARALLAX\" run deployment.toml --force --json & run=$!\n\
             while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\

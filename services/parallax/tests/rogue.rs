@@ -282,7 +282,7 @@ fn invalid_poses_and_evidence_are_refused() {
         poses.send(&with_wrong_content(good(frame))).unwrap();
         pause();
     }
-    // Evidence is held until its frame is due, so this one is about a later frame.
+    // Evidence is held until its frame is due, so this evidence is about a later frame.
     let to_come = rogue.stamp(1, case.lines("pose3d.jsonl").len() as u64 + 8);
     send_wrong_evidence(&evidence, to_come);
     drop((poses, evidence, rogue));

@@ -143,7 +143,7 @@ fn a_run_is_smoothed_live_and_better_afterwards() {
             > 10
     );
     assert_angles(&case);
-    // Without `smooth`, the next run has no smoothed files, not even those of an earlier run.
+    // Without `smooth`, the next run has no smoothed files, not even the files of an earlier run.
     let off = [
         "run",
         "deployment.toml",

@@ -8,8 +8,8 @@ use crate::memory::KeypointState;
 use crate::view::{Found, View};
 
 impl View<'_> {
-    /// Reads the people of a frame. If the file cannot be read, the frame is refused, with a warning the first time. A frame
-    /// without a file has nobody in it.
+    /// Reads the people of a frame. If the file cannot be read, the frame is refused, with a warning the first time. A frame without a file
+    /// contains nobody.
     pub(crate) fn take(
         &self,
         keypoints: &Keypoints,

@@ -28,7 +28,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads the people of a frame, in pixels of the frame. There is nobody if no file has the frame.
+    /// Reads the people of a frame, in pixels of the frame. There are no people if no file has the frame.
     ///
     /// * `people`: replaced by the people of the frame.
     ///

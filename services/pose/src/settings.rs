@@ -4,7 +4,7 @@ use deployment::paper::{Config, Search};
 use fmp::TrackSettings;
 use pipeline::ViewSettings;
 
-/// Returns the settings of the single-view step, without those that are read from files.
+/// Returns the settings of the single-view step, without the settings that are read from files.
 pub fn settings(config: &Config) -> ViewSettings {
     ViewSettings {
         n_candidates: config.candidates,

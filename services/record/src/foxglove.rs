@@ -26,7 +26,7 @@ const JOINT_M: f64 = 0.04;
 const LINE_M: f64 = 0.02;
 /// Number of standard deviations that contain a point in space with a probability of 95 %.
 const SPREAD: f64 = 2.796;
-/// Maximum size of an ellipsoid, in metres. Larger ones would hide everything.
+/// Maximum size of an ellipsoid, in metres. Larger ellipsoids would hide everything.
 const LARGEST_M: f64 = 2.0;
 
 /// The cameras and joints of a run.
@@ -97,7 +97,7 @@ impl Foxglove {
     }
 
     /// Returns the Foxglove messages for one of Parallax's messages, each with the index of its topic. Messages about the cameras come
-    /// before the first one.
+    /// before the first message.
     ///
     /// * `data`: the message as written to the recording.
     pub(crate) fn messages(&mut self, kind: Kind, data: &[u8]) -> Vec<(usize, String)> {

@@ -25,7 +25,7 @@ pub(crate) struct Item {
 struct Shared {
     n_bytes: AtomicU64,
     n_items: AtomicU64,
-    /// True if the file cannot be written any more.
+    /// True if the file can no longer be written.
     is_broken: AtomicBool,
     lost: Vec<AtomicU64>,
 }
@@ -92,7 +92,7 @@ impl Inlet {
             && (waiting == 0 || waiting + n_bytes as u64 <= self.max_bytes)
     }
 
-    /// Returns true if the file cannot be written any more.
+    /// Returns true if the file can no longer be written.
     pub(crate) fn is_broken(&self) -> bool {
         self.shared.is_broken.load(Ordering::Acquire)
     }

@@ -1,7 +1,7 @@
 //! Receives every message at once. A separate thread writes the messages.
 //!
-//! With realtime delivery, no sender waits for the disk: messages that do not fit into the queue are dropped and counted.
-//! With lossless delivery, senders wait while the queue is full, but not for ever.
+//! With realtime delivery, no sender waits for the disk: messages that do not fit into the queue are dropped and counted. With lossless
+//! delivery, senders wait while the queue is full, but not forever.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 pub struct Job {
     /// Path of the recording.
     pub file: PathBuf,
-    /// Description of the run. Its session is replaced by that of the service.
+    /// Description of the run. Its session is replaced by the session of the service.
     pub about: About,
     /// The topics of the deployment.
     pub topics: Topics,

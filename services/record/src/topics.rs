@@ -33,7 +33,7 @@ impl Topics {
     /// Returns all topics, heartbeats first. When a heartbeat has been read, all messages that it counts can be received.
     pub(crate) fn channels(&self, without: Without) -> Vec<Channel> {
         let mut channels = Vec::new();
-        // The bridge publishes the messages from other hosts. Its heartbeats count all of them together.
+        // The bridge publishes the messages from other hosts. Its heartbeats count all these messages together.
         let is_here = |text: &String| self.processes.contains(text);
         let mut add = |kind, name: String, sender: Option<String>| {
             if !self.elsewhere.contains(&name) {

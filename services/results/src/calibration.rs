@@ -108,7 +108,7 @@ impl Calibration {
         }
     }
 
-    /// Looks for two cameras whose footage is exchanged, and logs them once.
+    /// Looks for two cameras whose footage is exchanged, and logs the two cameras once.
     fn find_exchanged(&mut self, scene: &Scene) {
         let Some(it) = self.swaps.swap().filter(|_| self.exchanged.is_none()) else {
             return;

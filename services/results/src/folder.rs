@@ -112,7 +112,7 @@ impl Folder {
         file.set_len(text.len() as u64)
     }
 
-    /// Removes the files that a smoother created from an earlier run, because they do not belong to this one.
+    /// Removes the files that a smoother created from an earlier run, because they do not belong to this run.
     pub(crate) fn remove_smoothed(&self) {
         if !self.dir.path().join(SmoothReport::FILE).exists() {
             return;

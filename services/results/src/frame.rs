@@ -136,7 +136,7 @@ impl FrameRecord {
     }
 
     /// Returns the candidate of a view that is the followed person, as far as the view itself can tell. With the filters, this is the best
-    /// candidate. With a network, it is the one closest to the fused person, or the largest one if fusion left out the view.
+    /// candidate. With a network, it is the candidate closest to the fused person, or the largest candidate if fusion left out the view.
     pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Own> {
         let candidates = self.candidates(scene, view);
         if !scene.has_maps || candidates.len() < 2 {

@@ -7,9 +7,9 @@ use messages::{FrameHeader, Status, ViewPose};
 pub enum Missing {
     /// The view sent a message without a pose: no person was found, or there was no frame.
     Empty(Status),
-    /// The view's message came too late, or had not come yet.
+    /// The view's message was received too late, or had not been received yet.
     Late,
-    /// The view skipped the frame: a later pose came, or the end of its poses.
+    /// The view skipped the frame: a later pose or the end of its poses was received.
     Dropped,
     /// The view's process, or the process that fuses the views, had died.
     Lost,
@@ -35,18 +35,18 @@ impl Missing {
 pub(crate) struct ViewHistory {
     /// Connected ports of the capture and pose processes.
     ports: [Vec<u128>; 2],
-    /// Latest epoch of the pose process from which a message came.
+    /// Latest epoch of the pose process from which a message was received.
     epoch: u32,
     /// Latest epoch of the pose process that a result used.
     used_epoch: u32,
-    /// True if a port has disappeared, and no pose has come since.
+    /// True if a port has disappeared, and no pose has been received since.
     lost_process: bool,
     last_frame: Option<u64>,
-    /// True if the pose process has sent the end of its stream, so that no more poses will come.
+    /// True if the pose process has sent the end of its stream, so that no more poses are expected.
     has_sent_all: bool,
     /// Latest epoch of the capture process, and the last frame of that epoch.
     captured: Option<(u32, u64)>,
-    /// True if the port of the capture process has disappeared, and no frame of the next epoch has come.
+    /// True if the port of the capture process has disappeared, and no frame of the next epoch has been received.
     lost_capture: bool,
     /// Last frame before the capture process was restarted, and first frame after it.
     gap: Option<[u64; 2]>,

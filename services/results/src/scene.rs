@@ -15,7 +15,7 @@ pub struct View {
     pub name: String,
     /// Mapping from the footage to the frames of the messages.
     pub framing: Framing,
-    /// Pyramid of these frames.
+    /// Pyramid of the frames of the messages.
     pub layout: Arc<Layout>,
 }
 
@@ -26,7 +26,7 @@ pub struct Scene {
     pub model: Arc<Model>,
     /// The views, in the order of their numbers in messages.
     pub views: Vec<View>,
-    /// True if the candidates of a view are people that a network sees. Fusion then decides which of them is the followed person.
+    /// True if the candidates of a view are people that a network sees. Fusion then decides which candidate is the followed person.
     pub has_maps: bool,
     /// Heat, from 0 to 1, that half of a person's joints must reach before the person is used to check the cameras.
     pub least_heat: f64,
@@ -60,7 +60,7 @@ impl Scene {
             .collect()
     }
 
-    /// Returns the rotation from the axes of the world to those of `OpenSim`, which has y up.
+    /// Returns the rotation from the axes of the world to the axes of `OpenSim`, which has y up.
     ///
     /// If z is up in the world, `(X, Y, Z) = (y, z, x)`. Another upward direction is first rotated to z, along the shortest path.
     /// If the upward direction is unknown, the world's axes are kept.

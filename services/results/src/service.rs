@@ -50,7 +50,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
             while may_await && gather.awaits_quality(skeletons.stamp.frame) {
                 std::thread::sleep(AWAIT_PAUSE);
                 ports.receive_inputs(&context, &mut gather, &writer)?;
-                // The errors do not come. They were lost, and those of later frames may be lost too.
+                // The expected errors were lost. The expected errors of later frames may be lost too.
                 may_await = begin.elapsed() < AWAITED;
             }
             if skeletons.status == Status::END {

@@ -1,6 +1,6 @@
 //! `pose3d.trc` for `OpenSim`: tab separated, in metres, y up.
 //!
-//! The format is for one person. During the run it is not known how many people will come, so the file has the followed person.
+//! The format is for one person. During the run, the number of people is not known in advance, so the file has the followed person.
 //! `parallax export` writes a file for every person.
 
 use messages::Skeletons;

@@ -20,9 +20,9 @@ pub struct Plan {
     pub namespace: Namespace,
     /// Session, which is part of the stamp of every message.
     pub session: u64,
-    /// Delivery, which decides what happens if a receiver is slower than its sender.
+    /// Delivery: the behaviour if a receiver is slower than its sender.
     pub delivery: Delivery,
-    /// All topics, including those of the heartbeats.
+    /// All topics, including the topics of heartbeats.
     pub topics: Vec<TopicPlan>,
     /// All processes, consumers first, so that senders do not have to wait for their receivers.
     pub processes: Vec<ProcessSpec>,
@@ -41,7 +41,7 @@ pub struct ProcessSpec {
     pub service: String,
     /// Arguments of this process. The arguments of all services are added.
     pub args: Vec<OsString>,
-    /// Role, which decides what happens to the run without the process.
+    /// Role, which determines whether the run continues without the process.
     pub role: Role,
     /// Names of the processes that send to this process. If all of them have been given up, this process is stopped. Otherwise its
     /// receivers would wait for a process that is alive but has nothing to send.

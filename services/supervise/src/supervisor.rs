@@ -19,9 +19,9 @@ use crate::{Death, Event, Outcome, Plan, Role};
 const TURN: Duration = Duration::from_millis(50);
 /// If an iteration took this long, the supervisor itself was stopped and received no heartbeats.
 const ASLEEP: Duration = Duration::from_secs(2);
-/// Longest time without an answer from shared memory. The transport may wait for ever if a file was truncated.
+/// Longest time without an answer from shared memory. The transport may wait forever if a file was truncated.
 const LONGEST_STALL: Duration = Duration::from_mins(1);
-/// Message after such a stall.
+/// Message if shared memory does not answer in this time.
 const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  \
     hint: another program has filled /dev/shm, or truncated or changed files there: free some space there; \
     `parallax clean` removes the leftovers\n";
@@ -402,8 +402,8 @@ impl Supervisor<'_> {
         })
     }
 
-    /// Returns true if all processes have finished. Also returns true if one was given up or restarted and the others only wait, because
-    /// they may never receive the end of the stream.
+    /// Returns true if all processes have finished. Also returns true if one process was given up or restarted and the other processes only
+    /// wait, because they may never receive the end of the stream.
     fn is_done(&self, now: Instant) -> bool {
         let was_lost = |watch: &Watch| watch.is_given_up() || watch.epoch > 0;
         let may_miss_end =

@@ -14,7 +14,7 @@ use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 
 /// If a main loop has had an iteration within this time, it is waiting, not computing.
 const WAITING: Duration = Duration::from_secs(1);
-/// Number of messages that a process has to send before iterations are compared, because the first ones take more work.
+/// Number of messages that a process has to send before iterations are compared, because the first iterations take more work.
 const WARM_UP_MESSAGES: u64 = 8;
 /// Number of output lines that are kept to explain a death.
 const KEPT_LINES: usize = 40;
@@ -323,7 +323,7 @@ impl Watch {
         }
     }
 
-    /// Returns true if the process waits for messages, but has received none for so long that none will come.
+    /// Returns true if the process waits for messages, but has received no message for so long that no more messages are expected.
     pub(crate) fn is_idle(&self, policy: &Policy, now: Instant) -> bool {
         let since = |change: Change| now.saturating_duration_since(change.at);
         self.child().is_some()

@@ -1,4 +1,4 @@
-//! The newest content for the pages. One thread updates it; every page takes the messages that it has not seen yet.
+//! The newest content for the pages. One thread updates it; every page takes the messages that it has not received yet.
 
 use std::collections::VecDeque;
 use std::io;

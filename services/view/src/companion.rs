@@ -68,7 +68,7 @@ impl Drop for Companion {
     }
 }
 
-/// Returns the usual port, or another one that is free now.
+/// Returns the usual port, or another port that is free.
 fn free_port() -> std::io::Result<u16> {
     let usual = Listen::usual().address;
     let bound = TcpListener::bind(usual);

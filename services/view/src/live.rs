@@ -22,7 +22,7 @@ const ABSENT: Duration = Duration::from_millis(250);
 
 /// Follows a deployment until a stop is requested: waits for a run, follows it until it ends, and waits for the next run.
 ///
-/// * `named`: name of the deployment; if `None`, the only one that runs.
+/// * `named`: name of the deployment; if `None`, the only running deployment.
 /// * `pictures_per_second`: largest number of pictures per second for each view.
 pub(crate) fn follow(named: Option<&str>, pictures_per_second: u32, board: &Board, stop: &Stop) {
     let mut said = None;

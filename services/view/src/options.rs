@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Subject of a page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Subject {
-    /// A deployment while it runs, by its name; `None` for the only one that runs.
+    /// Name of a running deployment; `None` for the only running deployment.
     Deployment(Option<String>),
     /// Folder with the results of a run.
     Folder(PathBuf),
@@ -19,7 +19,7 @@ pub enum Subject {
 pub struct Listen {
     /// Address to listen on; port 0 means any free port.
     pub address: SocketAddr,
-    /// True to use another port if this one is in use.
+    /// True to use another port if the port of `address` is in use.
     pub may_move: bool,
     /// Token that a page must know; `None` only on the loopback.
     pub token: Option<String>,

@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_large_picture_becomes_the_means_of_squares() {
-        // Columns alternate between 0 and 200, with a width of 1000 pixels, so three by three of them have a mean of 67 or 133.
+        // Columns alternate between 0 and 200, with a width of 1000 pixels, so blocks of three by three pixels have a mean of 67 or 133.
         let rgb: Vec<u8> = (0..1000 * 6).flat_map(|i| [200 * (i % 2) as u8, 9, 255]).collect();
         let (size, small) = reduced([1000, 6], &rgb).unwrap();
         assert_eq!(size, [333, 2]);

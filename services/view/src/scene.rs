@@ -24,7 +24,7 @@ pub(crate) struct Scene {
     pub up: [f64; 3],
     /// Frames per second of the footage; `None` if unknown.
     pub frame_rate_hz: Option<f64>,
-    /// True if results say which views see the person from behind. This is the case for results of the filters.
+    /// True if results state which views see the person from behind. This is the case for results of the filters.
     pub tells_facing: bool,
     /// Reason why the cameras are unknown; `None` if they are known.
     pub problem: Option<String>,

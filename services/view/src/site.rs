@@ -12,7 +12,7 @@ pub(crate) struct Site {
     pub board: Arc<Board>,
     /// The finished run; `None` for a live run.
     pub finished: Option<Arc<Finished>>,
-    /// Lock that is held while a frame of the finished run is read, so that pages read one after the other.
+    /// Lock that is held while a frame of the finished run is read, so that only one page reads at a time.
     pub reading: Arc<Mutex<()>>,
     /// Token that a page must know; `None` only on the loopback.
     pub token: Option<String>,

@@ -184,7 +184,7 @@ fn change_pose(pose: &mut PoseMessage, field: u8, it: Change) {
     }
 }
 
-/// Every message that is copied, and frames. The data in an accepted message is where the message says.
+/// Every message that is copied, and frames. The data in an accepted message is at the stated positions.
 pub fn wire_messages(input: &[u8]) {
     frame(input);
     candidates(input);

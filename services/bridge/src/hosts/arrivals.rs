@@ -34,11 +34,11 @@ impl Grid {
 /// Reason why there is no message for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gap {
-    /// The message did not come in time, although its host answers.
+    /// The message did not arrive in time, although its host answers.
     Late,
     /// The host did not answer.
     Gone,
-    /// A newer message came first: the link or the camera's process had no time for this one.
+    /// A newer message arrived first: the link or the camera's process had no time for this message.
     LeftOut,
 }
 
@@ -73,9 +73,9 @@ pub struct Tally {
     pub n_late: u64,
     /// Number of frames given up because their host did not answer.
     pub n_gone: u64,
-    /// Number of frames left out because a newer message came first.
+    /// Number of frames left out because a newer message arrived first.
     pub n_left_out: u64,
-    /// Number of messages that came after their frame was given up. These frames are included in the counts above.
+    /// Number of messages that arrived after their frame was given up. These frames are included in the counts above.
     pub n_came_late: u64,
     /// Number of messages without a frame.
     pub n_surplus: u64,

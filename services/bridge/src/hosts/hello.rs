@@ -1,4 +1,4 @@
-//! The introduction of a host with cameras, and the answer of the host that fuses. Both are JSON, because they are short and rare.
+//! The introduction of a host with cameras, and the answer of the fusing host. Both are JSON, because they are short and rare.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,16 +27,16 @@ pub struct Hello {
 pub enum Answer {
     /// The host may join the run.
     Welcome(Welcome),
-    /// The host may not join, for these reasons. `here` is the host that fuses.
+    /// The host may not join, for these reasons. In each difference, `here` is the fusing host.
     Refused(Vec<Difference>),
 }
 
 /// Facts about the run that a host with cameras needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Welcome {
-    /// Start time of the bridge of the host that fuses.
+    /// Start time of the bridge of the fusing host.
     pub origin: u64,
-    /// Session of the run: the time from which its instants are counted, by the clock of the host that fuses, in nanoseconds.
+    /// Session of the run: the time from which its instants are counted, by the clock of the fusing host, in nanoseconds.
     pub session: u64,
 }
 
@@ -69,7 +69,7 @@ impl Hello {
     /// Returns the answer to this introduction.
     ///
     /// * `is_known`: true if the deployment has a host of this name with cameras.
-    /// * `ours`: fingerprint of the host that fuses.
+    /// * `ours`: fingerprint of the fusing host.
     pub fn answer(&self, is_known: bool, ours: &Fingerprint, welcome: Welcome) -> Answer {
         let mut differences = Vec::new();
         if self.version != VERSION {

@@ -46,7 +46,7 @@ pub struct Maps {
 /// Error for bytes that are not maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MapsError {
-    /// The maps are truncated, or longer than their header says.
+    /// The maps are truncated, or longer than their header states.
     #[error("maps of {len} bytes, expected {expected}")]
     Length {
         /// Length of the maps.
@@ -63,7 +63,7 @@ pub enum MapsError {
 }
 
 impl Maps {
-    /// Returns the maps as bytes. If there are more than [`MOST_GAUSSIANS`], the last ones are left out.
+    /// Returns the maps as bytes. If there are more than [`MOST_GAUSSIANS`], the last Gaussians are left out.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = (self.people.len() as u32).to_le_bytes().to_vec();
         let mut n_left = MOST_GAUSSIANS;
@@ -126,7 +126,7 @@ impl Maps {
     }
 }
 
-/// Reads numbers one after the other.
+/// Reads a sequence of numbers.
 struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,

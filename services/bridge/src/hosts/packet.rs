@@ -53,7 +53,7 @@ pub struct Head {
     pub status: Status,
     /// Start time of the sending bridge, which identifies the bridge. Sequences start again with each bridge.
     pub origin: u64,
-    /// Number of the message among those of this view and content, counted from 0.
+    /// Number of the message among the messages of this view and content, counted from 0.
     pub sequence: u64,
     /// Number of the frame on the sending host.
     pub frame: u64,
@@ -100,7 +100,7 @@ pub struct Expected<'a> {
 /// Error for bytes that are not a packet of the sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PacketError {
-    /// The packet is truncated, or longer than its head says.
+    /// The packet is truncated, or longer than its head states.
     #[error("a packet of {len} bytes, expected {expected}")]
     Length {
         /// Length of the packet.

@@ -43,7 +43,7 @@ fn send_maps(
     Ok(())
 }
 
-/// The times of a message by this host's clock, in nanoseconds. None of them is in the future, whatever the error of the other clock.
+/// The times of a message by this host's clock, in nanoseconds. No time is in the future, whatever the error of the other clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Times {
     captured_at: u64,

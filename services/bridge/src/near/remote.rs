@@ -33,7 +33,7 @@ pub(super) struct State {
     pub(super) last_malformed: String,
     /// Number of packets from a bridge that was not welcomed, or not yet.
     pub(super) n_unknown: u64,
-    /// Number of packets that came before the clock of the host was known.
+    /// Number of packets that arrived before the clock of the host was known.
     pub(super) n_without_clock: u64,
     /// Number of packets for which there was no space, because the host sends too many.
     pub(super) n_no_room: u64,

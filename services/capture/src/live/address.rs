@@ -50,13 +50,13 @@ pub enum LiveError {
         /// Address without a password.
         address: String,
     },
-    /// No picture came for some time.
+    /// No picture has arrived for some time.
     #[error("{address} sends no pictures")]
     Silent {
         /// Address without a password.
         address: String,
     },
-    /// Another camera has the address of this one.
+    /// Another camera now has the address of this camera.
     #[error("{address} is a different camera now: {found}, expected {expected}")]
     Another {
         /// Address of the camera.

@@ -21,7 +21,7 @@ const N_FOR_VERDICT: u32 = 30;
 struct Least(VecDeque<(u64, i64)>);
 
 impl Least {
-    /// Adds a number. A number that is far from the earlier ones shows that the clock was set.
+    /// Adds a number. A number that is far from the earlier numbers shows that the clock was set.
     ///
     /// * Returns the minimum.
     fn add(&mut self, at_nanos: u64, number: i64) -> i64 {
@@ -65,9 +65,9 @@ pub(super) enum Verdict {
     /// There are too few pictures so far.
     #[default]
     Unknown,
-    /// The clock agrees with that of this machine.
+    /// The clock agrees with this machine's clock.
     Right,
-    /// The clock differs, or the pictures come too late.
+    /// The clock differs, or the pictures arrive too late.
     Wrong,
 }
 

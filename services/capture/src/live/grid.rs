@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use messages::Status;
 
 /// Distance beyond half a period that a picture may have from its instant, in periods. With this tolerance, pictures that jitter around the
-/// middle between two instants stay with one of them.
+/// middle between two instants stay with the same instant.
 const SLACK: f64 = 0.1;
 /// Number of intervals whose median is the period of a camera, and number of intervals that are needed.
 const N_INTERVALS: usize = 15;
 const LEAST_INTERVALS: usize = 5;
-/// Largest accepted difference between a camera's clock and that of this machine, in nanoseconds.
+/// Largest accepted difference between a camera's clock and this machine's clock, in nanoseconds.
 const MAX_OFF_NANOS: u64 = 2_000_000_000;
 
 /// The instants `start + k / rate`. Does not read a clock.
@@ -66,7 +66,8 @@ impl Grid {
         at_nanos.cast_signed().wrapping_sub(self.start_nanos.cast_signed()) as f64 / self.period
     }
 
-    /// Returns the fault in the time of a picture: equal to or earlier than that of the previous picture, or far from the current time.
+    /// Returns the fault in the time of a picture. The time is wrong if it is not later than the time of the previous picture, or far from
+    /// the current time.
     pub(crate) fn wrong_clock(&mut self, at_nanos: u64, arrived_at_nanos: u64) -> Option<Status> {
         if at_nanos.abs_diff(arrived_at_nanos) > MAX_OFF_NANOS {
             return Some(Status::CLOCK_JUMPED);

@@ -16,12 +16,12 @@ pub(crate) struct Phase {
     period_nanos: u64,
     /// Times and skews of pictures that are not part of a measurement yet, in nanoseconds.
     newest: Vec<(u64, i64)>,
-    /// Times and skews of the measurements, in nanoseconds. When a camera drifts from one instant to the next, a whole period is added, so
-    /// that its skew does not jump.
+    /// Times and skews of the measurements, in nanoseconds. When a camera drifts from one instant to the next, a whole period is added to
+    /// its skew, so that the skew does not jump.
     measured: VecDeque<(u64, i64)>,
     /// Sum of the periods that were added so far, in nanoseconds.
     added: i64,
-    /// True if the times are those of the camera's own clock.
+    /// True if the times are from the camera's own clock.
     is_own_time: bool,
 }
 

@@ -33,7 +33,7 @@ pub(crate) struct Picture {
     pub at_nanos: u64,
     /// Time at which the picture arrived.
     pub arrived_at_nanos: u64,
-    /// Number of earlier pictures that this one has overtaken, because this process was slow.
+    /// Number of earlier pictures that this picture has overtaken, because this process was slow.
     pub n_overtaken: u64,
     /// Clock that gives the time of the picture.
     pub timed_by: TimedBy,
@@ -211,7 +211,7 @@ impl Keeper {
         }
     }
 
-    /// Reads until the camera fails. Returns no error if the camera is not needed any more.
+    /// Reads until the camera fails. Returns no error if the camera is no longer needed.
     fn read_all(&self, input: &mut Input, n_read: &mut u64) -> Option<LiveError> {
         {
             let mut state = self.shared.state();
@@ -261,7 +261,7 @@ impl Keeper {
         rgb
     }
 
-    /// Puts a picture into the queue. Returns memory that is not needed any more.
+    /// Puts a picture into the queue. Returns memory that is no longer needed.
     fn post(&self, taken: Taken, rgb: Vec<u8>, rate_hz: Option<f64>) -> Option<Vec<u8>> {
         let mut state = self.shared.state();
         state.trouble = None;

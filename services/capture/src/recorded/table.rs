@@ -183,7 +183,7 @@ impl Table {
         self.pictures.partition_point(|picture| picture.instant < instant)
     }
 
-    /// Returns the first picture of a later connection than that of a given picture.
+    /// Returns the first picture whose connection is later than the connection of a given picture.
     pub(super) fn after_connection(&self, at: usize) -> usize {
         let rest = self.pictures.get(at..).unwrap_or_default();
         let n = rest.iter().take_while(|picture| picture.connection == rest[0].connection);

@@ -93,7 +93,7 @@ pub(crate) struct Arguments {
     /// Settings of fusion: a TOML file with the keys of `[paper]`.
     #[arg(long, value_name = "FILE")]
     paper: Option<PathBuf>,
-    /// Learned consistency (a file of `train consistency`), instead of the one in --paper; "shipped" for the shipped file.
+    /// Learned consistency (a file of `train consistency`), instead of the file in --paper; "shipped" for the shipped file.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
     /// Network that sees in which direction people face, to tell left from right (`train orientation`); "shipped" for the shipped
@@ -401,7 +401,7 @@ fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
     Ok(config)
 }
 
-/// Returns the versions to compare: the requested ones, or all for which inputs are given.
+/// Returns the versions to compare: the requested versions, or all versions for which inputs are given.
 fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
     let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {

@@ -3,7 +3,7 @@
 use failure::{ExitKind, Failure};
 use training::datasets::sequences::Sequence;
 
-/// Splits sequences into training sequences and held-out ones, on which the weights are chosen.
+/// Splits sequences into training sequences and held-out sequences, on which the weights are chosen.
 pub(super) fn split(
     all: Vec<Sequence>,
     hold_out: &[String],

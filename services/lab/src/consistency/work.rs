@@ -24,7 +24,7 @@ const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 /// Settings of a training of consistency.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Largest number of held-out instants for trying weights, evenly spaced over all of them.
+    /// Largest number of held-out instants on which weights are tried, evenly spaced over all held-out instants.
     pub tries: usize,
     /// Name of the rig whose camera pairs are also learned by name.
     pub rig: Option<String>,
@@ -119,7 +119,7 @@ impl<'a> Learning<'a> {
         })
     }
 
-    /// Returns some of the held-out instants, evenly spaced over all of them.
+    /// Returns some of the held-out instants, evenly spaced.
     fn thinned(&self, held: &[Sequence]) -> Vec<Sequence> {
         let n: usize = held.iter().map(|held| held.frames.len()).sum();
         let most = self.job.tries.min(n);

@@ -252,7 +252,7 @@ impl EvidenceJob<'_> {
         rows
     }
 
-    /// * `last`: the method with which the others are compared.
+    /// * `last`: the method with which the other methods are compared.
     fn row(
         &self,
         stress: &Stress,

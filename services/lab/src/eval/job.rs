@@ -174,7 +174,8 @@ impl Job<'_> {
         })
     }
 
-    /// Returns the errors that the network predicts for a view; if the truth is known, also the same errors together with the true ones.
+    /// Returns the errors that the network predicts for a view; if the truth is known, also the predicted errors together with the true
+    /// errors.
     ///
     /// * `joints`: the true joints in the frame.
     /// * `frame_scale`: pixels of the frame per pixel of the footage.

@@ -39,7 +39,7 @@ pub fn name(path: &Path) -> String {
 
 /// Writes the results on a data set, one line per person.
 ///
-/// * `folder`: folder of the file, whose name is that of the data set.
+/// * `folder`: folder of the file. The file has the name of the data set.
 ///
 /// # Errors
 ///

@@ -76,7 +76,7 @@ pub struct SingleView<'a> {
 pub struct Expectation {
     /// Expected errors, in the unit of the thresholds.
     pub sigma: Vec<f32>,
-    /// Thresholds of this view, used if those of the settings are empty.
+    /// Thresholds of this view, used if the settings have no thresholds.
     pub tau: Option<Vec<f32>>,
 }
 

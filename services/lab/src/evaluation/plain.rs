@@ -32,7 +32,7 @@ pub fn linear(views: &[Sighting<'_>]) -> Option<Point3<f64>> {
 }
 
 /// Linear triangulation that leaves out as few views as necessary for a mean reprojection error below `limit_px`, as Pose2Sim does. Among
-/// sets of the same size, it uses the one with the smallest error.
+/// sets of the same size, the set with the smallest error is used.
 pub fn dropping(views: &[Sighting<'_>], limit_px: f64) -> Option<Point3<f64>> {
     let n = views.len().min(16);
     let mut best: Option<(f64, Point3<f64>)> = None;

@@ -19,8 +19,8 @@ pub struct FrameScore {
     pub aligned_m: Vec<Option<f64>>,
     /// True if the body fits the truth better with left and right exchanged; `None` if there are no joints to compare.
     pub is_exchanged: Option<bool>,
-    /// For each view, the 14 joints that were found (if any) and the true ones, in pixels of the footage. `None`
-    /// if a true joint is unknown or behind the camera.
+    /// For each view, the 14 joints that were found (if any) and the true joints, in pixels of the footage. `None` if a true joint is
+    /// unknown or behind the camera.
     pub views: Vec<Option<(Option<Joints>, Joints)>>,
     /// Single-view solutions of each pair, or of all views at once.
     pub iterations: Vec<u32>,

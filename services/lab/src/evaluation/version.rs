@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Terms between views; each variant includes the terms of the previous ones.
+/// Terms between views; each variant includes the terms of the previous variants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Terms {
     /// No terms: flexible mixtures of parts in every view, then triangulation.

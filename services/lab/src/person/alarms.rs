@@ -24,7 +24,7 @@ pub(super) struct Alarms {
     folder: Option<PathBuf>,
     n_images: usize,
     n_unreadable: usize,
-    /// Threshold and number of false alarms, for the threshold of the training and for that of `detect`.
+    /// Threshold and number of false alarms, for the threshold of the training and for the threshold of `detect`.
     counts: [(f64, usize); 2],
 }
 

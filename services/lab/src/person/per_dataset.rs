@@ -13,7 +13,7 @@ pub(super) enum Whose<'a> {
     One(usize, &'a str),
 }
 
-/// Finds the data set that a value is for. This is the data set in `DATASET=VALUE`, as it was written, or otherwise all of them.
+/// Finds the data set that a value is for. This is the data set in `DATASET=VALUE`, as it was written, or otherwise all data sets.
 ///
 /// If several data sets match, the longest name wins.
 pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {

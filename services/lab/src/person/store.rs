@@ -245,7 +245,7 @@ fn claim(out: &Path) -> Result<File, Failure> {
             Failure::new(ExitKind::Usage, message)
         })?;
     match file.try_lock() {
-        // If the file system does not support locks, the training goes on without one.
+        // If the file system does not support locks, the training continues without a lock.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let message = format!("--out {}: another training is writing it", out.display());

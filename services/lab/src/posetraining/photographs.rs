@@ -178,7 +178,7 @@ fn of_person(
     }))
 }
 
-/// Returns the joints that are marked as visible; the others are not finite.
+/// Returns the joints that are marked as visible; all other joints are not finite.
 fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
     core::array::from_fn(|joint| {
         let is_visible = person.visible.get(joint).is_some_and(|visible| *visible);
@@ -235,8 +235,8 @@ fn length([x, y]: Point) -> f32 {
     x.hypot(y)
 }
 
-/// Returns the mean distance by which the left hip and shoulder are to the right of the right ones, in the upright picture. It is negative
-/// for a person seen from behind. Joints without a mark are taken from the teacher; `None` if neither source has them.
+/// Returns the mean distance by which the left hip and shoulder are to the right of the right hip and shoulder, in the upright picture. It
+/// is negative for a person seen from behind. Joints without a mark are taken from the teacher; `None` if neither source has them.
 fn across(marks: &Marks) -> Option<f32> {
     let widths = PAIRS.iter().filter_map(|[right, left]| {
         let is_marked = [right, left].iter().all(|joint| marks.marked[**joint][0].is_finite());

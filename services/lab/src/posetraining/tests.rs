@@ -68,7 +68,7 @@ fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
     let sight = network.look(picture, [20.0, 10.0, 80.0, 90.0], &mut workspace);
     let sight = sight.unwrap().unwrap();
     assert!(sight.front().is_some());
-    // Each error is a tenth of the window's height, which is that of the box with a margin.
+    // Each error is a tenth of the window's height, which is the height of the box with a margin.
     let errors: Vec<f64> = sight.errors().unwrap().collect();
     assert_eq!(errors.len(), N_KEYPOINTS);
     assert!(

@@ -12,7 +12,7 @@ use training::datasets::sequences::{
 ///
 /// # Errors
 ///
-/// Fails if the file cannot be read or is not such a table.
+/// Fails if the file cannot be read, or is not a table of markers.
 pub fn marker_table(name: &Path) -> Result<MarkerTable, Failure> {
     let preset = name.to_str().filter(|text| PRESETS.contains(text));
     match preset.and_then(MarkerTable::preset) {

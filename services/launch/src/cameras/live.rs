@@ -12,7 +12,7 @@ use scene::Address;
 
 use super::{Footage, advice, source};
 
-/// Number of frames of a live camera without an end. It is larger than that of any footage.
+/// Number of frames of a live camera without an end. It is larger than the number of frames of any footage.
 pub(crate) const ENDLESS: u64 = 1_000_000_000_000;
 
 /// Returns true if the source of a camera is live. If a file has this name, the source is the file.

@@ -47,7 +47,7 @@ pub struct Given {
     pub lines: Lines,
     /// Frames of the footage per second, if the run has no frame rate.
     pub rate_hz: Option<f64>,
-    /// Upward direction in the world of the rig, in place of the one in the rig.
+    /// Upward direction in the world of the rig, in place of the direction that the rig gives.
     pub up: Option<UnitVector3<f64>>,
 }
 

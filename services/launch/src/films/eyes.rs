@@ -44,7 +44,7 @@ impl Eyes {
         self.joints.names()
     }
 
-    /// Returns true if left and right follow the picture.
+    /// Returns true if the network names left and right as seen in the picture.
     pub(super) fn as_seen(&self) -> bool {
         self.joints.card().keypoints.sides == Sides::Seen
     }

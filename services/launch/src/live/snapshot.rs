@@ -83,7 +83,7 @@ impl Snapshot {
         }
     }
 
-    /// Returns the names of the views, as far as the metrics contain them.
+    /// Returns the names of the views that occur in the metrics.
     pub fn views(&self) -> BTreeMap<usize, &str> {
         let readings = self.processes.iter().filter_map(|process| process.reading.as_ref());
         readings

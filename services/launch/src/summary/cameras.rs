@@ -46,7 +46,7 @@ pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
 }
 
 /// Returns the counts of every live camera's pictures, one line per camera. The counts of a restarted process begin at its restart. A
-/// warning follows if the times of some cameras cannot be compared with those of others.
+/// warning follows if the times of some cameras cannot be compared with the times of other cameras.
 pub(super) fn live(outcome: &Outcome) -> String {
     let readings = outcome
         .processes

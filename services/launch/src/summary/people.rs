@@ -16,7 +16,8 @@ pub(super) struct Outside {
 }
 
 impl Outside {
-    /// Finds such views. Returns `None` if all people have a suitable size, or there are no people.
+    /// Finds the views in which people are too small or too large. Returns `None` if all people have a suitable size, or there are no
+    /// people.
     ///
     /// * `has_size`: true if the deployment sets `capture.size`.
     pub(super) fn of(run: &RunSummary, has_size: bool) -> Option<Self> {

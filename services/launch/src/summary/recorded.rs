@@ -23,7 +23,7 @@ impl Recorded {
     /// Reads the summary in the output folder of a run.
     ///
     /// * `session`: the session of the run. A summary of another session counts as missing.
-    /// * `cameras`: the cameras of the deployment. The summary must have counts for each of them.
+    /// * `cameras`: the cameras of the deployment. The summary must have counts for each camera.
     pub(super) fn read(folder: &Path, session: u64, cameras: &[&str]) -> Self {
         let file = folder.join(RunSummary::FILE);
         let read = match files::read_text(&file, files::SETTINGS) {

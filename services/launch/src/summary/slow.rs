@@ -5,8 +5,8 @@ use runfiles::Summary;
 /// The warning is given if the share of frames with a result is below this.
 const MOST: f64 = 0.8;
 
-/// Returns a line with the number of frames that the machine had time for, and what would help. Returns `None` if it had time for most
-/// frames, and with lossless delivery.
+/// Returns a line with the number of frames that the machine had time for, and with advice. Returns `None` if it had time for most frames,
+/// and with lossless delivery.
 ///
 /// * `n_frames`: number of frames of the footage that the run reached.
 /// * `seconds`: duration of the run.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::frames::{beside, by_clock, slowest};
 use super::{CameraFootage, FrameTable, Looked, Seen, footage_failure};
 
-/// A property of a camera's pictures (mirrored, inverted) is assumed for all of them after this many pictures agree.
+/// A property of a camera's pictures (mirrored, inverted) is assumed for all pictures of the camera after this many pictures agree.
 const SURE: usize = 3;
 
 /// Settings of the search.
@@ -22,7 +22,7 @@ pub struct LookSettings {
     pub every: Option<usize>,
     /// Maximum number of pictures to search, per camera.
     pub most: usize,
-    /// Number of pictures to search in each path, from the first. If not set, all of them.
+    /// Number of pictures to search in each path, from the first. If not set, all pictures are searched.
     pub first: Option<u64>,
     /// Assignment of pictures to frames. If not set, the table beside the first video is used.
     pub frames: Option<FrameTable>,
@@ -237,7 +237,7 @@ fn hints(found: &[Sighting]) -> Hints {
     }
 }
 
-/// Chooses the variant of the board that most pictures show, and collects what each camera saw of it.
+/// Chooses the variant of the board that most pictures show, and collects each camera's sights of this variant.
 fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
     let mut votes = vec![0; finder.variants().len()];
     for it in raw.iter().flat_map(|camera| &camera.found) {

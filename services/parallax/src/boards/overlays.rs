@@ -25,7 +25,7 @@ pub struct Overlay {
     pub jpeg: Vec<u8>,
 }
 
-/// Returns the pictures with the largest residuals: at most `most`, and at most a third of them from one camera.
+/// Returns the pictures with the largest residuals: at most `most` pictures, and at most a third of them from one camera.
 ///
 /// # Errors
 ///

@@ -340,7 +340,7 @@ fn guessed(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Option<Str
         every: Some(most.div_ceil(GUESSED_PICTURES).max(1)),
         ..settings.look.clone()
     };
-    // The largest dictionary of each family contains the codes of the smaller ones.
+    // The largest dictionary of each family contains the codes of the smaller dictionaries.
     let largest = dictionary_names().filter(|dictionary_name| {
         !["_50", "_100", "_250"].iter().any(|small| dictionary_name.ends_with(small))
     });

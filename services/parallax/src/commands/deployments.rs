@@ -1,4 +1,4 @@
-//! `parallax status` and `parallax clean`: list running deployments, and the shared memory that dead ones left behind.
+//! `parallax status` and `parallax clean`: list running deployments, and the shared memory that dead deployments left behind.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! `parallax doctor`: checks that this machine has what Parallax needs, and advises on what is missing.
+//! `parallax doctor`: checks that this machine has everything that Parallax needs, and advises on missing parts.
 
 use std::process::{Command, ExitCode};
 

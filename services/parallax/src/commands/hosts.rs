@@ -13,13 +13,13 @@ use launch::{Resolved, hosts, load, plan};
 use serde_json::Value;
 use terminal::output;
 
-/// Time that `status` waits for the host that fuses.
+/// Time that `status` waits for the fusing host.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show the hosts of a running deployment: which of them answer, the accuracy of their clocks, and the fate of every view's frames.
+    /// Show the hosts of a running deployment: which of them answer, the accuracy of their clocks, and the counts of every view's frames.
     Status(StatusArguments),
     /// Create the keys of all hosts: a certificate authority, and a certificate with its key for each host.
     Keys(KeysArguments),
@@ -68,7 +68,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Resolves what this machine runs: a whole deployment, or the part of one host. A host with cameras waits for the host that fuses,
+/// Resolves what this machine runs: a whole deployment, or the part of one host. A host with cameras waits for the fusing host,
 /// which also gives the time at which the run began. Returns `None` on a stop request.
 ///
 /// * `chosen`: the host that the user named, and true if nothing is to be started.
@@ -131,7 +131,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     let host = host.ok_or("the deployment has no [[host]]").or_fail(ExitKind::Usage)?;
     in_one_thread()?;
     let mut address = hosts::address(deployment, host)?;
-    // On the host that fuses, the bridge listens already, so this command connects to it.
+    // On the fusing host, the bridge listens already, so this command connects to it.
     address.listens = false;
     let text = bridge::status(&address, PATIENCE).or_fail(ExitKind::Run)?;
     let Some(text) = text else {

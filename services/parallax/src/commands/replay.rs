@@ -143,7 +143,7 @@ fn resolve(
         capture.mode,
         capture.size.is_some() || capture.scale.is_some(),
     );
-    // The recorded size is used, unless the user sets another one.
+    // The recorded size is used, unless the user sets another size.
     let search_size = recorded.search_size.filter(|_| !is_sized);
     if from == Stage::Capture {
         return Ok(Resolved {
@@ -262,7 +262,8 @@ fn check(
     })
 }
 
-/// Checks that the recording has the frames, evidence or poses of every view. A recording by one of several hosts may lack some of them.
+/// Checks that the recording has the frames, evidence or poses of every view. A recording by one of several hosts may lack some of these
+/// messages.
 ///
 /// * `needs`: true if pixels are needed, and true if evidence is needed.
 fn check_views(

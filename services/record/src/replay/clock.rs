@@ -1,4 +1,4 @@
-//! Converts the times of a recording to those of the run in which it is replayed.
+//! Converts the times of a recording to the times of the run in which it is replayed.
 
 use messages::{Stamp, Timing};
 use recording::Envelope;

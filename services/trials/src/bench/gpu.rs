@@ -19,7 +19,7 @@ use super::provenance::Provenance;
 use super::report::Report;
 use crate::spread::Spread;
 
-/// Rounds before the measured ones, in which kernels are compiled and memory is allocated.
+/// Rounds before the measured rounds, in which kernels are compiled and memory is allocated.
 const WARM_UP: usize = 3;
 
 /// Options of the benchmark of the GPU.

@@ -108,7 +108,7 @@ fn start(series: &Series, namespace: &Namespace) -> Result<Child, Failure> {
     Child::start(&executable, &args).or_fail(ExitKind::Run)
 }
 
-/// Sends all messages. Returns the locations of the first ones, or `None` if the benchmark was interrupted.
+/// Sends all messages. Returns the locations of the first messages, or `None` if the benchmark was interrupted.
 fn send(
     series: &Series,
     publisher: &SlicePublisher<u8, FrameHeader>,

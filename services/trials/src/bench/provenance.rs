@@ -50,7 +50,7 @@ impl Provenance {
     }
 }
 
-/// Returns the text after a prefix in the first line with this prefix; `unknown` if there is no such line.
+/// Returns the text after a prefix in the first line with this prefix; `unknown` if no line has the prefix.
 fn first(file: &str, prefix: &str) -> String {
     let text = fs::read_to_string(file).unwrap_or_default();
     let mut lines = text.lines();

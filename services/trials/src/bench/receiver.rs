@@ -12,7 +12,7 @@ use terminal::output;
 
 use crate::spread::Spread;
 
-/// Number of messages before the measured ones.
+/// Number of messages before the measured messages.
 pub(super) const WARM_UP: u64 = 64;
 /// Number of first messages whose location is recorded.
 pub(super) const N_PLACED: u64 = 32;

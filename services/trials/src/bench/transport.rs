@@ -146,7 +146,7 @@ impl Transport {
         }
     }
 
-    /// Returns the requested limits, and those that always apply.
+    /// Returns the requested limits, and the limits that always apply.
     fn limits(&self, rows: &[Row]) -> Vec<Limit> {
         let mut limits = Vec::new();
         for (spins, most) in [(false, self.max_event_us), (true, self.max_polled_us)] {

@@ -187,7 +187,7 @@ fn free_port() -> std::io::Result<u16> {
     Ok(TcpListener::bind(("127.0.0.1", 0))?.local_addr()?.port())
 }
 
-/// Writes the deployment with its hosts, for one of them. The first half of the cameras is connected to the fusing host.
+/// Writes the deployment with its hosts, for one of the hosts. The first half of the cameras is connected to the fusing host.
 fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
     let text = std::fs::read_to_string(&testbed.file)
         .map_err(|error| failure::in_file(&testbed.file, &error))?;

@@ -108,7 +108,7 @@ impl Testbed {
 
     /// Returns the `key=value` pairs of a scenario.
     ///
-    /// * `more`: pairs in addition to those of all scenarios.
+    /// * `more`: pairs in addition to the pairs of all scenarios.
     pub(super) fn set(&self, more: &[&str]) -> Vec<String> {
         let more = more.iter().copied().map(str::to_owned);
         self.set.iter().cloned().chain(more).collect()

@@ -30,7 +30,7 @@ pub(super) struct Score {
 /// * `pairs`: the found and the true joints of `skeleton::PARSE14` of each result, in metres.
 pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [Point])>) -> Score {
     let segments = segments(&PARSE14).map_or_else(Vec::new, Vec::from);
-    // For each segment, the number of correct ones and the number of all.
+    // For each segment, the number of results in which it is correct, and the number of all results.
     let mut right = vec![[0_usize; 2]; segments.len()];
     let (mut distances, mut n_joints, mut frames) = (Vec::new(), 0_usize, 0);
     for (found, truth) in pairs {

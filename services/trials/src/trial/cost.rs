@@ -58,7 +58,7 @@ impl EpochSource {
     }
 
     /// Returns the time at which the process sent its first message of an epoch that contributed to a result, milliseconds since the
-    /// planning of the run; `None` if there is no such result.
+    /// planning of the run; `None` if there is no result with this epoch.
     pub(crate) fn began_ms(self, epoch: u32, results: &[FrameResult]) -> Option<f64> {
         let mut sent = results.iter().filter_map(|result| self.epoch(result));
         sent.find(|pair| pair.0 == epoch).map(|sent| sent.1)

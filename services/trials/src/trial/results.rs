@@ -69,7 +69,7 @@ fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
     lines.map_err(|error| failure::in_file(&file, &error))
 }
 
-/// Joins the lines of both files by frame. A frame that is in only one of them has no result.
+/// Joins the lines of both files by frame. A frame that is in only one of the files has no result.
 fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<FrameResult> {
     let times = times.into_iter().map(|time| (time.frame, time));
     let times: BTreeMap<u64, TimesLine> = times.collect();

@@ -222,7 +222,7 @@ impl Person {
         Ok(person)
     }
 
-    /// Looks at the person. If the person lies or stands on the hands, also looks at the rotated picture, and returns the result with the
+    /// Looks at the person. If the person is lying or upside down, also looks at the rotated picture, and returns the result with the
     /// better score.
     fn seen(
         network: &PoseNetwork,
@@ -242,7 +242,7 @@ impl Person {
         })
     }
 
-    /// Looks at the person in the rotated picture. Also returns how the picture should be rotated.
+    /// Finds the person in the picture, rotated by `turn`. Also returns how the picture should be rotated.
     fn turned(
         network: &PoseNetwork,
         picture: &Picture,

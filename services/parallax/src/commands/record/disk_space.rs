@@ -43,7 +43,8 @@ impl PerFrame {
                     sum.foxglove += if has_foxglove { bytes / 2 } else { 0 };
                 }
                 Some(Kind::Skeletons) => {
-                    // The topic has space for eight people, but the recording contains only those in use. A run follows one person.
+                    // The topic has space for eight people, but the recording contains only the people in the frame. A run follows one
+                    // person.
                     let person = Kind::Skeletons.element_bytes().unwrap_or(0);
                     sum.rest += (Kind::Skeletons.head_bytes() + person) as u64;
                     sum.rest += if has_foxglove { SCENE_BYTES } else { 0 };

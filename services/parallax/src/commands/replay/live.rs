@@ -12,7 +12,7 @@ use recording::Recording;
 
 /// Replaces live cameras by the recording.
 ///
-/// In a replay from capture, no frame is dropped by default, because nothing is live any more.
+/// In a replay from capture, no frame is dropped by default, because there is no live camera.
 ///
 /// * `set`: the user's replacements of values.
 ///

@@ -116,7 +116,7 @@ impl<'t> Page<'t> {
     }
 }
 
-/// Returns the style of a line (ECMA-48, 8.3.117): bold for titles, red for dead processes, yellow for silent ones.
+/// Returns the style of a line (ECMA-48, 8.3.117): bold for titles, red for dead processes, yellow for silent processes.
 fn style(line: &str) -> &'static str {
     let has = |word: &str| line.split_whitespace().any(|found| found == word);
     if line.starts_with("PROCESS") {

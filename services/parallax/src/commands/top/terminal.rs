@@ -96,7 +96,7 @@ impl Terminal {
         Ok(keys_in(&bytes))
     }
 
-    /// Waits for bytes, and returns the available ones. Returns no bytes after a signal.
+    /// Waits for bytes, and returns the available bytes. Returns no bytes after a signal.
     fn read(&self, wait: Duration) -> io::Result<Vec<u8>> {
         let input = input(self.keyboard.as_ref());
         if !events(input, PollFlags::IN, wait)?.contains(PollFlags::IN) {
