@@ -86,7 +86,7 @@ fn rows() -> [(&'static str, Switches); 7] {
 
 pub(crate) struct Clip {
     pub(crate) cameras: Vec<Camera>,
-    /// Pictures as `[view][frame]`, with all frames up to the last one needed.
+    /// Pictures as `[view][frame]`, with all frames up to the last frame that is needed.
     pub(crate) frames: Vec<Vec<Vec<u8>>>,
 }
 

@@ -196,7 +196,7 @@ impl Pair {
         )
     }
 
-    /// Fuses the two views, the first one of `order` first.
+    /// Fuses the two views, in the order of `order`.
     fn fuse(
         &self,
         settings: &Settings,

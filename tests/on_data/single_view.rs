@@ -81,7 +81,7 @@ pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Returns the largest difference between an array `[row, col, ...]` of the reference and ours.
+/// Returns the largest difference between an array `[row, col, ...]` of the reference and our values.
 fn difference(theirs: &Array, ours: impl Fn(&[usize]) -> f64) -> f64 {
     let index = |mut flat: usize| {
         let mut index = vec![0; theirs.shape.len()];

@@ -71,8 +71,8 @@ fn tracking_is_nearly_as_accurate_as_a_full_search() {
         );
         reached.push((same, errors));
     }
-    // Values reached so far: 82.9 % of the poses are the same, and the median is 34.4 px, compared with 34.5 px (left and right are those
-    // of the single view).
+    // Values reached so far: 82.9 % of the poses are the same, and the median is 34.4 px, compared with 34.5 px (with left and right as in
+    // the single view).
     let (share, of_default) = reached[0];
     assert!(share > 0.75, "the same pose in {share} of the frames");
     assert!(of_default[0] <= 1.1 * median, "{} {median}", of_default[0]);

@@ -30,7 +30,7 @@ pub enum JoinError {
     Refused(Vec<Difference>),
 }
 
-/// Lists the differences from the point of view of this host. the fusing host wrote them from its own point of view.
+/// Lists the differences from the point of view of this host. The fusing host wrote them from its own point of view.
 pub(crate) fn listed(all: &[Difference]) -> String {
     let each = all.iter().map(|difference| {
         let (there, here) = (&difference.here, &difference.there);

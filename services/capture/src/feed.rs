@@ -204,7 +204,7 @@ impl Feed {
         }
     }
 
-    /// Skips the next `n` frames. Returns how many there were.
+    /// Skips the next `n` frames, or fewer at the end. Returns the number of skipped frames.
     ///
     /// # Errors
     ///

@@ -6,7 +6,7 @@ use messages::Status;
 /// camera may be slow for a moment: neither counts as a clock jump.
 const JUMP_S: f64 = 2.0;
 
-/// Keeps the state of a camera's last frame, to check the next one. Does not read a clock.
+/// Keeps the state of a camera's last frame, to check the next frame. Does not read a clock.
 #[derive(Debug)]
 pub(crate) struct Guard {
     /// Number of repetitions from which a picture counts as frozen; 0 to disable the check.
@@ -23,7 +23,7 @@ impl Guard {
     /// Creates a guard that has not seen a frame.
     ///
     /// * `frozen_after`: number of repetitions from which a picture counts as frozen; 0 to disable the check.
-    /// * `rate_hz`: frame rate of the footage per second, counting all frames, not only used ones.
+    /// * `rate_hz`: frame rate of the footage per second, counting all frames, not only the used frames.
     pub(crate) fn new(frozen_after: u32, rate_hz: Option<f64>) -> Self {
         Self {
             frozen_after,

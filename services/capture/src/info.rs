@@ -1,4 +1,4 @@
-//! Properties of a camera's pictures that are known before the first one.
+//! Properties of a camera's pictures that are known before the first picture.
 
 use footage::{Depth, Size, Turn};
 

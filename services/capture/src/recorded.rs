@@ -183,7 +183,7 @@ impl RecordedFeed {
         instant >= self.next && (instant - self.next).is_multiple_of(self.step)
     }
 
-    /// Skips the next `n` frames. Returns how many there were.
+    /// Skips the next `n` frames, or fewer at the end. Returns the number of skipped frames.
     pub(crate) fn skip(&mut self, n: u64) -> u64 {
         let n = n.min(self.n_left);
         self.n_left -= n;
@@ -208,7 +208,7 @@ impl RecordedFeed {
             .is_some_and(|format| format.to_rgb(message.elements, stride, size, &mut self.rgb)))
     }
 
-    /// Returns the next wanted picture of a stream; `None` if the next one belongs to another connection.
+    /// Returns the next wanted picture of a stream; `None` if the next picture belongs to another connection.
     ///
     /// * `first`: the next picture of the table.
     fn next_of_stream(&mut self, first: Picture) -> Result<Option<Picture>, FootageError> {

@@ -22,7 +22,7 @@ struct Times {
     n_instants: u64,
     /// Position of the next instant among the used instants.
     at: u64,
-    /// Index of the next frame from the footage, and of the last one.
+    /// Index of the next frame from the footage. `shown` is the index of the last frame.
     next: u64,
     shown: Option<u64>,
 }
@@ -116,7 +116,7 @@ impl Retimed {
         self.feed.complaints()
     }
 
-    /// Skips frames or instants. Returns how many there were.
+    /// Skips frames or instants. Returns the number that were skipped.
     ///
     /// # Errors
     ///

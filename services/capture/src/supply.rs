@@ -118,7 +118,7 @@ impl Supply {
         self.held.as_deref().unwrap_or_else(fresh)
     }
 
-    /// Skips the next `n` frames. Returns how many there were.
+    /// Skips the next `n` frames, or fewer at the end. Returns the number of skipped frames.
     pub(crate) fn skip(&mut self, n: u64) -> u64 {
         let n = n.min(self.info.n_frames.saturating_sub(self.at));
         for _ in 0..n {

@@ -14,7 +14,7 @@ use exports::report::html::{Html, STYLE};
 use exports::report::{html, put};
 use figure::Figure;
 
-/// Draws a model.
+/// Draws a model. The page shows:
 ///
 /// * Every filter as a glyph: for each cell, the positive weights of its nine orientations, as strokes along
 ///   the edges that they respond to.

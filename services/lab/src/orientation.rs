@@ -42,7 +42,7 @@ pub struct Judged {
     pub on: String,
     /// Number of people.
     pub n: usize,
-    /// Share of people whose direction the network distinguishes from the opposite one, from 0 to 1.
+    /// Share of people whose direction the network distinguishes from the opposite direction, from 0 to 1.
     pub right: f64,
     /// 95 % interval of `right` (Wilson).
     pub interval: [f64; 2],

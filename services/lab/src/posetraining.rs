@@ -26,8 +26,8 @@ pub struct People {
     /// Photographs of annotated people. Left and right are sides of the body. If the choice exchanges them for people seen from behind
     /// (`Sides::Seen`), the marks do not determine the direction in which a person faces.
     pub photographs: Chosen,
-    /// For each thread, the networks that help. The first adds missing joints and corrects wrong marks. The other networks add the
-    /// keypoints that earlier networks do not have.
+    /// For each thread, the networks that act as teachers. The first adds missing joints and corrects wrong marks. The other networks add
+    /// the keypoints that earlier networks do not have.
     pub teachers: Vec<Vec<PoseNetwork>>,
     /// Synthetic scenes.
     pub scenes: Scenes,

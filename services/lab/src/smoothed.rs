@@ -44,7 +44,7 @@ pub struct Row {
     pub filled_mm: Option<Mean>,
 }
 
-/// All methods against the truth.
+/// Comparison of all methods with the truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// Number of compared positions: joints times instants.

@@ -45,7 +45,7 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
 ///
 /// # Errors
 ///
-/// Fails like [`resolve`]. Also fails if the vertical is not given, because all hosts must use the same one.
+/// Fails like [`resolve`]. Also fails if the vertical is not given, because all hosts must use the same vertical.
 pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolved, Failure> {
     let lengths = keypoints::lengths(deployment)?;
     let deployment = &keypoints::with_pictures(deployment.clone(), &lengths)?;
@@ -68,7 +68,7 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     };
     sanity::warn(&resolved, &lengths)?;
     check_names_and_sizes(&resolved, &is_here)?;
-    // The vertical is stored in the deployment, so that every process and a replay use the same one.
+    // The vertical is stored in the deployment, so that every process and a replay use the same vertical.
     if let Some(found) = vertical::find(deployment)? {
         if host.is_some() {
             let message = "neither the calibration nor the deployment gives the upward direction";

@@ -21,11 +21,11 @@ const STEP: u64 = 20;
 const MAX_VIEWS: usize = 4;
 /// Maximum length of the longer side of a searched image, in pixels.
 const MAX_SIDE_PX: f64 = 480.0;
-/// If two rolls differ by less than this, in degrees, only one is searched.
+/// If two rolls differ by less than this angle, in degrees, only one of them is searched.
 const SAME_ROLL: f64 = 12.0;
-/// A direction within this angle of a world axis is replaced by the axis. In degrees.
+/// A direction within this angle of a world axis, in degrees, is replaced by the axis.
 const NEAR_AXIS: f64 = 6.0;
-/// If two directions differ by less than this angle, in degrees, only one is tried.
+/// If two directions differ by less than this angle, in degrees, only one of them is tried.
 const SAME_DIRECTION: f64 = 10.0;
 /// Scores that differ by less than this count as equal. Among directions with equal scores, the first is used. The direction for level
 /// cameras is tried first.

@@ -80,7 +80,7 @@ fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
     assert_eq!(report["run"]["restarts"], restarts);
     let accuracy = &report["accuracy"]["all"];
     let [pcp3d, mpjpe] = ["pcp3d_percent", "mpjpe_mm"].map(|key| number(&accuracy[key]));
-    // Only frames with a skeleton count, because their number depends on the machine.
+    // Only frames with a skeleton are counted, because their number depends on the machine.
     let found = 1.0 - number(&accuracy["lost_percent"]) / 100.0;
     assert!((35.0..=100.0).contains(&(pcp3d / found)), "{accuracy:#}");
     assert!((5.0..400.0).contains(&mpjpe), "{accuracy:#}");

@@ -97,7 +97,7 @@ fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending()
 fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
     // The run is longer than a client may need to join on a loaded machine.
     let case = Case::new("asleep", &[160; 2], PACED);
-    // This client holds a picture of each view, and never reads another one.
+    // This client holds a picture of each view, and never reads another picture.
     let mut asleep = Client::wait_for(&case.name, &Wish::views().with_pictures()).unwrap();
     let started = case.start(&["run", "deployment.toml", "--json"]);
     let held = loop {

@@ -1,5 +1,5 @@
-//! Tests of runs without enough shared memory, file descriptors or a free name; of leftovers of other users; and that no network sockets
-//! are open.
+//! Tests of runs without enough shared memory, file descriptors or a free name; and of leftovers of other users. Also tests that no network
+//! sockets are open.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;
@@ -295,7 +295,7 @@ mod long {
         assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
-        // The killed process frees memory, so the next one may fail at different places: the queues, a topic or its wake-up is refused.
+        // The killed process frees memory, so the next process may fail at different places: the queues, a topic or its wake-up is refused.
         for words in [
             "of shared memory",
             "free in /dev/shm",

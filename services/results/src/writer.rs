@@ -94,7 +94,7 @@ impl Writer {
         }
     }
 
-    /// Queues the frames without a result after the last one. Waits for space, because nothing follows.
+    /// Queues the frames without a result after the last result. Waits for space, because nothing follows.
     pub(crate) fn rest(&self, absent: Vec<Absent>) {
         let record = None;
         if let Err(error) = self.queue.send(Batch { absent, record }) {

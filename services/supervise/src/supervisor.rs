@@ -316,7 +316,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Handles the end of a process, and kills one that hangs.
+    /// Handles the end of a process. Kills the process if it hangs.
     fn reap(&mut self, index: usize, now: Instant) -> Result<(), SuperviseError> {
         let watch = &mut self.watches[index];
         let overdue = watch.overdue(&self.plan.policy, now);

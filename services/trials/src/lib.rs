@@ -6,8 +6,8 @@
 //! | [`mod@bench`] | messages between two processes; deployments under load | latency and throughput |
 //! | [`demo`] | synthetic cameras, one of which is killed | accuracy of the results, recovery and losses |
 //!
-//! Every run uses real processes, started as by `parallax run`. The command line passes the options of a trial
-//! and prints its report. Progress is shown during the run.
+//! Every run uses real processes, which are started as `parallax run` starts them. The command line passes the options of a trial and
+//! prints its report. Progress is shown during the run.
 #![forbid(unsafe_code)]
 
 mod spread;

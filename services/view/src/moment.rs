@@ -26,7 +26,7 @@ pub(crate) struct Moment {
     pub others: Vec<Other>,
     /// Position of every joint in world coordinates, in metres; `None` for an unknown joint.
     pub joints: Vec<Option<[f64; 3]>>,
-    /// Covariance of every joint, square metres: xx, xy, xz, yy, yz, zz.
+    /// Covariance of every joint, in square metres: xx, xy, xz, yy, yz, zz.
     pub spread: Vec<Option<[f64; 6]>>,
     /// Pose in every view.
     pub views: Vec<Seen>,

@@ -1,9 +1,9 @@
 //! Access rules, and the files of the page.
 //!
-//! On the loopback, any process of this machine can request the page, but pages of other sites cannot. The name in `Host` must be
-//! a name of the loopback; this refuses other host names that resolve to 127.0.0.1. If a browser makes a request for another site,
-//! `Origin` names that site, and the request is refused. With a token, which is required on any other address, pages must know the token
-//! instead. The files of the page contain no data; all data is sent through the web socket.
+//! On the loopback, any process of this machine can request the page, but pages of other sites cannot. The name in `Host` must be a name of
+//! the loopback; this refuses other host names that resolve to 127.0.0.1. If a browser makes a request for another site, `Origin` names
+//! that site, and the request is refused. If a token is set, which is required on any other address, pages must know the token instead. The
+//! files of the page contain no data; all data is sent through the web socket.
 
 use core::net::IpAddr;
 

@@ -148,7 +148,7 @@ impl Page {
         &self.site.board
     }
 
-    /// Sends new messages and responds to requests. If there are none, waits.
+    /// Sends new messages and responds to requests. Waits if there are no messages or requests.
     ///
     /// * `bell`: event file that is signalled when the board has changed.
     fn turn(&mut self, socket: &mut WebSocket<TcpStream>, bell: &OwnedFd) -> Result<(), Error> {

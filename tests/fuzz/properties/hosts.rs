@@ -66,7 +66,7 @@ fn packet_of(mut it: Numbers<'_>, body: &[u8]) {
     }
 }
 
-/// Any times of another host's clock.
+/// Estimates another host's clock from any times.
 fn clock_of(mut it: Numbers<'_>) {
     let mut clock = Clock::default();
     for _ in 0..8 {

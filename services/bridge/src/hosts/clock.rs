@@ -1,7 +1,7 @@
 //! Estimates the offset and drift of another host's clock, with a bound on the error.
 //!
 //! An exchange of four times (RFC 5905, section 8) bounds the offset by half of its round trip, however the delay is divided between the
-//! two directions. The window is divided into parts. Of each part, only the exchange with the shortest round trip is used, as in the clock
+//! two directions. The window is divided into parts. In each part, only the exchange with the shortest round trip is used, as in the clock
 //! filter of NTP. A line through these exchanges gives offset and drift.
 
 use std::collections::VecDeque;
@@ -218,7 +218,7 @@ fn sample(it: &Exchange) -> Result<Sample, ExchangeError> {
     })
 }
 
-/// Returns the time between two times, in nanoseconds.
+/// Returns the difference between two times, in nanoseconds.
 fn time_between(later: u64, earlier: u64) -> f64 {
     (i128::from(later) - i128::from(earlier)) as f64
 }
@@ -280,7 +280,8 @@ impl Line {
     }
 }
 
-/// Returns a bound on the error of a drift. Any two exchanges give a bound, because at each the offset is known to half of its round trip.
+/// Returns a bound on the error of a drift. Any two exchanges give a bound, because at each exchange the offset is known to within half of
+/// the round trip.
 fn drift_error(drift: f64, all: &(impl Iterator<Item = Sample> + Clone)) -> f64 {
     let pairs = all
         .clone()

@@ -273,7 +273,7 @@ pub(super) fn kind_of(content: Content) -> Option<Kind> {
     }
 }
 
-/// Receives answers to requests for the time, and the requests of hosts that start.
+/// Receives answers to requests for the time, and requests from hosts that start.
 fn hear_signals(
     link: &Arc<Link>,
     topics: &Topics,

@@ -28,7 +28,7 @@ pub(super) struct State {
     heard_at: Option<u64>,
     pub(super) n_packets: u64,
     pub(super) n_bytes: u64,
-    /// Number of malformed packets, and reason of the last one.
+    /// Number of malformed packets. The next field is the reason for the last one.
     pub(super) n_malformed: u64,
     pub(super) last_malformed: String,
     /// Number of packets from a bridge that was not welcomed, or not yet.

@@ -73,8 +73,8 @@ pub(super) enum Verdict {
 
 /// Judges the clock of a camera that stamps its pictures, by the delays of the pictures.
 ///
-/// A small error of a clock cannot be distinguished from the transfer time of a picture. With a large error,
-/// pictures would come from the future, or too late to be awaited.
+/// A small error of a clock cannot be distinguished from the transfer time of a picture. With a large error, pictures would seem to come
+/// from the future, or would arrive too late to be awaited.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
     least: Least,

@@ -30,9 +30,9 @@ pub(super) struct Taken {
     pub at_nanos: u64,
     /// Time at which the picture arrived.
     pub arrived_at_nanos: u64,
-    /// Number of pictures before this one that the camera lost.
+    /// Number of pictures before this picture that the camera lost.
     pub n_lost: u64,
-    /// Number of pictures before this one that were lost because this process was slow and no buffer was free.
+    /// Number of pictures before this picture that were lost because this process was slow and no buffer was free.
     pub n_overtaken: u64,
     /// True if the pixels are valid.
     pub is_whole: bool,

@@ -7,10 +7,10 @@ use recording::{Buffer, Kind};
 
 use super::table::{Part, Picture, Table};
 
-/// Returns the bytes of a head and of the following pictures, up to the end of the connection. The pictures begin with the last one before
-/// `first` that does not depend on another picture.
+/// Returns the bytes of a head and of the following pictures, up to the end of the connection. The pictures begin with the last picture
+/// before `first` that does not depend on another picture.
 ///
-/// After a gap or a damaged message, pictures are left out up to the next one that does not depend on another picture.
+/// After a gap or a damaged message, pictures are left out up to the next picture that does not depend on another picture.
 pub(super) fn from(
     file: &Path,
     table: &Table,
@@ -58,7 +58,7 @@ enum State {
 impl State {
     /// Returns the state after a piece.
     ///
-    /// * `is_next`: true if the piece directly follows the previous one.
+    /// * `is_next`: true if the piece directly follows the previous piece.
     /// * `is_read`: true if the piece is not damaged.
     fn after(self, format: [u8; 4], is_next: bool, is_read: bool) -> Self {
         match (self, &format) {

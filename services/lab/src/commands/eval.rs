@@ -383,7 +383,7 @@ fn consistency_file(config: &Config) -> Option<&PathBuf> {
     config.consistency.as_ref().map(Consistency::file)
 }
 
-/// Reads the `[paper]` settings from a file; the defaults if there is none.
+/// Reads the `[paper]` settings from a file; returns the defaults if there is no file.
 fn paper_section(file: Option<&Path>) -> Result<Config, Failure> {
     let Some(file) = file else {
         return Ok(Config::default());

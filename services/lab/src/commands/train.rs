@@ -111,7 +111,7 @@ pub(crate) struct Arguments {
     /// Folder of images without people, to count false alarms after the training. If not given, the negatives.
     #[arg(long, value_name = "DIR")]
     judge: Option<PathBuf>,
-    /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.
+    /// Continue from the checkpoint of an interrupted training. If there is no checkpoint, start from the beginning.
     #[arg(long)]
     resume: bool,
     /// Print events and the summary as JSON, one object per line.

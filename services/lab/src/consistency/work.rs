@@ -307,7 +307,7 @@ fn smallest(errors: &[(Option<f64>, f64)]) -> Option<f64> {
     errors.iter().min_by(|a, b| a.1.total_cmp(&b.1))?.0
 }
 
-/// Returns the index of the largest value; of the first if several are equal or no value is known.
+/// Returns the index of the largest value. If several values are equal or no value is known, returns the first index.
 fn largest(values: impl Iterator<Item = Option<f64>>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
     for (nth, value) in values.enumerate() {

@@ -1,4 +1,5 @@
-//! Disturbances as in real rooms, added on purpose: part of a person is covered, a camera is rotated, a view shows another person.
+//! Disturbances that occur in real rooms, added on purpose: part of a person is covered, a camera is rotated, or a view shows another
+//! person.
 
 use core::fmt;
 use core::str::FromStr;

@@ -5,7 +5,8 @@ use statistics::score::Bootstrap;
 
 use crate::evaluation::{Combining, FrameScore, Measured, Summary, Terms, Version, summarise};
 
-/// Returns the results of three versions, each better than the previous one, on two boxing subjects of `HumanEva` with five frames each.
+/// Returns the results of three versions, each better than the previous version, on two boxing subjects of `HumanEva` with five frames
+/// each.
 pub(crate) fn made_up() -> (Summary, Vec<Version>) {
     let geometry = |combining| Version {
         terms: Terms::Geometry,

@@ -74,7 +74,7 @@ pub fn part_errors(
     Some(errors)
 }
 
-/// Returns the same as [`part_errors`], and whether left and right are exchanged.
+/// Returns the errors like [`part_errors`], and true if left and right are exchanged.
 pub fn part_errors_and_facing(
     centres: &[[f64; 2]],
     joints: &[[f64; 2]],

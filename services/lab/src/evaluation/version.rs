@@ -68,7 +68,7 @@ const COMBINING: [(Combining, &str, &str); 4] = [
 ];
 
 impl Version {
-    /// The baseline: every view alone.
+    /// The baseline, in which every view is solved alone.
     pub const SINGLE: Self = Self {
         terms: Terms::Single,
         combining: Combining::Pairs,

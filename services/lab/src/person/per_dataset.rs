@@ -7,7 +7,7 @@ use failure::{ExitKind, Failure};
 /// Data sets that the value of an option is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Whose<'a> {
-    /// All data sets; the value names none.
+    /// All data sets, because the value does not name one.
     All(&'a str),
     /// Index of the data set, and the value for it.
     One(usize, &'a str),

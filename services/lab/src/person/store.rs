@@ -136,7 +136,7 @@ impl Store {
         (state.n_done, state.n_steps) = (n_done, n_steps);
     }
 
-    /// Writes the checkpoint completely, or keeps the previous one.
+    /// Writes the checkpoint completely, or keeps the previous checkpoint.
     ///
     /// # Errors
     ///
@@ -174,7 +174,7 @@ impl Store {
         })
     }
 
-    /// Waits until the current file is written, and returns the failure for a stopped training. Its hint says how to
+    /// Waits until the current file is written, and returns the failure for a stopped training. The hint of the failure explains how to
     /// continue.
     pub fn interrupted(&self) -> Failure {
         let state = self.lock();

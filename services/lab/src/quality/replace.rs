@@ -4,7 +4,7 @@ use std::path::Path;
 
 use failure::{ExitKind, Failure};
 
-/// Writes a file completely, or keeps the previous one.
+/// Writes a file completely, or keeps the previous file.
 pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     files::replace(path, bytes).map_err(|error| {
         let message = format!("cannot write {}: {error}", path.display());

@@ -68,7 +68,7 @@ pub fn everybody(truth: &[Frame], lines: &[FrameLine], rate_hz: f64) -> Everybod
     tally.sum_up(rate_hz)
 }
 
-/// Counts over the frames so far.
+/// Counts over all frames so far.
 #[derive(Default)]
 struct Tally {
     score: Score,

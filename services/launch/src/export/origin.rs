@@ -19,10 +19,10 @@ use crate::resolved::Resolved;
 /// Choice of a run's trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Lines {
-    /// As found by the run.
+    /// The trajectories as the run found them.
     #[default]
     Raw,
-    /// As smoothed by `parallax smooth`.
+    /// The trajectories as `parallax smooth` has smoothed them.
     Smooth,
 }
 

@@ -73,7 +73,7 @@ pub(crate) struct Arguments {
     /// Frames of the footage per second, if the run has no frame rate.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// Upward direction in the world of the rig, for example 0,0,1, in place of the one in the calibration.
+    /// Upward direction in the world of the rig, for example 0,0,1, in place of the direction in the calibration.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = up)]
     up: Option<UnitVector3<f64>>,
     /// Replace existing files.
@@ -87,7 +87,7 @@ pub(crate) struct Arguments {
 /// Choice of trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Trajectories {
-    /// As found by the run.
+    /// The trajectories as the run found them.
     Raw,
     /// Smoothed: pose3d-smooth.jsonl.
     Smooth,

@@ -57,7 +57,7 @@ pub(crate) struct Arguments {
     /// Frames per second, in place of the times in the file.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
-    /// Upward direction in the world of the run, in place of the one in its calibration.
+    /// Upward direction in the world of the run, in place of the direction in its calibration.
     #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
     /// Print JSON.

@@ -1,4 +1,4 @@
-//! Tests of notices before a run begins, and of the origin of data.
+//! Tests of the notices that are shown before a run begins, and of the reported origin of data.
 
 use std::fs;
 use std::path::Path;

@@ -6,7 +6,7 @@ use recording::Envelope;
 /// Speed of a replay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pace {
-    /// As fast as messages can be read and received.
+    /// The highest speed at which messages can be read and received.
     Max,
     /// A multiple of the recorded speed, above 0.
     Times(f64),

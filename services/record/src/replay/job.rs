@@ -10,7 +10,7 @@ use crate::replay::Pace;
 pub struct Job {
     /// Path of the recording.
     pub file: PathBuf,
-    /// The topics that the replaced process publishes. The first one determines the end of the stream.
+    /// The topics that the replaced process publishes. The first topic determines the end of the stream.
     pub outputs: Vec<Output>,
     /// Replay speed.
     pub pace: Pace,
@@ -25,6 +25,6 @@ pub struct Job {
 pub struct Output {
     /// Name of the topic.
     pub topic: String,
-    /// Number of processes that subscribe to the topic. If there are none, nothing is sent on it.
+    /// Number of processes that subscribe to the topic. If there are no such processes, nothing is sent on the topic.
     pub n_receivers: usize,
 }

@@ -29,7 +29,7 @@ pub struct Gpu {
     pub sizes: Vec<[usize; 2]>,
     /// Numbers of views that are searched at the same time.
     pub views: Vec<usize>,
-    /// Frame rates, hertz; 0 for as fast as possible.
+    /// Frame rates, in hertz; 0 for as fast as possible.
     pub rates_hz: Vec<f64>,
     /// Number of frames for each row of the table.
     pub frames: usize,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 /// Options of a load benchmark.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The deployment file; synthetic cameras if there is none.
+    /// The deployment file; if `None`, synthetic cameras are used.
     pub deployment: Option<PathBuf>,
     /// Number of cameras, from the first in the deployment file; by default all. The default for synthetic cameras is 4.
     pub views: Option<usize>,

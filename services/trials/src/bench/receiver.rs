@@ -47,7 +47,7 @@ pub(super) struct ReceiverReport {
     pub received: u64,
     /// Number of messages with wrong content.
     pub broken: u64,
-    /// Time from just before sending to just after receiving, microseconds.
+    /// Time from just before sending to just after receiving, in microseconds.
     pub hop_us: Option<Spread>,
     /// Locations of the first messages.
     pub spots: Vec<Spot>,

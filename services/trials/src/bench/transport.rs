@@ -20,7 +20,7 @@ use crate::trial::limit;
 pub struct Transport {
     /// Messages per series.
     pub messages: u64,
-    /// Interval between messages, microseconds.
+    /// Interval between messages, in microseconds.
     pub interval_us: u64,
     /// Sizes of messages, bytes, at least 16; one series for each size.
     pub bytes: Vec<usize>,
@@ -30,9 +30,9 @@ pub struct Transport {
     pub cores: Vec<usize>,
     /// Real-time priority of both processes, 1 to 99.
     pub priority: Option<u8>,
-    /// The largest median of a hop with a receiver that is woken by an event, microseconds.
+    /// The largest median of a hop with a receiver that is woken by an event, in microseconds.
     pub max_event_us: Option<f64>,
-    /// The largest median of a hop with a polling receiver, microseconds.
+    /// The largest median of a hop with a polling receiver, in microseconds.
     pub max_polled_us: Option<f64>,
     /// The name of the deployment, unique among those that run at the same time.
     pub name: String,

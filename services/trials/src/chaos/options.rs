@@ -7,7 +7,7 @@ use super::scenario::Scenario;
 /// Options of a fault-injection trial.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Deployment file; four synthetic cameras if `None`.
+    /// Deployment file; if `None`, four synthetic cameras are used.
     pub deployment: Option<PathBuf>,
     /// Scenarios to run; if empty, all that are possible with the processes of the deployment.
     pub scenarios: Vec<Scenario>,

@@ -16,7 +16,7 @@ use crate::spread::Spread;
 
 /// Share of the frames after which no process is killed.
 const UNTIL: f64 = 0.8;
-/// Time between two kills, nanoseconds.
+/// Time between two kills, in nanoseconds.
 const PERIOD: u64 = 2_000_000_000;
 
 /// Runs the deployment, kills processes, and checks the limits.

@@ -14,7 +14,7 @@ use crate::trial::results::FrameResult;
 #[derive(Debug)]
 pub(super) struct RandomKills {
     random: Rng,
-    /// Time between two kills, nanoseconds.
+    /// Time between two kills, in nanoseconds.
     period: u64,
     /// Frame whose result ends the kills.
     until_frame: u64,
@@ -57,7 +57,7 @@ impl Kill {
 }
 
 impl RandomKills {
-    /// * `period`: the time between two kills, nanoseconds.
+    /// * `period`: the time between two kills, in nanoseconds.
     /// * `until_frame`: frame whose result ends the kills, so that all processes have time to come back.
     pub(super) fn new(seed: u64, period: u64, until_frame: u64) -> Self {
         Self {
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2099), None);
         let first = health_at(&mut random_kills, "pose-0", 0, 1, 2100).unwrap();
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2200), None);
-        // The other process is killed, because the first one is not back.
+        // The other process is killed, because the first process is not back.
         let second = handle_at(
             &mut random_kills,
             &Event::Line {

@@ -15,7 +15,7 @@ use supervise::Event;
 
 use crate::trial::injection::has_worked;
 
-/// Time between two samples, nanoseconds.
+/// Time between two samples, in nanoseconds.
 const PERIOD: u64 = 1_000_000_000;
 /// Smallest number of samples from which growth is computed.
 const MIN_SAMPLES: usize = 9;
@@ -163,7 +163,7 @@ fn age_class(nanos: u64) -> u32 {
     (nanos / 1_000_000_000).checked_ilog2().map_or(0, |exponent| exponent + 1)
 }
 
-/// Returns the memory of all processes in two parts of a run, in bytes. For each process, it is the mean over the age classes that the
+/// Returns the memory of all processes in two parts of a run, in bytes. The memory of a process is the mean over the age classes that the
 /// process had in both parts, with the median of each class. A process without a common age class is left out.
 fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
     let n_processes = parts.iter().flat_map(|part| part.iter());

@@ -113,7 +113,7 @@ impl Scenario {
                     && processes.iter().filter(|process| service_of(process) == "capture").count()
                         > 3
             }
-            // With fewer than four cameras the moved one cannot be identified.
+            // With fewer than four cameras, the moved camera cannot be identified.
             Self::Moved => {
                 processes.iter().filter(|process| service_of(process) == "capture").count() > 3
             }

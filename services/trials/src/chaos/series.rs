@@ -28,7 +28,7 @@ pub(super) struct Part {
 
 /// Divides a run into parts.
 ///
-/// * `length`: the length of a part, nanoseconds; the last part may be shorter.
+/// * `length`: the length of a part, in nanoseconds; the last part may be shorter.
 /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
 pub(super) fn parts(
     length: u64,

@@ -16,7 +16,7 @@ use super::testbed::Testbed;
 use super::verdict::{Verdict, ms};
 use crate::trial::limit::{at_least, at_most};
 
-/// Duration of the stop, nanoseconds.
+/// Duration of the stop, in nanoseconds.
 const STALL_NANOS: u64 = 3_000_000_000;
 /// Settings with which the supervisor does not treat the stopped process as hung.
 const NO_HANG_DETECTION: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];

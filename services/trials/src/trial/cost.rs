@@ -136,7 +136,7 @@ mod tests {
     use super::super::results::ViewResult;
     use super::*;
 
-    /// Returns a result sent at a time, with the epoch of all its processes; without an epoch, the view is missing.
+    /// Returns a result that was sent at a given time, and whose processes all have the given epoch. Without an epoch, the view is missing.
     fn moment(frame: u64, sent_ms: f64, epoch: Option<u32>) -> FrameResult {
         let camera = epoch.map(|epoch| CameraTimes {
             epoch,

@@ -134,7 +134,7 @@ impl Folder {
         Ok(moment)
     }
 
-    /// Returns the picture of the frame, or the last one before it.
+    /// Returns the picture of the frame, or the last picture before it.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         let (folder, frames) = self.pictures.get(view)?;
         let before = frames.partition_point(|number| *number <= frame);

@@ -112,7 +112,7 @@ impl Tape {
         Ok(moment)
     }
 
-    /// Returns the picture of the frame, or the last one before it.
+    /// Returns the picture of the frame, or the last picture before it.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
         let (frame, entry) = self.pictures.get(view)?.range(..=frame).next_back()?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);

@@ -92,7 +92,7 @@ impl Events {
         }
     }
 
-    /// Processes the state of all processes. Reports processes that have died, are back or are silent, and losses.
+    /// Compares the state of all processes with the last check. Reports processes that have died, are back or are silent, and losses.
     pub(crate) fn processes(&mut self, board: &Board, snapshot: &Snapshot) {
         for process in &snapshot.processes {
             let name = &process.name;

@@ -29,7 +29,7 @@ pub(super) struct Learning {
     /// Library for the computation: `built-in`, or `libtorch` if this executable was built with it.
     #[arg(long, value_name = "NAME", default_value = "built-in", value_parser = ["built-in", "libtorch"])]
     backend: String,
-    /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.
+    /// Continue from the checkpoint of an interrupted training. If there is no checkpoint, start from the beginning.
     #[arg(long)]
     pub(super) resume: bool,
     /// Print the steps as JSON, one object per line.

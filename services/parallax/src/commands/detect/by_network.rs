@@ -208,7 +208,7 @@ impl Detector<'_> {
 }
 
 impl Person {
-    /// If there is only one box, replaces it by one that fits the person better, as a deployment does.
+    /// If there is only one box, replaces it by a box that fits the person better, as a deployment does.
     fn seen_closer(
         eyes: &Eyes,
         picture: &Picture,

@@ -97,7 +97,7 @@ impl<'t> Page<'t> {
         }
     }
 
-    /// Returns the escape sequences that draw this page over the previous one.
+    /// Returns the escape sequences that draw this page over the previous page.
     fn escaped(&self, size: Size) -> String {
         const DIM: &str = "2";
         let empty = self.len - self.lines.len();

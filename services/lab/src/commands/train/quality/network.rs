@@ -77,7 +77,7 @@ pub(crate) struct Arguments {
     /// Identity stored in the file. If not given, the file's name.
     #[arg(long, value_name = "TEXT")]
     identity: Option<String>,
-    /// Continue from the checkpoint of an interrupted training; start from the beginning if there is none.
+    /// Continue from the checkpoint of an interrupted training. If there is no checkpoint, start from the beginning.
     #[arg(long)]
     resume: bool,
     /// Print events and the summary as JSON, one object per line.
