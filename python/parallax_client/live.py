@@ -211,7 +211,8 @@ class Client:
     def picture(self, camera, patience=1.0):
         """Returns the newest picture of a camera in the sender's memory, for use in a `with` statement.
 
-        Returns None if there is no picture in time. Do not hold the picture for long: only one picture of each camera can be held at a time.
+        Returns None if there is no picture in time. Do not hold the picture for long: only one picture of each camera can be
+        held at a time.
         """
         port = self._in_place("frame", camera)
         return self._newest(port, lambda it: Picture(it.message, it.array, it), patience)

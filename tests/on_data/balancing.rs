@@ -1,4 +1,4 @@
-//! Four real cameras around a balancing person: the effect of uprighting, facing and candidates.
+//! Four real cameras around a balancing person: the effects of upright frames, of the facing direction, and of several candidates.
 //!
 //! Prints the table of errors against the markerless reference, and checks the figures reached so far.
 
@@ -18,8 +18,9 @@ use viewquality::orientation::{Detector, Network};
 use crate::shared_dir;
 
 pub(crate) const SIZE: [u32; 2] = [272, 480];
-/// Frames with an upright trunk. `BENT` are frames in which the person is mostly bent over.
+/// Frames with an upright trunk.
 const UPRIGHT: [usize; 5] = [0, 5, 10, 15, 20];
+/// Frames in which the person is mostly bent over.
 const BENT: [usize; 7] = [5, 15, 25, 35, 45, 55, 65];
 /// If the torso of a view's pose is further than this from the torso of the reference, in pixels, the pose is on a wrong object.
 const WRONG_PX: f64 = 40.0;

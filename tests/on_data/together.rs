@@ -32,8 +32,9 @@ const JOINTS: [Option<usize>; N_JOINTS] = [
 ];
 const HIPS: [usize; 2] = [2, 3];
 const NECK: usize = 12;
-/// Side of the square in which the people are, in metres. `APART_M` is the smallest distance between people.
+/// Side of the square in which the people are, in metres.
 const SQUARE_M: f64 = 3.6;
+/// Smallest distance between people, in metres.
 const APART_M: f64 = 0.45;
 /// Distance from the middle line of a trunk within which the trunk hides joints behind it, in metres.
 const TRUNK_M: f64 = 0.15;

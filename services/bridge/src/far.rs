@@ -21,11 +21,13 @@ use crate::topics::Topics;
 
 /// Interval at which the host introduces itself, because the other host may have been restarted.
 const HELLO_EVERY: Duration = Duration::from_millis(500);
-/// Interval at which the end of a stream is sent until it is acknowledged. `END_PATIENCE` is the longest time for which it is sent.
+/// Interval at which the end of a stream is sent until it is acknowledged.
 const END_EVERY: Duration = Duration::from_millis(300);
+/// Longest time for which the end of a stream is sent.
 const END_PATIENCE: Duration = Duration::from_secs(15);
-/// Longest sleep while a message waits for an acknowledgement. `LONG` is the longest sleep otherwise.
+/// Longest sleep while a message waits for an acknowledgement.
 const SHORT: Duration = Duration::from_millis(2);
+/// Longest sleep if no message waits for an acknowledgement.
 const LONG: Duration = Duration::from_millis(20);
 /// Maximum number of acknowledgements that wait to be read.
 const MOST_ACKS: usize = 1024;

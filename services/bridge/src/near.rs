@@ -25,8 +25,9 @@ use publish::{Publisher, Times};
 use remote::Remote;
 use report::Report;
 
-/// Interval at which the clocks of the other hosts are queried at the beginning. `PING_EVERY` is the later interval.
+/// Interval at which the clocks of the other hosts are queried at the beginning.
 const PING_SOON: Duration = Duration::from_millis(100);
+/// Interval at which the clocks of the other hosts are queried later.
 const PING_EVERY: Duration = Duration::from_millis(500);
 const SOON: Duration = Duration::from_secs(10);
 /// Interval at which the state is written.

@@ -16,8 +16,9 @@ use crate::live::{Grid, LiveJob, Phase, Picture, Source};
 const PATIENCE_NANOS: u64 = 250_000_000;
 /// Longest wait for a picture, so that a stop request is noticed.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Number of pictures after which the rate of a camera is compared with that of the instants, and largest accepted difference.
+/// Number of pictures after which the rate of a camera is compared with the rate of the instants.
 const N_FOR_RATE: u64 = 100;
+/// Largest accepted difference between these rates, as a share.
 const RATE_TOLERANCE: f64 = 0.02;
 
 /// Sends the pictures of a live camera to their topic.

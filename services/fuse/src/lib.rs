@@ -1,5 +1,5 @@
-//! Fuses the candidates of all views. For people found by networks, sends the identities of people; by the paper's method, the poses of
-//! camera pairs.
+//! Fuses the candidates of all views. If networks find the people, sends the identities of people. With the paper's method, sends the poses
+//! of camera pairs.
 #![forbid(unsafe_code)]
 
 mod input;

@@ -10,8 +10,9 @@ use training::datasets::{People, Person, Picture, Sides};
 
 use crate::judged::{go_on, pictures, truth};
 
-/// Index of the neck in `skeleton::PARSE14`; `HEAD` is the index of the top of the head.
+/// Index of the neck in `skeleton::PARSE14`.
 const NECK: usize = 12;
+/// Index of the top of the head in `skeleton::PARSE14`.
 const HEAD: usize = 13;
 
 /// A network, and the method to find its boxes.

@@ -47,7 +47,7 @@ pub(crate) struct Found {
 ///
 /// # Errors
 ///
-/// Fails if these cannot be read, or there are more keypoints than fit into a message.
+/// Fails if a card or the names cannot be read, or there are more keypoints than fit into a message.
 pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
     let Found {
         mut extra,

@@ -166,7 +166,7 @@ impl Report {
         suspected.map(|(camera, _)| camera.clone()).collect()
     }
 
-    /// Returns the cameras whose pictures were taken at other times than they state.
+    /// Returns the cameras whose pictures were not taken at their stated times.
     pub fn out_of_step(&self) -> impl Iterator<Item = (&String, &CameraFit)> {
         let summary = self.recorded.summary().into_iter();
         let fits = summary.flat_map(|summary| &summary.calibration);

@@ -1,4 +1,4 @@
-//! Tests of benchmarks with real processes: their reports, their exit codes, and that pixels are never copied.
+//! Tests of benchmarks with real processes. They check the reports and the exit codes, and that pixels are never copied.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;

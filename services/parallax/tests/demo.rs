@@ -167,7 +167,7 @@ mod long {
             json!([]),
             "no process was killed"
         );
-        // The machine is measured before and after; the slower result is reported, with the resulting frame rate.
+        // The machine is measured before and after the run. The slower result is reported, with the resulting frame rate.
         let machine = &report["machine"];
         let [frame_ms, rate_hz, slowness] =
             ["frame_ms", "rate_hz", "slowness"].map(|key| machine[key].as_f64().unwrap());

@@ -23,8 +23,8 @@ pub struct FolderError {
 
 /// A folder whose files are replaced as a whole.
 ///
-/// A file `x` is written as `x.part`, and renamed at the end. So the result of an earlier run is kept until the new one is complete,
-/// and the name of an unfinished file shows its state.
+/// A file `x` is written as `x.part`, and renamed at the end. Therefore, the result of an earlier run is kept until the new result is
+/// complete, and the name of an unfinished file shows its state.
 #[derive(Debug)]
 pub struct Folder {
     dir: files::Folder,

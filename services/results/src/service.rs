@@ -18,8 +18,9 @@ use crate::job::Job;
 use crate::writer::Writer;
 use crate::{Folder, FrameRecord, Picture};
 
-/// Maximum wait for expected errors that were used, and interval between checks.
+/// Maximum wait for expected errors that fusion has used.
 const AWAITED: Duration = Duration::from_secs(2);
+/// Interval between checks during this wait.
 const AWAIT_PAUSE: Duration = Duration::from_micros(500);
 
 /// Writes all messages until the footage ends or a stop is requested.

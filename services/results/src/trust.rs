@@ -9,11 +9,13 @@ use runfiles::{Doubt, Trust};
 use crate::height::height_px;
 use crate::pose3d::is_placed;
 
-/// Step in which lengths of bones are counted, in metres, and the longest length.
+/// Step in which lengths of bones are counted, in metres.
 const LENGTH_STEP_M: f64 = 0.001;
+/// Longest length of a bone that is counted, in metres.
 const LONGEST_M: f64 = 1.0;
-/// Maximum movement of the middle of a body between two results, in metres, and in metres per second.
+/// Maximum movement of the middle of a body between two results, in metres.
 const FARTHEST_M: f64 = 0.5;
+/// Maximum speed of the middle of a body between two results, in metres per second.
 const FASTEST_M_S: f64 = 6.0;
 /// Ratio of the standard deviation to the median absolute deviation, for normally distributed errors.
 const SD_PER_MAD: f64 = 1.4826;

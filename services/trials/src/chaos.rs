@@ -90,7 +90,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     }))
 }
 
-/// Returns the requested scenarios; if none are requested, all that are possible with the processes of the deployment.
+/// Returns the requested scenarios; if none are requested, all scenarios that are possible with the processes of the deployment.
 fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Failure> {
     if requested.is_empty() {
         let mut all = Scenario::all();

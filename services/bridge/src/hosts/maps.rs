@@ -4,8 +4,9 @@
 //! between cells (two `f64` each), and the numbers of columns, rows and Gaussians (`u32` each). Each Gaussian has its joint (`u32`),
 //! position, height and precision (six `f32`).
 
-/// Number of bytes per person, and per Gaussian.
+/// Number of bytes per person.
 const PERSON: usize = 44;
+/// Number of bytes per Gaussian.
 const EACH: usize = 28;
 /// Maximum number of Gaussians in a message.
 pub const MOST_GAUSSIANS: usize = 1024;

@@ -7,8 +7,9 @@ use messages::Status;
 /// Distance beyond half a period that a picture may have from its instant, in periods. With this tolerance, pictures that jitter around the
 /// middle between two instants stay with the same instant.
 const SLACK: f64 = 0.1;
-/// Number of intervals whose median is the period of a camera, and number of intervals that are needed.
+/// Number of intervals whose median is the period of a camera.
 const N_INTERVALS: usize = 15;
+/// Minimum number of intervals that are needed for the period.
 const LEAST_INTERVALS: usize = 5;
 /// Largest accepted difference between a camera's clock and this machine's clock, in nanoseconds.
 const MAX_OFF_NANOS: u64 = 2_000_000_000;

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-/// Number of pictures whose median is one measurement, time for which measurements are used in nanoseconds, and maximum number of
-/// measurements.
+/// Number of pictures whose median is one measurement.
 const N_PICTURES: usize = 15;
+/// Time for which measurements are used, in nanoseconds.
 const WINDOW_NANOS: u64 = 60_000_000_000;
 const MOST_MEASUREMENTS: usize = 240;
 /// Minimum time for which a camera must have been measured before its drift is reported, in nanoseconds.
@@ -39,7 +39,7 @@ impl Phase {
         }
     }
 
-    /// Starts again if the times of the following pictures are from another clock than before.
+    /// Starts again if the times of the following pictures are from a different clock than before.
     ///
     /// * `is_own_time`: true if the times are from the camera's own clock.
     pub(crate) fn by_clock(&mut self, is_own_time: bool) {

@@ -20,8 +20,9 @@ const N_WAITING: usize = 4;
 const LEAST_FOR_RATE: u64 = 30;
 /// Time without a picture after which a decoder is ended, if it has no limit of its own or does not keep to it.
 const LONGEST_SILENCE: Duration = Duration::from_secs(15);
-/// First pause before a camera is opened again, and longest pause after further failures.
+/// First pause before a camera is opened again.
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
+/// Longest pause after further failures.
 const LONGEST_PAUSE: Duration = Duration::from_secs(8);
 
 /// A picture that waits to be used.

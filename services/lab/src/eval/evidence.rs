@@ -17,7 +17,7 @@ use training::datasets::sequences::{Frame, Sequence};
 
 use super::as_run::{self, AsRun};
 
-/// Error of a segment's ends above which the segment is not found, as a share of its length (eq. 13 of the paper).
+/// Largest error of a segment's ends at which the segment counts as found, as a share of its length (eq. 13 of the paper).
 const GAMMA: f64 = 0.5;
 /// Largest error of a joint, in metres; a missing joint has this error.
 const MOST_M: f64 = 2.0;

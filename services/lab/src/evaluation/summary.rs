@@ -11,8 +11,9 @@ const PCK_M: f64 = 0.15;
 const GAMMA: f64 = 0.5;
 /// Number of thresholds in the curves: from 0 in steps of 0.05.
 const N_GAMMAS: usize = 21;
-/// Range of the histogram of changes in both directions, in pixels. `N_BINS` is the number of its bins.
+/// Range of the histogram of changes in both directions, in pixels.
 const REACH_PX: f64 = 50.0;
+/// Number of bins of the histogram of changes.
 const N_BINS: usize = 40;
 /// Change below which a joint counts as unchanged, in pixels.
 const SAME_PX: f64 = 1.0;

@@ -35,8 +35,9 @@ const MIN_TRUNK_PX: f64 = 10.0;
 const MAX_LEAN: f64 = 0.35;
 /// Margin of the box around the parts, in trunk lengths, as in a search.
 const MARGIN: f64 = 0.25;
-/// Width of the shoulders of a person seen from the front, in trunk lengths. `HIPS` is the width of the hips.
+/// Width of the shoulders of a person seen from the front, in trunk lengths.
 const SHOULDERS: f64 = 0.62;
+/// Width of the hips of a person seen from the front, in trunk lengths.
 const HIPS: f64 = 0.38;
 /// Sum of the bends of knees and elbows and the head's lean for a person seen from the side, in trunk lengths.
 const BEND: f64 = 0.35;

@@ -1,4 +1,4 @@
-//! Options whose values can be for one of several data sets: `--only PARSE=1-100`.
+//! Options whose values can apply to one of several data sets: `--only PARSE=1-100`.
 
 use std::path::{Path, PathBuf};
 

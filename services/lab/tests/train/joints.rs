@@ -14,7 +14,7 @@ const KNEES: [[usize; 2]; 2] = [[1, 2], [4, 3]];
 const BEYOND: f64 = 0.25;
 
 impl Drawn {
-    /// Trains a model, and draws people to learn joints from and other people, whose knees are marked too low.
+    /// Trains a model. Draws people from whom joints are learned, and other people. The knees of all of them are marked too low.
     fn with_low_knees() -> Self {
         let drawn = Self::new(14);
         assert_ended(&drawn.train("m.fmp", &[]).wait(), 0, &[]);

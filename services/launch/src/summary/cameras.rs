@@ -34,7 +34,7 @@ pub(super) fn contradicted(contradicted: &Contradicted) -> String {
     )
 }
 
-/// Returns the text about a camera whose pictures were taken at other times than they state.
+/// Returns the text about a camera whose pictures were not taken at their stated times.
 pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     let [offset, error] = [fit.offset_ms, fit.offset_error_ms].map(|ms| ms.unwrap_or(f64::NAN));
     let how = if offset < 0.0 { "before" } else { "after" };

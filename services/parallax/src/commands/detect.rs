@@ -132,7 +132,7 @@ pub(crate) struct Arguments {
     /// Also show the network the mirror image of every person, and use the mean. This is more accurate, but takes twice as long.
     #[arg(long)]
     mirror: bool,
-    /// Detector of people (.onnx) that finds the boxes, in place of the shipped one.
+    /// Detector of people (.onnx) that finds the boxes, in place of the shipped detector.
     #[arg(long, value_name = "FILE", conflicts_with = "outline")]
     detector: Option<PathBuf>,
     /// Card of the detector. If not given, the file beside the detector with the ending .toml, or the detector's entry `parallax.card`.

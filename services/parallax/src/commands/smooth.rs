@@ -125,7 +125,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
 }
 
-/// Returns the default settings, with the values of the command line in their place.
+/// Returns the settings: the values of the command line, or otherwise the defaults.
 fn settings(arguments: &Arguments) -> Settings {
     let defaults = Settings::default();
     Settings {

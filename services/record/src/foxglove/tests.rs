@@ -1,4 +1,4 @@
-//! Checks the Foxglove messages against their schemas, with nobody, one person and two people.
+//! Checks the Foxglove messages against their schemas, for frames with nobody, one person and two people.
 
 use bytemuck::bytes_of;
 use geometry::{Intrinsics, Lens};

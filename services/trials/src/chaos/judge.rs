@@ -17,7 +17,7 @@ const LATE_MS: f64 = 1000.0;
 /// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
 /// not count.
 const MAX_UNACCOUNTED: u64 = 2;
-/// Factor by which a resource may grow. `MORE_BYTES` and `MORE_FILES` are added.
+/// Factor by which a resource may grow, in addition to the following amounts.
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
@@ -165,7 +165,7 @@ pub(super) fn random(
 /// Measurements of a run whose supervisor was killed, and of the next run.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SupervisorKillOutcome {
-    /// Time from the kill until the last process of the run had ended, in milliseconds; `None` if some did not end.
+    /// Time from the kill until the last process of the run had ended, in milliseconds; `None` if some processes did not end.
     pub ended_ms: Option<f64>,
     /// Number of files left for the next run to remove.
     pub files: u64,

@@ -9,7 +9,7 @@ use super::scenario::Scenario;
 pub struct Options {
     /// Deployment file; if `None`, four synthetic cameras are used.
     pub deployment: Option<PathBuf>,
-    /// Scenarios to run; if empty, all that are possible with the processes of the deployment.
+    /// Scenarios to run; if empty, all scenarios that are possible with the processes of the deployment.
     pub scenarios: Vec<Scenario>,
     /// Seed for the choice of processes and cameras, and for the synthetic scene.
     pub seed: u64,

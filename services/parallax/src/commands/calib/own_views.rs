@@ -24,7 +24,7 @@ pub(super) struct Agreement {
 ///
 /// # Errors
 ///
-/// Fails if the file cannot be read, or in no frame two views found a person independently of each other.
+/// Fails if the file cannot be read, or if it has no frame in which two views found a person independently of each other.
 pub(super) fn agreement(rig: &Rig, file: &Path) -> Result<Agreement, Failure> {
     let frames = frames(rig, file)?;
     let n_seen = |views: &&Vec<Option<Points>>| views.iter().flatten().count();
