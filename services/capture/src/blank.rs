@@ -10,10 +10,11 @@ use crate::info::FeedInfo;
 const SCHEME: &str = "blank://";
 /// Brightness of all pixels.
 const GREY: u8 = 128;
-/// Limits: longest side in pixels, number of frames, and lowest and highest frame rate per second. `[capture]` in a deployment has the same
-/// limits.
+/// Longest side of a frame, in pixels. `[capture]` in a deployment has the same limits as these constants.
 const MAX_SIDE: usize = 16_384;
+/// Maximum number of frames.
 const MOST_FRAMES: u64 = 1_000_000_000_000;
+/// Lowest and highest frame rate, per second.
 const RATES_HZ: [f64; 2] = [0.001, 1e5];
 
 /// Grey footage, such as `blank://1920x1080?frames=70&rate=60`.

@@ -18,7 +18,7 @@ const PATIENCE_NANOS: u64 = 250_000_000;
 const PAUSE: Duration = Duration::from_millis(20);
 /// Number of pictures after which the rate of a camera is compared with the rate of the instants.
 const N_FOR_RATE: u64 = 100;
-/// Largest accepted difference between these rates, as a share.
+/// Largest accepted difference between the rate of a camera and the rate of the instants, as a share.
 const RATE_TOLERANCE: f64 = 0.02;
 
 /// Sends the pictures of a live camera to their topic.

@@ -22,9 +22,9 @@ impl FindEvery {
     /// * `rate_hz`: rate of the frames that are searched. It is not known for pictures in a folder, which may have been taken at any time.
     ///   Nobody is followed in such pictures.
     pub(crate) fn new(config: &Config, rate_hz: Option<f64>) -> Self {
-        /// Interval while one person is seen. How fast people come and go depends on time, not on frames.
+        /// Interval while one person is seen, in seconds. How fast people come and go depends on time, not on frames.
         const SECONDS: f64 = 0.5;
-        /// Interval while several people are seen.
+        /// Interval while several people are seen, in seconds.
         const SECONDS_OF_SEVERAL: f64 = 0.125;
         /// Minimum interval in frames. Shorter intervals are not needed, because the network follows the people that it sees.
         const OFTEN: f64 = 10.0;

@@ -20,7 +20,7 @@ use crate::{Folder, FrameRecord, Picture};
 
 /// Maximum wait for expected errors that fusion has used.
 const AWAITED: Duration = Duration::from_secs(2);
-/// Interval between checks during this wait.
+/// Interval between checks while expected errors are awaited.
 const AWAIT_PAUSE: Duration = Duration::from_micros(500);
 
 /// Writes all messages until the footage ends or a stop is requested.

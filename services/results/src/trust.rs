@@ -11,7 +11,7 @@ use crate::pose3d::is_placed;
 
 /// Step in which lengths of bones are counted, in metres.
 const LENGTH_STEP_M: f64 = 0.001;
-/// Longest length of a bone that is counted, in metres.
+/// Longest length that is distinguished, in metres. Longer bones count as this length.
 const LONGEST_M: f64 = 1.0;
 /// Maximum movement of the middle of a body between two results, in metres.
 const FARTHEST_M: f64 = 0.5;

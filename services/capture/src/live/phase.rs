@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 const N_PICTURES: usize = 15;
 /// Time for which measurements are used, in nanoseconds.
 const WINDOW_NANOS: u64 = 60_000_000_000;
+/// Maximum number of measurements.
 const MOST_MEASUREMENTS: usize = 240;
 /// Minimum time for which a camera must have been measured before its drift is reported, in nanoseconds.
 const LEAST_NANOS: u64 = 5_000_000_000;

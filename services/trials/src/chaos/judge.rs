@@ -17,7 +17,7 @@ const LATE_MS: f64 = 1000.0;
 /// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
 /// not count.
 const MAX_UNACCOUNTED: u64 = 2;
-/// Factor by which a resource may grow, in addition to the following amounts.
+/// Factor by which a resource may grow. A fixed amount is added.
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
