@@ -71,7 +71,7 @@ impl Evidence {
             }
             match ViewMaps::pack(header, sample.payload()) {
                 Ok(bytes) => self.newest = Some((header.stamp.frame, bytes)),
-                Err(error) => tracing::warn!(%error, "evidence that is not sent"),
+                Err(error) => tracing::warn!(%error, "the evidence of a frame cannot be sent"),
             }
         }
         if let Item::Message { envelope, maps, .. } = item
@@ -160,7 +160,7 @@ pub(crate) fn run(service: &Service, job: &Job, role: &Far) -> Result<(), Failur
 fn check(answer: &Mutex<Option<Answer>>) -> Result<(), Failure> {
     let answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(Answer::Refused(why)) = answer.as_ref() {
-        let message = format!("the host that fuses refuses this one: {}", listed(why));
+        let message = format!("the fusing host does not accept this host: {}", listed(why));
         return Err(Failure::new(ExitKind::Config, message));
     }
     Ok(())
@@ -246,7 +246,7 @@ fn listen(link: &Arc<Link>, job: &Job, origin: u64) -> Result<Listening, Failure
                 let _is_kept = sender.try_send((view, content, sequence)).is_ok();
             }
             Ok(_) => {}
-            Err(error) => tracing::debug!(%error, "from the host that fuses"),
+            Err(error) => tracing::debug!(%error, "a message from the fusing host cannot be read"),
         }
     };
     let subscribed = link.subscribe(&topics.down(host), on_signal);
@@ -255,7 +255,7 @@ fn listen(link: &Arc<Link>, job: &Job, origin: u64) -> Result<Listening, Failure
     let keep = Arc::clone(&answer);
     let on_answer = move |_: &str, bytes: &[u8]| match Answer::parse(bytes) {
         Ok(it) => *keep.lock().unwrap_or_else(PoisonError::into_inner) = Some(it),
-        Err(error) => tracing::debug!(%error, "from the host that fuses"),
+        Err(error) => tracing::debug!(%error, "a message from the fusing host cannot be read"),
     };
     let subscribed = link.subscribe(&topics.answer(host), on_answer);
     subscribed.or_fail(ExitKind::Run)?;
@@ -348,7 +348,7 @@ impl Sending<'_> {
                 match jpeg::encode(rgb, size, self.role.jpeg_quality) {
                     Ok(jpeg) => encoded = jpeg,
                     Err(error) => {
-                        tracing::warn!(%error, view = lane.view, "a frame without JPEG");
+                        tracing::warn!(%error, view = lane.view, "a frame cannot be encoded as JPEG");
                         self.service.health().dropped(Cause::Malformed, 1);
                         return;
                     }

@@ -26,7 +26,7 @@ pub enum JoinError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The files of this host differ from those of the fusing host.
-    #[error("the host that fuses refuses this one: {}", listed(.0))]
+    #[error("the fusing host does not accept this host: {}", listed(.0))]
     Refused(Vec<Difference>),
 }
 
@@ -85,7 +85,8 @@ pub fn join(
         if said.is_none_or(|said| said.elapsed() > SAY_EVERY) {
             if said.is_some() {
                 let what = if address.keys.is_some() {
-                    " (is it running and reachable, are its keys from the same authority, and does our certificate have the name of this host?)"
+                    "; check that it is running and reachable, that its keys come from the same authority, and that the certificate of \
+                     this host contains its name"
                 } else {
                     ""
                 };

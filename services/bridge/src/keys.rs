@@ -17,10 +17,10 @@ pub struct KeyFiles {
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
     /// A file is missing.
-    #[error("there is no {0}")]
+    #[error("{0} does not exist")]
     Missing(PathBuf),
     /// A key file already exists.
-    #[error("{0} exists and is not replaced, because hosts with the old keys would be refused")]
+    #[error("{0} already exists, and is not replaced: hosts with the old keys would no longer be accepted")]
     Exists(PathBuf),
     /// A file cannot be written.
     #[error("cannot write {file}")]

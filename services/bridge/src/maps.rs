@@ -9,7 +9,7 @@ use wire::WireError;
 
 const _: () = assert!(
     MAX_CANDIDATES * PARSE14.joints.len() * MOST_OF_A_JOINT <= MOST_GAUSSIANS,
-    "all that a view can have"
+    "the maps of a view must fit"
 );
 
 /// Properties of a view's maps.
@@ -37,11 +37,11 @@ pub(crate) enum Refused {
     Format(#[from] MapsError),
     #[error(transparent)]
     Wire(#[from] WireError),
-    #[error("{0} people")]
+    #[error("the message has {0} people, which is too many")]
     People(usize),
-    #[error("maps of {n} cells, at most {longest}")]
+    #[error("the maps have {n} cells, but at most {longest} are allowed")]
     Cells { n: usize, longest: usize },
-    #[error("Gaussian {nth} of the maps of person {person} has values that no Gaussian has")]
+    #[error("Gaussian {nth} of the maps of person {person} has invalid values")]
     Gaussian { person: usize, nth: usize },
 }
 

@@ -167,7 +167,7 @@ impl Receiving<'_> {
                 Ok(it) => self.publish(&it)?,
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
                 Err(RecvTimeoutError::Disconnected) => {
-                    let message = "no thread receives from the link any more";
+                    let message = "the threads that receive from the link have ended";
                     return Err(Failure::new(ExitKind::Run, message));
                 }
             }
@@ -205,7 +205,7 @@ impl Receiving<'_> {
         // The clock is not known yet, or the host gives a wrong time. Frames that have not begun are not given up because of this message.
         let soon = now_nanos().saturating_add(job.period_nanos as u64 + FUTURE);
         if instant > soon && arrived.head.status != Status::END {
-            remote.malformed(&"an instant in the future");
+            remote.malformed(&"the message has an instant in the future");
             return Ok(());
         }
         let grid = job.grid(service.session());

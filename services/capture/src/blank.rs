@@ -65,7 +65,7 @@ impl Blank {
             what: what.to_owned(),
         };
         let rest = address.strip_prefix(SCHEME);
-        let rest = rest.ok_or_else(|| layout("it starts with something else"))?;
+        let rest = rest.ok_or_else(|| layout("the address does not begin with `blank://`"))?;
         let (size, options) = rest.split_once('?').unwrap_or((rest, ""));
         let sides = size.split_once('x');
         let (width, height) = sides.ok_or_else(|| layout("width and height are missing"))?;
@@ -77,8 +77,8 @@ impl Blank {
                 _ => return Err(layout(&format!("`{option}` is not `frames` or `rate`"))),
             }
         }
-        let n_frames = n_frames.ok_or_else(|| layout("no `frames`"))?;
-        let rate_hz = rate_hz.ok_or_else(|| layout("no `rate`"))?;
+        let n_frames = n_frames.ok_or_else(|| layout("`frames` is missing"))?;
+        let rate_hz = rate_hz.ok_or_else(|| layout("`rate` is missing"))?;
         Ok(Self {
             size: Size::new(
                 within("width", width, [1, MAX_SIDE])?,
@@ -183,10 +183,10 @@ mod tests {
     #[test]
     fn addresses_that_cannot_be_are_refused_with_what_is_wrong() {
         for (address, words) in [
-            ("blank.mp4", "starts with something else"),
+            ("blank.mp4", "does not begin with `blank://`"),
             ("blank://?frames=1&rate=1", "width and height are missing"),
-            ("blank://64x48?rate=1", "no `frames`"),
-            ("blank://64x48?frames=1", "no `rate`"),
+            ("blank://64x48?rate=1", "`frames` is missing"),
+            ("blank://64x48?frames=1", "`rate` is missing"),
             ("blank://64x48?frames=1&rate=1&x=2", "`x=2` is not"),
             ("blank://0x48?frames=1&rate=1", "`width` is \"0\""),
             (

@@ -223,7 +223,7 @@ impl Live<'_, '_> {
             skew_ms = skew as f64 * 1e-6,
             max_skew_ms = self.wanted.max_skew_nanos as f64 * 1e-6,
             drift_ppm = self.phase.drift_ppb().map(|drift_ppb| drift_ppb as f64 * 1e-3),
-            "the pictures of this camera are far from the instants of the frames"
+            "this camera takes its pictures far from the instants of the frames"
         );
     }
 
@@ -253,7 +253,7 @@ impl Live<'_, '_> {
                 view = self.job.view,
                 rate_hz,
                 wanted_hz = self.wanted.rate_hz,
-                "the rate of this camera differs from that of the run"
+                "the frame rate of this camera differs from the frame rate of the run"
             );
         }
     }

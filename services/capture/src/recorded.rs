@@ -31,7 +31,7 @@ pub struct Recorded {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedError {
     /// The address does not name a camera.
-    #[error("no camera is named: use run.mcap#NAME")]
+    #[error("the address does not name a camera: use run.mcap#NAME")]
     NoName,
     /// The file cannot be opened.
     #[error("cannot open the recording")]
@@ -40,7 +40,7 @@ pub enum RecordedError {
     #[error("cannot read the recording")]
     Read(#[from] ReadError),
     /// The recording has no pictures of this camera.
-    #[error("it has no original pictures of camera {camera:?}; {}", others(.known))]
+    #[error("the recording has no original pictures of camera {camera:?}; {}", others(.known))]
     NoCamera {
         /// Name of the camera.
         camera: String,
@@ -48,7 +48,7 @@ pub enum RecordedError {
         known: Vec<String>,
     },
     /// The recorded facts about the camera's pictures contradict each other.
-    #[error("its pictures of {camera:?} cannot be used: {what}")]
+    #[error("the recorded pictures of camera {camera:?} cannot be used: {what}")]
     Malformed {
         /// Name of the camera.
         camera: String,
@@ -62,9 +62,9 @@ pub enum RecordedError {
 
 fn others(known: &[String]) -> String {
     if known.is_empty() {
-        "it has no original pictures: only `parallax record` of live cameras keeps them".to_owned()
+        "it has no original pictures at all: only `parallax record` of live cameras keeps them".to_owned()
     } else {
-        format!("it has those of {}", known.join(", "))
+        format!("it has original pictures of {}", known.join(", "))
     }
 }
 

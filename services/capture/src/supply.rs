@@ -165,7 +165,7 @@ impl Supply {
                 messages = complaints.messages,
                 undecoded = complaints.undecoded,
                 last = complaints.last,
-                "the decoder complained about this camera's video; incomplete pictures are left out"
+                "the decoder reported errors in this camera's video; incomplete pictures are left out"
             );
         }
     }

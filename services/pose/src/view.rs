@@ -97,7 +97,7 @@ impl View<'_> {
         let image = match Rgb8View::new(size[0], size[1], sample.payload()) {
             Ok(image) if size == expected => image,
             _ => {
-                tracing::warn!(?size, ?expected, "a frame with another size");
+                tracing::warn!(?size, ?expected, "a frame has the wrong size");
                 return Ok(Err(Status::BAD_INPUT));
             }
         };

@@ -126,7 +126,7 @@ fn predict(
         return no_prediction();
     }
     let Some(frame) = frame else {
-        tracing::debug!(frame_number, "the frame does not exist any more");
+        tracing::debug!(frame_number, "the frame no longer exists");
         return no_prediction();
     };
     let [width, height] = layout.image_size;
@@ -135,7 +135,7 @@ fn predict(
     let image = match Rgb8View::new(width, height, frame.payload()) {
         Ok(image) if has_expected_size => image,
         _ => {
-            tracing::warn!(frame_number, "a frame with another size");
+            tracing::warn!(frame_number, "a frame has the wrong size");
             return no_prediction();
         }
     };

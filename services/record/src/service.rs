@@ -260,7 +260,7 @@ impl<'a> Recorder<'a> {
                 tracing::warn!(
                     topic = channel.name,
                     lost,
-                    "messages are not in the recording"
+                    "messages are missing from the recording"
                 );
             }
         }

@@ -66,7 +66,7 @@ impl Calibration {
                     camera = scene.views[view].name,
                     residual_px = fit.residual_px,
                     without_px = fit.without_px,
-                    "is not where the calibration says"
+                    "the camera is not where the calibration says"
                 );
             }
             fit.suspected = is_named;
@@ -101,7 +101,7 @@ impl Calibration {
                     camera = scene.views[view].name,
                     offset_ms = fit.offset_ms,
                     offset_error_ms = fit.offset_error_ms,
-                    "is out of step: its pictures were taken at other times than they state"
+                    "the camera is out of step: its pictures were taken at other times than they state"
                 );
             }
             fit.out_of_step = is_named;
@@ -115,8 +115,8 @@ impl Calibration {
         };
         let cameras = it.views.map(|view| scene.views[view].name.clone());
         tracing::warn!(
-            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, but only by {:.1} if the footage of \
-             the two is exchanged{}",
+            "the footage of {} and {} seems to be exchanged: rays to the same part miss each other by {:.1} degrees, but only by {:.1} \
+             degrees if the footage of the two is exchanged{}",
             cameras[0],
             cameras[1],
             it.degrees,
@@ -124,7 +124,7 @@ impl Calibration {
             if it.is_sure {
                 ""
             } else {
-                "; it may also be two other cameras"
+                "; perhaps two other cameras are exchanged instead"
             },
         );
         self.exchanged = Some(Exchanged {
@@ -143,8 +143,7 @@ impl Calibration {
         };
         self.is_contradiction_told = true;
         tracing::warn!(
-            "the cameras contradict each other: rays to the same part miss each other by {:.1} degrees, where up to {:.1} \
-             are usual",
+            "the cameras contradict each other: rays to the same part miss each other by {:.1} degrees (normally at most {:.1} degrees)",
             it.degrees,
             it.usual_degrees
         );

@@ -119,7 +119,7 @@ impl Folder {
         }
         for name in [FrameLine::SMOOTHED_FILE, SmoothReport::FILE, "angles.csv"] {
             if let Err(error) = self.dir.remove(name) {
-                tracing::debug!(%error, name, "an earlier run's file stays");
+                tracing::debug!(%error, name, "a file of an earlier run cannot be removed");
             }
         }
     }
@@ -191,7 +191,7 @@ impl Folder {
                 remove_pictures(&to)?;
             }
             let renamed = self.dir.rename(&part(name), name);
-            renamed.map_err(|source| self.failed("rename the finished", name, source))
+            renamed.map_err(|source| self.failed("rename the finished output", name, source))
         });
         outcomes.filter_map(Result::err).collect()
     }

@@ -257,11 +257,11 @@ mod tests {
                 ..PairPose::default()
             })
         };
-        assert!(!gather.awaits_quality(3), "nothing is known of the frame");
+        assert!(!gather.awaits_quality(3), "nothing is known about the frame");
         gather.fused(3, pair([0, 4]));
         assert!(
             !gather.awaits_quality(3),
-            "none were used, or those of an earlier frame"
+            "no expected errors were used, or those of an earlier frame"
         );
         gather.fused(3, pair([0, 1]));
         assert!(gather.awaits_quality(3));
@@ -270,7 +270,7 @@ mod tests {
             ..ViewQuality::default()
         };
         gather.quality(0, &quality);
-        assert!(gather.awaits_quality(3), "those of the other view");
+        assert!(gather.awaits_quality(3), "the expected errors of the other view are missing");
         gather.quality(1, &quality);
         assert!(!gather.awaits_quality(3));
     }

@@ -56,7 +56,7 @@ impl Heights {
         if let Some((view, px)) = outside {
             self.has_warned = true;
             tracing::warn!(
-                "people are {px:.0} px high in the frames of {}, but {} to {} px are best for the search: see capture.scale",
+                "people are {px:.0} px high in the frames of {}, but {} to {} px are best for the search: adjust capture.scale",
                 scene.views[view].name,
                 USABLE_PX[0],
                 USABLE_PX[1],

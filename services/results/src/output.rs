@@ -294,7 +294,7 @@ impl Output {
         });
         let axes = match scene.up_in_world {
             Some(_) => "y up",
-            None => "those of the world, because the rig does not give the upward direction",
+            None => "the axes of the world, because the rig does not give the upward direction",
         };
         RunSummary {
             frame_rate_hz: scene.frame_rate_hz,

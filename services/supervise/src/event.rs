@@ -47,7 +47,7 @@ pub enum Death {
 impl fmt::Display for Death {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Exit { status: 0 } => f.write_str("ended with status 0 without having finished"),
+            Self::Exit { status: 0 } => f.write_str("ended with status 0 before it had finished"),
             Self::Exit { status } => write!(f, "ended with status {status}"),
             Self::Signal { number } => write!(f, "ended by signal {number}"),
             Self::Hung { still } => write!(f, "hung for {:.1} s", still.as_secs_f64()),
@@ -55,7 +55,7 @@ impl fmt::Display for Death {
                 let [worked, longest] = [worked, longest].map(Duration::as_millis);
                 write!(
                     f,
-                    "computed for {worked} ms in one iteration, where none took more than {longest} ms before"
+                    "computed for {worked} ms in one iteration, although no earlier iteration took more than {longest} ms"
                 )
             }
             Self::Silent { still } => {

@@ -22,9 +22,9 @@ const ASLEEP: Duration = Duration::from_secs(2);
 /// Longest time without an answer from shared memory. The transport may wait forever if a file was truncated.
 const LONGEST_STALL: Duration = Duration::from_mins(1);
 /// Message if shared memory does not answer in this time.
-const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  \
-    hint: another program has filled /dev/shm, or truncated or changed files there: free some space there; \
-    `parallax clean` removes the leftovers\n";
+const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  hint: another program has \
+                       filled /dev/shm, or has truncated or changed files in it; free some space in /dev/shm; `parallax clean` removes the \
+                       leftovers\n";
 
 /// Error of a failed run.
 #[derive(Debug, thiserror::Error)]
@@ -290,7 +290,7 @@ impl Supervisor<'_> {
                     }
                 }
                 Err(error) => {
-                    tracing::warn!(process = watch.spec.name, %error, "cannot read its output");
+                    tracing::warn!(process = watch.spec.name, %error, "cannot read the output of the process");
                 }
             }
         }
@@ -305,13 +305,13 @@ impl Supervisor<'_> {
             }
             Ok(None) => {}
             Err(error) => {
-                tracing::warn!(process = watch.spec.name, %error, "cannot receive its heartbeats");
+                tracing::warn!(process = watch.spec.name, %error, "cannot receive the heartbeats of the process");
             }
         }
         match watch.metrics.latest() {
             Ok(metrics) => metrics.iter().for_each(|message| watch.note_metrics(message)),
             Err(error) => {
-                tracing::warn!(process = watch.spec.name, %error, "cannot receive its metrics");
+                tracing::warn!(process = watch.spec.name, %error, "cannot receive the metrics of the process");
             }
         }
     }
@@ -359,7 +359,7 @@ impl Supervisor<'_> {
             Sequel::GiveUp => {
                 let process = watch.spec.name.as_str();
                 if let Err(error) = Losses::of(&self.plan.namespace).note(process) {
-                    tracing::warn!(process, %error, "senders will wait a long time for it");
+                    tracing::warn!(process, %error, "senders will wait a long time for the process that was given up");
                 }
                 (self.on_event)(Event::GivenUp {
                     process: &watch.spec.name,

@@ -401,7 +401,7 @@ mod tests {
         assert_eq!(death_of(well, true), None);
         let death = death_of(well, false).unwrap();
         assert_eq!(death, Death::Exit { status: 0 });
-        let expected = "ended with status 0 without having finished";
+        let expected = "ended with status 0 before it had finished";
         assert_eq!(death.to_string(), expected);
         let (killed, failed) = (ExitStatus::from_raw(15), ExitStatus::from_raw(1 << 8));
         for in_order in [true, false] {

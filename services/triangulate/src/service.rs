@@ -174,7 +174,7 @@ fn skeleton(
         return step.run(views, &pairs);
     }
     let all_views = wire::all_views_from_pairs(&pairs)
-        .inspect_err(|error| tracing::warn!(%error, "unreadable poses of all views"));
+        .inspect_err(|error| tracing::warn!(%error, "the poses of all views cannot be read"));
     let found = all_views.ok().flatten().and_then(|all| all.only(is_here));
     match found {
         Some(found) => step.run_all_views(views, &found),

@@ -152,7 +152,7 @@ fn seen(scene: &Scene, message: &Skeletons, view: usize) -> Seen {
         let why = if is_there || status != Status::NO_DETECTION {
             status.reason()
         } else {
-            "no frame in time"
+            "no frame arrived in time"
         };
         return Seen {
             why: Some(why.to_owned()),
@@ -233,6 +233,6 @@ pub(crate) mod tests {
         let moment = Moment::of_message(&scene(), &message);
         assert_eq!((moment.joints, moment.stature), (vec![None; 14], None));
         assert_eq!(moment.why.as_deref(), Some("too few views"));
-        assert_eq!(moment.views[0].why.as_deref(), Some("no frame in time"));
+        assert_eq!(moment.views[0].why.as_deref(), Some("no frame arrived in time"));
     }
 }

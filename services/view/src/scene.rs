@@ -86,7 +86,7 @@ impl Scene {
                 up: resolved.deployment.up.unwrap_or([0.0, 0.0, 1.0]),
                 frame_rate_hz: resolved.frame_rate_hz(),
                 tells_facing: !resolved.deployment.has_maps(),
-                problem: Some(format!("without cameras: {why}")),
+                problem: Some(format!("the cameras are not shown: {why}")),
             }
         })
     }

@@ -36,10 +36,10 @@ pub struct Exchange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExchangeError {
     /// One of the clocks was set back.
-    #[error("the answer is dated before its question")]
+    #[error("a clock was set back during the exchange")]
     Backwards,
     /// The other host claims to have taken longer than the whole exchange.
-    #[error("the answer took {inside} ns, but the whole exchange only {outside} ns")]
+    #[error("the other host claims that it answered after {inside} ns, but the whole exchange took only {outside} ns")]
     Inside {
         /// Time from question to answer on the other host, in nanoseconds.
         inside: u64,
@@ -47,7 +47,7 @@ pub enum ExchangeError {
         outside: u64,
     },
     /// The round trip was too long to compare the clocks.
-    #[error("the round trip took {trip} ns, too long to compare the clocks")]
+    #[error("the round trip took {trip} ns, which is too long to compare the clocks")]
     Slow {
         /// Length of the round trip, in nanoseconds.
         trip: u64,
@@ -89,9 +89,9 @@ impl Estimate {
         let share = self.bound_nanos as f64 / period_nanos.max(1) as f64;
         (share > max_share).then(|| {
             format!(
-                "its clock is only known to {:.3} ms, {:.0} % of the time between two frames (link.max_clock_share is {:.0} %), \
-                 because round trips on the network take {:.3} ms at best; use a network with less traffic; if cameras stamp their \
-                 pictures themselves, run `chrony` or `linuxptp` on all hosts",
+                "the clock of this host is known only to within {:.3} ms, which is {:.0} % of the time between two frames \
+                 (link.max_clock_share is {:.0} %), because a round trip on the network takes at least {:.3} ms; use a network with less \
+                 traffic; if the cameras stamp their own pictures, run `chrony` or `linuxptp` on all hosts",
                 self.bound_nanos as f64 * 1e-6,
                 100.0 * share,
                 100.0 * max_share,

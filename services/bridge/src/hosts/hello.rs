@@ -44,10 +44,10 @@ pub struct Welcome {
 #[derive(Debug, thiserror::Error)]
 pub enum HelloError {
     /// There are too many bytes.
-    #[error("{0} bytes, but at most {MOST_BYTES} are allowed")]
+    #[error("the message has {0} bytes, but at most {MOST_BYTES} are allowed")]
     Long(usize),
     /// The content is not an introduction or answer.
-    #[error("not an introduction")]
+    #[error("the message is not a valid introduction or answer")]
     Json(#[from] serde_json::Error),
 }
 

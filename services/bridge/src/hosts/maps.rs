@@ -48,7 +48,7 @@ pub struct Maps {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MapsError {
     /// The maps are truncated, or longer than their header states.
-    #[error("maps of {len} bytes, expected {expected}")]
+    #[error("the maps have {len} bytes, expected {expected}")]
     Length {
         /// Length of the maps.
         len: usize,
@@ -56,7 +56,7 @@ pub enum MapsError {
         expected: usize,
     },
     /// There are more Gaussians than any host sends.
-    #[error("{got} Gaussians, but at most {MOST_GAUSSIANS} are allowed")]
+    #[error("the maps have {got} Gaussians, but at most {MOST_GAUSSIANS} are allowed")]
     Many {
         /// Number of Gaussians.
         got: usize,

@@ -101,7 +101,7 @@ pub struct Expected<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PacketError {
     /// The packet is truncated, or longer than its head states.
-    #[error("a packet of {len} bytes, expected {expected}")]
+    #[error("the packet has {len} bytes, expected {expected}")]
     Length {
         /// Length of the packet.
         len: usize,
@@ -109,18 +109,18 @@ pub enum PacketError {
         expected: usize,
     },
     /// The packet does not start with the mark of packets.
-    #[error("not a packet of Parallax: it begins with {0:02x?}")]
+    #[error("the message is not a packet of Parallax: it begins with {0:02x?}")]
     Magic([u8; 4]),
     /// The other host has another version.
     #[error(
-        "version {got} of the link, but this host has version {VERSION}; use the same version of Parallax on all hosts"
+        "the other host has version {got} of the link, but this host has version {VERSION}; use the same version of Parallax on all hosts"
     )]
     Version {
         /// Version of the other host.
         got: u16,
     },
     /// The bytes differ from the bytes that were sent.
-    #[error("hash {got:016x} of the content, expected {expected:016x}")]
+    #[error("the content has the hash {got:016x}, expected {expected:016x}")]
     Hash {
         /// Hash of the received bytes.
         got: u64,

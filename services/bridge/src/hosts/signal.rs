@@ -44,7 +44,7 @@ pub enum Signal {
 
 /// Error for bytes that are not a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{len} bytes are not a signal of version {VERSION}")]
+#[error("the message of {len} bytes is not a signal of version {VERSION}")]
 pub struct SignalError {
     /// Number of bytes.
     pub len: usize,

@@ -128,7 +128,7 @@ impl Gate {
         let came_at = now_nanos();
         let name = host_of(key);
         let Some(remote) = self.remotes.iter().find(|remote| remote.name == name) else {
-            tracing::debug!(key, "from a host that is not in the deployment");
+            tracing::debug!(key, "a message came from a host that is not in the deployment");
             return;
         };
         let expected = Expected {
@@ -147,7 +147,7 @@ impl Gate {
         };
         if !crosses {
             return remote
-                .malformed(&"a message that must not be sent: link.carry differs on that host");
+                .malformed(&"the host sends messages that `link.carry` excludes on this host; set the same value on all hosts");
         }
         let mut state = remote.state();
         if state.welcomed != Some(packet.head.origin) {
@@ -218,7 +218,7 @@ impl Decoder {
             Content::Frame if it.head.status == Status::OK => {
                 let pixels = jpeg::decode(&it.body, self.size);
                 if pixels.is_none() {
-                    remote.malformed(&"a JPEG that is damaged, or has another size");
+                    remote.malformed(&"the JPEG is damaged, or has the wrong size");
                 }
                 pixels?
             }
@@ -257,7 +257,7 @@ impl Decoder {
             _ if bytes.is_empty() => Ok(None),
             Some(maps) => maps.unpack(bytes).map(Some).map_err(|error| error.to_string()),
             None => Err(format!(
-                "{} bytes after poses, although no maps are sent",
+                "the poses are followed by {} bytes, but this deployment sends no maps",
                 bytes.len()
             )),
         }
@@ -342,7 +342,7 @@ fn hear_hellos(
         match (remote, &answer) {
             (Some(remote), Answer::Welcome(_)) => remote.welcomed(hello.origin, now_nanos()),
             (Some(remote), Answer::Refused(why)) => remote.refused(why),
-            (None, _) => tracing::warn!(name, "a host that is not in the deployment is refused"),
+            (None, _) => tracing::warn!(name, "a host is not accepted, because it is not in the deployment"),
         }
         if let Some(link) = back.upgrade() {
             link.send(&own.answer(name), answer.to_bytes(), true);

@@ -81,7 +81,7 @@ impl Remote {
         let mut state = self.state();
         state.heard_at = Some(exchange.heard_at);
         if let Err(error) = state.clock.add(exchange) {
-            tracing::debug!(%error, host = self.name, "times that are not used");
+            tracing::debug!(%error, host = self.name, "the times of an exchange cannot be used");
         }
     }
 
@@ -103,7 +103,7 @@ impl Remote {
             let why = listed(why);
             tracing::warn!(
                 host = self.name,
-                "refused, from the point of view of that host: {why}"
+                "the host is not accepted; it differs as follows, from its own point of view: {why}"
             );
         }
         state.refused = Some(why.to_vec());
@@ -117,7 +117,7 @@ impl Remote {
         state.last_malformed = why.to_string();
         if state.n_malformed.is_power_of_two() {
             let n = state.n_malformed;
-            tracing::warn!(host = self.name, %why, n, "messages of this host are refused");
+            tracing::warn!(host = self.name, %why, n, "messages from this host cannot be used");
         }
     }
 
@@ -129,10 +129,10 @@ impl Remote {
             state.was_there = is_there;
             if is_there {
                 state.n_came += 1;
-                tracing::info!(host = self.name, "answers");
+                tracing::info!(host = self.name, "the host answers");
             } else {
                 state.n_went += 1;
-                tracing::warn!(host = self.name, "does not answer: its views are missing");
+                tracing::warn!(host = self.name, "the host does not answer: its views are missing");
             }
         }
         let estimate = state.clock.estimate(now).filter(|_| is_there);

@@ -216,7 +216,7 @@ fn again(path: &Path, about: &VideoAbout) -> Result<VideoDevice, LiveError> {
             continue;
         };
         if device.about().is_ok_and(|found| found == *about) {
-            tracing::warn!(was = %path.display(), now = %other.display(), "this camera has another number now");
+            tracing::warn!(was = %path.display(), now = %other.display(), "this camera has a new device number");
             return Ok(device);
         }
     }
@@ -299,8 +299,8 @@ fn say_of_clock(clock: &OwnClock, camera: &str) {
         tracing::warn!(
             camera,
             delay_ms,
-            "by its own clock, the pictures of this camera arrive before they were taken, or too late to be used: they count as \
-             taken when they arrived; set the camera's clock and that of this machine from the same time server"
+            "according to this camera's clock, its pictures arrive before they are taken, or too late to be used; their arrival times are \
+             used as capture times instead; synchronise the camera and this machine with the same time server"
         );
     }
 }
@@ -360,7 +360,7 @@ fn settled_picture(
 
 /// Ends a stream that is silent for too long. Stops watching when dropped.
 #[derive(Debug)]
-#[expect(dead_code, reason = "its end is what is waited for")]
+#[expect(dead_code, reason = "the other thread waits until this value is dropped")]
 struct Watched(Option<SyncSender<()>>);
 
 impl Watched {

@@ -237,7 +237,7 @@ mod tests {
             piece(PieceKind::Other, 100),
         ]);
         kept.put_decoded(0);
-        assert_eq!(originals.n_all(), 0, "no time is known yet");
+        assert_eq!(originals.n_all(), 0, "the capture time is not known yet");
         kept.decoded(33_366_667, 5000 * MS);
         // The second piece was not decoded.
         kept.decoded(100_100_000, 5067 * MS);

@@ -196,7 +196,8 @@ impl Keeper {
             let is_tried = self.camera.is_http() && n_read == 0;
             is_bare ^= is_tried;
             if is_tried && is_bare && said.is_none() {
-                tracing::debug!(camera = %self.camera.address, %error, "read without a first boundary");
+                tracing::debug!(camera = %self.camera.address, %error, "reading the stream again, without a boundary before the first \
+                                                                        picture");
                 continue;
             }
             if n_read > 0 || said != Some(status) {

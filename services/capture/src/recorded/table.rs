@@ -108,11 +108,11 @@ impl Table {
         };
         let rate_hz = rate_hz.unwrap_or(first.grid_rate_hz);
         if !(RATES_HZ[0]..=RATES_HZ[1]).contains(&rate_hz) {
-            return Err(malformed("its rate cannot be"));
+            return Err(malformed("the recorded frame rate is out of range"));
         }
         let size = Size::new(first.width as usize, first.height as usize);
         if size.rgb_bytes() == 0 || size.width.max(size.height) > 1 << 16 {
-            return Err(malformed("its size cannot be"));
+            return Err(malformed("the recorded picture size is out of range"));
         }
         let mut table = Self {
             size,
@@ -127,7 +127,7 @@ impl Table {
         table.place(heads);
         if table.pictures.is_empty() {
             return Err(malformed(
-                "no picture is complete and lies at an instant of the run",
+                "no picture is complete and belongs to an instant of the run",
             ));
         }
         Ok(table)

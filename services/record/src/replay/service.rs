@@ -46,7 +46,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             Err(error @ ReadError::Read(_)) => return Err(error).or_fail(ExitKind::Input),
             Err(error) => {
                 let (topic, frame) = (playback.topic(*output), entry.frame);
-                tracing::debug!(%error, topic, frame, "damaged: left out");
+                tracing::debug!(%error, topic, frame, "a damaged message is left out");
                 service.health().dropped(Cause::Malformed, 1);
                 continue;
             }
@@ -79,7 +79,7 @@ fn received(job: &Job) -> impl Iterator<Item = &Output> {
 fn tracks<'a>(job: &Job, recording: &'a Recording) -> Result<Vec<&'a Track>, Failure> {
     let tracks = received(job).map(|output| {
         recording.tracks.get(&output.topic).ok_or_else(|| {
-            let message = format!("{} has no messages of {}", job.file.display(), output.topic);
+            let message = format!("{} has no messages of topic {}", job.file.display(), output.topic);
             Failure::new(ExitKind::Input, message)
         })
     });

@@ -70,7 +70,7 @@ impl Folder {
             ));
         }
         if frames.is_empty() {
-            let text = format!("{} in {} has no frame", FrameLine::FILE, path.display());
+            let text = format!("{} in {} has no frames", FrameLine::FILE, path.display());
             return Err(Failure::new(ExitKind::Input, text));
         }
         frames.sort_by_key(|frame| frame.number);
@@ -120,7 +120,7 @@ impl Folder {
         let at = at.min(self.frames.len() - 1);
         let text = &line_at(&self.poses, self.frames[at].place, 1)?;
         let line = runfiles::lines::<FrameLine>(text).next();
-        let line = line.ok_or("an empty line").map_err(unreadable)?;
+        let line = line.ok_or("the line is empty").map_err(unreadable)?;
         let line = line.map_err(unreadable)?;
         let mut moment = of_line(&self.scene, &line);
         moment.at = Some(at);
@@ -230,7 +230,7 @@ fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
             scene
         }
         Err(why) => {
-            notes.push(format!("without cameras: {why}"));
+            notes.push(format!("the cameras are not shown: {why}"));
             Scene {
                 name: String::new(),
                 views: Vec::new(),

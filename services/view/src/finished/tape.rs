@@ -52,7 +52,7 @@ impl Tape {
             read_pose(&mut input, pose).is_ok_and(|message| message.status != Status::END)
         });
         if poses.is_empty() {
-            return Err(refused("the recording has no result".to_owned()));
+            return Err(refused("the recording has no results".to_owned()));
         }
         poses.sort_by_key(|pose| pose.frame);
         let frame = |(place, entry): (usize, &Entry)| Frame {
@@ -131,7 +131,7 @@ fn read_pose(file: &mut File, entry: &Entry) -> Result<Box<Skeletons>, Failure> 
     let refused = || {
         Failure::new(
             ExitKind::Input,
-            "a message of the results topic is of another kind",
+            "a message of the results topic has the wrong kind",
         )
     };
     message.skeletons().ok_or_else(refused)

@@ -63,7 +63,7 @@ impl Events {
             if self.n_without >= IN_A_ROW {
                 board.event(
                     Weight::Note,
-                    &format!("frame {}: skeleton is back", moment.frame),
+                    &format!("frame {}: the skeleton is back", moment.frame),
                 );
             }
             self.n_without = 0;
@@ -86,8 +86,8 @@ impl Events {
         *last = status;
         let name = scene.views.get(view).map_or("", |view| &view.name);
         match status {
-            Status::OK => board.event(Weight::Note, &format!("{name}: pictures are back")),
-            Status::END => board.event(Weight::Note, &format!("{name}: end of footage")),
+            Status::OK => board.event(Weight::Note, &format!("{name}: the pictures are back")),
+            Status::END => board.event(Weight::Note, &format!("{name}: the footage has ended")),
             other => board.event(Weight::Error, &format!("{name}: {}", other.reason())),
         }
     }
