@@ -50,7 +50,7 @@ fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
     let ended = origin("rig.toml");
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("not a run of this rig"),
+        ended.stderr.contains("does not belong to this rig"),
         "{}",
         ended.stderr
     );

@@ -127,7 +127,7 @@ fn a_large_picture_is_searched_at_a_reported_smaller_size() {
     assert_eq!(number(&large["scale"]), 4.0 * number(&small["scale"]));
     let plain = ["detect", "large.png", "--model", "model.plx"];
     let ended = case.start(&[&plain[..], &["--size", "128"]].concat()).wait();
-    let said = "searched at 96x128 of 384x512";
+    let said = "searched at 96x128 instead of 384x512";
     assert!(ended.stdout.contains(said), "{}", ended.stdout);
     let ended = case.start(&[&plain[..], &["--full"]].concat()).wait();
     assert!(!ended.stdout.contains("searched at"), "{}", ended.stdout);

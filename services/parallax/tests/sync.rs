@@ -224,7 +224,7 @@ fn clocks_are_found_by_the_sounds_of_the_videos() {
     let ended = estimate(&case, &["--by", "sound"]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("\"c2\": it has no footage"),
+        ended.stderr.contains("\"c2\": the camera has no footage"),
         "{}",
         ended.stderr
     );

@@ -42,7 +42,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let column = |wanted: &[&str]| {
         let found = header.iter().position(|title| wanted.contains(&title.trim()));
-        found.ok_or_else(|| format!("no column {}", wanted[0]))
+        found.ok_or_else(|| format!("the column {} is missing", wanted[0]))
     };
     let columns = [
         column(&["sync_index", "frame"])?,
@@ -83,7 +83,7 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         groups.entry((camera, frame)).or_default().push((id, at));
     }
     if groups.is_empty() {
-        return Err(format!("no corners of the cameras {}", names.join(", ")));
+        return Err(format!("the table has no corners of the cameras {}", names.join(", ")));
     }
     let sights = groups
         .into_iter()

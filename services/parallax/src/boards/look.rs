@@ -138,7 +138,7 @@ fn unknown(table: &FrameTable, camera: &str) -> Failure {
     Failure::new(
         ExitKind::Input,
         format!(
-            "the table of timestamps has the cameras {}, not {camera}",
+            "the table of timestamps has the cameras {}, but not {camera}",
             known.join(", ")
         ),
     )

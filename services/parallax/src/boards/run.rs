@@ -129,9 +129,9 @@ pub fn calibrate(
     let outcome = outcome.map_err(|error| refused(&error, looked.as_ref(), &task))?;
     if let Some(it) = outcome.out_of_step {
         notes.push(format!(
-            "boards fit each camera alone to {:.2} px, but all cameras together to {:.2} px, with focal lengths changed by up to {:.1} %: the pictures of a frame \
-             were not taken at the same time. The lens of each camera was found from its own pictures, and the poses of \
-             the cameras from the frames in which the board moves least",
+            "the residual of the boards is {:.2} px in each camera alone, but {:.2} px in all cameras together, where focal lengths change \
+             by up to {:.1} %: the pictures of a frame were not taken at the same time. The lens of each camera was found from its own \
+             pictures, and the poses of the cameras from the frames in which the board moves least",
             it.alone_px,
             it.together_px,
             100.0 * it.bent
@@ -307,7 +307,7 @@ fn known(
             Err(Failure::new(
                 ExitKind::Usage,
                 format!(
-                    "--known has the cameras {}, but none of {}",
+                    "the calibration in --known has the cameras {}, but none of {}",
                     there.join(", "),
                     names.join(", ")
                 ),
@@ -376,7 +376,8 @@ fn reasons(looked: &Looked) -> String {
             "the pictures show a chessboard with {columns}x{rows} inner corners: give the number of inner corners, not of squares"
         ),
         Some(Nothing::Elsewhere { n_markers }) => format!(
-            "there are markers (up to {n_markers} in a picture), but in other places than on this board: are its numbers of squares and its dictionary right?"
+            "there are markers (up to {n_markers} in a picture), but not in the positions of this board: are the numbers of squares and \
+             the dictionary of --board right?"
         ),
         Some(Nothing::NoCorners) => {
             "there is a board, but its corners are not sharp: move it more slowly, or use more light".to_owned()

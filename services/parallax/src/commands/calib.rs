@@ -167,7 +167,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             up.x, up.y, up.z
         ))?,
         None => output::line(
-            "the upward direction is not known: a run finds it, unless `up` in its deployment sets it",
+            "the upward direction is not known: a run finds this direction, unless `up` in the deployment sets it",
         )?,
     }
     for camera in rig.cameras() {
@@ -182,7 +182,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
                 centre.x, centre.y, centre.z
             )
         } else {
-            "position not known".to_owned()
+            "position unknown".to_owned()
         };
         output::line(format_args!(
             "  {:<10} {}x{} px, f ({:.1}, {:.1}), c ({:.1}, {:.1}), {place}",

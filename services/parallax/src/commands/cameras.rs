@@ -92,9 +92,9 @@ fn wanted(arguments: &ViewArguments) -> Result<LiveCamera, Failure> {
         let names: Vec<&str> = live.map(|camera| camera.name.as_str()).collect();
         let message = format!("{} has no live camera {name:?}", file.display());
         let hint = if names.is_empty() {
-            "it has no live cameras".to_owned()
+            "the deployment has no live cameras".to_owned()
         } else {
-            format!("it has {}", names.join(", "))
+            format!("the live cameras are {}", names.join(", "))
         };
         Failure::new(ExitKind::Usage, message).with_hint(hint)
     })
@@ -128,8 +128,8 @@ fn list(as_json: bool) -> Result<ExitCode, Failure> {
     }
     if found.is_empty() {
         output::line(
-            "no video devices (/dev/video*): plug in a camera; in a container, pass its device in. Network cameras \
-             are not listed: `parallax cameras view rtsp://... --out shot.png` takes a picture with one",
+            "there are no video devices (/dev/video*): plug in a camera; in a container, pass its device in. Network cameras are not \
+             listed: `parallax cameras view rtsp://... --out shot.png` takes a picture with one",
         )?;
     }
     for it in &found {
@@ -201,7 +201,7 @@ fn text(it: &Found) -> String {
     let rate = it
         .mode
         .rate_hz
-        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} per second"));
+        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} frames per second"));
     let about = &it.about;
     let mut lines = vec![
         format!(
@@ -225,7 +225,7 @@ fn text(it: &Found) -> String {
             let rates: Vec<String> =
                 size.rates_hz.iter().map(|rates_hz| format!("{rates_hz:.2}")).collect();
             lines.push(format!(
-                "    {} at {} per second",
+                "    {} at {} frames per second",
                 size.text(),
                 rates.join(", ")
             ));

@@ -119,7 +119,7 @@ fn document(entries: &[Entry]) -> Vec<String> {
         lines.push(match &entry.value {
             Some(value) => format!("{name} = {value}  # {}", entry.origin.name()),
             None if entry.key == "capture.scale" && is_by_itself => {
-                format!("# the run chooses {name}: `run --dry-run` shows it")
+                format!("# a run chooses {name} automatically: `run --dry-run` shows the value")
             }
             None => format!("# {name} is not set"),
         });

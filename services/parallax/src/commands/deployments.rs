@@ -47,7 +47,7 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     if found.is_empty() {
-        output::message("no deployment is running, and no dead one has left shared memory behind");
+        output::message("no deployment is running, and no dead deployment has left shared memory behind");
     }
     for deployment in &found {
         let name = deployment.namespace.name();
@@ -58,7 +58,7 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
                 deployment.processes.len()
             ),
             None if deployment.processes.is_empty() => {
-                "dead: `parallax clean` removes it".to_owned()
+                "dead: `parallax clean` removes the leftovers".to_owned()
             }
             None => format!("dead, except for {}", deployment.processes.join(", ")),
         };

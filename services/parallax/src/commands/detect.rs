@@ -47,7 +47,7 @@ your own box.
 The shipped detector was not trained on people smaller than an eighth of the picture's height. For such people, crop the picture, or give --box.
 
 With --network none, --model, --joints or --joint-map, the filters find parts, and these are printed. A picture with a \
-side longer than --size is then scaled down to that size. The output says so: \"searched at 1280x960 of 4000x3000\". People smaller than \
+side longer than --size is then scaled down to that size. The output says so: \"searched at 1280x960 instead of 4000x3000\". People smaller than \
 about 150 pixels in the scaled picture are not found. --full searches all pixels, and needs about 460 bytes of memory per pixel. \
 The card configs/models/person.md lists the false alarms for each --threshold.
 
@@ -395,7 +395,7 @@ impl Detector<'_> {
         let [width, height] = layout.image_size;
         let whole = picture.size;
         if [width, height] != [whole.width, whole.height] {
-            notes.push(format!("searched at {width}x{height} of {whole}"));
+            notes.push(format!("searched at {width}x{height} instead of {whole}"));
         }
         let notes = [String::new()].into_iter().chain(notes);
         let notes = notes.collect::<Vec<_>>().join("; ");

@@ -144,7 +144,7 @@ fn program(name: &'static str, without: State) -> Finding {
             let words = first.split(" Copyright").next();
             Finding::good(name, words.unwrap_or_default())
         }
-        Ok(output) => Finding::good(name, format!("ends with {}", output.status))
+        Ok(output) => Finding::good(name, format!("fails with {}", output.status))
             .but(without, "reinstall it: Debian's package is `ffmpeg`"),
         Err(error) => Finding::good(name, format!("cannot be run: {error}")).but(
             without,
@@ -167,7 +167,7 @@ fn shared_memory() -> Finding {
         }
         Err(error) => Finding::good(what, error.to_string()).but(
             State::Missing,
-            "processes exchange frames there: mount a tmpfs at /dev/shm",
+            "processes exchange frames in /dev/shm: mount a tmpfs there",
         ),
     }
 }

@@ -19,10 +19,10 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Formats, their use and content:
-    c3d        motion capture        points, mm, z up; residual: standard deviation, mm; a gap: residual -1
-    trc        OpenSim               points, m, y up; a gap: NaN
-    glb        viewers, Blender      skinned skeleton and animation, m, y up; a gap: a missing bone
-    bvh        animation             bones of fixed length (medians), cm, y up; a gap: the last rotation is kept
+    c3d        motion capture        points, mm, z up; residual: standard deviation, mm, or -1 in a gap
+    trc        OpenSim               points, m, y up; NaN in a gap
+    glb        viewers, Blender      skinned skeleton and animation, m, y up; in a gap, bones are missing
+    bvh        animation             bones of fixed length (medians), cm, y up; in a gap, bones keep their last rotation
     csv        tables                a row for each frame, m, axes of the rig; standard deviations
     csv-long   tables                a row for each joint of each frame: covariance, views, the reason for a gap
     parquet    tables                like csv-long; needs a build with `--features parquet`

@@ -169,7 +169,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
     } else if host["refused"].is_null() {
         "does not answer"
     } else {
-        "is refused: its files differ"
+        "is not accepted: its files differ"
     };
     let clock = &host["clock"];
     let clock = if clock.is_null() {

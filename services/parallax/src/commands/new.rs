@@ -166,7 +166,7 @@ impl Step {
         }
         if let Some(file) = self.done.as_ref().filter(|file| is_doubt && file.exists()) {
             output::message(format_args!(
-                "{} is written: run the same command again to continue with it",
+                "{} was written: run the same command again to continue with this file",
                 file.display()
             ));
         }

@@ -256,7 +256,7 @@ fn check(
     let failure = Failure::new(ExitKind::Input, message);
     Err(match recording.counts.keys().find(|key| kind.is_of_another_version(key)) {
         Some(topic) => failure.with_hint(format!(
-            "its messages of {topic} have another layout than in this version of Parallax: replay the file with the version that recorded it"
+            "the messages of {topic} have a different layout in this version of Parallax: replay the file with the version that recorded it"
         )),
         None => failure,
     })

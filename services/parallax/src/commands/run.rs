@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if resolved.is_far() && (arguments.view || !arguments.publish.is_empty()) {
-        let message = "--view and --publish only work on the host that fuses, because this host has no skeletons";
+        let message = "--view and --publish work only on the fusing host: this host has no skeletons";
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let device = launch::device(&loaded.deployment)?;
@@ -136,7 +136,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 fn above_zero(text: &str) -> Result<f64, String> {
     let number: f64 = text.parse().ok().ok_or("not a number")?;
     let fits = number.is_finite() && number > 0.0;
-    fits.then_some(number).ok_or_else(|| "not above 0".to_owned())
+    fits.then_some(number).ok_or_else(|| "the number is not above 0".to_owned())
 }
 
 /// Prints processes, shared memory and the largest topics.
@@ -150,7 +150,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
     let free = free_shared_memory().or_fail(ExitKind::Run)?;
     let mb = |bytes: u64| bytes as f64 / 1e6;
     output::line(format_args!(
-        "shared memory: {:.0} MB of {:.0} MB free in /dev/shm; the largest topics:",
+        "shared memory: {:.0} MB are needed, {:.0} MB are free in /dev/shm; the largest topics:",
         mb(total),
         mb(free)
     ))?;

@@ -155,7 +155,7 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
     if arguments.write {
         write(&arguments.config, &outcome, &names)?;
         output::message(format_args!(
-            "wrote the clocks into {}",
+            "wrote the clock offsets to {}",
             arguments.config.display()
         ));
     }
@@ -165,7 +165,7 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
 /// Returns the index of the reference camera.
 fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Failure> {
     if let [_] | [] = &deployment.cameras[..] {
-        let message = "the deployment has one camera: there is no other clock to compare with";
+        let message = "the deployment has only one camera, so there is no other clock to compare with";
         return Err(Failure::new(ExitKind::Config, message));
     }
     let Some(name) = &arguments.reference else {
@@ -176,7 +176,7 @@ fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Fa
         let known: Vec<&str> =
             deployment.cameras.iter().map(|camera| camera.name.as_str()).collect();
         let message = format!(
-            "--reference: no camera {name:?}; there are {}",
+            "--reference: there is no camera {name:?}; the cameras are {}",
             known.join(", ")
         );
         Failure::new(ExitKind::Usage, message)
@@ -251,11 +251,11 @@ fn table(outcome: &Outcome, names: &[&str], (reference, by): (usize, By)) -> Res
     if outcome.cameras.iter().all(|camera| camera.drift_error.is_none()) {
         output::line("drift: not determined by the footage, so 0 is used")?;
     } else if outcome.cameras.iter().any(|camera| camera.drift == 0.0) {
-        output::line("drift: 0 if not significant")?;
+        output::line("drift: 0 means that the drift is not significant")?;
     }
     output::line(format_args!(
         "{:<25} {:>9} {:>15} {:>12} {:>8}",
-        "pair alone", "best, ms", "second best, ms", "as good, %", "samples"
+        "pair alone", "best, ms", "second best, ms", "ratio, %", "samples"
     ))?;
     for it in &outcome.pairs {
         let [a, b] = it.cameras.map(|camera| names[camera]);
@@ -363,12 +363,12 @@ fn refuse(outcome: &Outcome, names: &[&str], by: By) -> Result<(), Failure> {
     let failure = Failure::new(ExitKind::Degraded, message);
     Err(failure.with_hint(match by {
         By::Movement => {
-            "best is footage in which people walk through the view of all cameras; --window sets a larger range of offsets; --by sound compares \
-             recorded sounds; `parallax calib check` checks the calibration"
+            "use footage in which people walk through the view of all cameras; --window sets a larger range of offsets; --by sound \
+             compares recorded sounds; `parallax calib check` checks the calibration"
         }
         By::Sound => {
-            "best are sounds that all cameras record: clap a few times, unevenly; --window sets a larger range of offsets; without --by sound, the \
-             movement of people is compared"
+            "use sounds that all cameras record: clap a few times, at irregular intervals; --window sets a larger range of offsets; \
+             without --by sound, the movement of people is compared"
         }
     }))
 }
@@ -389,7 +389,7 @@ fn write(file: &Path, outcome: &Outcome, names: &[&str]) -> Result<(), Failure> 
             format!("{}: offset_ms = {:.3}{drift}", key.name, key.offset_ms)
         });
         let hint = format!(
-            "write the offsets by hand: {}",
+            "enter the offsets by hand: {}",
             lines.collect::<Vec<_>>().join("; ")
         );
         Failure::new(ExitKind::Config, format!("{}: {error}", file.display())).with_hint(hint)

@@ -170,7 +170,7 @@ fn token_in(file: &Path) -> Result<String, Failure> {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_".contains(&byte);
     if token.len() < SHORTEST_TOKEN || !token.bytes().all(is_plain) {
         let text = format!(
-            "{}: a token has at least {SHORTEST_TOKEN} letters, digits, '-' or '_', and nothing else",
+            "{}: a token consists of at least {SHORTEST_TOKEN} letters, digits, '-' or '_', and nothing else",
             file.display()
         );
         return Err(Failure::new(ExitKind::Usage, text));

@@ -30,7 +30,8 @@ pub(super) fn agreement(rig: &Rig, file: &Path) -> Result<Agreement, Failure> {
     let n_seen = |views: &&Vec<Option<Points>>| views.iter().flatten().count();
     if !frames.iter().any(|views| n_seen(&views) > 1) {
         let message = format!(
-            "{}: no frame has single-view poses (`single`) of two cameras of the rig, and poses after fusion agree with any rig",
+            "{}: no frame has single-view poses (`single`) of two cameras of the rig; poses after fusion cannot be used, because they \
+             agree with any rig",
             file.display()
         );
         let hint = "pass `pose2d.jsonl` of a run whose cameras have the same names as in the rig";
@@ -74,11 +75,11 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
         let sure = if swap.is_sure {
             ""
         } else {
-            "; it may also be two other cameras"
+            "; perhaps two other cameras are exchanged instead"
         };
         return vec![format!(
-            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, but only by \
-             {:.1} if the footage of these two is exchanged{sure}",
+            "the footage of {} and {} seems to be exchanged: rays to the same part miss each other by {:.1} degrees, but only by {:.1} \
+             degrees if the footage of the two is exchanged{sure}",
             name(swap.views[0]),
             name(swap.views[1]),
             swap.degrees,
@@ -87,11 +88,11 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
     }
     if let Some(found) = swaps.contradiction() {
         let likely = found.likely.map_or_else(String::new, |[a, b]| {
-            format!(" ({} and {} exchanged would fit best)", name(a), name(b))
+            format!(" (exchanging {} and {} would fit best)", name(a), name(b))
         });
         return vec![format!(
-            "the cameras contradict each other: rays to the same part miss each other by {:.1} degrees, where up to {:.1} are \
-             usual{likely}",
+            "the cameras contradict each other: rays to the same part miss each other by {:.1} degrees (normally at most {:.1} \
+             degrees){likely}",
             found.degrees, found.usual_degrees
         )];
     }
@@ -215,7 +216,7 @@ mod tests {
         assert!(right.errors.cameras.iter().all(|camera| camera.median_px < 1.5));
         std::fs::write(&file, seen(&rig, [0, 2, 1, 3])).unwrap();
         let wrong = agreement(&rig, &file).unwrap().disagreements.join("; ");
-        assert!(wrong.contains("c1 and c2 look exchanged"), "{wrong}");
+        assert!(wrong.contains("the footage of c1 and c2 seems to be exchanged"), "{wrong}");
     }
 
     #[test]

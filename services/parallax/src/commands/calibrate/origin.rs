@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let (new_from_old, source) = match (&arguments.board, &arguments.people) {
         (Some(board), _) => (
             by_board(arguments, &rig, board, globals)?,
-            format!("origin by {board}"),
+            format!("origin from {board}"),
         ),
         (None, Some(run)) => {
             let floor = stood::find(&rig, run, arguments.rate)?;
@@ -90,12 +90,12 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
                 floor.n,
                 1e3 * floor.spread_m
             ));
-            (from_floor(&floor), "origin by people who stood".to_owned())
+            (from_floor(&floor), "origin from standing people".to_owned())
         }
         (None, None) if arguments.at.is_empty() => {
             return Err(Failure::new(
                 ExitKind::Usage,
-                "no board, points on the floor or people are given",
+                "no board, no points on the floor and no people are given",
             )
             .with_hint(
                 "pass --board BOARD FOOTAGE..., or --at, --x and --floor, or --people RUN",
@@ -106,7 +106,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             let clicks = clicks.map(|texts| clicks_of(&rig, texts));
             let [at, x, floor] = clicks;
             let found = from_points(&rig, &[at?, x?, floor?]).or_fail(ExitKind::Calibration)?;
-            (found, "origin by three points".to_owned())
+            (found, "origin from three points".to_owned())
         }
     };
     let new = rebased(&rig, &new_from_old, &source).or_fail(ExitKind::Calibration)?;
@@ -122,7 +122,8 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let below = new.cameras().iter().find(|camera| camera.centre_in_world().z < 0.0);
     match below {
         None if by_bodies => {
-            let message = "all feet stood on one spot, so the vertical was found from upright bodies, and is only exact to some degrees";
+            let message = "all feet stood on one spot, so the vertical was found from upright bodies, and is only accurate to a few \
+                           degrees";
             let hint = "to find it from the feet, use a run in which a person walks about";
             Err(Failure::new(ExitKind::Degraded, message).with_hint(hint))
         }
@@ -164,7 +165,7 @@ fn by_board(
     from_board(rig, &looked.layout.points, &sights).map_err(|error| {
         let hint = match error {
             OriginError::BoardApart { .. } => {
-                "use --frames for the number of frames in which the board does not move"
+                "set --frames to the number of frames in which the board does not move"
             }
             _ => "is the board flat on the floor and in view of a camera in the first frames?",
         };

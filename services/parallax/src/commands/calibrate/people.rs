@@ -147,7 +147,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     refuse(&outcome.doubts, &names, HINT)?;
     if let Some(file) = &arguments.walk.out {
         let source = format!(
-            "calibrated from a person walking about, {} instants{}{}",
+            "calibrated from a person walking about, over {} instants{}{}",
             outcome.n_instants,
             source_of_scale(arguments),
             how_sure(&outcome)
@@ -177,7 +177,7 @@ fn how_sure(outcome: &Outcome) -> String {
     let worst =
         |axis: usize| outcome.reports.iter().map(|report| report.sd[axis]).fold(0.0, f64::max);
     format!(
-        ", cameras known to {:.2} degrees and {:.0} mm",
+        ", cameras known to within {:.2} degrees and {:.0} mm",
         worst(0),
         1e3 * worst(1)
     )
@@ -186,7 +186,7 @@ fn how_sure(outcome: &Outcome) -> String {
 fn source_of_scale(arguments: &Arguments) -> String {
     match (&arguments.height_m, &arguments.distance) {
         (Some(metres), _) => format!(", scale from a height of {metres} m"),
-        (None, Some((a, b, metres))) => format!(", scale from {metres} m between {a} and {b}"),
+        (None, Some((a, b, metres))) => format!(", scale from a distance of {metres} m between {a} and {b}"),
         (None, None) => ", scale and world of the previous rig".to_owned(),
     }
 }
@@ -196,7 +196,7 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
         let names = walk.names();
         names.iter().position(|other| other == name).ok_or_else(|| {
             let message = format!(
-                "--distance: no camera {name:?}; there are {}",
+                "--distance: there is no camera {name:?}; the cameras are {}",
                 names.join(", ")
             );
             Failure::new(ExitKind::Usage, message)
@@ -242,7 +242,8 @@ fn vertical(outcome: &Outcome) -> &'static str {
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     let [from, to] = outcome.span_s;
     output::line(format_args!(
-        "{} instants over {:.1} s; vertical from {}; scale known to {:.1} %; height of the person from the bones {:.3} m; sides of {} views exchanged; clocks {}",
+        "{} instants over {:.1} s; vertical from {}; scale known to within {:.1} %; height of the person from the bones {:.3} m; sides of \
+         {} views exchanged; clocks {}",
         outcome.n_instants,
         to - from,
         vertical(outcome),

@@ -104,8 +104,8 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     refuse(&outcome.doubts, &names, HINT)?;
     if !outcome.is_better {
         let message = format!(
-            "not better: held-out joints are {:.2} px from where the other cameras see them with the old rig, and {:.2} px \
-             with the new rig; keep the old rig",
+            "the new rig is not better: the distance of held-out joints from where the other cameras see them is {:.2} px with the old \
+             rig, and {:.2} px with the new rig; keep the old rig",
             outcome.held_out_px[0], outcome.held_out_px[1]
         );
         return Err(Failure::new(ExitKind::Limit, message));
@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if let Some(file) = &arguments.walk.out {
         let before = inputs::rig_of(&walk.deployment)?;
         let source = format!(
-            "{}; refined with a person, {} instants",
+            "{}; refined with a person, over {} instants",
             before.source(),
             outcome.n_instants
         );
@@ -136,7 +136,7 @@ fn about(arguments: &Arguments, walk: &Walk) -> Vec<(String, String)> {
         (
             "believed".to_owned(),
             format!(
-                "rotations to {} degrees, positions to {} mm, clocks to {} ms",
+                "rotations to within {} degrees, positions to within {} mm, clocks to within {} ms",
                 arguments.sd_degrees, arguments.sd_mm, arguments.sd_ms
             ),
         ),
@@ -148,8 +148,8 @@ fn about(arguments: &Arguments, walk: &Walk) -> Vec<(String, String)> {
 
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     output::line(format_args!(
-        "{} instants; held-out joints are {:.2} px from where the other cameras see them with the old rig, {:.2} px with the new rig; {} of {} blocks \
-         became better ({:.1} standard errors)",
+        "{} instants; the distance of held-out joints from where the other cameras see them is {:.2} px with the old rig, and {:.2} px \
+         with the new rig; {} of {} blocks improved ({:.1} standard errors)",
         outcome.n_instants,
         outcome.held_out_px[0],
         outcome.held_out_px[1],

@@ -298,7 +298,8 @@ impl Person {
 fn nobody(eyes: &Eyes) -> String {
     let card = eyes.detector.card();
     format!(
-        "{} finds nobody (no box reaches `least_score` = {} of its card), or the network finds nobody with a heat of {}; use --box to give a box",
+        "the detector {} finds nobody (no box reaches `least_score` = {} of its card), or the network finds nobody with a heat of at least \
+         {}; use --box to give a box",
         card.name, card.least_score, eyes.least_heat
     )
 }

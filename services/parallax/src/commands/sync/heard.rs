@@ -26,7 +26,7 @@ pub(super) fn compared(
     for camera in &deployment.cameras {
         let name = camera.name.clone();
         if camera.source.is_empty() {
-            return Err(silent(&name, "it has no footage"));
+            return Err(silent(&name, "the camera has no footage"));
         }
         let spec = launch::cameras::source(camera, &deployment.capture);
         let sound = unless_stopped(stop, move || sound(&name, &spec, part))?;

@@ -47,7 +47,7 @@ pub(super) fn table(calibrated: &Calibrated) -> Result<(), Failure> {
     for it in &outcome.pairs {
         let [a, b] = it.cameras.map(|nth| &calibrated.task.names[nth]);
         output::line(format_args!(
-            "{:<29} {:>5} frames together, {} agree, {:.4} m apart",
+            "{:<29} seen together in {:>5} frames, {} of them agree, cameras {:.4} m apart",
             format!("{a} - {b}"),
             it.n,
             it.n_agree,

@@ -50,7 +50,7 @@ pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor,
     check(rig, run, &frames, &skeletons)?;
     let found = floor(&times_s, &skeletons).ok_or_else(|| {
         let message = format!(
-            "{}: in its {} frames, no person stands on a foot",
+            "{}: none of the {} frames shows a person who stands on a foot",
             run.display(),
             frames.len()
         );
@@ -116,8 +116,8 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
         }
         Some(share) if share > MOST_OFF => {
             let message = format!(
-                "{}: this is not a run of this rig: its joints are off from where the cameras saw them by {:.0} % of the person's size (median; \
-                 allowed: {:.0} %)",
+                "{}: the run does not belong to this rig: the distance of its joints from where the cameras saw them is {:.0} % of the \
+                 person's size (median; at most {:.0} % is allowed)",
                 run.display(),
                 100.0 * share,
                 100.0 * MOST_OFF
