@@ -20,7 +20,9 @@ pub enum KeyError {
     #[error("{0} does not exist")]
     Missing(PathBuf),
     /// A key file already exists.
-    #[error("{0} already exists, and is not replaced: hosts with the old keys would no longer be accepted")]
+    #[error(
+        "{0} already exists, and is not replaced: hosts with the old keys would no longer be accepted"
+    )]
     Exists(PathBuf),
     /// A file cannot be written.
     #[error("cannot write {file}")]

@@ -62,7 +62,8 @@ pub enum RecordedError {
 
 fn others(known: &[String]) -> String {
     if known.is_empty() {
-        "it has no original pictures at all: only `parallax record` of live cameras keeps them".to_owned()
+        "it has no original pictures at all: only `parallax record` of live cameras keeps them"
+            .to_owned()
     } else {
         format!("it has original pictures of {}", known.join(", "))
     }

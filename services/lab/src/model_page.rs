@@ -113,7 +113,7 @@ fn numbers(model: &Model) -> Html {
             format!("{:.4}", summary.detection_threshold),
         ),
         ("biases", format!("{low:.3} to {high:.3}")),
-        ("springs, one per", kind.to_owned()),
+        ("one spring per", kind.to_owned()),
         ("mirror", mirror.to_owned()),
     ];
     let mut out = html!("<ul class=\"numbers\">\n");

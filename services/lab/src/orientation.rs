@@ -114,7 +114,7 @@ pub fn train(
     let network = viewquality::orientation::train(&samples, &job.settings, watch);
     work.go_on()?;
     let network = network.ok_or_else(|| {
-        let message = "no people for training: the direction of no person is known";
+        let message = "there are no people for training, because no person's direction is known";
         Failure::new(ExitKind::Input, message)
     })?;
     write(out, &network)?;

@@ -82,7 +82,7 @@ pub fn read<T: Example>(path: &Path) -> Result<Prepared<T>, Failure> {
     let fail = |error: std::io::Error| failure::in_file(path, &error);
     let is_other = || {
         let message = format!(
-            "{}: not a file of `parallax-lab train {}`",
+            "{}: this is not a file of `parallax-lab train {}`",
             path.display(),
             T::MADE_BY
         );

@@ -90,7 +90,7 @@ fn truth(
     .map_err(|error| in_file(path, &error))?;
     let [sequence] = &sequences[..] else {
         let what = format!(
-            "{}: {} sequences, expected one",
+            "{}: found {} sequences, expected one",
             path.display(),
             sequences.len()
         );
@@ -119,7 +119,7 @@ fn truth(
     }
     if n_known == 0 {
         let what = format!(
-            "{}: the truth has none of the {} frames (from {}) or joints of the run",
+            "{}: the truth has none of the {} frames of the run (the first is {}), or none of its joints",
             path.display(),
             frames.len(),
             frames.first().copied().unwrap_or_default()

@@ -68,7 +68,7 @@ pub(crate) fn run<T: Task>(
     let kept = match files::read(&file, files::RESULTS) {
         Ok(bytes) if job.resume => Some(bytes),
         Ok(_) => {
-            let message = format!("{} is from an interrupted training", file.display());
+            let message = format!("{} was left by an interrupted training", file.display());
             let hint = "continue from it with --resume, or delete it";
             return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
         }

@@ -132,7 +132,10 @@ fn options_of_sequences_are_refused_for_single_pictures_and_vice_versa() {
         (&[people, "--oracle"][..], "--oracle has no effect"),
         (&[people, "--resume"], "--resume has no effect"),
         (&[people, "walk.toml"], "cannot be evaluated in one run"),
-        (&["walk.toml", "--only", "1"], "there are none"),
+        (
+            &["walk.toml", "--only", "1"],
+            "no single pictures are given",
+        ),
         (&[people, people], "people is given twice"),
     ] {
         let words = [&["eval", "--model", "model.plx", "--out", "out"], words].concat();
@@ -207,7 +210,7 @@ fn impossible_evaluations_are_refused() {
         (&["--versions", "adaptive"][..], 2, "--oracle"),
         (&["--versions", "fnp"], 2, "fnp"),
         (&["--size", "12"], 2, "WIDTHxHEIGHT"),
-        (&["--share", "1-0.5"], 2, "there is nothing between"),
+        (&["--share", "1-0.5"], 2, "the range from 1 to 0.5 is empty"),
         (&["--paper", "wrong.toml"], 3, "alhpa"),
         (&["--paper", "beyond.toml"], 3, "`paper.alpha` is -1"),
         (&["--paper", "none.toml"], 4, "none.toml"),

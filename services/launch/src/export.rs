@@ -215,7 +215,8 @@ fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
     if origin.trials[0].rate_hz.is_none()
         && let Some(formats) = lacks(Format::needs_rate)
     {
-        let message = format!("the run has no frame rate, which {formats} must contain");
+        let message =
+            format!("the frame rate of the run is not known, and {formats} must contain it");
         return Err(Failure::new(ExitKind::Usage, message)
             .with_hint("give the frame rate, for example --rate 30"));
     }

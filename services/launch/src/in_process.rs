@@ -55,7 +55,8 @@ impl InProcess {
                     keypoints.push(Some(source));
                 }
                 pose::Step::Filters(_) => {
-                    let message = "in this deployment the filters find people, not a network";
+                    let message =
+                        "this deployment finds people with filters, but a network is needed here";
                     return Err(Failure::new(ExitKind::Config, message));
                 }
             }

@@ -107,7 +107,11 @@ pub fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     running.retain(|deployment| deployment.supervisor.is_some());
     if running.len() > 1 {
         let names: Vec<&str> = running.iter().map(|running| running.namespace.name()).collect();
-        let message = format!("{} deployments run: {}", names.len(), names.join(", "));
+        let message = format!(
+            "{} deployments are running: {}",
+            names.len(),
+            names.join(", ")
+        );
         return Err(
             Failure::new(ExitKind::Usage, message).with_hint("give the name of one of them")
         );

@@ -155,7 +155,7 @@ fn a_detector_that_finds_nobody_says_what_its_card_asks_for() {
         "x.png",
     ];
     let ended = run(&case, &shown, &[]);
-    let said = "finds nobody: no box scores 0.95 or more";
+    let said = "finds nobody: no box has a score of 0.95 or more";
     assert!(ended.stdout.contains(said), "{}", ended.stdout);
 }
 

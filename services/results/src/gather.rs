@@ -257,7 +257,10 @@ mod tests {
                 ..PairPose::default()
             })
         };
-        assert!(!gather.awaits_quality(3), "nothing is known about the frame");
+        assert!(
+            !gather.awaits_quality(3),
+            "nothing is known about the frame"
+        );
         gather.fused(3, pair([0, 4]));
         assert!(
             !gather.awaits_quality(3),
@@ -270,7 +273,10 @@ mod tests {
             ..ViewQuality::default()
         };
         gather.quality(0, &quality);
-        assert!(gather.awaits_quality(3), "the expected errors of the other view are missing");
+        assert!(
+            gather.awaits_quality(3),
+            "the expected errors of the other view are missing"
+        );
         gather.quality(1, &quality);
         assert!(!gather.awaits_quality(3));
     }

@@ -233,6 +233,9 @@ pub(crate) mod tests {
         let moment = Moment::of_message(&scene(), &message);
         assert_eq!((moment.joints, moment.stature), (vec![None; 14], None));
         assert_eq!(moment.why.as_deref(), Some("too few views"));
-        assert_eq!(moment.views[0].why.as_deref(), Some("no frame arrived in time"));
+        assert_eq!(
+            moment.views[0].why.as_deref(),
+            Some("no frame arrived in time")
+        );
     }
 }

@@ -39,7 +39,9 @@ pub enum ExchangeError {
     #[error("a clock was set back during the exchange")]
     Backwards,
     /// The other host claims to have taken longer than the whole exchange.
-    #[error("the other host claims that it answered after {inside} ns, but the whole exchange took only {outside} ns")]
+    #[error(
+        "the other host claims that it answered after {inside} ns, but the whole exchange took only {outside} ns"
+    )]
     Inside {
         /// Time from question to answer on the other host, in nanoseconds.
         inside: u64,

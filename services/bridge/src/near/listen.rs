@@ -128,7 +128,10 @@ impl Gate {
         let came_at = now_nanos();
         let name = host_of(key);
         let Some(remote) = self.remotes.iter().find(|remote| remote.name == name) else {
-            tracing::debug!(key, "a message came from a host that is not in the deployment");
+            tracing::debug!(
+                key,
+                "a message came from a host that is not in the deployment"
+            );
             return;
         };
         let expected = Expected {
@@ -342,7 +345,10 @@ fn hear_hellos(
         match (remote, &answer) {
             (Some(remote), Answer::Welcome(_)) => remote.welcomed(hello.origin, now_nanos()),
             (Some(remote), Answer::Refused(why)) => remote.refused(why),
-            (None, _) => tracing::warn!(name, "a host is not accepted, because it is not in the deployment"),
+            (None, _) => tracing::warn!(
+                name,
+                "a host is not accepted, because it is not in the deployment"
+            ),
         }
         if let Some(link) = back.upgrade() {
             link.send(&own.answer(name), answer.to_bytes(), true);

@@ -132,7 +132,10 @@ impl Remote {
                 tracing::info!(host = self.name, "the host answers");
             } else {
                 state.n_went += 1;
-                tracing::warn!(host = self.name, "the host does not answer: its views are missing");
+                tracing::warn!(
+                    host = self.name,
+                    "the host does not answer: its views are missing"
+                );
             }
         }
         let estimate = state.clock.estimate(now).filter(|_| is_there);

@@ -360,7 +360,10 @@ fn settled_picture(
 
 /// Ends a stream that is silent for too long. Stops watching when dropped.
 #[derive(Debug)]
-#[expect(dead_code, reason = "the other thread waits until this value is dropped")]
+#[expect(
+    dead_code,
+    reason = "the other thread waits until this value is dropped"
+)]
 struct Watched(Option<SyncSender<()>>);
 
 impl Watched {

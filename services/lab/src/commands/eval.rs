@@ -37,8 +37,9 @@ SEQUENCE is a folder of HumanEva-I (all of it or one subject), of UMPM or of `pa
 Versions: fmp (each view alone, then triangulation); geometry (adds distances to epipolar lines); appearance (adds part types); \
 adaptive (switches off parts with a large expected error). They solve pairs of views and take the mean of the results, as in the paper. \
 A suffix changes this: geometry+consensus uses the poses that most views support. In geometry+all-views, all other views \
-support each view at once; geometry+all-views-mean uses the mean of their terms. Without --versions, all versions whose inputs are given \
-run, with pairs and with all views. appearance needs tables of part types or --consistency; adaptive needs --network, --sigma or --oracle.
+support each view at once; geometry+all-views-mean uses the mean of their terms. Without --versions, every version whose inputs are given \
+is evaluated, with pairs and with all views. appearance needs tables of part types or --consistency; adaptive needs --network, --sigma or \
+--oracle.
 
 --network FILE predicts the errors of the single views, as the service `quality` does. The report then shows how accurate the predictions \
 are for each part: area under the ROC curve and rank correlation. The network's thresholds apply if --paper sets no tau. \
@@ -172,16 +173,16 @@ pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
 }
 
 fn share(text: &str) -> Result<[f64; 2], String> {
-    let (from, to) = text.split_once('-').ok_or("expected FROM-TO, as 0.8-1")?;
+    let (from, to) = text.split_once('-').ok_or("expected FROM-TO, such as 0.8-1")?;
     let end = |text: &str| match text.parse::<f64>() {
         Ok(end) if (0.0..=1.0).contains(&end) => Ok(end),
-        _ => Err(format!("{text:?} is not a share from 0 to 1")),
+        _ => Err(format!("{text:?} is not a number from 0 to 1")),
     };
     let [from, to] = [end(from)?, end(to)?];
     if from < to {
         Ok([from, to])
     } else {
-        Err(format!("there is nothing between {from} and {to}"))
+        Err(format!("the range from {from} to {to} is empty"))
     }
 }
 
@@ -300,7 +301,7 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
             let is_judged = done.sequences.iter().any(|sequence| !sequence.1.is_empty());
             failure::require_results(
                 is_judged,
-                "no frame was evaluated: there is none, or --only and --every leave none",
+                "no frame was evaluated: the input has no frames, or --only and --every exclude all of them",
             )
         }
         n => {
@@ -320,7 +321,9 @@ fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
     let selects = arguments.only.is_some() || arguments.without.is_some();
     let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));
     if n == 0 && selects {
-        return refuse("--only and --without select single pictures, but there are none");
+        return refuse(
+            "--only and --without select single pictures, but no single pictures are given",
+        );
     }
     if n > 0 && arguments.evidence.network_evidence.is_some() {
         return refuse("--network-evidence is for sequences, not for single pictures");

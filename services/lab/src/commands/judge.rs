@@ -124,7 +124,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     if arguments.card.is_some() || arguments.find_boxes || arguments.mirror {
         let message = format!(
-            "{}: --card, --find-boxes and --mirror are for networks, files that end in .onnx",
+            "{}: --card, --find-boxes and --mirror are only for networks (files that end in .onnx)",
             arguments.model.display()
         );
         return Err(Failure::new(ExitKind::Usage, message));

@@ -219,10 +219,12 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
     let mut entries = description.metadata.iter();
     if entries.any(|entry| entry.0 == viewquality::key::VERSION) {
         return output::line(
-            "  it predicts the errors of single views (`errors` in [paper] of a deployment) and does not find keypoints",
+            "  the network predicts the errors of single views (`errors` in [paper] of a deployment) and does not find keypoints",
         );
     }
-    output::line("  no card: none was given, and there is none in the network or beside it")?;
+    output::line(
+        "  no card: no card was given, and there is no card in the network file or beside it",
+    )?;
     let networks = network::nearest(description);
     let detectors = network::nearest_detectors(description);
     if networks.is_empty() && detectors.is_empty() {
@@ -242,7 +244,7 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
             _ => "are equally close",
         };
         output::line(format_args!(
-            "  among the cards of {of}, {} {come}, by the shapes of inputs and outputs",
+            "  of the cards for {of}, {} {come} (judged by the shapes of inputs and outputs)",
             files.join(", ")
         ))?;
     }
@@ -258,7 +260,10 @@ fn taken(card: &Card) -> String {
         Fit::Stretch => "stretched to the input",
     };
     let margin = card.crop.margin;
-    format!("{}; the box x {margin}, {fit}", prepared(&card.input))
+    format!(
+        "{}; the box, enlarged by a factor of {margin}, {fit}",
+        prepared(&card.input)
+    )
 }
 
 fn prepared(input: &Input) -> String {

@@ -31,8 +31,8 @@ given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch,
 
 With --motion, the subjects move as recorded in a C3D or TRC file. Limbs have the recorded directions, but the lengths of \
 the subject. The path is moved to the middle of the room. Joint angles are not limited. A table (--markers) maps \
-markers to joints. Gaps of up to --motion-gap seconds are interpolated. Longer gaps are refused; the message names the frames. So \
-are impossible motions: implausible leg lengths, a head below the feet, or knees that bend forward.
+markers to joints. Gaps of up to --motion-gap seconds are interpolated. Longer gaps are an error, and the message names the frames. \
+Impossible motions are an error, too: implausible leg lengths, a head below the feet, or knees that bend forward.
 
 With --live, no pictures are written. The cameras of the deployment have the source synth://RIG?camera=C1&action=..., \
 and each capture process renders its pictures during the run. The ground truth is that of these pictures.
@@ -239,7 +239,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
     if skews_ms.len() > n_cameras {
         let message = format!(
-            "--skew-ms has {} values, but the rig has {n_cameras} cameras",
+            "--skew-ms has {} values, but the rig has only {n_cameras} cameras",
             skews_ms.len()
         );
         return Err(Failure::new(ExitKind::Usage, message));

@@ -13,7 +13,8 @@ pub(super) fn split(
     subjects.dedup();
     if let Some(unknown) = hold_out.iter().find(|subject| !subjects.contains(&subject.as_str())) {
         let known = subjects.join(", ");
-        let message = format!("--hold-out: there is no subject {unknown:?}, only {known}");
+        let message =
+            format!("--hold-out: there is no subject {unknown:?}; the subjects are {known}");
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let held: Vec<String> = if hold_out.is_empty() {
@@ -43,7 +44,7 @@ pub(super) fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
         if cameras(pair[0]) != cameras(pair[1]) {
             let other = pair[1];
             let message = format!(
-                "--rig {rig}: {} {} has other cameras than the previous sequence",
+                "--rig {rig}: {} {} does not have the same cameras as the previous sequence",
                 other.dataset, other.name
             );
             return Err(Failure::new(ExitKind::Usage, message));

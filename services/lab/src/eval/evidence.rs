@@ -142,7 +142,7 @@ impl EvidenceJob<'_> {
     /// Solves all frames as `parallax run` does.
     fn as_run(&self, sequences: &[Sequence], console: &dyn Console) -> Result<Tally, Failure> {
         let n_frames: usize = sequences.iter().map(|sequence| sequence.frames.len()).sum();
-        console.begin("frames as run", "");
+        console.begin("frames solved as in a run", "");
         let (mut tally, mut done) = (Tally::default(), 0);
         for sequence in sequences {
             let mut film = Film::open(sequence, &self.film).or_fail(ExitKind::Input)?;

@@ -70,7 +70,7 @@ pub struct FrameResult {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The first line is not a header.
-    #[error("line 1 is not the header of a file of records")]
+    #[error("line 1 is not the header of a records file")]
     Header(#[source] serde_json::Error),
     /// The records are from a run with other settings.
     #[error("the records are from a run with other settings or versions")]

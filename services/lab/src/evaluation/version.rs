@@ -41,8 +41,8 @@ pub struct Version {
 /// Error: the text does not name a version.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{text:?}: a version is fmp, geometry, appearance or adaptive, and of the last three \
-     +consensus, +all-views or +all-views-mean"
+    "{text:?} is not a version: expected fmp, geometry, appearance or adaptive; the last three may end in +consensus, +all-views or \
+     +all-views-mean"
 )]
 pub struct VersionError {
     /// The text.

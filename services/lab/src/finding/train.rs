@@ -27,7 +27,7 @@ pub fn train(
     let begun = |from: &Earlier| {
         let begun = finder::begun(&settings.shape, settings.seed, &from.bytes);
         begun.map_err(|error| {
-            let hint = "--from needs a network of `train finder` with the `shape` of the settings";
+            let hint = "--from needs a network made by `train finder`, with the same `shape` as in the settings";
             failure::in_file(&from.file, &error).with_hint(hint)
         })
     };

@@ -142,7 +142,7 @@ impl Data {
 pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     if let Some(folder) = folders.iter().find(|folder| !folder.is_dir()) {
         let message = format!(
-            "{}: not a folder of images without people",
+            "{}: this is not a folder of images without people",
             folder.display()
         );
         return Err(Failure::new(ExitKind::Input, message));
@@ -185,7 +185,8 @@ fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure
         )),
         _ => {
             let message = format!("{option} is given more than once for one data set");
-            Err(Failure::new(ExitKind::Usage, message).with_hint("join them: 1-100,150"))
+            Err(Failure::new(ExitKind::Usage, message)
+                .with_hint("combine the values, for example 1-100,150"))
         }
     }
 }

@@ -55,8 +55,9 @@ pub(crate) fn deal<'a>(
             Whose::All(_) => {
                 let first = datasets.first().map(|dataset| dataset.display().to_string());
                 let first = first.unwrap_or_default();
-                let message =
-                    format!("{option} {argument}: there are several data sets, and none is named");
+                let message = format!(
+                    "{option} {argument}: there are several data sets, but the option does not name one"
+                );
                 return Err(Failure::new(ExitKind::Usage, message).with_hint(format!(
                     "name the data set as on the command line, for example {option} {first}={argument}"
                 )));

@@ -124,8 +124,8 @@ impl Store {
     fn with_advice(&self, refused: Refused) -> Failure {
         let path = self.checkpoint();
         Failure::new(ExitKind::Input, refused).with_hint(format!(
-            "--resume needs the data sets, negatives, options and settings that it was made with; to \
-             begin anew, delete {}",
+            "--resume needs the data sets, negatives, options and settings of the interrupted training; to start from the beginning, \
+             delete {}",
             path.display()
         ))
     }
@@ -193,12 +193,13 @@ impl Store {
         }
         let path = self.checkpoint();
         let so_far = match n_done {
-            0 => stopped("stopped before a step was done".to_owned()),
+            0 => stopped("stopped before the first step was done".to_owned()),
             _ => stopped(format!("stopped after {n_done} of {n_steps} steps")),
         };
         if !path.exists() {
-            return so_far
-                .with_hint("there is no checkpoint: the first one is written after a step");
+            return so_far.with_hint(
+                "there is no checkpoint yet: the first checkpoint is written after the first step",
+            );
         }
         let path = path.display();
         so_far.with_hint(format!(
@@ -248,9 +249,12 @@ fn claim(out: &Path) -> Result<File, Failure> {
         // If the file system does not support locks, the training continues without a lock.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
         Err(TryLockError::WouldBlock) => {
-            let message = format!("--out {}: another training is writing it", out.display());
+            let message = format!(
+                "--out {}: another training is writing this file",
+                out.display()
+            );
             Err(Failure::new(ExitKind::Usage, message)
-                .with_hint("wait for it, or write to another --out"))
+                .with_hint("wait until that training ends, or choose another --out"))
         }
     }
 }

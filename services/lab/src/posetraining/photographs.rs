@@ -102,7 +102,7 @@ fn of_all(
         let died = || {
             Err(Failure::new(
                 ExitKind::Run,
-                "a thread that prepares people has panicked",
+                "a thread that prepares the images of people has panicked",
             ))
         };
         let join = |scoped_join_handle: std::thread::ScopedJoinHandle<'_, _>| {

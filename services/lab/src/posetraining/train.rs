@@ -16,14 +16,14 @@ pub type Pass = training::networks::Pass<Cost, Score>;
 fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
     let Some(from) = &job.from else {
         if settings.extras_alone {
-            let message = "extras_alone = true keeps a network except for its extra keypoints, but no network is named";
-            let hint = "name the network with --from, or remove extras_alone from the settings";
+            let message = "extras_alone = true trains only the extra keypoints of an existing network, but no network is given";
+            let hint = "give the network with --from, or remove extras_alone from the settings";
             return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
         }
         return Ok(None);
     };
     let begun = pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
-        let hint = "--from needs a network of `train network` with the `shape` of the settings";
+        let hint = "--from needs a network made by `train network`, with the same `shape` as in the settings";
         failure::in_file(&from.file, &error).with_hint(hint)
     })?;
     Ok(Some(begun))

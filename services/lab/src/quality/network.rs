@@ -152,7 +152,10 @@ fn read_all(files: &[PathBuf]) -> Result<Samples, Failure> {
     for file in files {
         let samples = read(file)?;
         if !all.all.is_empty() && samples.tile != all.tile {
-            let message = format!("{}: the tiles have another size", file.display());
+            let message = format!(
+                "{}: the tiles do not have the same size as in the previous files",
+                file.display()
+            );
             return Err(Failure::new(ExitKind::Input, message));
         }
         all.tile = samples.tile;

@@ -21,7 +21,7 @@ pub(super) enum NoSample {
     #[error("no person was found")]
     Nobody,
     /// A true joint is unknown.
-    #[error("a joint is unknown")]
+    #[error("the true position of a joint is unknown")]
     Unknown,
     /// The model has another number of parts.
     #[error("the model does not have 26 parts")]

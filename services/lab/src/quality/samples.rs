@@ -59,10 +59,7 @@ pub fn make(
     all.extend(people(job, &work)?);
     let n = all.len();
     if n == 0 {
-        return Err(Failure::new(
-            ExitKind::Input,
-            "there is no sample for any picture",
-        ));
+        return Err(Failure::new(ExitKind::Input, "no picture gave a sample"));
     }
     let samples = Samples {
         tile: [job.tile.height, job.tile.width],

@@ -24,9 +24,11 @@ pub fn marker_table(name: &Path) -> Result<MarkerTable, Failure> {
 fn failed(error: MotionError) -> Failure {
     let hint = match &error {
         MotionError::NoPreset { .. } | MotionError::NoMarker { .. } => {
-            "configs/markers/cmu.toml shows what a marker table looks like: --markers my.toml"
+            "write a marker table like configs/markers/cmu.toml, and pass it as --markers my.toml"
         }
-        MotionError::Gap { .. } => "choose other frames (--motion-frames 1-600), or --motion-gap S",
+        MotionError::Gap { .. } => {
+            "choose other frames (--motion-frames 1-600), or allow longer gaps (--motion-gap S)"
+        }
         MotionError::Frames { .. } => {
             return Failure::new(ExitKind::Usage, error);
         }
@@ -103,7 +105,7 @@ pub fn n_frames(
     let most = (recording.seconds() * rate_hz + 1e-6).floor() as u64 + 1;
     match asked {
         Some(asked) if asked > most => Err(format!(
-            "{asked} frames were requested, but the recording ends after {most} at {rate_hz} frames per second"
+            "{asked} frames were requested, but at {rate_hz} frames per second the recording ends after {most} frames"
         ))
         .or_fail(ExitKind::Usage),
         asked => Ok(asked.unwrap_or(most)),

@@ -12,9 +12,7 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
     let camera = format!("camera {camera:?}");
     match error {
         FeedError::Footage(FootageError::Live { .. }) => {
-            format!(
-                "this is the `source` of {camera}; recorded files and synth:// scenes can be its footage"
-            )
+            format!("the `source` of {camera} must be a recorded file or a synth:// scene")
         }
         FeedError::Footage(FootageError::Io { source, .. })
             if source.kind() == ErrorKind::PermissionDenied =>

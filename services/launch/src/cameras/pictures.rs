@@ -123,8 +123,7 @@ fn with_up(rig: Rig) -> Rig {
 
 /// Returns true if a calibration is of the rotated picture, and the reason for this decision.
 fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, String) {
-    const BY_HAND: &str =
-        "`rotate = 0` (as stored) or `rotate = \"tag\"` in the [[camera]] sets it explicitly";
+    const BY_HAND: &str = "to choose explicitly, set `rotate = 0` (as stored) or `rotate = \"tag\"` in the [[camera]]";
     let Some(camera) = rig.camera(name) else {
         return (true, BY_HAND.to_owned());
     };
@@ -246,9 +245,7 @@ fn gaps(numbers: &[u64], counted: PictureNumbers) -> Option<String> {
         ""
     };
     let all = numbers.len() as u64 + n;
-    (n > 0).then(|| {
-        format!("{n} of {all} frames ({named}{more}): the numbers in the names are missing")
-    })
+    (n > 0).then(|| format!("{n} of {all} frames: no file name has the numbers {named}{more}"))
 }
 
 #[cfg(test)]

@@ -79,7 +79,10 @@ fn line((name, it): &(String, CameraCounts)) -> String {
         parts.push(format!("{:.3} a second", it.rate_microhertz as f64 / 1e6));
     }
     if it.skew_nanos != UNMEASURED {
-        let skew = format!("{:+.1} ms from the instants", it.skew_nanos as f64 / 1e6);
+        let skew = format!(
+            "taken {:+.1} ms from the instants of the frames",
+            it.skew_nanos as f64 / 1e6
+        );
         parts.push(skew);
     }
     if it.drift_ppb != UNMEASURED {
@@ -102,10 +105,8 @@ fn line((name, it): &(String, CameraCounts)) -> String {
 fn times(it: &CameraCounts) -> Option<String> {
     let ms = it.delay_nanos as f64 / 1e6;
     match it.timed_by {
-        TimedBy::CAMERA => Some(format!(
-            "{ms:.0} ms from the camera to here by its own clock"
-        )),
-        TimedBy::ARRIVAL => Some("counted as taken when they arrived".to_owned()),
+        TimedBy::CAMERA => Some(format!("delay {ms:.0} ms according to the camera's clock")),
+        TimedBy::ARRIVAL => Some("arrival times used as capture times".to_owned()),
         TimedBy::DISBELIEVED => Some(format!(
             "counted as taken when they arrived, because by the camera's own clock they took {ms:.0} ms to get here, which is not \
              plausible (set that clock from the time server of this machine)"

@@ -83,7 +83,10 @@ pub fn parse_corners(text: &str, names: &[String]) -> Result<Read, String> {
         groups.entry((camera, frame)).or_default().push((id, at));
     }
     if groups.is_empty() {
-        return Err(format!("the table has no corners of the cameras {}", names.join(", ")));
+        return Err(format!(
+            "the table has no corners of the cameras {}",
+            names.join(", ")
+        ));
     }
     let sights = groups
         .into_iter()

@@ -48,7 +48,12 @@ fn table(text: &str) -> Result<FrameTable, String> {
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let column = |names: &[&str]| {
         let found = header.iter().position(|title| names.contains(&title.trim()));
-        found.ok_or_else(|| format!("the column {} is missing: expected sync_index and cam_id", names[0]))
+        found.ok_or_else(|| {
+            format!(
+                "the column {} is missing: expected sync_index and cam_id",
+                names[0]
+            )
+        })
     };
     let (sync, camera) = (column(&["sync_index"])?, column(&["cam_id", "port"])?);
     let mut frames: BTreeMap<String, Vec<usize>> = BTreeMap::new();

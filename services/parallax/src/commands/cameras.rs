@@ -198,10 +198,9 @@ fn described(it: &Found) -> Value {
 
 fn text(it: &Found) -> String {
     let [width, height] = it.mode.size;
-    let rate = it
-        .mode
-        .rate_hz
-        .map_or_else(String::new, |rate_hz| format!(", {rate_hz:.2} frames per second"));
+    let rate = it.mode.rate_hz.map_or_else(String::new, |rate_hz| {
+        format!(", {rate_hz:.2} frames per second")
+    });
     let about = &it.about;
     let mut lines = vec![
         format!(

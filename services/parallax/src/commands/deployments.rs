@@ -47,7 +47,9 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     if found.is_empty() {
-        output::message("no deployment is running, and no dead deployment has left shared memory behind");
+        output::message(
+            "no deployment is running, and no dead deployment has left shared memory behind",
+        );
     }
     for deployment in &found {
         let name = deployment.namespace.name();

@@ -97,7 +97,8 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if resolved.is_far() && (arguments.view || !arguments.publish.is_empty()) {
-        let message = "--view and --publish work only on the fusing host: this host has no skeletons";
+        let message =
+            "--view and --publish work only on the fusing host: this host has no skeletons";
         return Err(Failure::new(ExitKind::Usage, message));
     }
     let device = launch::device(&loaded.deployment)?;

@@ -165,7 +165,8 @@ fn run_estimate(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Fai
 /// Returns the index of the reference camera.
 fn reference(arguments: &Arguments, deployment: &Deployment) -> Result<usize, Failure> {
     if let [_] | [] = &deployment.cameras[..] {
-        let message = "the deployment has only one camera, so there is no other clock to compare with";
+        let message =
+            "the deployment has only one camera, so there is no other clock to compare with";
         return Err(Failure::new(ExitKind::Config, message));
     }
     let Some(name) = &arguments.reference else {

@@ -79,7 +79,11 @@ fn received(job: &Job) -> impl Iterator<Item = &Output> {
 fn tracks<'a>(job: &Job, recording: &'a Recording) -> Result<Vec<&'a Track>, Failure> {
     let tracks = received(job).map(|output| {
         recording.tracks.get(&output.topic).ok_or_else(|| {
-            let message = format!("{} has no messages of topic {}", job.file.display(), output.topic);
+            let message = format!(
+                "{} has no messages of topic {}",
+                job.file.display(),
+                output.topic
+            );
             Failure::new(ExitKind::Input, message)
         })
     });

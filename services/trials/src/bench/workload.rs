@@ -210,7 +210,10 @@ impl Workload {
         let n_cameras = deployment.cameras.len();
         self.n_views = options.views.unwrap_or(n_cameras);
         if self.n_views > n_cameras {
-            let message = format!("--views {}: the deployment has {n_cameras}", self.n_views);
+            let message = format!(
+                "--views {}: the deployment has only {n_cameras} cameras",
+                self.n_views
+            );
             return Err(Failure::new(ExitKind::Usage, message));
         }
         let planned = Planned::new(&deployment, self.verbosity.level)?;

@@ -69,7 +69,11 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
                 (measured.spread * requested.max_return_ms).round(),
                 cost.back_ms,
             ),
-            at_least("results of the others during the fault", least, results),
+            at_least(
+                "results of the other cameras during the fault",
+                least,
+                results,
+            ),
             at_most(
                 "longest pause between results, ms",
                 (measured.slowness * requested.max_pause_ms).round(),

@@ -120,7 +120,7 @@ pub(super) fn run(
     }
     failure::require_results(
         rows.iter().any(|row| row.n_frames > 0),
-        "no frame was evaluated: there is none, or --every leaves none",
+        "no frame was evaluated: the input has no frames, or --every excludes all of them",
     )
 }
 

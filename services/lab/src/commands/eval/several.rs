@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Fail
     leave(arguments, &report, &in_lines(&report))?;
     failure::require_results(
         !report.actors.is_empty(),
-        "no frame has a person in its truth",
+        "the truth has no person in any frame",
     )
 }
 
@@ -62,7 +62,7 @@ pub(super) fn run_of_scene(arguments: &Arguments, run: &Path) -> Result<ExitCode
     leave(arguments, &report, &everybody_in_lines(&report))?;
     failure::require_results(
         report.frames > 0,
-        "the run has no frame of the truth: check that both are of the same scene",
+        "the run and the truth have no frame in common: check that they belong to the same scene",
     )
 }
 
@@ -124,7 +124,7 @@ fn chosen(asked: &[usize], n_views: usize) -> Result<Vec<usize>, Failure> {
     let wrong = (0..asked.len()).find(|nth| asked[*nth] >= n_views || is_twice(*nth));
     if let Some(wrong) = wrong {
         let message = format!(
-            "--views: {} is not from 0 to {}, or is given twice",
+            "--views: {} is given twice, or is not a number from 0 to {}",
             asked[wrong],
             n_views.saturating_sub(1)
         );

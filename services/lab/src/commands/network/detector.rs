@@ -108,7 +108,7 @@ fn in_words(
     ))?;
     output::line(format_args!("  gives  {}", given(card)))?;
     output::line(format_args!(
-        "  keeps  boxes with a score of at least {}; if two boxes share more than {} of their union, the better one",
+        "  keeps  boxes with a score of at least {}; of two boxes that share more than {} of their union, only the better one",
         card.least_score, card.most_overlap
     ))?;
     for (what, text) in [("licence", &card.licence), ("weights", &card.weights)] {
@@ -143,7 +143,7 @@ fn given(card: &DetectorCard) -> String {
 fn boxes_in_words(found: &[PersonBox], card: &DetectorCard) -> Result<(), Failure> {
     if found.is_empty() {
         output::line(format_args!(
-            "  finds nobody: no box scores {} or more",
+            "  finds nobody: no box has a score of {} or more",
             card.least_score
         ))?;
     }

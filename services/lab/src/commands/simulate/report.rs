@@ -36,7 +36,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
     let n_frames = report["frames_in_footage"].as_f64().unwrap_or(0.0);
     if n_views == 0 || n_frames < 1.0 {
         return Err(format!(
-            "{n_frames} frames of {n_views} views: no costs can be computed"
+            "the report has {n_frames} frames of {n_views} views, so no costs can be computed"
         ));
     }
     // Mean time of a process of this service, in milliseconds per frame.
@@ -51,7 +51,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         (!all.is_empty()).then(|| 1e3 * sum / (all.len() as f64 * n_frames))
     };
     let needed =
-        |service: &str| mean(service).ok_or_else(|| format!("no process {service} in the report"));
+        |service: &str| mean(service).ok_or_else(|| format!("the report has no process {service}"));
     let workers = spent.keys().filter(|key| key.starts_with("fuse-")).count() as f64;
     let fused = mean("fuse").map_or(0.0, |value| value * workers)
         + needed("triangulate")?

@@ -35,7 +35,7 @@ pub(super) fn subjects(text: &str) -> Result<Vec<u64>, String> {
     for part in text.split(',') {
         for subject in range(part).ok_or_else(wrong)? {
             if subjects.len() == MAX_SUBJECTS {
-                return Err(format!("more than {MAX_SUBJECTS} subjects"));
+                return Err(format!("at most {MAX_SUBJECTS} subjects are allowed"));
             }
             if !subjects.contains(&subject) {
                 subjects.push(subject);

@@ -89,7 +89,7 @@ fn a_model_is_written_by_one_training_at_a_time() {
     let first = Store::new(&out, false).unwrap();
     let second = Store::new(&out, false).unwrap_err().to_string();
     assert!(
-        second.contains("another training is writing it"),
+        second.contains("another training is writing this file"),
         "{second}"
     );
     drop(first);

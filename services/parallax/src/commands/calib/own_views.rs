@@ -216,7 +216,10 @@ mod tests {
         assert!(right.errors.cameras.iter().all(|camera| camera.median_px < 1.5));
         std::fs::write(&file, seen(&rig, [0, 2, 1, 3])).unwrap();
         let wrong = agreement(&rig, &file).unwrap().disagreements.join("; ");
-        assert!(wrong.contains("the footage of c1 and c2 seems to be exchanged"), "{wrong}");
+        assert!(
+            wrong.contains("the footage of c1 and c2 seems to be exchanged"),
+            "{wrong}"
+        );
     }
 
     #[test]

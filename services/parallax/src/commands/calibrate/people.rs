@@ -186,7 +186,9 @@ fn how_sure(outcome: &Outcome) -> String {
 fn source_of_scale(arguments: &Arguments) -> String {
     match (&arguments.height_m, &arguments.distance) {
         (Some(metres), _) => format!(", scale from a height of {metres} m"),
-        (None, Some((a, b, metres))) => format!(", scale from a distance of {metres} m between {a} and {b}"),
+        (None, Some((a, b, metres))) => {
+            format!(", scale from a distance of {metres} m between {a} and {b}")
+        }
         (None, None) => ", scale and world of the previous rig".to_owned(),
     }
 }

@@ -78,8 +78,7 @@ pub(super) fn walk(
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let deployment = launch::cameras::settled(&deployment)?;
     if deployment.cameras.len() < 2 {
-        let message =
-            "the deployment has only one camera, but at least two are needed to find the pose of a camera";
+        let message = "the deployment has only one camera, but at least two are needed to find the pose of a camera";
         return Err(Failure::new(ExitKind::Config, message));
     }
     let terminal = Terminal::with_bar(globals.quiet, false, BAR)
