@@ -34,7 +34,10 @@ pub enum JoinError {
 pub(crate) fn listed(all: &[Difference]) -> String {
     let each = all.iter().map(|difference| {
         let (there, here) = (&difference.here, &difference.there);
-        format!("{} is {here} here, {there} there", difference.what)
+        format!(
+            "{} is {here} on this host, but {there} on the fusing host",
+            difference.what
+        )
     });
     each.collect::<Vec<_>>().join("; ")
 }

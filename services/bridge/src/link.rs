@@ -49,7 +49,7 @@ impl Link {
         let put = self.0.put(key, bytes);
         let put = put.congestion_control(CongestionControl::Drop).priority(priority).express(true);
         if let Err(error) = put.wait() {
-            tracing::debug!(%error, key, "not sent");
+            tracing::debug!(%error, key, "a message cannot be sent");
         }
     }
 
@@ -78,7 +78,7 @@ impl Link {
         let own = key.to_owned();
         let declared = self.0.declare_queryable(key).callback(move |query| {
             if let Err(error) = query.reply(own.as_str(), on()).wait() {
-                tracing::debug!(%error, "not answered");
+                tracing::debug!(%error, "a query cannot be answered");
             }
         });
         let declared = declared.background().wait();

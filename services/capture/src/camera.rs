@@ -156,9 +156,14 @@ impl<'a> Camera<'a> {
         }
         let view = self.job.view;
         if let Some(status) = trouble {
-            tracing::warn!(view, frame, cause = status.reason(), "without a picture");
+            tracing::warn!(
+                view,
+                frame,
+                cause = status.reason(),
+                "the camera gives no picture"
+            );
         } else {
-            tracing::info!(view, frame, "pictures again");
+            tracing::info!(view, frame, "the camera gives pictures again");
         }
         self.trouble = trouble;
     }

@@ -239,7 +239,7 @@ impl Stage {
             index,
             seconds = picture.seconds,
             repeated = picture.repeated,
-            "made a picture"
+            "rendered a picture"
         );
         self.skip(1);
         Some(FrameView {

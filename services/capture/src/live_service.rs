@@ -179,14 +179,24 @@ impl Live<'_, '_> {
         if n.is_power_of_two() {
             self.has_said = true;
             let (view, cause) = (self.job.view, status.reason());
-            tracing::warn!(view, frame = index, cause, times = n, "without a picture");
+            tracing::warn!(
+                view,
+                frame = index,
+                cause,
+                times = n,
+                "the camera gives no picture"
+            );
         }
     }
 
     /// Logs that there are pictures again, if it was logged that they were missing.
     fn say_that_it_is_back(&mut self, index: u64) {
         if self.trouble.take().is_some() && core::mem::take(&mut self.has_said) {
-            tracing::info!(view = self.job.view, frame = index, "pictures again");
+            tracing::info!(
+                view = self.job.view,
+                frame = index,
+                "the camera gives pictures again"
+            );
         }
     }
 

@@ -34,7 +34,7 @@ fn a_missed_limit_of_a_scenario_is_named_and_has_its_own_exit_code() {
     assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
     assert_eq!(report["held"], false);
     let limits = report["scenarios"][0]["limits"].as_array().unwrap();
-    let back = limits.iter().find(|limit| limit["what"] == "back after, ms");
+    let back = limits.iter().find(|limit| limit["what"] == "time until back, ms");
     assert_eq!(back.unwrap()["held"], false, "{report:#}");
 }
 

@@ -149,7 +149,7 @@ fn predict(
     let forecast = match source.forecaster.run(&seen) {
         Ok(forecast) => forecast,
         Err(error) => {
-            tracing::warn!(frame_number, %error, "no prediction");
+            tracing::warn!(frame_number, %error, "the errors of a frame cannot be predicted");
             return no_prediction();
         }
     };

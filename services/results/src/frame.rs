@@ -130,7 +130,7 @@ impl FrameRecord {
             })
         };
         read.unwrap_or_else(|error| {
-            tracing::warn!(view, frame = self.frame(), %error, "unreadable candidates");
+            tracing::warn!(view, frame = self.frame(), %error, "the candidates of a view cannot be read");
             Vec::new()
         })
     }

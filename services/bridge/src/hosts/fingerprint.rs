@@ -9,7 +9,7 @@ pub struct Fingerprint(Vec<(String, String)>);
 
 /// A file or setting that differs between two hosts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
-#[error("{what} differs: {here} here, {there} there")]
+#[error("{what} differs: {here} on this host, {there} on the other host")]
 pub struct Difference {
     /// Name of the file or setting, such as `rig` or `model`.
     pub what: String,
@@ -76,7 +76,7 @@ mod tests {
         assert_eq!(
             got,
             [
-                "rig differs: af63dc4c8601ec8c here, af63df4c8601f1a5 there",
+                "rig differs: af63dc4c8601ec8c on this host, af63df4c8601f1a5 on the other host",
                 "network differs: nothing here, shipped there"
             ]
         );

@@ -228,7 +228,7 @@ impl Decoder {
             Content::Frame => Vec::new(),
             Content::ViewPose => {
                 let Some((poses, maps)) = maps::split(&it.body) else {
-                    remote.malformed(&"truncated poses");
+                    remote.malformed(&"the poses are truncated");
                     return None;
                 };
                 let maps = self.check(maps);
@@ -336,7 +336,7 @@ fn hear_hellos(
     let fingerprint = fingerprint.clone();
     let heard = link.subscribe(&topics.hello("*"), move |key, bytes| {
         let Ok(hello) = Hello::parse(bytes) else {
-            tracing::debug!(key, "no introduction");
+            tracing::debug!(key, "the introduction of a host cannot be read");
             return;
         };
         let name = host_of(key);

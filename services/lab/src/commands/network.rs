@@ -140,7 +140,12 @@ fn first_picture(file: &Path) -> Result<Picture, Failure> {
         most: Some(1),
     };
     let picture = Pictures::open(file, one)?.next_picture()?;
-    picture.ok_or_else(|| Failure::new(ExitKind::Input, format!("{}: no picture", file.display())))
+    picture.ok_or_else(|| {
+        Failure::new(
+            ExitKind::Input,
+            format!("{}: the file has no picture", file.display()),
+        )
+    })
 }
 
 fn ports(ports: &[Port]) -> Vec<Value> {

@@ -76,7 +76,10 @@ fn line((name, it): &(String, CameraCounts)) -> String {
     let more = more.into_iter().filter(|more| more.0 > 0);
     parts.extend(more.map(|(n, what)| format!("{n} {what}")));
     if it.rate_microhertz > 0 {
-        parts.push(format!("{:.3} a second", it.rate_microhertz as f64 / 1e6));
+        parts.push(format!(
+            "{:.3} pictures per second",
+            it.rate_microhertz as f64 / 1e6
+        ));
     }
     if it.skew_nanos != UNMEASURED {
         let skew = format!(

@@ -323,7 +323,10 @@ fn nowhere(settings: &BoardSettings, looked: &Looked, stop: &Stop) -> Failure {
     let pictures: usize = looked.cameras.iter().map(|camera| camera.n_pictures).sum();
     let failure = Failure::new(
         ExitKind::Input,
-        format!("no board {} in {pictures} pictures", settings.board),
+        format!(
+            "none of {pictures} pictures shows the board {}",
+            settings.board
+        ),
     );
     let guess = guessed(settings, looked, stop);
     failure.with_hint(guess.unwrap_or_else(|| reasons(looked)))
@@ -430,7 +433,7 @@ impl Calibrated {
             source += "; intrinsics only, without poses";
         }
         if !self.outcome.doubts.is_empty() {
-            source += "; doubtful: ";
+            source += "; the calibration is doubtful: ";
             source += &self.doubts().join("; ");
         }
         Rig::new(cameras, None, source).or_fail(ExitKind::Calibration)

@@ -241,7 +241,7 @@ impl<'a> Playback<'a> {
             Ok(()) if output == 0 => health.sent(envelope.stamp.frame),
             Ok(()) => {}
             Err(error @ SendError::TooLong { .. }) => {
-                tracing::warn!(%error, frame = envelope.stamp.frame, "left out");
+                tracing::warn!(%error, frame = envelope.stamp.frame, "a message is too long, and is left out");
                 health.dropped(Cause::Malformed, 1);
             }
             Err(error) => return Err(error.into()),

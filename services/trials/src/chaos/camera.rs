@@ -99,7 +99,7 @@ impl CameraFailure {
                 limits.max_pause_ms,
                 self.longest_pause_ms,
             ),
-            at_most("back after, ms", limits.max_return_ms, self.back_ms),
+            at_most("time until back, ms", limits.max_return_ms, self.back_ms),
         ]);
         checked.extend(outcome.judge(0));
         checked
@@ -224,6 +224,6 @@ mod tests {
         let gone = Some("camera gone");
         let never_back: Vec<FrameResult> =
             (0..8).map(|i| moment(i, 100.0 * i as f64, gone.filter(|_| i > 1))).collect();
-        assert_eq!(missed(&failed(&never_back)), ["back after, ms"]);
+        assert_eq!(missed(&failed(&never_back)), ["time until back, ms"]);
     }
 }

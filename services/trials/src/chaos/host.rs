@@ -101,8 +101,8 @@ fn verdict(name: &str, options: &Options, measured: Measured) -> Verdict {
         details: Vec::new(),
         numbers: json!({ "noticed_ms": gone_ms, "back_ms": back_ms, "hosts": state }),
         limits: vec![
-            at_most("noticed after, ms", MAX_NOTICED_MS, gone_ms),
-            at_most("back after, ms", options.limits.max_return_ms, back_ms),
+            at_most("time until noticed, ms", MAX_NOTICED_MS, gone_ms),
+            at_most("time until back, ms", options.limits.max_return_ms, back_ms),
             none_of("views with frames unaccounted for", &unaccounted),
         ],
         run: Value::Null,

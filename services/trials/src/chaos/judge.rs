@@ -83,8 +83,8 @@ pub(super) fn once(
         _ => back,
     };
     let mut limits = vec![
-        at_most("noticed after, ms", notice, cost.noticed_ms),
-        at_most("back after, ms", back, cost.back_ms),
+        at_most("time until noticed, ms", notice, cost.noticed_ms),
+        at_most("time until back, ms", back, cost.back_ms),
         at_most(
             "longest pause between results, ms",
             pause,
@@ -120,7 +120,7 @@ pub(super) fn random(
             Some(kills.downtime_ms.map_or(0, |downtime_ms| downtime_ms.n) as f64),
         ),
         at_most(
-            "back after (p99), ms",
+            "time until back (p99), ms",
             requested.max_return_ms,
             kills.downtime_ms.map(|downtime_ms| downtime_ms.p99),
         ),
@@ -183,12 +183,12 @@ pub(super) fn supervisor(
 ) -> Vec<Limit> {
     let mut limits = vec![
         at_most(
-            "processes of the killed run ended after, ms",
+            "time until all processes of the killed run ended, ms",
             NOTICE_MS,
             killed.ended_ms,
         ),
         at_most(
-            "first result of the next run after, ms",
+            "time until the first result of the next run, ms",
             requested.max_return_ms,
             killed.result_ms,
         ),
@@ -245,10 +245,13 @@ mod tests {
             (|_, _| (), nothing),
             (
                 |cost, _| cost.noticed_ms = Some(1001.0),
-                &["noticed after, ms"],
+                &["time until noticed, ms"],
             ),
-            (|cost, _| cost.back_ms = Some(8001.0), &["back after, ms"]),
-            (|cost, _| cost.back_ms = None, &["back after, ms"]),
+            (
+                |cost, _| cost.back_ms = Some(8001.0),
+                &["time until back, ms"],
+            ),
+            (|cost, _| cost.back_ms = None, &["time until back, ms"]),
             (
                 |cost, _| cost.longest_pause_ms = Some(2001.0),
                 &["longest pause between results, ms"],
@@ -295,7 +298,7 @@ mod tests {
         };
         assert_eq!(missed_once(ProcessFault::Stop, "pose-1", late), [""; 0]);
         let got = missed_once(ProcessFault::Kill, "pose-1", late);
-        assert_eq!(got, ["noticed after, ms", "back after, ms"]);
+        assert_eq!(got, ["time until noticed, ms", "time until back, ms"]);
     }
 
     #[test]
@@ -342,7 +345,7 @@ mod tests {
             ),
             (
                 |series, _| series.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
-                &["back after (p99), ms"],
+                &["time until back (p99), ms"],
             ),
             (
                 |_, used| used.memory_bytes = 143_000_000,
@@ -366,7 +369,11 @@ mod tests {
             assert_eq!(missed_random(change), expected);
         }
         let none = random(&ASKED, &RandomKillsOutcome::default(), &good().1);
-        let expected = ["kills", "back after (p99), ms", "frames unaccounted for"];
+        let expected = [
+            "kills",
+            "time until back (p99), ms",
+            "frames unaccounted for",
+        ];
         assert_eq!(missed(none), expected, "nobody was killed");
     }
 
@@ -391,12 +398,15 @@ mod tests {
         };
         assert_eq!(
             judge(&orphans),
-            ["processes of the killed run ended after, ms"]
+            ["time until all processes of the killed run ended, ms"]
         );
         let broken = SupervisorKillOutcome {
             result_ms: None,
             ..good_one
         };
-        assert_eq!(judge(&broken), ["first result of the next run after, ms"]);
+        assert_eq!(
+            judge(&broken),
+            ["time until the first result of the next run, ms"]
+        );
     }
 }

@@ -65,7 +65,11 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
             let Limit {
                 what, asked, got, ..
             } = limit;
-            writeln!(text, "{:<8}{:<17}   {what}: {got} (asked: {asked})", "", "")?;
+            writeln!(
+                text,
+                "{:<8}{:<17}   {what}: {got} (required: {asked})",
+                "", ""
+            )?;
         }
         for line in &verdict.details {
             writeln!(text, "{:<8}{line}", "")?;
@@ -140,7 +144,7 @@ mod tests {
             details: vec!["from s".to_owned()],
             numbers: Value::Null,
             limits: vec![
-                at_most("back after, ms", 8000.0, got),
+                at_most("time until back, ms", 8000.0, got),
                 at_most("x", 1.0, Some(0.0)),
             ],
             run: Value::Null,
@@ -152,7 +156,7 @@ mod tests {
             "held    kill-pose         pose-1: noticed 3 ms",
             "from s",
             "MISSED  hang-pose         pose-1: noticed 3 ms",
-            "back after, ms: nothing (asked: at most 8000)",
+            "time until back, ms: nothing (required: at most 8000)",
             "from s",
             "1 of 2 scenarios held",
         ];

@@ -65,7 +65,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
         )));
         limits.extend([
             at_most(
-                "killed camera back after, ms",
+                "time until the killed camera is back, ms",
                 (measured.spread * requested.max_return_ms).round(),
                 cost.back_ms,
             ),
@@ -233,11 +233,11 @@ mod tests {
             (|run| run.score = score(None), "PCP3D at 0.5, %"),
             (
                 |run| run.changed_cost(|cost| cost.back_ms = Some(8001.0)),
-                "killed camera back after, ms",
+                "time until the killed camera is back, ms",
             ),
             (
                 |run| run.changed_cost(|cost| cost.back_ms = None),
-                "killed camera back after, ms",
+                "time until the killed camera is back, ms",
             ),
             (
                 |run| run.changed_cost(|cost| cost.results_without_it = 0),
@@ -271,7 +271,11 @@ mod tests {
         let slow = |run: &mut Run| (run.slowness, run.spread) = (3.0, 2.0);
         for (back_ms, pause_ms, expected) in [
             (16_000.0, 6000.0, &[][..]),
-            (16_001.0, 6000.0, &["killed camera back after, ms"]),
+            (
+                16_001.0,
+                6000.0,
+                &["time until the killed camera is back, ms"],
+            ),
             (16_000.0, 6001.0, &["longest pause between results, ms"]),
         ] {
             let got = missed(|run| {

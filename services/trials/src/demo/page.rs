@@ -150,9 +150,12 @@ fn of_cost(cost: &Cost, camera: &str) -> Table {
     let count =
         |value: Option<u64>| value.map_or_else(|| "–".to_owned(), |number| number.to_string());
     table.rows = [
-        ("death noticed after", ms(cost.noticed_ms)),
-        ("restarted after", ms(cost.restarted_ms)),
-        ("first frame used in a result again after", ms(cost.back_ms)),
+        ("time until the death was noticed", ms(cost.noticed_ms)),
+        ("time until the restart", ms(cost.restarted_ms)),
+        (
+            "time until a frame was used in a result again",
+            ms(cost.back_ms),
+        ),
         ("last frame before the kill", count(cost.last_frame)),
         ("first frame after the kill", count(cost.first_frame)),
         (
