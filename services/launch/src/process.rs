@@ -362,7 +362,9 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let plan = resolved.recording.as_ref();
-    let plan = plan.ok_or("there is no recording").or_fail(ExitKind::Config)?;
+    let plan = plan
+        .ok_or("the deployment has no recording to write")
+        .or_fail(ExitKind::Config)?;
     let job = record::Job {
         file: plan.file.clone(),
         about: recorded::about(resolved, plan)?,

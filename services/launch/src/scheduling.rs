@@ -49,7 +49,7 @@ pub(crate) fn remove_denied(
     let warning = |(denied, names): &(Denied, Vec<String>)| {
         let reason = core::error::Error::source(denied).map(|source| format!(" ({source})"));
         format!(
-            "{}: {denied}{}; continuing without it. Try: {}",
+            "{}: {denied}{}; continuing without this setting. Try: {}",
             names.join(", "),
             reason.unwrap_or_default(),
             denied.hint()
@@ -114,7 +114,7 @@ mod tests {
         assert!(priority.contains("ulimit -r"), "{priority}");
         assert!(
             cores.starts_with(
-                "pose-1: cannot run on cores 1,7: 0,1 may be used; continuing without it"
+                "pose-1: cannot run on cores 1,7: 0,1 may be used; continuing without this setting"
             ),
             "{cores}"
         );

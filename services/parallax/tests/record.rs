@@ -109,7 +109,7 @@ fn omitted_messages_and_existing_files_are_reported() {
     let topics = &report["recording"]["topics"];
     assert_eq!(topics.get("evidence/v4/0"), None);
     assert!(report["recording"]["bytes"].as_u64().unwrap() < 1_000_000);
-    for (from, lacks) in [("pose", "the pixels of its frames"), ("fuse", "evidence")] {
+    for (from, lacks) in [("pose", "the pixels of the frames"), ("fuse", "evidence")] {
         let ended = replayed(&case, &["--from", from]);
         assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
         assert!(ended.stderr.contains(lacks), "{}", ended.stderr);

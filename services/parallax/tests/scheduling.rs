@@ -37,7 +37,7 @@ fn processes_run_on_their_configured_cores() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     assert!(
-        !ended.stderr.contains("continuing without it"),
+        !ended.stderr.contains("continuing without this setting"),
         "{}",
         ended.stderr
     );

@@ -211,7 +211,7 @@ fn subjects(text: &str) -> Result<[u64; 2], String> {
     let ends = text.split_once('-').unwrap_or((text, text));
     match (ends.0.trim().parse(), ends.1.trim().parse()) {
         (Ok(from), Ok(to)) if from <= to => Ok([from, to]),
-        _ => Err("expected numbers of subjects, FROM-TO".to_owned()),
+        _ => Err("expected the first and the last number of the subjects, FROM-TO".to_owned()),
     }
 }
 

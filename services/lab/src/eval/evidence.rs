@@ -363,7 +363,7 @@ pub fn evidence_text(rows: &[EvidenceRow]) -> String {
     use core::fmt::Write as _;
     let mut text = format!(
         "{:<12} {:<16} {:>7} {:<15} {:>7} {:<15} {:<24}\n",
-        "stress", "method", "PCP3D", "(95 %)", "mm", "(95 %)", "maps and bones err less by"
+        "stress", "method", "PCP3D", "(95 %)", "mm", "(95 %)", "maps and bones better by"
     );
     for it in rows {
         let [gain, from, to] = it.last_errs_less_mm;

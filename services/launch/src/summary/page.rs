@@ -87,8 +87,9 @@ fn latency(report: &LatencyReport) -> Table {
     });
     Table {
         heading: "Latency".to_owned(),
-        note: "Milliseconds: from capture to result, then the computing time of every stage."
-            .to_owned(),
+        note:
+            "Times in milliseconds: from capture to result, then the computing time of every stage."
+                .to_owned(),
         columns: ["", "measured", "median", "99 of 100", "longest"].map(str::to_owned).into(),
         rows: rows.collect(),
     }

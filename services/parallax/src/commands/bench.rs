@@ -84,7 +84,7 @@ pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failu
 /// * `report`: `None` if the benchmark was interrupted.
 fn publish(report: Option<Report>, to: &Output, globals: Globals) -> Result<ExitCode, Failure> {
     let Some(report) = report else {
-        output::message("stopped: there is no report");
+        output::message("stopped: no report was written");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
     };
     if let Some(file) = &to.record {

@@ -34,7 +34,7 @@ A run longer than --part-seconds is also reported in parts.
 kill-supervisor: the supervisor is killed. Its processes end within a second. The next start of the same deployment removes \
 the leftovers, and succeeds.
 
-camera-...: a camera fails for a fifth of the footage, like with `fault` in a deployment. The camera's frames have the status of \
+camera-...: a camera fails for a fifth of the footage, as with `fault` in a deployment. The camera's frames have the status of \
 the fault, and results from the other cameras continue (--max-pause-ms). The camera is used in results again within --max-return-ms.
 
 camera-moved: one camera of the rig is rotated by two degrees. This camera must be identified, and no other. \

@@ -145,7 +145,7 @@ fn program(name: &'static str, without: State) -> Finding {
             Finding::good(name, words.unwrap_or_default())
         }
         Ok(output) => Finding::good(name, format!("fails with {}", output.status))
-            .but(without, "reinstall it: Debian's package is `ffmpeg`"),
+            .but(without, "reinstall ffmpeg (on Debian, the package `ffmpeg`)"),
         Err(error) => Finding::good(name, format!("cannot be run: {error}")).but(
             without,
             "needed for videos and live cameras, but not for folders of pictures: `apt install ffmpeg`",

@@ -230,7 +230,7 @@ fn check(
     };
     let needs_evidence = reads_evidence.contains(&from) && n_pairs > 0;
     let missing = if needs_pixels && without.pixels {
-        Some((Kind::Frame, "the pixels of its frames"))
+        Some((Kind::Frame, "the pixels of the frames"))
     } else if needs_evidence && without.evidence {
         Some((Kind::Evidence, "evidence"))
     } else {

@@ -37,7 +37,7 @@ A result is refused, with exit code 7 and the reason, in these cases: another of
 is flat (nobody moves), a pair or a part of the footage contradicts the rest, the views do not fit each other, or a camera sees \
 nobody. Nothing is written then. If the footage is too short to find the drift, the table says so.
 
-With --by sound, the times are compared at which sounds begin: steps, voices, doors, claps. Nobody needs to be visible. Sound \
+With --by sound, the command compares the times at which sounds begin: steps, voices, doors, claps. Nobody needs to be visible. Sound \
 travels a metre in 2.9 ms, so an offset is uncertain by the distance of the two cameras divided by 343 m/s. The printed uncertainties include this. \
 In JSON, `joints` then counts sounds, and pixels are null. A result is refused if there are too few sounds, sounds that only one camera recorded, a \
 regular beat, or pairs or parts that contradict each other.

@@ -55,7 +55,10 @@ pub fn transport(options: &Transport, verbosity: Verbosity) -> Result<Option<Rep
     let provenance = Provenance::now();
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     for denied in sender.apply() {
-        tracing::warn!("{denied}; continuing without it. Try: {}", denied.hint());
+        tracing::warn!(
+            "{denied}; continuing without this setting. Try: {}",
+            denied.hint()
+        );
     }
     let mut rows = Vec::new();
     for spins in [false, true] {

@@ -42,7 +42,7 @@ impl CameraFault {
                 "camera-clock",
                 "the clock of a camera jumps, goes back and stops",
             ],
-            Self::Size => ["camera-size", "a camera sends pictures of another size"],
+            Self::Size => ["camera-size", "a camera sends pictures of a different size"],
             Self::Slow => ["camera-slow", "a camera skips every second frame"],
             Self::Damage => [
                 "camera-damage",

@@ -10,7 +10,7 @@ use super::{EXITS, Output};
 use terminal::rate;
 
 const HELP: &str = "\
-Each run is a deployment of real processes, started like with `parallax run`. Without a deployment file, the cameras are \
+Each run is a deployment of real processes, started as by `parallax run`. Without a deployment file, the cameras are \
 synthetic, with 320x240 pixels and `--rate` frames per second. Their pictures are rendered in advance into OUT/pictures. \
 With --live, the capture processes render the pictures during the run, and compete with the other processes for the cores. The pictures \
 are searched near the last pose, or everywhere with `--set paper.search=full`.

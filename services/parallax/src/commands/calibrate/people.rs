@@ -27,18 +27,18 @@ of a run with this rig show how large the errors of joints are";
 #[derive(Debug, Args)]
 #[command(after_help = "\
 People are read from the `keypoints` of a camera, or found by its network, as in `parallax sync estimate`. \
-It is best if only one person walks about. Of several people, the person is used whom the cameras see together for the longest time. The \
-deployment's rig supplies intrinsics and names. Its poses are only used with `--scale rig`.
+It is best if only one person walks about. If there are several people, the command uses the person whom the cameras see together for the \
+longest time. The deployment's rig supplies intrinsics and names. Its poses are only used with `--scale rig`.
 
 Pictures do not show the scale. Give the person's standing height (--height-m), which is compared with the lengths of the bones. The scale is then \
-right to 2 or 3 percent for usual proportions. Or give the distance between two cameras (--distance), or keep the scale and the world of the given rig \
-(--scale rig). Without `--scale rig`, the world has its floor at z = 0, its origin under the middle of the walk, and z pointing \
-up. The vertical is found from the standing feet, or else from upright bodies.
+right to 2 or 3 percent for usual proportions. Or give the distance between two cameras (--distance), or keep the scale and the world of \
+the given rig (--scale rig). Without `--scale rig`, the world has its floor at z = 0, its origin under the middle of the walk, and z \
+pointing up. The vertical is found from the standing feet, or else from upright bodies.
 
 A result is refused if two halves of the recording give different rigs, a camera has too \
-little in common with the others, its pose is too uncertain, or no person was found. All reasons are printed, nothing is written, and the exit code is 7. \
-If the pose of a camera is uncertain by more than 0.3 degrees or 1 percent of its distance to the people (one standard deviation), the rig is written with a \
-note. Every such camera is printed, and the exit code is 6.
+little in common with the others, its pose is too uncertain, or no person was found. All reasons are printed, nothing is written, and the \
+exit code is 7. If the pose of a camera is uncertain by more than 0.3 degrees or 1 percent of its distance to the people (one standard \
+deviation), the rig is written with a note. Every such camera is printed, and the exit code is 6.
 
 The clock offsets of the deployment are used, unless --window is given, or joints fit clearly better with other offsets.
 
