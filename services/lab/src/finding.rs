@@ -81,7 +81,9 @@ pub fn prepare(
         prepared.add(picture, subject.is_multiple_of(KEPT as u64));
     }
     let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!("{learnt} pictures for training, {kept} held out"));
+    console.message(&format!(
+        "{learnt} pictures are used for training, and {kept} are held out"
+    ));
     Ok(prepared)
 }
 

@@ -95,7 +95,7 @@ pub fn train(
     let n_photographs = samples.len();
     let n_behind = samples.iter().filter(|sample| sample.front[1] < 0.0).count();
     console.message(&format!(
-        "{n_photographs} photographs of people, {n_behind} from behind"
+        "{n_photographs} photographs of people, {n_behind} of them from behind"
     ));
     samples.extend(rendered::samples(&job.scenes, model, &work)?);
     let n_rendered = samples.len() - n_photographs;

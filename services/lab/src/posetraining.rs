@@ -87,7 +87,9 @@ pub fn prepare(
         prepared.add(person, is_kept);
     }
     let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!("{learnt} people for training, {kept} held out"));
+    console.message(&format!(
+        "{learnt} people are used for training, and {kept} are held out"
+    ));
     Ok(prepared)
 }
 

@@ -196,7 +196,9 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     text.extend(named);
     if damaged.len() > MAX_LISTED {
         let more = damaged.len() - MAX_LISTED;
-        text.extend([format!("\n    and {more} more; --json lists all")]);
+        text.extend([format!(
+            "\n    and {more} more messages; --json lists all of them"
+        )]);
     }
     (!damaged.is_empty()).then_some(text)
 }
@@ -235,7 +237,7 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
         let [whole, all] = [extent.whole_bytes, extent.file_bytes];
         write!(
             text,
-            "\n  not complete: {why}; read up to byte {whole} of {all}"
+            "\n  incomplete ({why}): read up to byte {whole} of {all}"
         )?;
     }
     for place in extent.damage.iter().take(MAX_LISTED) {

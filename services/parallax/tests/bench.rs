@@ -174,7 +174,7 @@ mod long {
             "{whole:#}"
         );
         assert!(whole["cpu_seconds"].as_f64() > Some(0.0), "{whole:#}");
-        assert_eq!(dead["run"], "2 views, one dead");
+        assert_eq!(dead["run"], "2 views, one camera killed");
         assert_eq!(dead["summary"]["given_up"], json!(["capture-1"]));
     }
 }

@@ -92,7 +92,7 @@ fn a_truncated_recording_is_replayed_up_to_its_end() {
     let ended = replayed(&case, &["--from", "fuse", "--out", "part"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("not complete: cut off; read up to byte"),
+        ended.stderr.contains("incomplete (cut off): read up to byte"),
         "{}",
         ended.stderr
     );

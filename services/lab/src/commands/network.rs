@@ -249,7 +249,7 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
             _ => "are equally close",
         };
         output::line(format_args!(
-            "  of the cards for {of}, {} {come} (judged by the shapes of inputs and outputs)",
+            "  among the cards for {of}, {} {come} (judged by the shapes of inputs and outputs)",
             files.join(", ")
         ))?;
     }

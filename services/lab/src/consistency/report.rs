@@ -54,7 +54,7 @@ fn text(out: &Path, done: &Done) -> String {
         done.seconds
     )];
     lines.push(
-        "number of bins in half the circle, and the score of tables with this number on held-out people:"
+        "number of bins per half circle, and the score of tables with this number of bins on held-out people:"
             .to_owned(),
     );
     for (n, lift) in &done.bins {

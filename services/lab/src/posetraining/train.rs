@@ -54,11 +54,11 @@ fn drawn(passes: &[Pass]) -> String {
             ],
         ),
         panel(
-            "share, held-out people",
+            "shares for held-out people",
             vec![
                 score("limbs, both ends", &|score| score.both_ends),
                 score("direction", &|score| score.front),
-                score("area of errors", &|score| score.area),
+                score("ROC area of errors", &|score| score.area),
                 score("extra keypoints", &|score| score.extras),
             ],
         ),
@@ -110,7 +110,7 @@ fn line(pass: &Pass) -> String {
         return learnt;
     };
     format!(
-        "{learnt}; {} held-out people: limbs {:.1} / {:.1} %, direction {:.1} %, area of errors {:.3}, extra keypoints {:.1} %",
+        "{learnt}; {} held-out people: limbs {:.1} / {:.1} %, direction {:.1} %, ROC area of errors {:.3}, extra keypoints {:.1} %",
         score.people,
         100.0 * score.mean_of_ends,
         100.0 * score.both_ends,

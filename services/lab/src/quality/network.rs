@@ -208,7 +208,7 @@ impl Say<'_> {
             "event": "data", "learnt": learnt, "validated": validated, "resumed": self.before,
         }))?;
         console.message(&format!(
-            "{learnt} samples for training, {validated} for validation"
+            "{learnt} samples are used for training, and {validated} for validation"
         ));
         if self.before > 0 {
             console.message(&format!("continuing after pass {}", self.before));
@@ -229,7 +229,7 @@ impl Say<'_> {
             "validated": validated.loss, "area": validated.area, "seconds_left": left,
         }))?;
         let best = if trainer.best() == Some(n - 1) {
-            ", the best"
+            ", the best so far"
         } else {
             ""
         };

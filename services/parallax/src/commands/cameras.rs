@@ -136,7 +136,7 @@ fn list(as_json: bool) -> Result<ExitCode, Failure> {
         output::line(text(it))?;
     }
     for (path, why) in others {
-        output::line(format!("{}: not usable: {why}", path.display()))?;
+        output::line(format!("{}: cannot be used: {why}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -62,7 +62,10 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
             None if deployment.processes.is_empty() => {
                 "dead: `parallax clean` removes the leftovers".to_owned()
             }
-            None => format!("dead, except for {}", deployment.processes.join(", ")),
+            None => format!(
+                "dead, but these processes are still running: {}",
+                deployment.processes.join(", ")
+            ),
         };
         output::line(format_args!("{name:<32} {:>10}  {how}", size(deployment)))?;
     }

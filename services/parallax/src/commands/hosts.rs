@@ -176,7 +176,7 @@ fn line(host: &Value, deployment: &Deployment) -> String {
         "clock unknown".to_owned()
     } else {
         format!(
-            "clock within {:.3} ms, drift {:.1} ppm, round trip {:.3} ms",
+            "clock known to within {:.3} ms, drift {:.1} ppm, round trip {:.3} ms",
             number(&clock["bound_ms"]),
             number(&clock["drift_ppm"]),
             number(&clock["trip_ms"])

@@ -197,9 +197,12 @@ mod tests {
     fn the_run_with_a_killed_camera_is_the_last() {
         assert_eq!(
             names(Kind::Scale, 3),
-            ["1 view", "2 views", "3 views", "3 views, one dead"]
+            ["1 view", "2 views", "3 views", "3 views, one camera killed"]
         );
-        assert_eq!(names(Kind::Latency, 2), ["2 views", "2 views, one dead"]);
+        assert_eq!(
+            names(Kind::Latency, 2),
+            ["2 views", "2 views, one camera killed"]
+        );
         assert_eq!(names(Kind::Throughput, 4), ["4 views, every frame"]);
     }
 

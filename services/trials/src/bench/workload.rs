@@ -43,7 +43,7 @@ impl Display for Case {
         let plural = if self.n_views == 1 { "" } else { "s" };
         write!(f, "{} view{plural}", self.n_views)?;
         f.write_str(match (self.is_lossless, self.has_dead) {
-            (_, true) => ", one dead",
+            (_, true) => ", one camera killed",
             (true, false) => ", every frame",
             (false, false) => "",
         })

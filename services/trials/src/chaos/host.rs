@@ -199,9 +199,8 @@ fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
     };
     let (near, far) = cameras.split_at(cameras.len() / 2);
     let text = format!(
-        "{text}\n[link]\ninsecure = true     # it never leaves this machine\n\n\
-         [[host]]\nname = \"desk\"\nfuses = true\naddress = \"127.0.0.1:{port}\"\nviews = [{}]\n\n\
-         [[host]]\nname = \"{FAR}\"\nviews = [{}]\n",
+        "{text}\n[link]\ninsecure = true     # the link never leaves this machine\n\n[[host]]\nname = \"desk\"\nfuses = true\naddress = \
+         \"127.0.0.1:{port}\"\nviews = [{}]\n\n[[host]]\nname = \"{FAR}\"\nviews = [{}]\n",
         names(near),
         names(far)
     );

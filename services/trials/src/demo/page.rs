@@ -159,7 +159,7 @@ fn of_cost(cost: &Cost, camera: &str) -> Table {
         ("last frame before the kill", count(cost.last_frame)),
         ("first frame after the kill", count(cost.first_frame)),
         (
-            "frames in between, not used in any result",
+            "frames between these two, not used in any result",
             count(cost.frames_lost),
         ),
         (
