@@ -362,7 +362,7 @@ mod tests {
         assert!(refused(&path("synth://ring:2?camera=7")).contains("only c1, c2"));
         assert!(refused(&path("synth://ring:2")).contains("names no camera"));
         assert!(refused(&path("synth://nobody.toml?camera=0")).contains("rig"));
-        assert!(refused(&path("blank://32x16?rate=20")).contains("no `frames`"));
+        assert!(refused(&path("blank://32x16?rate=20")).contains("`frames` is missing"));
         assert!(refused(&path("nothing/here.mp4")).contains("no such footage"));
         let beyond = SourceSpec {
             start: 10,

@@ -218,7 +218,7 @@ mod tests {
         let text = out_of_step("left", &fit);
         assert!(text.contains("left is out of step"), "{text}");
         assert!(
-            text.contains("21 ms before their stated times, +-1"),
+            text.contains("21 ms before their stated times (+-1 ms)"),
             "{text}"
         );
     }

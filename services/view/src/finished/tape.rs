@@ -147,7 +147,7 @@ fn note(recording: &Recording, notes: &mut Vec<String>) {
     }
     if recording.n_lost() > 0 {
         notes.push(format!(
-            "{} messages are not in the recording",
+            "{} messages are missing from the recording",
             recording.n_lost()
         ));
     }
