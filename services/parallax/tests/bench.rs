@@ -88,7 +88,7 @@ fn measuring_more_cameras_than_exist_is_refused() {
     let (ended, _) = bench(&case, &["scale", "deployment.toml", "--views", "3"]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("the deployment has 2"),
+        ended.stderr.contains("the deployment has only 2 cameras"),
         "{}",
         ended.stderr
     );

@@ -20,7 +20,8 @@ fn a_gap_in_the_numbers_is_a_missing_picture_of_that_camera() {
             fs::remove_file(case.path(&format!("b/{frame:04}.png"))).unwrap();
         }
         let ended = case.run();
-        let said = "camera \"b\" has no picture for 2 of 6 frames (2 to 3)";
+        let said =
+            "camera \"b\" has no picture for 2 of 6 frames: no file name has the numbers 2 to 3";
         assert!(ended.stderr.contains(said), "{}", ended.stderr);
         let (lines, due) = (case.lines("pose3d.jsonl"), whole.lines("pose3d.jsonl"));
         assert_eq!(lines.len(), 6);

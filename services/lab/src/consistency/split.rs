@@ -110,6 +110,9 @@ mod tests {
     fn somebody_must_be_left_to_learn_from() {
         assert!(held(&["s1"], &[]).unwrap_err().contains("no subject is left"));
         let said = held(&["s1", "s2"], &["s3"]).unwrap_err();
-        assert!(said.contains("no subject \"s3\", only s1, s2"), "{said}");
+        assert!(
+            said.contains("no subject \"s3\"; the subjects are s1, s2"),
+            "{said}"
+        );
     }
 }

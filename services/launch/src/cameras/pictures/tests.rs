@@ -58,5 +58,8 @@ fn gaps_are_named_by_frames() {
     let counted = PictureNumbers { first: 10, step: 5 };
     assert_eq!(gaps(&[10, 15, 20], counted), None);
     let text = gaps(&[15, 20, 30, 55], counted).unwrap();
-    assert!(text.starts_with("5 of 9 frames (3, 5 to 8)"), "{text}");
+    assert!(
+        text.starts_with("5 of 9 frames: no file name has the numbers 3, 5 to 8"),
+        "{text}"
+    );
 }
