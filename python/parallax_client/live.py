@@ -167,7 +167,7 @@ class Client:
 
     def __init__(self, name, skeletons, poses, pictures, cameras, most, wait):
         if not (skeletons or poses or pictures):
-            raise ClientError("nothing is requested: choose skeletons, poses or pictures")
+            raise ClientError("no data are requested: choose skeletons, poses or pictures")
         self.name, self._wish = name, (skeletons, poses, pictures)
         self._cameras, self._most = cameras, most
         self._changed, self._ready = threading.Condition(), collections.deque()

@@ -159,7 +159,7 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
     // Usually the run ends at once. It may also wait for a truncated file, and notice this after a minute.
     let ended = started.wait_among_others();
     assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
-    let causes = ["is gone or damaged", "has not answered the supervisor"];
+    let causes = ["is missing or damaged", "has not answered the supervisor"];
     let said = causes.map(|cause| format!("error: shared memory of the deployment {cause}"));
     let is_said = said.iter().any(|words| ended.stderr.contains(words));
     assert!(

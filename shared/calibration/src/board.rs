@@ -228,7 +228,7 @@ pub struct Outcome {
 pub enum BoardError {
     /// A camera did not see the board often enough.
     #[error(
-        "camera {camera:?} saw the board in {n} pictures, at least {least} with {corners} corners are needed",
+        "camera {camera:?} saw the board in {n} pictures, but at least {least} pictures with {corners} corners are needed",
         corners = LEAST_CORNERS
     )]
     TooFewBoards {
@@ -241,7 +241,7 @@ pub enum BoardError {
     },
     /// No initial focal length was found for a camera.
     #[error(
-        "camera {camera:?}: no focal length fits the board that it saw: is the description of the board correct?"
+        "camera {camera:?}: no focal length fits the board in its pictures: is the description of the board correct?"
     )]
     NoStart {
         /// Name of the camera.
@@ -249,7 +249,7 @@ pub enum BoardError {
     },
     /// The cameras form groups that never saw the board together.
     #[error(
-        "no board connects these groups of cameras: {}; show it to cameras of different groups at the same time",
+        "these groups of cameras never saw the board at the same time: {}; show the board to cameras of different groups at the same time",
         .groups.iter().map(|group| group.join(", ")).collect::<Vec<_>>().join(" | ")
     )]
     Apart {
@@ -257,6 +257,6 @@ pub enum BoardError {
         groups: Vec<Vec<String>>,
     },
     /// The adjustment produced numbers that are not finite.
-    #[error("the adjustment of all cameras gave numbers that are not finite")]
+    #[error("the joint adjustment of all cameras gave numbers that are not finite")]
     NotFinite,
 }

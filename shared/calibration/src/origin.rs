@@ -17,7 +17,7 @@ const FLATTEST: f64 = 0.05;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OriginError {
     /// A point was seen by fewer than two cameras.
-    #[error("point {point} is given in {views} cameras, at least 2 are needed")]
+    #[error("point {point} is given in {views} cameras, but at least 2 are needed")]
     TooFewViews {
         /// Number of the point, counted from 1.
         point: usize,
@@ -26,7 +26,7 @@ pub enum OriginError {
     },
     /// The rays to a point do not meet.
     #[error(
-        "point {point}: its rays miss each other by {rms_px:.1} px: is it the same point in all cameras?"
+        "the rays to point {point} miss each other by {rms_px:.1} px: was the same point marked in all cameras?"
     )]
     Apart {
         /// Number of the point, counted from 1.
@@ -43,21 +43,21 @@ pub enum OriginError {
         source: TriangulateError,
     },
     /// The three points are on a line.
-    #[error("the three points are on a line, or two of them are the same")]
+    #[error("the three points are on one line, or two of them are the same")]
     OnALine,
     /// No camera sees the board.
     #[error("no camera sees enough of the board")]
     NoBoard,
     /// The cameras see the board in different places.
     #[error(
-        "the cameras disagree about the board by {rms_px:.1} px: does it lie still, and is it the right board?"
+        "the cameras disagree about the board by {rms_px:.1} px: did the board lie still, and is it the right board?"
     )]
     BoardApart {
         /// Root mean square of the residuals, in pixels.
         rms_px: f64,
     },
     /// The cameras are not valid in the new world.
-    #[error("the rig in the new world")]
+    #[error("the rig is not valid in the new world")]
     Rig(#[from] RigError),
 }
 

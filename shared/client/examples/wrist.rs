@@ -1,7 +1,7 @@
 //! Moves a bar with the right wrist of the person that a running deployment follows.
 //!
 //! `cargo run -p parallax-client --example wrist -- demo "right wrist"`
-#![expect(clippy::print_stdout, reason = "an example shows something")]
+#![expect(clippy::print_stdout, reason = "an example prints its results")]
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ fn main() -> Result<(), ClientError> {
         let Some(moment) = client.next(Duration::from_secs(1))? else {
             let words = match client.state() {
                 State::Waiting => "waiting for the deployment",
-                State::Connected => "no result for a second",
+                State::Connected => "no result has arrived for a second",
             };
             println!("{words}");
             continue;
@@ -32,7 +32,7 @@ fn main() -> Result<(), ClientError> {
                 let share = f64::midpoint(x / REACH_M, 1.0).clamp(0.0, 1.0);
                 let column = (share * (WIDTH - 1) as f64).round() as usize;
                 println!(
-                    "{:>6} {}#{} {x:+.3} {y:+.3} {z:+.3} m, sure to {:.3} m, {} missed",
+                    "{:>6} {}#{} {x:+.3} {y:+.3} {z:+.3} m, \u{b1} {:.3} m, {} missed",
                     moment.frame,
                     "-".repeat(column),
                     "-".repeat(WIDTH - 1 - column),

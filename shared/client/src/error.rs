@@ -18,7 +18,7 @@ pub enum ClientError {
     #[error(transparent)]
     Description(#[from] RunningError),
     /// The deployment has no camera with the requested name.
-    #[error("deployment {deployment:?} has no camera {camera:?}, but {}", .cameras.join(", "))]
+    #[error("deployment {deployment:?} has no camera {camera:?}; its cameras are {}", .cameras.join(", "))]
     NoCamera {
         /// Name of the deployment.
         deployment: String,
@@ -28,7 +28,7 @@ pub enum ClientError {
         cameras: Vec<String>,
     },
     /// The [`Wish`](crate::Wish) requests nothing.
-    #[error("nothing is requested: choose skeletons, poses or pictures")]
+    #[error("no data are requested: choose skeletons, poses or pictures")]
     NoWish,
     /// A message cannot be received.
     #[error(transparent)]

@@ -63,7 +63,7 @@ pub struct Camera {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
-    expecting = "expected 0, 90, 180 or 270 degrees to the right, or \"tag\""
+    expecting = "expected a rotation to the right of 0, 90, 180 or 270 degrees, or \"tag\""
 )]
 pub enum Rotate {
     /// Clockwise rotation, in degrees.

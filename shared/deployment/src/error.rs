@@ -4,7 +4,7 @@
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// An unknown key, most often a typing error.
-    #[error("{place}: unknown key `{key}`, {hint}")]
+    #[error("{place}: unknown key `{key}`: {hint}")]
     UnknownKey {
         /// File and line, or the option of the command line.
         place: String,
@@ -74,7 +74,7 @@ impl ConfigError {
 /// Returns a hint for the most common mistake: `[camera]` with single brackets.
 fn of_cameras(key: &str) -> &'static str {
     if key == "camera" {
-        "; every camera begins with [[camera]], in double brackets"
+        "; every camera begins with [[camera]] in double brackets"
     } else {
         ""
     }
@@ -98,7 +98,7 @@ fn hint(key: &str, known: &[&str]) -> String {
         .filter(|(distance, it)| *distance <= 2.max(it.len() / 3))
         .min();
     nearest.map_or_else(
-        || format!("known here: {}", known.join(", ")),
+        || format!("the known keys of this section are {}", known.join(", ")),
         |(_, it)| format!("did you mean `{it}`?"),
     )
 }
@@ -113,7 +113,7 @@ mod tests {
     fn a_slip_gets_the_nearest_name() {
         let message = "unknown field `modle`, expected one of `name`, `model`, `rig`";
         let got = ConfigError::explain("a.toml:3".to_owned(), message, None).to_string();
-        assert_eq!(got, "a.toml:3: unknown key `modle`, did you mean `model`?");
+        assert_eq!(got, "a.toml:3: unknown key `modle`: did you mean `model`?");
     }
 
     #[test]
@@ -154,6 +154,9 @@ mod tests {
     fn a_name_like_no_other_gets_the_list() {
         let message = "unknown field `quux`, expected `name` or `rig`";
         let got = ConfigError::explain("a.toml:3".to_owned(), message, None).to_string();
-        assert_eq!(got, "a.toml:3: unknown key `quux`, known here: name, rig");
+        assert_eq!(
+            got,
+            "a.toml:3: unknown key `quux`: the known keys of this section are name, rig"
+        );
     }
 }

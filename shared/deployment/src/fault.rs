@@ -62,7 +62,7 @@ pub struct Fault {
 /// A text that is not a list of faults.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{text:?} is not a fault: expected KIND@FROM+COUNT, for example freeze@30+20, KIND one of {}",
+    "{text:?} is not a fault: expected KIND@FROM+COUNT, for example freeze@30+20, where KIND is one of {}",
     FaultKind::ALL.map(|fault_kind| fault_kind.1).join(", ")
 )]
 pub struct FaultError {

@@ -116,7 +116,7 @@ pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
         it.hosts.len() >= 2,
         "host",
         "given once",
-        "two or more, or none: a single machine needs no host",
+        "at least two [[host]] tables; with a single machine, leave out [[host]]",
     )?;
     names(it)?;
     views(it)?;
@@ -125,7 +125,7 @@ pub(crate) fn check(it: &Deployment) -> Result<(), Complaint> {
         fusing.len() == 1,
         "host.fuses",
         &format!("true for {} hosts", fusing.len()),
-        "true for exactly one: the results are written there",
+        "true for exactly one host, where the results are written",
     )?;
     for host in &it.hosts {
         address(host)?;
@@ -149,14 +149,14 @@ fn names(it: &Deployment) -> Result<(), Complaint> {
         demand(
             whole.len() <= 32,
             "host.name",
-            &format!("{name:?}, {whole:?} with that of the deployment"),
-            "at most 32 characters together",
+            &format!("{name:?}, or {whole:?} together with the name of the deployment"),
+            "at most 32 characters for both names together",
         )?;
         demand(
             it.hosts[..index].iter().all(|other| other.name != *name),
             "host.name",
             &format!("twice {name:?}"),
-            "every host once",
+            "a different name for each host",
         )?;
     }
     Ok(())
@@ -177,7 +177,7 @@ fn views(it: &Deployment) -> Result<(), Complaint> {
             host.fuses || !host.views.is_empty(),
             "host.views",
             &format!("empty for {:?}", host.name),
-            "at least one camera on a host that does not fuse",
+            "at least one camera on each host that does not fuse",
         )?;
     }
     for camera in &it.cameras {
@@ -200,7 +200,7 @@ fn address(host: &Host) -> Result<(), Complaint> {
             !host.fuses,
             "host.address",
             &format!("left out of host {:?}, which fuses", host.name),
-            "the address on which it listens: \"192.168.1.5:7447\"",
+            "the address on which this host listens, such as \"192.168.1.5:7447\"",
         );
     };
     let parts = address.rsplit_once(':');
@@ -213,7 +213,7 @@ fn address(host: &Host) -> Result<(), Complaint> {
         is_good,
         "host.address",
         &format!("{address:?}"),
-        "a name or number, a colon and a port: \"192.168.1.5:7447\"",
+        "a host name or IP address, a colon and a port, such as \"192.168.1.5:7447\"",
     )
 }
 
@@ -223,27 +223,27 @@ fn real_time(it: &Deployment) -> Result<(), Complaint> {
         it.capture.mode == Mode::Realtime,
         "capture.mode",
         "not \"realtime\"",
-        "\"realtime\" if there are hosts, because frames of several machines are matched by their times",
+        "\"realtime\" for a deployment with hosts, because frames of several machines are matched by their times",
     )?;
     demand(
         it.capture.frame_rate_hz.is_some(),
         "capture.frame_rate_hz",
         "left out",
-        "frames per second of all cameras, if there are hosts",
+        "the frame rate of all cameras, which a deployment with hosts needs",
     )?;
     let has_clocks = it.cameras.iter().any(|camera| camera.offset_ms.is_some());
     demand(
         !has_clocks,
         "camera.offset_ms",
-        "given, with hosts",
-        "none: the clocks of hosts are compared while they run",
+        "given in a deployment with hosts",
+        "no offset, because the clocks of hosts are compared during the run",
     )?;
     demand(
         it.link.carry == Carry::Frames || it.views() != Views::All,
         "link.carry",
-        "\"poses\", where `paper.views` is \"all\"",
-        "\"frames\", or `method = \"network\"`, or `paper.views = \"pairs\"`: the evidence of filters, on which all views at once are solved, \
-         does not cross",
+        "\"poses\" although `paper.views` is \"all\"",
+        "\"frames\" (or set `method = \"network\"` or `paper.views = \"pairs\"`), because hosts do not send the filter responses from \
+         which all views are solved at once",
     )
 }
 
@@ -252,13 +252,13 @@ fn keys(it: &Deployment) -> Result<(), Complaint> {
         it.link.insecure || it.link.keys.is_some(),
         "link.keys",
         "left out",
-        "the folder that `parallax hosts keys` makes; or link.insecure = true, which lets anyone on the network see the pictures",
+        "the folder that `parallax hosts keys` makes; or set link.insecure = true, which lets anyone on the network see the pictures",
     )?;
     demand(
         !(it.link.insecure && it.link.keys.is_some()),
         "link.insecure",
-        "true, with link.keys",
-        "either of the two",
+        "true although link.keys is given",
+        "only one of link.keys and link.insecure",
     )
 }
 

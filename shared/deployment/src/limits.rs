@@ -69,15 +69,14 @@ impl Deployment {
         let deadline_ms = self.deadline_ms();
         if is_lossless && deadline_ms < 1000 {
             doubts.push(format!(
-                "`supervise.deadline_ms` is {deadline_ms}, and `capture.mode` \"lossless\": a view whose frame takes \
-                 longer is left out of the result; 10000 is usual"
+                "`supervise.deadline_ms` is {deadline_ms}, although `capture.mode` is \"lossless\": a view whose frame takes longer is \
+                 left out of the result; 10000 is usual"
             ));
         }
         let hang_limit_s = self.hang_limit_s();
         if is_lossless && hang_limit_s < 10 {
             doubts.push(format!(
-                "`supervise.hang_limit_s` is {hang_limit_s}: a process that computes for longer on one frame is killed; \
-                 120 is usual"
+                "`supervise.hang_limit_s` is {hang_limit_s}: a process that spends more time on one frame is killed; 120 is usual"
             ));
         }
         if let Some(rate) = self
@@ -93,7 +92,7 @@ impl Deployment {
         let cores = n_cores.unwrap_or(usize::MAX);
         if threads > cores.saturating_mul(4) {
             doubts.push(format!(
-                "`runtime.threads` is {threads} in every pose process, on a machine with {cores} cores"
+                "`runtime.threads` is {threads} for every pose process, but the machine has only {cores} cores"
             ));
         }
         doubts.extend(self.runtime.doubts());
@@ -106,7 +105,7 @@ impl Runtime {
         let high = self.priority.iter().filter(|priority| *priority.1 == 99);
         let said = high.map(|(name, _)| {
             format!(
-                "`runtime.priority` of {name} is 99, above that of the system's own threads; use at most 98"
+                "`runtime.priority` of {name} is 99, which is above the priority of the system's own threads; use at most 98"
             )
         });
         said.collect()

@@ -33,9 +33,9 @@ pub(crate) fn settle(
     demand(
         !it.has_clocks(),
         "camera.offset_ms",
-        "given, or `drift_ppm`, for footage",
+        "given (or `drift_ppm` is) for footage",
         &format!(
-            "neither: camera {name:?} is live, and all footage in the same run begins with the run"
+            "neither of these keys, because camera {name:?} is live, and all footage in the same run begins with the run"
         ),
     )?;
     let mode = given.get("capture").and_then(|section| section.get("mode"));
@@ -44,14 +44,14 @@ pub(crate) fn settle(
         "capture.mode",
         &mode.map_or_else(String::new, ToString::to_string),
         &format!(
-            "\"realtime\", or nothing: camera {name:?} is live and does not wait, so a run with it is never lossless"
+            "\"realtime\" or no value, because camera {name:?} is live and does not wait, so its runs are never lossless"
         ),
     )?;
     demand(
         it.capture.start_frame == 0,
         "capture.start_frame",
         &it.capture.start_frame.to_string(),
-        &format!("0: camera {name:?} is live, so earlier frames do not exist"),
+        &format!("0, because camera {name:?} is live, and frames before the start do not exist"),
     )?;
     it.capture.mode = Mode::Realtime;
     Ok(())
@@ -64,28 +64,28 @@ fn keys_of_live(camera: &Camera) -> Result<(), Complaint> {
         camera.fault.is_empty(),
         "camera.fault",
         &of,
-        "none: simulated faults are for footage only",
+        "no faults, because only footage can have simulated faults",
     )?;
     demand(
         camera.keypoints.is_none(),
         "camera.keypoints",
         &of,
-        "none: they are found while it runs",
+        "no keypoints file, because the keypoints of a live camera are found during the run",
     )?;
     demand(
         camera.skew_ms.is_none(),
         "camera.skew_ms",
         &of,
-        "none: it is measured",
+        "no value, because it is measured during the run",
     )?;
     demand(
         camera.offset_ms.is_none() && camera.drift_ppm.is_none(),
         "camera.offset_ms",
         &format!(
-            "given, or `drift_ppm`, for the live camera {:?}",
+            "given (or `drift_ppm` is) for the live camera {:?}",
             camera.name
         ),
-        "neither: they are for footage only; a live camera reports its times",
+        "neither of these keys, because they are for footage only; a live camera reports its own times",
     )?;
     let sides = camera.size.unwrap_or([1, 1]);
     demand(
@@ -111,14 +111,14 @@ fn keys_of_kind(camera: &Camera) -> Result<(), Complaint> {
     demand(
         is_device || (camera.format.is_none() && camera.controls.is_empty()),
         "camera.format",
-        &format!("given, or `controls`, for the stream {:?}", camera.name),
-        "neither: both are for video devices",
+        &format!("given (or `controls` is) for the stream {:?}", camera.name),
+        "neither of these keys, because both are for video devices only",
     )?;
     demand(
         !is_device || camera.transport.is_none(),
         "camera.transport",
         &format!("given for the video device {:?}", camera.name),
-        "none: it is for RTSP cameras",
+        "no value, because this key is for RTSP cameras only",
     )?;
     let scheme = camera.source.split(':').next().unwrap_or_default();
     let is_rtsp = ["rtsp", "rtsps"].iter().any(|name| scheme.eq_ignore_ascii_case(name));
@@ -126,7 +126,7 @@ fn keys_of_kind(camera: &Camera) -> Result<(), Complaint> {
         is_rtsp || camera.clock.is_none(),
         "camera.clock",
         &format!("given for {:?}", camera.name),
-        "none: it is for RTSP cameras",
+        "no value, because this key is for RTSP cameras only",
     )
 }
 
@@ -145,7 +145,7 @@ fn no_keys_of_live(camera: &Camera) -> Result<(), Complaint> {
             !is_given,
             key,
             &format!("given for {:?}", camera.name),
-            "none: it is for live cameras, and the `source` of this one is footage",
+            "no value, because this key is for live cameras, and the `source` of this camera is footage",
         )?;
     }
     Ok(())

@@ -89,7 +89,7 @@ pub(crate) fn stranger(method: Method, given: &Table) -> Option<Stranger> {
     let key = stray_key(method, given)?;
     let other = method.other().name();
     let message = format!(
-        "`{key}` belongs to the {other}'s method: set `method = \"{other}\"`, or leave it out"
+        "`{key}` belongs to the {other}'s method: set `method = \"{other}\"`, or leave out `{key}`"
     );
     Some(Stranger { key, message })
 }
@@ -141,7 +141,7 @@ mod tests {
             (
                 "",
                 "[paper]\ntau = 'umpm'\n",
-                "n.toml:11: `paper.tau` belongs to the paper's method: set `method = \"paper\"`, or leave it out",
+                "n.toml:11: `paper.tau` belongs to the paper's method: set `method = \"paper\"`, or leave out `paper.tau`",
             ),
             (
                 "method = 'network'\n",
@@ -151,7 +151,7 @@ mod tests {
             (
                 "method = 'paper'\n",
                 "[network]\nmirror = true\n",
-                "n.toml:12: `network.mirror` belongs to the network's method: set `method = \"network\"`, or leave it out",
+                "n.toml:12: `network.mirror` belongs to the network's method: set `method = \"network\"`, or leave out `network.mirror`",
             ),
             (
                 "method = 'paper'\n",

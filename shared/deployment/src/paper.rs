@@ -181,8 +181,8 @@ pub enum Switch {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
-    expecting = "expected \"none\", \"learned\", \"humaneva\", \"humaneva-median\", \"umpm\", \"umpm-median\", \
-                 one number per part, or { file = \"...\" }"
+    expecting = "expected \"none\", \"learned\", \"humaneva\", \"humaneva-median\", \"umpm\", \"umpm-median\", a list with one number per \
+                                                                                            part, or { file = \"...\" }"
 )]
 pub enum Tau {
     /// Thresholds with a known name.

@@ -61,7 +61,7 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
             !twin,
             "camera",
             &format!("twice {:?}", camera.name),
-            "every camera once",
+            "a different name for each camera",
         )?;
         demand(
             geometry::is_plain_name(&camera.name),
@@ -76,7 +76,7 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
             (-1000.0..=1000.0).contains(&skew_ms),
             "camera.skew_ms",
             &skew_ms.to_string(),
-            "-1000 to 1000: at most half the time between two frames is usual",
+            "-1000 to 1000 ms; usual values are at most half the time between two frames",
         )?;
     }
     Ok(())
@@ -98,7 +98,7 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         !camera.source.is_empty() || camera.keypoints.is_some(),
         "camera.source",
         &format!("left out of camera {:?}", camera.name),
-        "footage: every [[camera]] needs a `source`, or `keypoints` from another program",
+        "footage, because every [[camera]] needs a `source`, or `keypoints` from another program",
     )?;
     is_path("camera.source", &camera.source)?;
     if let Some(capture::Rotate::Degrees(degrees)) = camera.rotate {
@@ -106,11 +106,11 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
             degrees % 90 == 0 && degrees < 360,
             "camera.rotate",
             &degrees.to_string(),
-            "0, 90, 180 or 270 degrees to the right, or \"tag\"",
+            "a rotation to the right of 0, 90, 180 or 270 degrees, or \"tag\"",
         )?;
     }
     if let Some([_, step]) = camera.numbers {
-        let expected = "[first, step], the step at least 1";
+        let expected = "[first, step], where the step is at least 1";
         demand(step > 0, "camera.numbers", &step.to_string(), expected)?;
     }
     let Some(names) = &camera.keypoint_names else {
@@ -120,7 +120,7 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
         camera.keypoints.is_some(),
         "camera.keypoint_names",
         &format!("given for camera {:?}", camera.name),
-        "none without `keypoints`",
+        "no value, because this camera has no `keypoints`",
     )?;
     let known = keypoints::files::NameSet::known_sets();
     demand(
@@ -135,8 +135,8 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
     demand(
         it.size.is_none() || it.scale.is_none(),
         "capture.scale",
-        "given together with size",
-        "either of the two",
+        "given together with `capture.size`",
+        "only one of `capture.scale` and `capture.size`",
     )?;
     if let Some([width, height]) = it.size {
         whole("capture.size", width)?;
@@ -169,8 +169,8 @@ fn eyes(camera: &capture::Camera) -> Result<(), Complaint> {
     demand(
         camera.network.is_none() || camera.keypoints.is_none(),
         "camera.network",
-        &format!("given for {:?}, besides `keypoints`", camera.name),
-        "one of the two",
+        &format!("given for {:?} together with `keypoints`", camera.name),
+        "only one of `network` and `keypoints`",
     )
 }
 
@@ -200,7 +200,7 @@ fn paper(deployment: &Deployment) -> Result<(), Complaint> {
         !needs_file || config.consistency.is_some(),
         "paper.tau",
         "\"learned\"",
-        "thresholds, or a file of thresholds in `paper.consistency`",
+        "numbers as thresholds, or a file with thresholds in `paper.consistency`",
     )?;
     let tables = config.compatibility.iter();
     let tables = tables.map(|tables| ("paper.compatibility", &tables.views));
@@ -213,7 +213,7 @@ fn paper(deployment: &Deployment) -> Result<(), Complaint> {
             names[0] != names[1],
             key,
             &format!("{:?} twice", names[0]),
-            "two cameras",
+            "two different cameras",
         )?;
     }
     Ok(())
@@ -262,25 +262,25 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         n_views <= MOST_AT_ONCE,
         "paper.views",
         &format!("\"all\" of {n_views} cameras"),
-        &format!("at most {MOST_AT_ONCE} cameras at once, or \"pairs\""),
+        &format!("\"pairs\", or at most {MOST_AT_ONCE} cameras for \"all\""),
     )?;
     demand(
         config.energy == paper::Energy::Paper,
         "paper.energy",
         "\"released\"",
-        "\"paper\": `paper.views = \"all\"` works with no other energy",
+        "\"paper\", because `paper.views = \"all\"` works only with this energy",
     )?;
     demand(
         config.pairs.is_empty(),
         "paper.pairs",
         "given",
-        "none, as `paper.views` is \"all\"",
+        "no pairs, because `paper.views` is \"all\"",
     )?;
     demand(
         config.combine == paper::Combine::Mean,
         "paper.combine",
         "\"consensus\"",
-        "\"mean\": if `paper.views` is \"all\", there is nothing to combine",
+        "\"mean\", because if `paper.views` is \"all\", there are no results of pairs to combine",
     )
 }
 
@@ -313,6 +313,6 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
     });
     let names: Vec<&str> = services.iter().map(|service| service.0).collect();
     let names = names.join(", ");
-    let expected = format!("{names}, or one process of these, such as pose-0");
+    let expected = format!("one of {names}, or a single process, such as pose-0");
     demand(is_one, key, &format!("{name:?}"), &expected)
 }

@@ -5,7 +5,9 @@ pub(super) fn other_file(text: &str) -> Option<&'static str> {
     let begins =
         |head: &str| text.lines().any(|line| line.trim_end() == head || line.starts_with(head));
     if begins("format = \"parallax-rig\"") {
-        return Some("this is a rig file: give the deployment file whose `rig` names it");
+        return Some(
+            "this is a rig file: give the deployment file whose key `rig` names this rig file",
+        );
     }
     // Sections of Pose2Sim's Config.toml.
     let sections = [
@@ -19,8 +21,9 @@ pub(super) fn other_file(text: &str) -> Option<&'static str> {
     ];
     let n = sections.iter().filter(|section| begins(section)).count();
     (n >= 3 && !begins("[[camera]]")).then_some(
-        "this is a configuration of Pose2Sim: a deployment names the cameras, their videos and the calibration. `parallax new FOLDER \
-         --camera cam01=videos/cam01.mp4 --camera cam02=videos/cam02.mp4 --rig calibration/Calib.toml` writes one from these files",
+        "this is a configuration of Pose2Sim, but a deployment is expected, which names the cameras, their videos and the calibration. \
+         `parallax new FOLDER \
+         --camera cam01=videos/cam01.mp4 --camera cam02=videos/cam02.mp4 --rig calibration/Calib.toml` writes a deployment for these files",
     )
 }
 

@@ -30,7 +30,7 @@ impl Claim {
         if let Some(risk) = opened.risk().map_err(|error| in_file(folder, &error))? {
             tracing::warn!(
                 folder = %folder.display(),
-                "the output folder {risk}: others can change or remove the results there"
+                "the output folder {risk}: other users can change or remove the results in it"
             );
         }
         let path = folder.join(FILE);
@@ -76,7 +76,7 @@ fn taken(folder: &Path, file: &mut File) -> Failure {
         owner.trim()
     );
     Failure::new(ExitKind::Config, message)
-        .with_hint("wait until it ends, or name another output folder")
+        .with_hint("wait until that process ends, or name another output folder")
 }
 
 #[cfg(test)]

@@ -7,8 +7,7 @@ use std::process::ExitCode;
 use crate::{ExitKind, Failure};
 
 /// The hint that is shown after a panic.
-pub const DEFECT: &str = "this is a defect of the program, unless something else has changed its files in /dev/shm: \
-    please report it";
+pub const DEFECT: &str = "this is a defect of Parallax, unless another program has changed its files in /dev/shm: please report it";
 
 /// Runs a command in this process and returns its exit status. A panic is reported like any other error.
 ///

@@ -20,12 +20,12 @@ use crate::ExitKind;
 
 /// The umask of the process: no access for group and others.
 const OTHERS: Mode = Mode::RWXG.union(Mode::RWXO);
-const NO_MEMORY: &[u8] = b"error: shared memory of the deployment is gone or damaged (SIGBUS)\n  \
-    hint: something else has cut off, filled or changed files in /dev/shm while they were in use; \
-    `parallax clean` removes what is left there\n";
-const WRONG_MEMORY: &[u8] = b"error: a process has used memory that is not there (SIGSEGV)\n  \
-    hint: something else has changed the files of the deployment in /dev/shm while they were in use, \
-    or this is a defect of the program: please report it; `parallax clean` removes what is left there\n";
+const NO_MEMORY: &[u8] = b"error: shared memory of the deployment is missing or damaged (SIGBUS)\n  hint: another program has filled \
+                           /dev/shm, or has truncated or changed files there while they were in use; `parallax clean` removes the \
+                           remaining files\n";
+const WRONG_MEMORY: &[u8] = b"error: a process has accessed invalid memory (SIGSEGV)\n  hint: another program has changed the files of the \
+                              deployment in /dev/shm while they were in use, or this is a defect of Parallax: please report it; `parallax \
+                              clean` removes the remaining files\n";
 
 /// Prepares the process. Call this function first, from the main thread.
 ///

@@ -19,7 +19,10 @@ pub fn read_text(file: &Path) -> Result<String, Failure> {
 
 /// Returns the failure for a file that should be text but is not UTF-8.
 pub fn no_text(file: &Path) -> Failure {
-    let message = format!("{} is not text: it is not UTF-8", file.display());
+    let message = format!(
+        "{} is not a text file: its content is not UTF-8",
+        file.display()
+    );
     Failure::new(ExitKind::Input, message)
 }
 

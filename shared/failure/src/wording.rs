@@ -61,7 +61,7 @@ fn line(text: &str) -> String {
         return readable;
     }
     if text.starts_with("string values must be quoted") {
-        return "expected a value; text must stand in quotes, as in key = \"text\"".to_owned();
+        return "expected a value; text must be in quotes, as in key = \"text\"".to_owned();
     }
     [
         ("missing field", "missing key"),

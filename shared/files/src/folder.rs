@@ -213,7 +213,7 @@ impl Folder {
     fn in_the_way(&self, name: &OsStr) -> io::Error {
         let text = match self.kind(name) {
             Ok(kind) => format!(
-                "{} of {} already exists and is not overwritten: remove it, or choose another folder",
+                "{} that belongs to {} already exists and is not overwritten: remove it, or choose another folder",
                 kind.name(),
                 user(kind.owner)
             ),
@@ -239,7 +239,7 @@ impl Kind {
         use rustix::fs::FileType;
         match FileType::from_raw_mode(self.mode) {
             FileType::RegularFile if self.has_second_name => {
-                "a file with a second name (hard link)"
+                "a file with several names (hard links)"
             }
             FileType::RegularFile => "a file",
             FileType::Directory => "a folder",
@@ -305,7 +305,7 @@ mod tests {
         let (_base, folder, secret) = room();
         fs::hard_link(&secret, folder.path().join("a.part")).unwrap();
         let error = folder.resume("a.part").unwrap_err().to_string();
-        assert!(error.starts_with("a file with a second name"), "{error}");
+        assert!(error.starts_with("a file with several names"), "{error}");
         folder.begin("a.part").unwrap().write_all(b"new").unwrap();
         assert_eq!(text(&secret), "kept");
         assert_eq!(text(&folder.path().join("a.part")), "new");

@@ -50,7 +50,7 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
     let bytes = bytes.max(content.len() as u64);
     if bytes > most {
-        let text = format!("has {bytes} bytes, and at most {most} are read of such a file");
+        let text = format!("has {bytes} bytes, but at most {most} bytes are read from such a file");
         return Err(io::Error::new(ErrorKind::FileTooLarge, text));
     }
     Ok(content)

@@ -85,11 +85,13 @@ impl Doubt {
         let name = |camera: &usize| names.get(*camera).map_or("?", String::as_str);
         match self {
             Self::FewBoards { camera, n } => format!(
-                "{}: the board was used in only {n} pictures, but at least {FEW_BOARDS} are needed: show it for longer, at other places and tilts",
+                "{}: the board was used in only {n} pictures, but at least {FEW_BOARDS} are needed: show the board for longer, at other \
+                 places and tilts",
                 name(camera)
             ),
             Self::LittleCovered { camera, share } => format!(
-                "{}: its board covered {:.0} % of the picture, and the lens is unknown outside that area: move the board into the corners",
+                "{}: the board covered only {:.0} % of the picture, and the lens is unknown outside that area: move the board into the \
+                 corners",
                 name(camera),
                 100.0 * share
             ),
@@ -98,11 +100,13 @@ impl Doubt {
                 rms_px,
                 limit_px,
             } => format!(
-                "{}: residuals of {rms_px:.2} px (limit {limit_px:.2}): is the board flat, is its description correct, and is the lens of another kind (--lens)?",
+                "{}: the residuals are {rms_px:.2} px, but the limit is {limit_px:.2} px: is the board flat, is its description correct, \
+                 and does the lens need another model (--lens)?",
                 name(camera)
             ),
             Self::Focal { camera, share } => format!(
-                "{}: its focal length is known to only {:.1} %: show the board tilted by 30 to 45 degrees, nearer and further away",
+                "{}: its focal length is known to only {:.1} %: show the board tilted by 30 to 45 degrees, both nearer to the camera and \
+                 further away",
                 name(camera),
                 100.0 * share
             ),
@@ -111,18 +115,18 @@ impl Doubt {
                 degrees,
                 metres,
             } => format!(
-                "{}: its pose is known to only {degrees:.1} degrees and {:.0} mm, because pictures of one frame were not taken at the same \
-                 time: hold the board still for a second at every place, or synchronise the cameras",
+                "{}: its pose is known to only {degrees:.1} degrees and {:.0} mm, because the pictures of a frame were not taken at the \
+                 same time: hold the board still for a second at every place, or synchronise the cameras",
                 name(camera),
                 1000.0 * metres
             ),
             Self::ManyWrong { camera, share } => format!(
-                "{}: {:.0} % of its corners do not fit and were left out: was the board moved too fast?",
+                "{}: {:.0} % of the corners do not fit and were left out: was the board moved too fast?",
                 name(camera),
                 100.0 * share
             ),
             Self::Disagreement { cameras: [a, b], n } => format!(
-                "{} and {}: {} of {} frames agree about their relative pose: are the videos synchronised, or did a camera move?",
+                "{} and {}: only {} of {} frames agree about their relative pose: are the videos synchronised, or did a camera move?",
                 name(a),
                 name(b),
                 n[0],

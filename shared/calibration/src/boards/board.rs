@@ -56,7 +56,7 @@ pub enum BoardError {
         text: String,
     },
     /// The numbers of columns and rows are out of range.
-    #[error("{columns}x{rows}: a board has 2 to {limit} squares, corners or tags along each side", limit = MOST)]
+    #[error("the board is {columns}x{rows}, but it must have 2 to {limit} squares, corners or tags along each side", limit = MOST)]
     Counts {
         /// Number of columns.
         columns: usize,
@@ -86,7 +86,9 @@ pub enum BoardError {
         text: String,
     },
     /// The board has more markers than the dictionary.
-    #[error("the board needs {needed} markers, {dictionary} has {available}")]
+    #[error(
+        "the board needs {needed} markers, but the dictionary {dictionary} has only {available}"
+    )]
     TooFewMarkers {
         /// Number of markers on the board.
         needed: usize,
@@ -199,10 +201,11 @@ impl Board {
         let expected = match self.kind {
             Kind::Chessboard => "a chessboard has no options",
             Kind::Charuco => {
-                "options of a ChArUco board are a dictionary such as 5x5_100, marker=0.75 (of the square) or marker=30mm, and legacy"
+                "the options of a ChArUco board are a dictionary such as 5x5_100, the marker's side (marker=0.75 of the square, or \
+                 marker=30mm), and legacy"
             }
             Kind::Grid => {
-                "options of a grid are a dictionary such as 36h11, and gap=0.3 (of the tag) or gap=26mm"
+                "the options of a grid are a dictionary such as 36h11, and the gap between tags (gap=0.3 of the tag, or gap=26mm)"
             }
         };
         let invalid = || BoardError::Option {

@@ -59,7 +59,8 @@ pub enum Paper {
 pub enum PaperError {
     /// The page is too small for the board.
     #[error(
-        "the board needs {:.0} x {:.0} mm with its margin and ruler, the page has {:.0} x {:.0} mm: print smaller squares, or on a larger page",
+        "the board with its margin and ruler needs {:.0} x {:.0} mm, but the page is {:.0} x {:.0} mm: choose smaller squares or a larger \
+         page",
         .needed[0], .needed[1], .page[0], .page[1]
     )]
     TooSmall {
@@ -218,7 +219,9 @@ impl Drawing {
         }
         let length = 10.0 * tens;
         for (line, text) in [
-            format!("{length:.0} mm: measure this; print at 100 %, do not fit to page"),
+            format!(
+                "this line must measure {length:.0} mm: print at 100 %, without fitting to the page"
+            ),
             format!("Parallax  {board}"),
         ]
         .into_iter()

@@ -249,7 +249,7 @@ fn variants(board: &Board) -> Vec<Variant> {
                     };
                     let pattern = (is_legacy != board.is_legacy).then(|| {
                         let which = if is_legacy { "before 4.6" } else { "since 4.6" };
-                        format!("the board is drawn as OpenCV {which} does: its upper left square is {}",
+                        format!("the board has the layout of OpenCV {which}: its upper left square is {}",
                             if is_legacy { "white" } else { "black" })
                     });
                     let notes: Vec<String> = turned.iter().cloned().chain(pattern).collect();

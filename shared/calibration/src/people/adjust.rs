@@ -316,7 +316,7 @@ impl Problem for Adjustment {
         let bone = self.bones.iter().position(|bone| *bone == Some(parameter));
         bone.map_or_else(
             || "the constant error of a joint".to_owned(),
-            |bone| format!("length of the {}", BONES[bone].name),
+            |bone| format!("the length of the {}", BONES[bone].name),
         )
     }
 

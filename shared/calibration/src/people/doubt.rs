@@ -110,23 +110,24 @@ impl Doubt {
                 seen_s,
                 least_s,
             } => format!(
-                "{} sees a person for {seen_s:.1} s, less than {least_s} s",
+                "{} sees a person for {seen_s:.1} s, but at least {least_s} s are needed",
                 name(camera)
             ),
             Self::FewInstants { n, least } => format!(
-                "two cameras see a person together at {n} instants, fewer than {least}"
+                "two cameras see a person together at only {n} instants, but at least {least} are needed"
             ),
             Self::NoPair => "no two cameras see enough of one person at the same time, from different sides, to determine their relative pose"
                 .to_owned(),
             Self::Unplaced { camera, cost: None } => format!(
-                "{} shares too few joints with two other cameras at the same time, so its pose cannot be found",
+                "{} sees too few joints at the same time as two other cameras, so its pose cannot be found",
                 name(camera)
             ),
             Self::Unplaced {
                 camera,
                 cost: Some(cost),
             } => format!(
-                "{} does not fit the other cameras in any pose (mean cost {cost:.1}): its intrinsics, its clock or its people may be wrong",
+                "{} does not fit the other cameras in any pose (mean cost {cost:.1}): its intrinsics, its clock or the people it detected \
+                 may be wrong",
                 name(camera)
             ),
             Self::Fit {
@@ -134,7 +135,7 @@ impl Doubt {
                 share,
                 limit,
             } => format!(
-                "the joints of {} are {:.1} % of a person's size away from the rig's prediction, more than {:.1} %",
+                "the joints in {} are {:.1} % of a person's size away from the rig's prediction, but the limit is {:.1} %",
                 name(camera),
                 100.0 * share,
                 100.0 * limit
@@ -144,7 +145,8 @@ impl Doubt {
             }
             Self::Undetermined { what } => what.clone(),
             Self::Uncertain { camera, sd, limits } => format!(
-                "{} is known to only {:.2} degrees and {:.1} % of its distance (at most {} and {})",
+                "the pose of {} is uncertain by {:.2} degrees and {:.1} % of its distance to the people, but the limits are {} degrees and \
+                 {} %",
                 name(camera),
                 sd[0],
                 100.0 * sd[1],
@@ -152,21 +154,21 @@ impl Doubt {
                 100.0 * limits[1]
             ),
             Self::Halves { camera, by, limits } => format!(
-                "two halves of the recording disagree about {} by {:.2} degrees and {:.1} % of its distance (at most {} and {}): \
-                 people walked through too little of the volume, or a camera moved",
+                "two halves of the recording disagree about {} by {:.2} degrees and {:.1} % of its distance to the people, but the limits \
+                 are {} degrees and {} %: people walked through too little of the volume, or a camera moved",
                 name(camera),
                 by[0],
                 100.0 * by[1],
                 limits[0],
                 100.0 * limits[1]
             ),
-            Self::NoHalf { why } => format!("half of the recording gives no rig: {}", why.text(names)),
+            Self::NoHalf { why } => format!("one half of the recording does not determine a rig: {}", why.text(names)),
             Self::Bones { spread, limit } => format!(
-                "bones change their lengths by {:.0} %, more than {:.0} %: the joints in space are not those of a person",
+                "the lengths of bones change by {:.0} %, but the limit is {:.0} %: the triangulated joints are not those of a person",
                 100.0 * spread,
                 100.0 * limit
             ),
-            Self::NoBody => "too few joints are seen to determine the size of the person and the up direction".to_owned(),
+            Self::NoBody => "the cameras see too few joints to determine the size of the person and the up direction".to_owned(),
         }
     }
 }

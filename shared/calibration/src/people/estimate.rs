@@ -29,7 +29,7 @@ const MOST_BONES: f64 = 0.2;
 pub enum PeopleError {
     /// There is only one camera, or the number of films differs from the number of cameras.
     #[error(
-        "{cameras} cameras with {films} films: at least 2 cameras are needed, each with its film"
+        "there are {cameras} cameras and {films} films, but at least 2 cameras are needed, each with its film"
     )]
     Number {
         /// Number of cameras.
@@ -38,7 +38,7 @@ pub enum PeopleError {
         films: usize,
     },
     /// There are fewer joints than a body has, or the number of sides differs from the number of joints.
-    #[error("{joints} joints with {sides} sides: at least {least} joints are needed, each with its side", least = N_JOINTS)]
+    #[error("there are {joints} joints and {sides} sides, but at least {least} joints are needed, each with its side", least = N_JOINTS)]
     Joints {
         /// Number of joints.
         joints: usize,
@@ -46,7 +46,7 @@ pub enum PeopleError {
         sides: usize,
     },
     /// A length is not a positive number.
-    #[error("the length {metres} m is not a positive number")]
+    #[error("the length is {metres} m, but a positive number is needed")]
     Length {
         /// The length, in metres.
         metres: f64,

@@ -83,7 +83,7 @@ impl Costs {
 /// Cost of every offset between the clocks of two cameras.
 #[expect(
     clippy::partial_pub_fields,
-    reason = "the samples are what the search works with; all else is read outside"
+    reason = "only the search uses the samples; the other fields are read elsewhere"
 )]
 #[derive(Debug, Clone)]
 pub struct Curve {

@@ -188,7 +188,7 @@ impl fmt::Display for Worded<'_> {
             ),
             Doubt::Unconnected { camera, n, least } => write!(
                 f,
-                "{}: {n} joints are shared with other cameras at these offsets, but at least {least} are needed",
+                "{}: at these offsets, it sees only {n} joints together with other cameras, but at least {least} are needed",
                 name(camera)
             ),
             Doubt::Ambiguous {
@@ -202,8 +202,9 @@ impl fmt::Display for Worded<'_> {
                 let named: Vec<&str> = cameras.iter().map(name).collect();
                 write!(
                     f,
-                    "{}: ambiguous: {:+.0} ms away is {:.0} % as good (at most {:.0} % is accepted), the difference is {t:.1} standard \
-                     errors (at least {least_t:.0}); the movement repeats itself, or there is too little of it",
+                    "{}: the offset is ambiguous: another offset, {:+.0} ms away, is {:.0} % as good (limit {:.0} %), and the difference \
+                     is {t:.1} standard errors (at least {least_t:.0} are needed). The movement repeats itself, or there is too little \
+                     movement",
                     named.join(", "),
                     1e3 * *away_s,
                     100.0 * ratio,
@@ -216,7 +217,7 @@ impl fmt::Display for Worded<'_> {
                 window_s,
             } => write!(
                 f,
-                "{}: the best offset, {offset_s:+.2} s, is at the edge of the search of {window_s:.1} s: search further",
+                "{}: the best offset, {offset_s:+.2} s, is at the edge of the search window of {window_s:.1} s: search a larger window",
                 name(camera)
             ),
             _ => self.fit(f),
@@ -235,7 +236,7 @@ impl Worded<'_> {
                 most_s,
             } => write!(
                 f,
-                "{}: the minimum is flat: standard error {:.1} ms, at most {:.1} ms is accepted",
+                "{}: the minimum of the cost is flat: the standard error of the offset is {:.1} ms, but the limit is {:.1} ms",
                 name(camera),
                 1e3 * *error_s,
                 1e3 * *most_s
@@ -246,8 +247,8 @@ impl Worded<'_> {
                 least,
             } => write!(
                 f,
-                "{}: the best offset costs {:.0} % less than the mean of all, but at least {:.0} % is needed: too little movement, or the \
-                 calibration does not fit",
+                "{}: the best offset costs {:.0} % less than the mean of all offsets, but at least {:.0} % is needed: there is too little \
+                 movement, or the calibration does not fit",
                 name(camera),
                 100.0 * gain,
                 100.0 * least
@@ -258,8 +259,8 @@ impl Worded<'_> {
                 most,
             } => write!(
                 f,
-                "{}: joints are {percent:.1} % of a person's size away from the prediction of the other cameras (median; at most {most:.1} %): \
-                 cameras were exchanged or moved, or show different scenes",
+                "{}: its joints are {percent:.1} % of a person's size away from the prediction of the other cameras (median), but the \
+                 limit is {most:.1} %: cameras were exchanged or moved, or they show different scenes",
                 name(camera)
             ),
             _ => self.contradiction(f),
@@ -277,7 +278,8 @@ impl Worded<'_> {
                 least_share,
             } => write!(
                 f,
-                "{} and {}: alone they give an offset {:+.0} ms away from that of all cameras, which is {:.0} % as good for them (at least {:.0} % is needed)",
+                "{} and {}: the offset of these two cameras alone differs by {:+.0} ms from the offset of all cameras, which fits this \
+                 pair {:.0} % as well (at least {:.0} % is needed)",
                 name(a),
                 name(b),
                 1e3 * *away_s,
@@ -290,7 +292,7 @@ impl Worded<'_> {
                 most,
             } => write!(
                 f,
-                "{}: its clock would be {:+.2} % off, but at most {:.0} % is accepted: is the frame rate right?",
+                "{}: the rate of its clock would be {:+.2} % off, but the limit is {:.0} %: is the frame rate right?",
                 name(camera),
                 100.0 * drift,
                 100.0 * most
@@ -301,7 +303,8 @@ impl Worded<'_> {
                 most_s,
             } => write!(
                 f,
-                "{}: parts of the footage give offsets {:.0} ms apart, at most {:.0} ms is accepted: frames are missing, or the speed changed",
+                "{}: different sections of the footage give offsets {:.0} ms apart, but the limit is {:.0} ms: frames are missing, or the \
+                 frame rate changed",
                 name(camera),
                 1e3 * *away_s,
                 1e3 * *most_s
@@ -316,7 +319,7 @@ impl Worded<'_> {
         match self.doubt {
             Doubt::Quiet { camera, n, least } => write!(
                 f,
-                "{}: {n} sounds begin in its recording, but at least {least} are needed: clap a few times, unevenly",
+                "{}: only {n} sounds begin in its recording, but at least {least} are needed: clap a few times at uneven intervals",
                 name(camera)
             ),
             Doubt::Unheard {
@@ -329,8 +332,9 @@ impl Worded<'_> {
                 most_ratio,
             } => write!(
                 f,
-                "{} and {}: {n} sounds begin together at the best offset (at least {least}), with a cosine of {cosine:.2} (at least \
-                 {least_cosine:.1}); another offset is {:.0} % as good (at most {:.0} %): different rooms, an offset outside the search, or a regular beat",
+                "{} and {}: at the best offset, {n} sounds begin together (at least {least} are needed), with a cosine of {cosine:.2} (at \
+                 least {least_cosine:.1} is needed); another offset is {:.0} % as good (limit {:.0} %). The cameras were in different \
+                 rooms, the offset is outside the search window, or the sounds are a regular beat",
                 name(a),
                 name(b),
                 100.0 * ratio,
@@ -342,7 +346,8 @@ impl Worded<'_> {
                 most_s,
             } => write!(
                 f,
-                "{} and {}: alone they give an offset {:+.0} ms away from that of all cameras, at most {:.0} ms is accepted",
+                "{} and {}: the offset of these two cameras alone differs by {:+.0} ms from the offset of all cameras, but the limit is \
+                 {:.0} ms",
                 name(a),
                 name(b),
                 1e3 * *away_s,

@@ -36,7 +36,7 @@ pub struct Joint {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilmError {
     /// The number of films differs from the number of cameras.
-    #[error("{films} films were given for {cameras} cameras")]
+    #[error("{films} films were given for {cameras} cameras, but each camera needs one film")]
     Number {
         /// Number of films.
         films: usize,
@@ -44,14 +44,14 @@ pub enum FilmError {
         cameras: usize,
     },
     /// There are fewer than two cameras.
-    #[error("{cameras} camera: at least 2 are needed to compare their clocks")]
+    #[error("the number of cameras is {cameras}, but at least 2 are needed to compare clocks")]
     OneCamera {
         /// Number of cameras.
         cameras: usize,
     },
     /// The times of a camera are not ascending.
     #[error(
-        "camera {camera}: picture {shot} has the time {time_s} s, which is not after the previous picture"
+        "camera {camera}: picture {shot} is at {time_s} s, but must be later than the previous picture"
     )]
     Times {
         /// Index of the camera, from 0.
@@ -62,14 +62,14 @@ pub enum FilmError {
         time_s: f64,
     },
     /// The search window is out of range.
-    #[error("the window is {window_s} s, expected 0.1 to 60")]
+    #[error("the search window is {window_s} s, expected 0.1 to 60 s")]
     Window {
         /// The window, in seconds.
         window_s: f64,
     },
     /// The reference camera does not exist.
     #[error(
-        "reference camera {reference} does not exist: there are {cameras} cameras, counted from 0"
+        "the reference camera {reference} does not exist: there are {cameras} cameras, counted from 0"
     )]
     Reference {
         /// Index of the requested reference, from 0.

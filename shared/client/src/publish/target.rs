@@ -34,7 +34,9 @@ pub enum TargetError {
         why: &'static str,
     },
     /// The target is another machine.
-    #[error("{address} is not this machine: skeletons of people would leave it, unencrypted")]
+    #[error(
+        "{address} is not this machine: skeletons of people would leave this machine unencrypted"
+    )]
     Beyond {
         /// Address of the receiver.
         address: SocketAddr,
@@ -58,8 +60,8 @@ impl Target {
         let form = match (scheme, query) {
             ("udp", "" | "format=json") => Form::Json,
             ("udp", "format=osc") | ("osc", "") => Form::Osc,
-            ("udp" | "osc", _) => return Err(wrong("its form is unknown")),
-            _ => return Err(wrong("neither udp:// nor osc://")),
+            ("udp" | "osc", _) => return Err(wrong("its format is unknown")),
+            _ => return Err(wrong("it begins with neither udp:// nor osc://")),
         };
         let place = place.strip_suffix('/').unwrap_or(place);
         let address = match place.strip_prefix("localhost:") {
@@ -69,7 +71,7 @@ impl Target {
             }
             None => place.parse().ok(),
         };
-        let address = address.ok_or_else(|| wrong("no address and port"))?;
+        let address = address.ok_or_else(|| wrong("it has no address and port"))?;
         if address.port() == 0 {
             return Err(wrong("port 0"));
         }

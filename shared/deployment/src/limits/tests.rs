@@ -275,7 +275,7 @@ fn a_camera_has_footage_or_keypoints_and_names_of_these_that_are_known() {
         ("source = ''", "`camera.source` is left out of camera \"c\""),
         (
             "source = 'c.mp4'\nkeypoint_names = 'coco-17'",
-            "expected none without `keypoints`",
+            "expected no value, because this camera has no `keypoints`",
         ),
         (
             "keypoints = 'c'\nkeypoint_names = 'coco17'",

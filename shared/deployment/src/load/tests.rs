@@ -109,7 +109,7 @@ fn an_unknown_key_is_named_with_its_line_and_a_suggestion() {
     let text = SHORT.replace("workers", "wrokers");
     assert_eq!(
         refused(&text, &[]),
-        "deployment.toml:17: unknown key `wrokers`, did you mean `workers`?"
+        "deployment.toml:17: unknown key `wrokers`: did you mean `workers`?"
     );
 }
 
@@ -117,7 +117,7 @@ fn an_unknown_key_is_named_with_its_line_and_a_suggestion() {
 fn an_unknown_key_of_the_command_line_is_named_too() {
     assert_eq!(
         refused(SHORT, &["paper.wrokers=3"]),
-        "--set: unknown key `wrokers`, did you mean `workers`?"
+        "--set: unknown key `wrokers`: did you mean `workers`?"
     );
 }
 
@@ -229,7 +229,7 @@ fn a_wrong_value_is_refused_with_its_line() {
     let text = format!("{SHORT}\n[results]\nsmoth = true\n");
     assert_eq!(
         refused(&text, &[]),
-        "deployment.toml:20: unknown key `smoth`, did you mean `smooth`?"
+        "deployment.toml:20: unknown key `smoth`: did you mean `smooth`?"
     );
 }
 
@@ -246,8 +246,8 @@ fn whatever_runs_by_the_file_alone_may_be_given_cores_and_nothing_else() {
     let got = refused(SHORT, &["runtime.cores={ pose-2 = [0] }"]);
     assert!(
         got.ends_with(
-            "`runtime.cores` is \"pose-2\", expected capture, pose, quality, fuse, triangulate, results, or one \
-             process of these, such as pose-0"
+            "`runtime.cores` is \"pose-2\", expected one of capture, pose, quality, fuse, triangulate, results, or a single process, such \
+                                          as pose-0"
         ),
         "{got}"
     );
@@ -311,7 +311,7 @@ const LINES: &[(&str, &[&str])] = &[
     ),
     (
         "mode = realtime",
-        &["deployment.toml:20", "text must stand in quotes"],
+        &["deployment.toml:20", "text must be in quotes"],
     ),
     (
         "mode = \"live\"",
@@ -328,7 +328,7 @@ const EDITS: &[(&str, &str, &[&str])] = &[
     (
         "[[camera]]\nname = \"a\"",
         "[camera]\nname = \"a\"",
-        &["`camera` is given twice", "[[camera]], in double brackets"],
+        &["`camera` is given twice", "[[camera]] in double brackets"],
     ),
     (
         "[[camera]]",
