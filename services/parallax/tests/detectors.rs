@@ -111,7 +111,7 @@ fn a_card_lies_beside_the_detector_or_in_it() {
     let case = case("detector-card");
     let ended = run(&case, &DETECT, &[]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-    for words in ["det.onnx: the detector has no card", "--detector-card"] {
+    for words in ["det.onnx: this detector has no card", "--detector-card"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
     let mut net = detector();

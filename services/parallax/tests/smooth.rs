@@ -305,7 +305,7 @@ fn what_a_folder_lacks_is_said_and_by_exit_code() {
         (&nan, &[], 0, ""),
         (&back, &[], 4, "line 4 is at"),
         (&back, &["--rate-hz", "60"], 4, "line 4 is at"),
-        (&cut, &[], 7, "line 50 of pose3d.jsonl is cut off"),
+        (&cut, &[], 7, "line 50 of pose3d.jsonl is truncated"),
         (&torn, &[], 4, "line 21, column"),
         (&no_times, &[], 4, "--rate-hz"),
         (&no_times, &["--rate-hz", "60"], 0, ""),
@@ -317,7 +317,7 @@ fn what_a_folder_lacks_is_said_and_by_exit_code() {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
         if code == 0 || code == 7 {
             let n = lines(&case, "run/pose3d-smooth.jsonl").len();
-            let cut = usize::from(words.contains("cut off"));
+            let cut = usize::from(words.contains("is truncated"));
             assert_eq!(n, text.lines().count() - cut, "{words}");
         }
     }

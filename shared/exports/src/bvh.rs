@@ -191,7 +191,9 @@ fn notes(
             String::new()
         };
         notes.push(format!(
-            "the format knows no gaps: in {} of {} frames ({} of them without anything) bones stay as they were: frames {named}{more}",
+            "the format cannot mark gaps: in {} of {} frames ({} of them without any joints), missing bones keep their last rotation; \
+             these \
+             are the frames {named}{more}",
             held.n_frames,
             trial.slots.len(),
             held.n_whole

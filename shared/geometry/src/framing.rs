@@ -20,7 +20,8 @@ pub enum OutSize {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FramingError {
     /// The source does not have the size for which the camera was calibrated.
-    #[error("the source is {}x{} px but the camera is calibrated for {}x{} px", .source_size[0], .source_size[1], .calibrated[0], .calibrated[1])]
+    #[error("the source is {}x{} px, but the camera is calibrated for {}x{} px", .source_size[0], .source_size[1], .calibrated[0], \
+             .calibrated[1])]
     SourceSize {
         /// Width and height of the source's frames.
         source_size: [u32; 2],
@@ -38,7 +39,7 @@ pub enum FramingError {
         calibrated: [u32; 2],
     },
     /// The output would have no pixels, or far too many.
-    #[error("an output of {width} x {height} px is not between 1 and {LARGEST} px")]
+    #[error("the output is {width} x {height} px, but each side must be 1 to {LARGEST} px")]
     OutSize {
         /// Requested width, before rounding.
         width: f64,
@@ -46,7 +47,7 @@ pub enum FramingError {
         height: f64,
     },
     /// The roll is not a finite number.
-    #[error("roll of {roll} rad is not a finite number")]
+    #[error("the roll is {roll} rad, but must be a finite number")]
     Roll {
         /// Roll angle, in radians.
         roll: f64,

@@ -38,7 +38,7 @@ pub enum RigError {
         name: String,
     },
     /// A number is infinite or NaN.
-    #[error("camera {camera:?}: {quantity} is {value}, not a finite number")]
+    #[error("camera {camera:?}: {quantity} is {value}, but must be a finite number")]
     NotFinite {
         /// Name of the camera.
         camera: String,
@@ -48,7 +48,8 @@ pub enum RigError {
         value: f64,
     },
     /// The image has no pixels.
-    #[error("camera {camera:?}: image size is {width}x{height}, both must be at least 1", width = .size[0], height = .size[1])]
+    #[error("camera {camera:?}: the image size is {width}x{height}, but both sides must be at least 1", width = .size[0], height = \
+             .size[1])]
     EmptyImage {
         /// Name of the camera.
         camera: String,
@@ -56,7 +57,7 @@ pub enum RigError {
         size: [u32; 2],
     },
     /// A focal length is zero or negative.
-    #[error("camera {camera:?}: focal length {value} px is not positive")]
+    #[error("camera {camera:?}: the focal length is {value} px, but must be positive")]
     Focal {
         /// Name of the camera.
         camera: String,
@@ -65,7 +66,7 @@ pub enum RigError {
     },
     /// The principal point is further from the image than the image is wide.
     #[error(
-        "camera {camera:?}: principal point {quantity} = {value} px is far outside an image of {extent} px"
+        "camera {camera:?}: the principal point {quantity} = {value} px is far outside the image of {extent} px"
     )]
     PrincipalPoint {
         /// Name of the camera.
@@ -79,7 +80,7 @@ pub enum RigError {
     },
     /// A focal length is so long that all rays of the image are parallel to working precision.
     #[error(
-        "camera {camera:?}: focal length {value} px is more than {limit:e} times the image, which is {extent} px"
+        "camera {camera:?}: the focal length is {value} px, but the limit is {limit:e} times the size of the image, {extent} px"
     )]
     LongFocal {
         /// Name of the camera.
@@ -93,7 +94,7 @@ pub enum RigError {
     },
     /// A lens coefficient is larger than that of any real lens.
     #[error(
-        "camera {camera:?}: lens coefficient {value:e} exceeds {limit:e}: do the coefficients have the order of the format?"
+        "camera {camera:?}: a lens coefficient is {value:e}, but the limit is {limit:e}: are the coefficients in the order of the format?"
     )]
     LensCoefficient {
         /// Name of the camera.
@@ -105,7 +106,7 @@ pub enum RigError {
     },
     /// A camera is further from the origin than any place on Earth is from the Earth's centre.
     #[error(
-        "camera {camera:?}: it is {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
+        "camera {camera:?} is {metres:e} m from the origin of the world, but the limit is {limit:e} m: is the unit right?"
     )]
     Place {
         /// Name of the camera.
@@ -128,7 +129,7 @@ pub enum RigError {
 /// Error for a matrix that is not a rotation.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "not a rotation: largest entry of R Rᵀ - I is {deviation:e} (limit {limit:e}), determinant {determinant}"
+    "the matrix is not a rotation: the largest entry of R Rᵀ - I is {deviation:e} (limit {limit:e}), and the determinant is {determinant}"
 )]
 pub struct NotARotation {
     /// Largest absolute entry of R Rᵀ - I.
@@ -331,8 +332,8 @@ fn check_finite(camera: &Camera) -> Result<(), RigError> {
     let mut numbers = numbers
         .into_iter()
         .chain(lens.model().coefficients().map(labelled("a lens coefficient")))
-        .chain(rotation.coords.iter().copied().map(labelled("a number of the rotation")))
-        .chain(translation.vector.iter().copied().map(labelled("a number of the translation")));
+        .chain(rotation.coords.iter().copied().map(labelled("an entry of the rotation")))
+        .chain(translation.vector.iter().copied().map(labelled("an entry of the translation")));
     match numbers.find(|(_, value)| !value.is_finite()) {
         Some((quantity, value)) => {
             let camera = camera.name.clone();
@@ -423,8 +424,8 @@ fn check_image(camera: &Camera) -> Result<(), RigError> {
 mod tests;
 
 /// Requirement of [`is_plain_name`], as text for error messages.
-pub const PLAIN_NAME: &str = "1 to 64 bytes that begin with none of . - and space, without / \\ , \" and control \
-                              characters: the name of a camera becomes that of a folder";
+pub const PLAIN_NAME: &str = "1 to 64 bytes that do not begin with . - or a space, and do not contain / \\ , \" or control characters, \
+                              because each camera's name is also the name of a folder";
 
 /// Returns true if a name can be the name of a folder and a field of a table.
 pub fn is_plain_name(name: &str) -> bool {

@@ -56,7 +56,7 @@ impl Default for Settings {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TriangulateError {
     /// There are too few observations.
-    #[error("triangulation needs at least {needed} views, got {views}")]
+    #[error("triangulation needs at least {needed} views, but there are {views}")]
     TooFewViews {
         /// Number of usable observations.
         views: usize,
@@ -70,7 +70,9 @@ pub enum TriangulateError {
         views: usize,
     },
     /// A position or a standard deviation is not finite, or a standard deviation is not positive.
-    #[error("view {view}: position ({x}, {y}) px with deviation {sigma_px} px is not usable")]
+    #[error(
+        "view {view}: the position ({x}, {y}) px with standard deviation {sigma_px} px cannot be used"
+    )]
     BadObservation {
         /// Index of the observation.
         view: usize,
@@ -82,7 +84,9 @@ pub enum TriangulateError {
         sigma_px: f64,
     },
     /// The viewing rays are parallel to working precision, so the depth is unknown.
-    #[error("viewing rays are parallel: widest angle {angle:e} rad is below {limit:e}")]
+    #[error(
+        "the viewing rays are parallel: the widest angle between two rays is {angle:e} rad, but at least {limit:e} rad is needed"
+    )]
     ParallelRays {
         /// Widest angle between two rays, in radians.
         angle: f64,
@@ -97,7 +101,7 @@ pub enum TriangulateError {
     },
     /// There is no subset of enough views that agree.
     #[error(
-        "no {needed} views agree: best reprojection error {residual_px} px exceeds {limit_px} px"
+        "no {needed} views agree: the smallest reprojection error is {residual_px} px, but the limit is {limit_px} px"
     )]
     Inconsistent {
         /// Required number of observations.
@@ -114,7 +118,7 @@ pub enum TriangulateError {
         view: usize,
     },
     /// The refinement reached values that are not finite.
-    #[error("refinement diverged after {iterations} iterations")]
+    #[error("the refinement diverged after {iterations} iterations")]
     Diverged {
         /// Number of iterations.
         iterations: usize,

@@ -4,13 +4,13 @@
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
     /// The feature `gpu` is off.
-    #[error("this build has no GPU support: build it with --features gpu")]
+    #[error("this Parallax was built without GPU support: build it with --features gpu")]
     NotBuilt,
     /// Vulkan is missing or has no adapter.
     #[error("no Vulkan adapter was found")]
     NoAdapter,
     /// All adapters are programs that compute on the processor.
-    #[error("the only Vulkan adapter is software: {name}")]
+    #[error("the only Vulkan adapter is {name}, which computes on the processor")]
     OnlySoftware {
         /// Name of the best such adapter.
         name: String,
@@ -45,7 +45,7 @@ pub enum Unsuitable {
         has: u64,
     },
     /// The driver does not accept the kernels.
-    #[error("the driver refuses the kernels: {why}")]
+    #[error("the driver rejects the kernels: {why}")]
     Refused {
         /// The message of the driver.
         why: String,
@@ -54,5 +54,5 @@ pub enum Unsuitable {
 
 /// The device no longer responds, or did not respond in time. It gives no further results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the GPU was lost")]
+#[error("the connection to the GPU was lost")]
 pub struct DeviceLost;

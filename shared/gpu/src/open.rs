@@ -36,7 +36,9 @@ pub(crate) fn open(choice: Choice) -> Result<Opened, OpenError> {
     };
     let features = best.features() & WANTED;
     if !features.contains(Features::SHADER_F64) {
-        return Err(refused("it lacks double precision".to_owned()));
+        return Err(refused(
+            "the adapter does not support double precision".to_owned(),
+        ));
     }
     let limits = best.limits();
     let wanted = wgpu::DeviceDescriptor {

@@ -126,7 +126,7 @@ fn filled(text: &str, sizes: Sizes) -> String {
 }
 
 /// Compiles a text; its arithmetic is decorated if the device accepts SPIR-V.
-#[expect(unsafe_code, reason = "wgpu hands SPIR-V to the driver as it is")]
+#[expect(unsafe_code, reason = "wgpu passes SPIR-V to the driver unchanged")]
 fn module(device: &Device, text: &str, kernels: &[Entry]) -> Result<ShaderModule, Unsuitable> {
     if !device.takes_spirv() {
         return Ok(

@@ -44,7 +44,7 @@ pub(crate) fn shape(model: &Model) -> Result<Shape, Unsuitable> {
         return Err(without("filters of different sizes"));
     }
     if spec.cell_px != CELL_PX {
-        return Err(without("cells of another size than 4 pixels"));
+        return Err(without("cells with a side other than 4 pixels"));
     }
     Ok(Shape { n_types, side })
 }

@@ -55,7 +55,9 @@ fn main() {
             times[at].push(time(&sessions[at].0));
         }
     }
-    println!("processor time of loading and of one look, {rounds} rounds, milliseconds");
+    println!(
+        "processor time of loading the network and of one run, in milliseconds, over {rounds} rounds"
+    );
     println!(" load  least  median  library");
     let columns: Vec<[f64; 2]> = times.iter_mut().map(|all| least_and_median(all)).collect();
     for ((session, load), [least, median]) in sessions.iter().zip(&columns) {
@@ -81,7 +83,7 @@ fn by_onnx_runtime(library: &Path, bytes: &[u8]) -> Session {
 
 #[cfg(not(feature = "ort"))]
 fn by_onnx_runtime(_library: &Path, _bytes: &[u8]) -> Session {
-    panic!("--onnx-runtime needs --features ort")
+    panic!("--onnx-runtime needs a build with --features ort")
 }
 
 fn time(session: &Session) -> f64 {

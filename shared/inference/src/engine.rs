@@ -97,7 +97,7 @@ pub(crate) type EngineError = Box<dyn std::error::Error + Send + Sync>;
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The library cannot read the file: it is not an ONNX file, is truncated, or has unsupported operations.
-    #[error("the file is not a network that can be run")]
+    #[error("the file is not a network that Parallax can run")]
     File(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// ONNX Runtime cannot be used.
     #[error("ONNX Runtime cannot be used")]

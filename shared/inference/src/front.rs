@@ -21,7 +21,7 @@ const MOST_TAPS: usize = 2 * MOST_PADDING + 1;
 pub(crate) enum NoFront {
     #[error("the processor has neither AVX2 nor AVX-512")]
     Machine,
-    #[error("the network's input is not one picture of a fixed size")]
+    #[error("the input of the network is not a single picture of fixed size")]
     Input,
     #[error("the network has no convolution")]
     Nothing,
@@ -197,7 +197,7 @@ impl<'a> Finding<'a> {
             }
             "Add" => match self.values.get(taken(1)) {
                 Some(&second) => self.sum([first, second]).map(Some),
-                None => Err("its second input is not supported"),
+                None => Err("the second input of the layer is not supported"),
             },
             _ => Err("this operation is not supported"),
         }
@@ -205,7 +205,7 @@ impl<'a> Finding<'a> {
 
     fn give(&mut self, operation: Operation, sides: [usize; 3]) -> Result<Value, &'static str> {
         if !fits(sides) {
-            return Err("its output is empty or too large");
+            return Err("the output of the layer is empty or too large");
         }
         self.front.operations.push(operation);
         self.front.sides.push(sides);
@@ -219,7 +219,8 @@ impl<'a> Finding<'a> {
     fn conv(&mut self, node: &NodeProto, input: Value) -> Result<Value, &'static str> {
         let name = node.input.get(1).map_or("", String::as_str);
         let weights = self.source.constant(name);
-        let weights = weights.ok_or("its weights are not constants of single or half precision")?;
+        let weights = weights
+            .ok_or("the weights of the layer are not constants of single or half precision")?;
         let &[outputs, inputs, down, across] = &weights.shape[..] else {
             return Err("the convolution is not two-dimensional");
         };
@@ -235,22 +236,22 @@ impl<'a> Finding<'a> {
             return Err("convolutions in groups are not supported");
         }
         if text(node, "auto_pad", "NOTSET") != "NOTSET" || is_dilated || !kernel {
-            return Err("its padding mode, dilation or kernel is not supported");
+            return Err("the padding mode, dilation or kernel of the layer is not supported");
         }
         let stride = sides(ints(node, "strides").unwrap_or(&[1, 1]));
         let pads = sides(ints(node, "pads").unwrap_or(&[0; 4]));
         let (Some(stride), Some([top, left, bottom, right])) = (stride, pads) else {
-            return Err("its strides or padding are not supported");
+            return Err("the strides or padding of the layer are not supported");
         };
         let most = top.max(left).max(bottom).max(right);
         let [channels, rows, cols] = self.front.sides[input.stack];
         let reach = [rows + top + bottom, cols + left + right];
         let most_taps = down.max(across);
         if most > MOST_PADDING || most_taps > MOST_TAPS {
-            return Err("its padding or kernel is too large");
+            return Err("the padding or kernel of the layer is too large");
         }
         if channels != inputs || reach[0] < down || reach[1] < across {
-            return Err("its shape does not match its input");
+            return Err("the shape of the layer does not match its input");
         }
         let size = ConvSize {
             inputs,
@@ -259,7 +260,7 @@ impl<'a> Finding<'a> {
             stride,
             pad: [top, left],
         };
-        let bias = bias.ok_or("its bias is not a constant")?;
+        let bias = bias.ok_or("the bias of the layer is not a constant")?;
         let out = [0, 1].map(|axis| (reach[axis] - size.kernel[axis]) / stride[axis] + 1);
         let is_picture = input.stack == 0;
         let has_tiles = !is_picture && is_large(size, out);
@@ -271,7 +272,7 @@ impl<'a> Finding<'a> {
         };
         let conv = conv
             .and_then(|conv| conv.map_or_else(|| Conv::new(size, weights, &bias, is_picture), Ok));
-        let conv = conv.map_err(|_error| "its weights do not match its shape")?;
+        let conv = conv.map_err(|_error| "the weights of the layer do not match its shape")?;
         self.front.border = self.front.border.max(most);
         let operation = Operation::Conv {
             conv,
@@ -290,9 +291,9 @@ impl<'a> Finding<'a> {
             ("half_pixel", "round_prefer_floor") | ("asymmetric", "floor")
         );
         let scales = self.source.constant(scales);
-        let scales = scales.ok_or("its scales are not constants")?.values;
+        let scales = scales.ok_or("the scales of the layer are not constants")?.values;
         let [1.0, 1.0, down, across] = scales[..] else {
-            return Err("it scales more than rows and columns");
+            return Err("the layer scales more than rows and columns");
         };
         let is_whole = down == across && down.fract() == 0.0 && (1.0..=64.0).contains(&down);
         let has_sizes = node.input.get(3).is_some_and(|name| !name.is_empty());
@@ -301,7 +302,7 @@ impl<'a> Finding<'a> {
         if is_whole && is_nearest && !has_sizes && !has_axes {
             Ok(down as usize)
         } else {
-            Err("only repeating pixels is supported")
+            Err("the layer enlarges pictures by a method other than repeating pixels")
         }
     }
 
@@ -315,7 +316,7 @@ impl<'a> Finding<'a> {
         let [sides, [channels, rows, cols]] = of.map(|value| self.front.sides[value.stack]);
         let fits = of[0].repeat == 1 && sides == [channels, rows * repeat, cols * repeat];
         if of[0].stack == 0 || of[1].stack == 0 || !fits {
-            return Err("its inputs differ in shape");
+            return Err("the inputs of the layer differ in shape");
         }
         self.give(Operation::Sum { of, repeat }, sides)
     }
@@ -361,7 +362,10 @@ impl<'a> Finding<'a> {
         let first = first.min_by_key(|(refused, _)| **refused);
         let nodes = &self.source.graph.node;
         let (node, what) = first.map_or(
-            (node, "it is not connected to the network's input"),
+            (
+                node,
+                "the layer is not connected to the input of the network",
+            ),
             |(at, what)| (&nodes[*at], *what),
         );
         NoFront::Node {

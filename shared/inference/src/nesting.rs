@@ -43,7 +43,7 @@ impl Kind {
 
 /// Position of the first byte at which the nesting is wrong, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the file is truncated or not an ONNX file: unexpected byte {at}")]
+#[error("the file is truncated or not an ONNX file: byte {at} is unexpected")]
 pub(crate) struct MalformedFile {
     at: usize,
 }

@@ -35,7 +35,7 @@ impl OnnxRuntime {
             Some((file, environment)) if file == library => environment.clone(),
             Some((file, _)) => {
                 let [wanted, has] = [library, file].map(Path::display);
-                let message = format!("{wanted} cannot be loaded, {has} is already in use");
+                let message = format!("{wanted} cannot be loaded, because {has} is already in use");
                 return Err(LoadError::Library(message.into()));
             }
             None => {
@@ -167,7 +167,7 @@ impl Engine for Loaded {
                 ValueType::Tensor { shape, .. } => {
                     shape.iter().map(|&shape| usize::try_from(shape))
                 }
-                _ => return Err(format!("the output `{name}` is no tensor").into()),
+                _ => return Err(format!("the output `{name}` is not a tensor").into()),
             };
             let shape: Vec<usize> = sides.collect::<Result<_, _>>()?;
             let values = value.try_extract_tensor::<f32>().ok();

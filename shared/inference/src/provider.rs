@@ -37,7 +37,7 @@ impl fmt::Display for Place {
             Self::Processor => to.write_str("the processor"),
             Self::Cuda => to.write_str("CUDA"),
             Self::ProcessorForCuda(why) => {
-                write!(to, "the processor, since CUDA cannot start: {why}")
+                write!(to, "the processor, because CUDA cannot start: {why}")
             }
         }
     }

@@ -205,7 +205,7 @@ fn weights_that_do_not_fit_the_input_are_an_error() {
     let session = Session::parse(net.file(&["a"])).unwrap();
     let by = session.run_by().to_string();
     assert!(
-        by.ends_with("(Conv): its shape does not match its input"),
+        by.ends_with("(Conv): the shape of the layer does not match its input"),
         "{by}"
     );
     run(&session, &[1, 4, 6, 6], 1).unwrap_err();

@@ -47,11 +47,12 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
             ));
         }
         RigFileError::Read { path, .. } if path.is_dir() => {
-            return Some("a rig is one file: give the file, not its folder".to_owned());
+            return Some("the rig must be a file, not a folder".to_owned());
         }
         RigFileError::Read { .. } | RigFileError::NoFiles => {
             return Some(
-                "a rig file has the poses of the cameras; `parallax calib convert` makes one from the calibration of another program"
+                "the rig must be a file with the poses of the cameras; `parallax calib convert` makes a rig file from the calibration of \
+                 another program"
                     .to_owned(),
             );
         }
@@ -65,7 +66,7 @@ pub(crate) fn on_rig(error: &RigFileError) -> Option<String> {
     let begins = |key: &str| text.lines().any(|line| line.starts_with(key));
     if begins("rig =") && begins("[[camera]]") {
         return Some(
-            "this is a deployment file; the rig is the file that its `rig` names".to_owned(),
+            "this is a deployment file: give the file that its key `rig` names".to_owned(),
         );
     }
     None
@@ -86,5 +87,5 @@ pub(crate) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
         None => format!("cannot make the folder {}: {error}", folder.display()),
     };
     Failure::new(ExitKind::Input, message)
-        .with_hint("results go to the folder `output` of the deployment file, or to --out: name one that can be written")
+        .with_hint("choose a folder that can be written to, with `output` in the deployment file or with --out")
 }

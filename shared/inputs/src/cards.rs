@@ -136,7 +136,7 @@ pub fn card_beside(network: &Path) -> Option<PathBuf> {
 /// Returns the failure of a network that does not fit its card.
 pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'static)) -> Failure {
     let message = format!(
-        "{} does not fit its card ({place}): {}",
+        "{} does not match its card ({place}): {}",
         path.display(),
         failure::wording::in_one_line(error)
     );

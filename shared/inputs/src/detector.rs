@@ -61,10 +61,10 @@ impl DetectorFile {
             card,
         } = self;
         let Some((card, place)) = card else {
-            let message = format!("{}: the detector has no card", path.display());
+            let message = format!("{}: this detector has no card", path.display());
             let hint = format!(
-                "`parallax-lab model show {}` says which of the cards in configs/detectors comes nearest: give it with \
-                 --detector-card, or put it beside the detector as {}; docs/networks.md says how to write one",
+                "`parallax-lab model show {}` prints the most similar card in configs/detectors: pass that card to --detector-card, or put \
+                 a copy beside the detector as {}; docs/networks.md explains how to write a card",
                 failure::wording::shell(path.display()),
                 path.with_extension("toml").display()
             );

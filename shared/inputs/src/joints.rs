@@ -45,13 +45,13 @@ impl Joints {
             return Ok(chosen(None));
         }
         let message = format!(
-            "{}: learned with another model ({}, this one is {fingerprint})",
+            "{} was learned with the model {}, but the current model is {fingerprint}",
             file.display(),
             read.model
         );
         let failure = Failure::new(ExitKind::Input, message);
         Err(failure.with_hint(
-            "`parallax-lab train joints` makes such a file; \"none\" uses the centres of parts",
+            "`parallax-lab train joints` makes a file for the current model; \"none\" uses the centres of parts as joints",
         ))
     }
 
@@ -77,7 +77,9 @@ impl std::fmt::Display for Joints {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.file {
             None => out.write_str("the centres of parts"),
-            Some(_) if is_shipped(&self.from) => out.write_str("as learned (the file that ships)"),
+            Some(_) if is_shipped(&self.from) => {
+                out.write_str("as learned (the file that ships with Parallax)")
+            }
             Some(_) => write!(out, "as learned ({})", self.from.display()),
         }
     }

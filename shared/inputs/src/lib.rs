@@ -206,7 +206,7 @@ pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, 
     }
     if !has_head {
         let message = format!(
-            "{}: for models of {} parts, this one has {}",
+            "{} is for models with {} parts, but this model has {}",
             file.display(),
             skeleton::N_PARTS,
             model.n_parts()
@@ -257,7 +257,8 @@ pub fn pair_tables(
     let rig = config.consistency.as_ref().and_then(deployment::paper::Consistency::rig);
     if let Some(rig) = rig {
         let Some(own) = learned.of_rig(rig, cameras, appearance) else {
-            let message = format!("`paper.consistency`: no rig {rig:?} was learned");
+            let message =
+                format!("the file in `paper.consistency` has no data for the rig {rig:?}");
             return Err(Failure::new(ExitKind::Config, message));
         };
         of_pairs.extend(own);
@@ -330,7 +331,7 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
 pub fn of_deployment(failure: Failure, deployment: &Deployment) -> Failure {
     match &deployment.data {
         Some(data) if failure.kind() == ExitKind::Input => {
-            failure.with_another_hint(format!("where its data come from: {data}"))
+            failure.with_another_hint(format!("the origin of the deployment's data is: {data}"))
         }
         _ => failure,
     }

@@ -45,7 +45,7 @@ impl Library {
     #[cfg(not(feature = "ort"))]
     pub fn load(file: &Path, _provider: Provider) -> Result<Self, Failure> {
         let message = format!(
-            "{}: ONNX Runtime, but this Parallax was built without it: build it with --features ort",
+            "{} cannot be loaded, because this Parallax was built without ONNX Runtime: build Parallax with --features ort",
             file.display()
         );
         Err(Failure::new(failure::ExitKind::Config, message))

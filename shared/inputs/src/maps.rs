@@ -31,7 +31,7 @@ pub fn pose_network(
         RunBy::OnnxRuntime(place @ Place::ProcessorForCuda(_)) => {
             tracing::warn!(network = %file.display(), "ONNX Runtime runs the network on {place}");
         }
-        by => tracing::info!(network = %file.display(), "run by {by}"),
+        by => tracing::info!(network = %file.display(), "the network is run by {by}"),
     }
     let network = network.fitted()?;
     if deployment.network.mirror {

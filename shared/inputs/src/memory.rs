@@ -8,7 +8,7 @@ const SHARE_OF_RESPONSES: f64 = 1.6;
 /// Error for a search that needs more memory than this machine has free.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "searching all of {width}x{height} takes about {needed_gb:.1} GB of memory, and {free_gb:.1} GB are free"
+    "the search of the whole picture of {width}x{height} pixels needs about {needed_gb:.1} GB of memory, but only {free_gb:.1} GB are free"
 )]
 pub(crate) struct TooLarge {
     width: usize,

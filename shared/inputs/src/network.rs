@@ -105,10 +105,10 @@ impl NetworkFile {
             card,
         } = self;
         let Some((card, place)) = card else {
-            let message = format!("{}: the network has no card", path.display());
+            let message = format!("{}: this network has no card", path.display());
             let hint = format!(
-                "`parallax-lab model show {}` says which of the cards in configs/networks comes nearest: give it with --card, or \
-                 put it beside the network as {}; docs/networks.md says how to write one",
+                "`parallax-lab model show {}` prints the most similar card in configs/networks: pass that card to --card, or put a copy \
+                 beside the network as {}; docs/networks.md explains how to write a card",
                 failure::wording::shell(path.display()),
                 path.with_extension("toml").display()
             );
@@ -137,7 +137,10 @@ pub fn look<'a>(
     let sight = network.look_turned(image, (outline, turn), workspace);
     let sight = sight.map_err(|error| refused(&picture.path, &error))?;
     sight.ok_or_else(|| {
-        let message = format!("{}: a box without an extent", picture.path.display());
+        let message = format!(
+            "{}: the box of the person has no area",
+            picture.path.display()
+        );
         Failure::new(ExitKind::Input, message)
     })
 }

@@ -154,7 +154,7 @@ impl Searched {
         let layout = layout.map_err(|error| in_file(&picture.path, &error))?;
         check_memory(&layout).map_err(|needed| {
             let message = format!("{}: {needed}", picture.path.display());
-            let hint = "leave --full out, or ask for a smaller --size";
+            let hint = "leave out --full, or choose a smaller --size";
             Failure::new(ExitKind::Input, message).with_hint(hint)
         })?;
         let smaller = if size == picture.size {

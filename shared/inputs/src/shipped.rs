@@ -66,7 +66,8 @@ impl Shipped {
     }
 
     /// Terms of use of the shipped files.
-    pub const TERMS: &str = "for research only: learned from photographs that are for research (PARSE, LSP-extended, INRIA Person)";
+    pub const TERMS: &str = "for research only, because the training photographs are licensed for research (PARSE, LSP-extended, INRIA \
+                             Person)";
 
     /// Returns the shipped file with the same content as a user's file; `shipped` means the person model.
     pub fn of_file(file: &Path) -> Option<Self> {
@@ -119,7 +120,7 @@ impl Shipped {
             Self::Detector => ["network.detector", "train finder"],
         };
         format!(
-            "`{key}` is a file that `parallax-lab {made_by}` made, or \"{SHIPPED}\" for the built-in one"
+            "`{key}` names a file made by `parallax-lab {made_by}`, or is \"{SHIPPED}\" for the built-in file"
         )
     }
 }

@@ -107,8 +107,8 @@ fn measure(isa: Isa, rule: &MessageRule, grid: Grid, peak: f64) {
     let n = workspace.n_candidates(rule, grid) + biases;
     let speed = n as f64 / micros / 1e3;
     println!(
-        "  {:3} x {:3}: {micros:7.1} us and {layout:5.1} us to lay the child out, {:5.0} times the \
-         reference, {speed:5.1} candidates/ns = {:3.0} % of registers",
+        "  {:3} x {:3}: {micros:7.1} us, plus {layout:5.1} us for the layout of the child; {:5.0} times as fast as the reference; \
+         {speed:5.1} candidates/ns = {:3.0} % of registers",
         grid.rows,
         grid.cols,
         slow / micros,

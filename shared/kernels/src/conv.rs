@@ -35,7 +35,7 @@ pub struct ConvSize {
 /// The numbers of weights and biases do not match the sizes of the convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "a convolution from {} to {} channels by {:?} has {weights} weights and {bias} biases",
+    "a convolution from {} to {} channels with kernel {:?} has {weights} weights and {bias} biases",
     size.inputs, size.outputs, size.kernel
 )]
 pub struct ConvSizeError {

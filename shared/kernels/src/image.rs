@@ -12,7 +12,7 @@ pub struct Rgb8View<'a> {
 
 /// The number of bytes does not match the size of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("an RGB image of {width}x{height} pixels has {expected} bytes, got {got}")]
+#[error("an RGB image of {width}x{height} pixels must have {expected} bytes, but there are {got}")]
 pub struct ImageSizeError {
     /// Width in pixels.
     pub width: usize,

@@ -6,7 +6,7 @@
 )]
 #![expect(
     clippy::inline_always,
-    reason = "a body takes on the instruction set of the function that it is inlined into"
+    reason = "a body is compiled for the instruction set of the function into which it is inlined"
 )]
 
 mod conv;

@@ -370,7 +370,8 @@ impl Card {
                     format!("0 to {MAX_KEYPOINTS}")
                 })?;
                 demand(!(*udp && *centred), "output.centred", centred, || {
-                    "false where `udp` is true: corner cells lie on corner pixels there".to_owned()
+                    "false, because with `udp`, the centres of corner cells are the corner pixels"
+                        .to_owned()
                 })
             }
             Codec::Simcc {
@@ -393,7 +394,7 @@ impl Card {
                     && count(ListField::Score) <= 1
                     && fields.len() <= 16;
                 demand(fits, "output.fields", &format!("{fields:?}"), || {
-                    "\"x\" and \"y\" once, \"score\" at most once, others \"skip\"".to_owned()
+                    "\"x\" and \"y\" exactly once, \"score\" at most once, and \"skip\" for all other fields".to_owned()
                 })
             }
         }
@@ -427,7 +428,7 @@ impl Card {
             twice.is_none(),
             "keypoints.names",
             &twice.map_or("", |twice| twice.1),
-            || "every name once".to_owned(),
+            || "each name at most once".to_owned(),
         )
     }
 }

@@ -23,7 +23,7 @@ pub enum OutputError {
         expected: String,
     },
     /// A value is not a finite number.
-    #[error("value {index} of the output is {value}")]
+    #[error("value {index} of the output is {value}, which is not finite")]
     NotANumber {
         /// Index of the value.
         index: usize,
@@ -478,6 +478,9 @@ mod tests {
         let mut odd = values;
         odd[7] = f32::NAN;
         let refused = HeatMaps::new(&odd, &[1, 2, 3, 4], Layout::Planes, [2, 0]).unwrap_err();
-        assert_eq!(refused.to_string(), "value 7 of the output is NaN");
+        assert_eq!(
+            refused.to_string(),
+            "value 7 of the output is NaN, which is not finite"
+        );
     }
 }

@@ -130,7 +130,7 @@ impl DetectorCard {
                 "one to eight numbers from 1 to 256".to_owned()
             })?;
             demand(*person < 10_000, "output.person", person, || {
-                "less than 10000".to_owned()
+                "a number below 10000".to_owned()
             })?;
         }
         if let Boxes::Centres { stride, .. } = &card.output {

@@ -16,7 +16,7 @@ const TWICE: f64 = 0.802;
 /// The error for a cutoff that is too high for the rate.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "a cutoff of {cutoff_hz} Hz needs a rate above {} Hz, but the rate is {rate_hz:.3} Hz",
+    "a cutoff frequency of {cutoff_hz} Hz needs a frame rate above {} Hz, but the frame rate is {rate_hz:.3} Hz",
     needed_hz(*cutoff_hz)
 )]
 pub struct CutoffError {

@@ -88,7 +88,8 @@ pub fn smoothed(recorded: &Recorded, settings: &Settings) -> Result<Motion, Fail
         Method::Butterworth => {
             let filtered = butterworth::filter(recorded, settings.cutoff_hz, settings.fill_s);
             filtered.map_err(|error| {
-                let hint = "use a lower --cutoff-hz, or --method rts, which works at any rate";
+                let hint =
+                    "use a lower --cutoff-hz, or --method rts, which works at any frame rate";
                 Failure::new(ExitKind::Usage, error).with_hint(hint)
             })
         }
@@ -182,17 +183,19 @@ fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
         doubts.push(NOTHING_MEASURED.to_owned());
     } else if n_rejected * 5 > n_measured {
         doubts.push(format!(
-            "{n_rejected} measurements contradict those before and after, {n_measured} do not: check the measurements first"
+            "{n_rejected} measurements contradict the measurements before and after them, and only {n_measured} do not: check the \
+             measurements first"
         ));
     }
     let n_unsure = person.unsure.kept + person.unsure.exchanged + person.unsure.left_out;
     if n_unsure > 0 && n_unsure == n_frames {
         doubts.push(
-            "left and right are uncertain in every frame, and were kept as measured".to_owned(),
+            "left and right are uncertain in every frame, so both sides were kept as measured"
+                .to_owned(),
         );
     } else if person.unsure.left_out * 5 > n_frames {
         doubts.push(format!(
-            "left and right are uncertain in {} of {n_frames} frames, and the frames before and after do not decide them",
+            "left and right are uncertain in {} of {n_frames} frames, and the frames before and after do not help to distinguish them",
             person.unsure.left_out
         ));
     }

@@ -58,7 +58,9 @@ pub struct Recorded {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TimesError {
     /// An instant is not later than the previous instant.
-    #[error("instant {at} at {time_s} s is not after the instant before, which is at {before_s} s")]
+    #[error(
+        "times must increase: instant {at} is at {time_s} s, but the previous instant is at {before_s} s"
+    )]
     Order {
         /// Index of the instant, counted from 0.
         at: usize,
@@ -74,7 +76,7 @@ pub enum TimesError {
         at: usize,
     },
     /// The length of a row differs from the number of instants.
-    #[error("{got} values for {expected} instants")]
+    #[error("there are {got} values for {expected} instants")]
     Length {
         /// Number of values in the row.
         got: usize,

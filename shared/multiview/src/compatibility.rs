@@ -13,7 +13,7 @@ pub struct Compatibility {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CompatibilityError {
     /// The number of rows differs from the number of types of the model.
-    #[error("the table has {got} rows, expected {expected}: one per part and type")]
+    #[error("the table has {got} rows, expected {expected}, one for each part and type")]
     Rows {
         /// Number of rows found.
         got: usize,
@@ -21,7 +21,9 @@ pub enum CompatibilityError {
         expected: usize,
     },
     /// The length of a row differs from the number of types of the part.
-    #[error("line {line}: {got} columns, expected {expected}: the part, and one per type")]
+    #[error(
+        "line {line} has {got} columns, expected {expected}: one for the part, and one for each type"
+    )]
     Columns {
         /// Line number, counted from 1.
         line: usize,
@@ -51,7 +53,7 @@ pub enum CompatibilityError {
         got: String,
     },
     /// The probabilities of a row do not sum to 1.
-    #[error("line {line}: the probabilities sum to {sum}, expected 1")]
+    #[error("line {line}: the sum of the probabilities is {sum}, expected 1")]
     Sum {
         /// Line number, counted from 1.
         line: usize,
@@ -59,7 +61,9 @@ pub enum CompatibilityError {
         sum: f64,
     },
     /// Two tables belong to different models.
-    #[error("the two tables have {first:?} and {second:?} types per part")]
+    #[error(
+        "the two tables must have the same number of types per part, but they have {first:?} and {second:?}"
+    )]
     Shape {
         /// Number of types of every part in the first table.
         first: Vec<usize>,
@@ -407,7 +411,7 @@ mod tests {
         let error = Compatibility::joint_from_conditionals(&small, &large).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "the two tables have [2] and [3] types per part"
+            "the two tables must have the same number of types per part, but they have [2] and [3]"
         );
     }
 
@@ -440,7 +444,7 @@ mod tests {
             (
                 "0.75",
                 "0.8",
-                "line 1: the probabilities sum to 1.05, expected 1",
+                "line 1: the sum of the probabilities is 1.05, expected 1",
             ),
             (
                 "0.75",
@@ -466,12 +470,12 @@ mod tests {
             (
                 "2,0,0",
                 "2,0,0,0",
-                "line 3: 4 columns, expected 3: the part, and one per type",
+                "line 3 has 4 columns, expected 3: one for the part, and one for each type",
             ),
             (
                 "2,0,0\n",
                 "",
-                "the table has 3 rows, expected 4: one per part and type",
+                "the table has 3 rows, expected 4, one for each part and type",
             ),
         ];
         for (from, to, expected) in cases {

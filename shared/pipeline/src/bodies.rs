@@ -14,7 +14,7 @@ pub enum NoJoint {
     #[error(transparent)]
     Triangulation(#[from] TriangulateError),
     /// No body can have the joint at the place where it was found.
-    #[error("no body can have the joint at this position")]
+    #[error("no human body can have the joint at this position")]
     Implausible,
 }
 

@@ -40,7 +40,7 @@ pub enum AboutError {
     #[error("the recording does not state its {0}")]
     Missing(&'static str),
     /// A value is not a number.
-    #[error("the recording's {key} is {got:?}")]
+    #[error("the value of {key} in the recording is {got:?}, which is not valid")]
     Value {
         /// Name of the key.
         key: &'static str,
@@ -48,7 +48,7 @@ pub enum AboutError {
         got: String,
     },
     /// Another version of the program wrote the recording.
-    #[error("the recording has format {got:?}, this program reads format {FORMAT}")]
+    #[error("the recording has format {got:?}, but this program reads format {FORMAT}")]
     Format {
         /// Format in the file.
         got: String,

@@ -106,7 +106,7 @@ impl Contents {
         for channel in self.messages.keys() {
             if !self.channels.contains_key(channel) {
                 let n = self.messages[channel].len() as u64;
-                let name = format!("channel {channel}, whose name is not known");
+                let name = format!("channel {channel} (its name is not known)");
                 self.extent.missing.insert(name, n);
             }
         }

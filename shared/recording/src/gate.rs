@@ -46,7 +46,7 @@ impl<W> Gate<W> {
 impl<W: Write> Write for Gate<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.keeper.is_closed() {
-            return Err(io::Error::other("it could not be written before"));
+            return Err(io::Error::other("an earlier write failed"));
         }
         let n = self.out.write(bytes)?;
         self.keeper.0.n_bytes.fetch_add(n as u64, Ordering::Relaxed);

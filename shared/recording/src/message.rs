@@ -10,7 +10,7 @@ pub(crate) const PREAMBLE: [u8; 4] = [0, 1, 0, 0];
 
 const _: () = assert!(
     cfg!(target_endian = "little"),
-    "messages are written in the layout of memory"
+    "messages are written with their layout in memory"
 );
 
 /// Reason why the bytes of a message do not match its type.

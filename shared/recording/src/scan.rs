@@ -76,7 +76,7 @@ impl<R: Read + Seek> Scan<'_, R> {
             let whole = self.found.extent.whole_bytes;
             let is_found = self.go_to_next(begin + 1)?;
             if let Some(what) =
-                what.or_else(|| is_found.then_some("a record that cannot be so long"))
+                what.or_else(|| is_found.then_some("a record with an impossible length"))
             {
                 self.found.damaged(begin, what);
             }
@@ -95,7 +95,7 @@ impl<R: Read + Seek> Scan<'_, R> {
             op::CHUNK => self.chunk(begin)?,
             op::METADATA if len <= MAX_RECORD_BYTES => {
                 let body = self.cursor.bytes(len)?;
-                self.metadata(&body).ok_or(Stop::Damaged("what is said about the run"))?;
+                self.metadata(&body).ok_or(Stop::Damaged("the description of the run"))?;
             }
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE_INDEX | op::ATTACHMENT => {
                 self.cursor.skip(len)?;
@@ -105,7 +105,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                 self.end()?;
                 return Ok(true);
             }
-            _ => return Err(Stop::Damaged("a record that no recording has")),
+            _ => return Err(Stop::Damaged("a record of an unknown type")),
         }
         Ok(false)
     }
@@ -126,7 +126,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         let head = self.cursor.array::<HEAD_BYTES>()?;
         let chunk = Chunk::read(&head);
         let chunk = chunk.ok_or(Stop::Damaged(
-            "a chunk whose lengths contradict each other, or that is compressed",
+            "a chunk that is compressed or has contradictory lengths",
         ))?;
         let end = self.cursor.at().checked_add(chunk.n_bytes);
         let end = end.filter(|end| *end <= self.cursor.end());
@@ -152,7 +152,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         end: u64,
         messages: &mut Vec<MessageHead>,
     ) -> Result<(), Stop> {
-        let damaged = Stop::Damaged("a chunk whose records are longer or shorter than it");
+        let damaged = Stop::Damaged("a chunk with a length different from that of its records");
         while self.cursor.at() < end {
             let room = end - self.cursor.at();
             if room < RECORD_HEAD_BYTES {
@@ -187,7 +187,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                     }
                 }
                 op::SCHEMA => {}
-                _ => return Err(Stop::Damaged("a record that no chunk has")),
+                _ => return Err(Stop::Damaged("a chunk with a record of an unknown type")),
             }
             self.cursor.skip(next - self.cursor.at())?;
         }

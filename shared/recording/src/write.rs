@@ -277,7 +277,7 @@ impl<W: Write> Writer<W> {
 
     fn check(&self) -> Result<(), WriteError> {
         if self.keeper.is_closed() {
-            let error = io::Error::other("it could not be written before");
+            let error = io::Error::other("an earlier write failed");
             return Err(failed(&self.keeper, error.into()));
         }
         Ok(())

@@ -108,15 +108,23 @@ impl FrameLine {
 fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Error> {
     let people = Vec::<PersonLine>::deserialize(from)?;
     if people.len() > MOST_PEOPLE {
-        let text = format!("{} people, a frame has at most {MOST_PEOPLE}", people.len());
+        let text = format!(
+            "the frame has {} people, but at most {MOST_PEOPLE} are possible",
+            people.len()
+        );
         return Err(D::Error::custom(text));
     }
     for (nth, person) in people.iter().enumerate() {
         if person.id == 0 {
-            return Err(D::Error::custom("a person with id 0, ids begin at 1"));
+            return Err(D::Error::custom(
+                "a person has the id 0, but ids begin at 1",
+            ));
         }
         if people[..nth].iter().any(|other| other.id == person.id) {
-            let text = format!("two people with id {}, ids of a frame differ", person.id);
+            let text = format!(
+                "two people have the id {}, but the ids in a frame must differ",
+                person.id
+            );
             return Err(D::Error::custom(text));
         }
     }

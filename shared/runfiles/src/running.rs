@@ -51,12 +51,12 @@ pub enum RunningError {
     Malformed(#[source] serde_json::Error),
     /// The description has no part for other programs, because the deployment is of another version.
     #[error(
-        "the deployment does not describe itself to other programs: it is of another version of Parallax"
+        "the deployment has no description for other programs: it was started by another version of Parallax"
     )]
     Absent,
     /// The description is of another version.
     #[error(
-        "the description of the deployment is of version {theirs}, this program reads version {ours}"
+        "the description of the deployment has version {theirs}, but this program reads version {ours}"
     )]
     Version {
         /// Version of the deployment.

@@ -124,10 +124,11 @@ impl People {
             String::new()
         };
         if *frames_with_others == 0 {
-            return format!("no others in view{followed}");
+            return format!("no other people in view{followed}");
         }
         format!(
-            "up to {most} in view, more than one in {frames_with_others} frames; person.follow = \"{follow}\" chooses{followed}"
+            "up to {most} people in view, and more than one person in {frames_with_others} frames; person.follow = \"{follow}\" selects \
+             the followed person{followed}"
         )
     }
 }
@@ -229,7 +230,9 @@ impl RunSummary {
                 line: 1,
                 column: 1,
                 field: "schema_version".to_owned(),
-                problem: format!("found version {schema_version}, this program reads {VERSION}"),
+                problem: format!(
+                    "the file has version {schema_version}, but this program reads version {VERSION}"
+                ),
             });
         }
         parse(text)

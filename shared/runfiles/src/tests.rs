@@ -142,10 +142,13 @@ fn a_line_has_at_most_eight_people_each_with_an_identity_of_its_own() {
     for (ids, problem) in [
         (
             &[1, 2, 3, 4, 5, 6, 7, 8, 9][..],
-            "9 people, a frame has at most 8",
+            "the frame has 9 people, but at most 8 are possible",
         ),
-        (&[4, 5, 4], "two people with id 4, ids of a frame differ"),
-        (&[0], "a person with id 0, ids begin at 1"),
+        (
+            &[4, 5, 4],
+            "two people have the id 4, but the ids in a frame must differ",
+        ),
+        (&[0], "a person has the id 0, but ids begin at 1"),
     ] {
         let error = read::parse::<FrameLine>(&line_of(ids)).unwrap_err();
         assert_eq!(

@@ -136,13 +136,13 @@ impl Trust {
             )
         });
         let bones = self.body_deviation.map_or_else(String::new, |body_deviation| {
-            format!("bones {body_deviation:.1} sd from people's, ")
+            format!("bones {body_deviation:.1} sd from average people's, ")
         });
         let limbs = self.expected_error_m().map_or_else(String::new, |expected_error_m| {
-            format!("limbs waver by {:.1} cm, ", 100.0 * expected_error_m)
+            format!("limb wavering {:.1} cm, ", 100.0 * expected_error_m)
         });
         format!(
-            "{reprojection}{limbs}{bones}{} of bodies and {} of joints left out, sides unsure in {}",
+            "{reprojection}{limbs}{bones}{} of bodies and {} of joints left out, left and right uncertain in {} of frames",
             percent(self.implausible),
             percent(self.joints_implausible),
             percent(self.sides_unsure)
@@ -163,36 +163,39 @@ impl fmt::Display for Doubt {
         match self.kind {
             Kind::Reprojection => write!(
                 f,
-                "joints are {value:.0} % of the person's height away from the views' own joints (more than {limit:.0} %): run `parallax \
-                 calib check`, and check that all footage is of the same moment"
+                "3D joints are {value:.0} % of the person's height away from the joints detected in the views (limit {limit:.0} %): run \
+                 `parallax calib check`, and check that all footage was recorded at the same time"
             ),
             Kind::Limbs => write!(
                 f,
-                "bone lengths vary and views disagree, by {value:.1} cm together (more than {limit:.0} cm): limbs are wrong in some frames, \
-                 or the cameras do not fit"
+                "bone lengths vary and views disagree, by {value:.1} cm in total (limit {limit:.0} cm): limbs are wrong in some frames, or \
+                 the calibration does not fit the cameras"
             ),
             Kind::Jumps => write!(
                 f,
-                "the person jumps in {value:.1} % of the results (more than {limit:.0} %): the followed person changes; `person.follow` \
-                 and the space that the cameras see decide who is followed"
+                "the person jumps in {value:.1} % of the results (limit {limit:.0} %), because the followed person changes: change \
+                 `person.follow`, or limit the space that the cameras see"
             ),
             Kind::Implausible => write!(
                 f,
-                "{value:.0} % of the bodies that were found are impossible (more than {limit:.0} %): is one person completely visible, at the right scale?"
+                "{value:.0} % of the detected bodies are impossible (limit {limit:.0} %): is one person completely visible, and is the \
+                 unit of the calibration right?"
             ),
             Kind::Joints => write!(
                 f,
-                "{value:.0} % of the joints are in impossible positions (more than {limit:.0} %): is one person completely visible to every camera?"
+                "{value:.0} % of the joints are in impossible positions (limit {limit:.0} %): is one person completely visible to every \
+                 camera?"
             ),
             Kind::Bones => write!(
                 f,
-                "bones are {:.1} standard deviations from those of people (more than {:.1}): is the unit of the calibration right?",
+                "bone lengths are {:.1} standard deviations from the average of people (limit {:.1}): is the unit of the calibration \
+                 right?",
                 self.value,
                 self.kind.limit()
             ),
             Kind::Sides => write!(
                 f,
-                "left and right are unsure in {value:.0} % of the frames (more than {limit:.0} %): cameras that see the face help"
+                "left and right are uncertain in {value:.0} % of the frames (limit {limit:.0} %): add cameras that see the person's face"
             ),
         }
     }
@@ -225,16 +228,19 @@ mod tests {
             (|trust| trust.reprojection = Some(0.2), "joints are 20 %"),
             (
                 |trust| trust.bone_scatter_m = Some(0.0163),
-                "by 2.6 cm together",
+                "by 2.6 cm in total",
             ),
             (|trust| trust.jumps = 0.087, "jumps in 8.7 %"),
             (
                 |trust| trust.implausible = 0.4,
-                "40 % of the bodies that were found",
+                "40 % of the detected bodies",
             ),
             (|trust| trust.joints_implausible = 0.3, "30 % of the joints"),
-            (|trust| trust.body_deviation = Some(3.0), "bones are 3.0"),
-            (|trust| trust.sides_unsure = 0.5, "unsure in 50 %"),
+            (
+                |trust| trust.body_deviation = Some(3.0),
+                "bone lengths are 3.0",
+            ),
+            (|trust| trust.sides_unsure = 0.5, "uncertain in 50 %"),
         ];
         for (spoil, said) in cases {
             let mut trust = good();

@@ -115,7 +115,7 @@ fn joints_of_another_model_are_refused_and_so_are_too_few_people() {
     drawn.write("other.joints", text.replace(model, "0123456789abcdef"));
     drawn.write("broken.joints", &text[..text.len() / 2]);
     for (file, said) in [
-        ("other.joints", "learned with another model"),
+        ("other.joints", "was learned with the model"),
         ("broken.joints", "broken.joints"),
         ("absent.joints", "train joints"),
     ] {

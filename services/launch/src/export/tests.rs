@@ -195,7 +195,7 @@ fn people_that_cannot_be_are_refused_with_the_line_and_the_field() {
         (nine, "line 2, column 1"),
         (
             vec![one(), one()],
-            "two people with id 1, ids of a frame differ",
+            "two people have the id 1, but the ids in a frame must differ",
         ),
         (
             vec![one().replace("1.0,2.0", "NaN,2.0")],

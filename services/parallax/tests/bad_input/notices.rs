@@ -18,7 +18,9 @@ fn a_file_reports_the_origin_of_its_data() {
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("where its data come from: the room's archive, folder 7"),
+        ended
+            .stderr
+            .contains("the origin of the deployment's data is: the room's archive, folder 7"),
         "{}",
         ended.stderr
     );
@@ -47,7 +49,7 @@ fn shipped_files_report_the_origin_of_their_data() {
         fs::copy(configs.join(name), case.path("configs").join(name)).unwrap();
         let ended = case.start(&["run", &format!("configs/{name}"), "--dry-run"]).wait();
         assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-        for word in [&words[..], &["where its data come from"]].concat() {
+        for word in [&words[..], &["the origin of the deployment's data"]].concat() {
             assert!(
                 ended.stderr.contains(word),
                 "{name} lacks {word}: {}",

@@ -288,7 +288,7 @@ const INPUTS: &[Mistake] = &[
             case.write("person.joints", file);
             joints(case, "person.joints");
         },
-        &["person.joints", "learned with another model"],
+        &["person.joints", "was learned with the model"],
         &["`parallax-lab train joints`"],
     ),
     input(
@@ -301,12 +301,12 @@ const INPUTS: &[Mistake] = &[
         "folder for a rig",
         |fixture| fixture.edit("deployment.toml", "rig = \"rig.toml\"", "rig = \"a\""),
         &["cannot read", "/a"],
-        &["a rig is one file"],
+        &["the rig must be a file"],
     ),
     rig(
         "empty rig",
         |fixture| fixture.write("rig.toml", ""),
-        &["rig.toml", "no camera found"],
+        &["rig.toml", "the file has no camera"],
         &["rig.toml is empty"],
     ),
     rig(
@@ -319,7 +319,7 @@ const INPUTS: &[Mistake] = &[
             );
         },
         &["deployment.toml"],
-        &["the rig is the file that its `rig` names"],
+        &["give the file that its key `rig` names"],
     ),
     rig(
         "unknown lens",
@@ -347,7 +347,7 @@ const INPUTS: &[Mistake] = &[
         "negative focal length",
         |case| super::replace_line(case, "focal_px", "focal_px = [-170.0, 170.0]"),
         &["rig.toml", "camera \"a\"", "-170"],
-        &["is not positive"],
+        &["must be positive"],
     ),
 ];
 

@@ -364,7 +364,7 @@ mod tests {
     fn rejects_indices_out_of_range() {
         assert_eq!(
             outcome(|model| model.parts[1].filter_of_type[1] = 6),
-            "part 2 names filter 7, but there are 6"
+            "part 2 names filter 7, but the model has only 6"
         );
         assert_eq!(
             outcome(|model| edge(model, 1).parent = 3),

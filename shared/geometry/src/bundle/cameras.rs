@@ -13,7 +13,7 @@ const NO_IMAGE: f64 = 1e3;
 /// The parameters of a camera that are free; the others are held.
 #[expect(
     clippy::struct_excessive_bools,
-    reason = "each number is free or held by itself"
+    reason = "each parameter is free or fixed separately"
 )]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Free {
@@ -52,7 +52,7 @@ enum Number {
 }
 
 /// Cameras, and the assignment of their free parameters to the shared parameters from index 0.
-#[expect(clippy::struct_field_names, reason = "a list of cameras is that")]
+#[expect(clippy::struct_field_names, reason = "the type is a list of cameras")]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cameras {
     cameras: Vec<Camera>,
@@ -148,7 +148,7 @@ impl Cameras {
     /// * Returns the derivative with respect to the point. The caller converts it to the coordinates of its local block.
     #[expect(
         clippy::too_many_arguments,
-        reason = "what is seen, by whom, and where it goes"
+        reason = "the observation, its camera, and the output"
     )]
     pub fn observe(
         &self,

@@ -19,7 +19,7 @@ pub enum RigFileError {
         source: std::io::Error,
     },
     /// The file is too large for a calibration.
-    #[error("{path} is too large for a calibration: {bytes} bytes, limit {limit}", path = .path.display())]
+    #[error("{path} is too large for a calibration: the file has {bytes} bytes, but the limit is {limit} bytes", path = .path.display())]
     TooLarge {
         /// Path of the file.
         path: PathBuf,
@@ -74,7 +74,7 @@ pub enum RigFileError {
 #[derive(Debug, thiserror::Error)]
 pub enum ParseError {
     /// The text does not have the syntax of its format.
-    #[error("not valid {format}")]
+    #[error("the text is not valid {format}")]
     Syntax {
         /// Name of the format.
         format: &'static str,
@@ -116,7 +116,7 @@ pub enum ParseError {
         source: NotARotation,
     },
     /// The file has no camera.
-    #[error("no camera found: {expected}")]
+    #[error("the file has no camera: {expected}")]
     NoCameras {
         /// Description of a camera in this format.
         expected: &'static str,
@@ -125,7 +125,8 @@ pub enum ParseError {
     #[error(
         "camera {camera:?}: {why}{}",
         if *.has_lens {
-            ": `parallax calibrate board` with `--known` and this file, or `parallax calibrate people`, finds the poses of the cameras"
+            ": to find the poses of the cameras, use `parallax calibrate people`, or `parallax calibrate board` with `--known` and this \
+             file"
         } else {
             ""
         }
@@ -139,7 +140,7 @@ pub enum ParseError {
         has_lens: bool,
     },
     /// The cameras cannot be combined into a rig.
-    #[error("the cameras do not form a rig")]
+    #[error("the cameras do not form a valid rig")]
     Rig(#[source] RigError),
 }
 

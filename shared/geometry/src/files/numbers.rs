@@ -71,7 +71,7 @@ pub(super) fn intrinsics(
     for (row, column, expect) in [(1, 0, 0.0), (2, 0, 0.0), (2, 1, 0.0), (2, 2, 1.0)] {
         let value = k[(row, column)];
         if value != expect {
-            let requirement = "a calibration matrix is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]";
+            let requirement = "a calibration matrix must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]";
             return Err(ParseError::Value {
                 field: place(row, column),
                 value,
@@ -113,7 +113,7 @@ pub(super) fn lens(field: &str, list: &[f64], fisheye: bool) -> Result<LensModel
     if !known || list.iter().skip(8).any(|&value| value != 0.0) {
         return Err(ParseError::Shape {
             field: field.to_owned(),
-            expected: "0, 2, 4, 5 or 8 distortion coefficients (further ones must be 0)",
+            expected: "0, 2, 4, 5 or 8 distortion coefficients (all further coefficients must be 0)",
             found: format!("{list:?}"),
         });
     }
@@ -156,7 +156,7 @@ pub(super) fn rodrigues(field: &str, v: [f64; 3]) -> Result<UnitQuaternion<f64>,
     for value in v {
         finite(field, value)?;
         if value.abs() > 1e3 {
-            let requirement = "a rotation vector is in radians";
+            let requirement = "a rotation vector must be in radians";
             return Err(ParseError::Value {
                 field: field.to_owned(),
                 value,

@@ -42,7 +42,7 @@ pub fn parse(files: &[(&str, &str)], options: &ReadOptions) -> Result<Rig, Parse
     }
     if cameras.is_empty() {
         return Err(ParseError::NoCameras {
-            expected: "camera_matrix, or names and K_<name>",
+            expected: "the entry camera_matrix, or the entries names and K_<name>",
         });
     }
     super::entry::rig(cameras, options.up, "", options)
@@ -186,7 +186,7 @@ fn rotation(storage: &Storage, keys: &Keys) -> Result<UnitQuaternion<f64>, Parse
     if let Ok(nine) = <[f64; 9]>::try_from(list.as_slice()) {
         return numbers::rotation(key, &numbers::matrix_of_nine(&nine));
     }
-    numbers::rodrigues(key, sized(key, list, "a rotation of 9 numbers, or of 3")?)
+    numbers::rodrigues(key, sized(key, list, "a rotation of 9 or 3 numbers")?)
 }
 
 fn sized<const N: usize>(

@@ -150,13 +150,17 @@ fn lens(file: &CameraFile, field: &dyn Fn(&str) -> String) -> Result<LensModel, 
     if file.lens != LensKind::BrownConrady && file.tangential.is_some() {
         return Err(shape(
             "tangential",
-            "none for a lens that is not brown-conrady",
+            "no value, because the lens is not brown-conrady",
             2,
         ));
     }
     match file.lens {
         LensKind::Pinhole if radial.is_empty() => Ok(LensModel::Pinhole),
-        LensKind::Pinhole => Err(shape("radial", "none for a pinhole", radial.len())),
+        LensKind::Pinhole => Err(shape(
+            "radial",
+            "no value, because the lens is a pinhole",
+            radial.len(),
+        )),
         LensKind::BrownConrady => {
             let k =
                 padded(radial).ok_or_else(|| shape("radial", "k1 to at most k6", radial.len()))?;

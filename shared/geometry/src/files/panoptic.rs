@@ -36,7 +36,10 @@ struct CameraFile {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "expected three numbers, or three rows of one")]
+#[serde(
+    untagged,
+    expecting = "expected three numbers, or three rows of one number"
+)]
 enum Translation {
     List([f64; 3]),
     Column([[f64; 1]; 3]),
@@ -62,7 +65,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     })?;
     if file.cameras.is_empty() {
         return Err(ParseError::NoCameras {
-            expected: "an object with K, R and t in the list cameras for each view",
+            expected: "an object with K, R and t for each view, in the list `cameras`",
         });
     }
     let cameras = file.cameras.into_iter().map(|fields| camera(fields, options));

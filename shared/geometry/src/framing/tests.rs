@@ -115,7 +115,7 @@ fn a_source_of_another_size_is_refused_with_both_sizes() {
     let error = Framing::new(&camera, [1280, 960], None, size, 0.0).expect_err("twice the size");
     assert_eq!(
         error.to_string(),
-        "the source is 1280x960 px but the camera is calibrated for 640x480 px"
+        "the source is 1280x960 px, but the camera is calibrated for 640x480 px"
     );
     let error =
         Framing::new(&camera, [640, 480], Some([1, 0]), size, 0.0).expect_err("one column out");

@@ -1,7 +1,7 @@
 //! Convolutions of a few neighbouring pixels and two registers of outputs at a time.
 #![expect(
     clippy::needless_range_loop,
-    reason = "only ranges are unrolled surely, and that keeps sums in registers"
+    reason = "only loops over ranges are always unrolled, which keeps sums in registers"
 )]
 
 use super::blocked::BLOCK;

@@ -239,6 +239,6 @@ fn weights_that_do_not_fit_are_refused_with_their_numbers() {
     let error = Conv::new(size, &[0.0; 53], &[0.0; 3], false).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "a convolution from 2 to 3 channels by [3, 3] has 53 weights and 3 biases"
+        "a convolution from 2 to 3 channels with kernel [3, 3] has 53 weights and 3 biases"
     );
 }

@@ -134,7 +134,7 @@ fn data_set(set: &DataSet, names: Option<&NameSet>) -> Result<Film, FileError> {
         return Err(FileError::Entry {
             entry: "images[].id".to_owned(),
             got: format!("twice {twice}"),
-            expected: "every image once".to_owned(),
+            expected: "each image at most once".to_owned(),
         });
     }
     let category = category(&set.categories)?;
@@ -194,7 +194,7 @@ fn collected(
             entry: format!("{list}[{nth}].image_id"),
             got: it.image_id.to_string(),
             expected: if list.is_empty() {
-                format!("a frame below {MAX_FRAMES}")
+                format!("a frame number below {MAX_FRAMES}")
             } else {
                 "the `id` of one of `images`".to_owned()
             },
@@ -216,7 +216,7 @@ fn collected(
     let names = names.ok_or_else(|| FileError::Entry {
         entry: if list.is_empty() { "the list" } else { list }.to_owned(),
         got: "without a person who has keypoints".to_owned(),
-        expected: "at least one, or the names of the keypoints".to_owned(),
+        expected: "at least one person with keypoints, or the names of the keypoints".to_owned(),
     })?;
     Ok(Film {
         names,
@@ -237,7 +237,8 @@ fn category(all: &[Category]) -> Result<Option<&Category>, FileError> {
             let person = person.ok_or_else(|| FileError::Entry {
                 entry: "categories".to_owned(),
                 got: format!("{} with keypoints", several.len()),
-                expected: "one with keypoints, or one called \"person\"".to_owned(),
+                expected: "only one category with keypoints, or a category called \"person\""
+                    .to_owned(),
             })?;
             Ok(Some(person))
         }
@@ -248,7 +249,7 @@ fn number(id: &ImageId, entry: impl Fn() -> String) -> Result<u64, FileError> {
     id.number().ok_or_else(|| FileError::Entry {
         entry: entry(),
         got: id.to_string(),
-        expected: "a number, or a text that ends in one".to_owned(),
+        expected: "a number, or a text that ends in a number".to_owned(),
     })
 }
 

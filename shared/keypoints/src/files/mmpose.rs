@@ -75,7 +75,8 @@ pub(super) fn frame(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileE
             several => Err(FileError::Entry {
                 entry: "the list".to_owned(),
                 got: format!("of {} frames", several.len()),
-                expected: "one frame in each file of a folder; name the file itself where it holds all frames".to_owned(),
+                expected: "one frame in each file of a folder; if one file contains all frames, give the file instead of the \
+                           folder".to_owned(),
             }),
         },
     }
@@ -100,7 +101,7 @@ pub(super) fn film(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileErr
             return Err(FileError::Entry {
                 entry: "frame_id".to_owned(),
                 got: frame.frame_id.to_string(),
-                expected: format!("less than {MAX_FRAMES} after the first"),
+                expected: format!("less than {MAX_FRAMES} frames after the first frame"),
             });
         }
         let read = of_frame(&frame.instances, names.as_ref())?;
@@ -110,7 +111,7 @@ pub(super) fn film(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileErr
     let names = names.ok_or_else(|| FileError::Entry {
         entry: "the list".to_owned(),
         got: "without a person who has keypoints".to_owned(),
-        expected: "at least one, or the names of the keypoints".to_owned(),
+        expected: "at least one person with keypoints, or the names of the keypoints".to_owned(),
     })?;
     Ok(Film {
         names,
@@ -160,7 +161,7 @@ fn of_frame(instances: &[Instance], names: Option<&NameSet>) -> Result<Frame, Fi
                 return Err(FileError::Length {
                     entry: format!("instances[{nth}].keypoints[{number}]"),
                     got: place.len(),
-                    expected: "2: column and row in the picture".to_owned(),
+                    expected: "2 numbers, the column and the row in the picture".to_owned(),
                 });
             };
             let score = match person.keypoint_scores[..] {

@@ -17,26 +17,26 @@ pub struct NameSet {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NamesError {
     /// There is no known set with this name.
-    #[error("{name:?} is not a known set of keypoints, expected one of {}", NameSet::known_sets().join(", "))]
+    #[error("{name:?} is not a known set of keypoints: expected one of {}", NameSet::known_sets().join(", "))]
     UnknownSet {
         /// Name that is unknown.
         name: String,
     },
     /// There are too few or too many names.
-    #[error("{n} names of keypoints, expected 1 to {MAX_KEYPOINTS}")]
+    #[error("there are {n} names of keypoints, expected 1 to {MAX_KEYPOINTS}")]
     Number {
         /// Number of names.
         n: usize,
     },
     /// Two keypoints have the same name.
-    #[error("the keypoint {name:?} is listed twice; every name must occur once")]
+    #[error("the keypoint {name:?} is listed twice, but each name must occur only once")]
     Twice {
         /// Name that occurs twice.
         name: String,
     },
     /// No joint of the skeleton follows from the keypoints.
     #[error(
-        "no joint of the skeleton follows from the keypoints {names}; expected names such as \"left shoulder\""
+        "no joint of the skeleton can be derived from the keypoints {names}: expected names such as \"left shoulder\""
     )]
     NoJoint {
         /// Names of the first keypoints.

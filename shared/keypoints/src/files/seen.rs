@@ -38,7 +38,7 @@ pub enum FileError {
     },
     /// The text is not JSON at all.
     #[error(
-        "begins with {begin:?}, expected JSON; tables, such as those of DeepLabCut, are not read"
+        "the file begins with {begin:?}, expected JSON; tables, such as DeepLabCut's, cannot be read"
     )]
     NotJson {
         /// First letters of the text.
@@ -68,8 +68,8 @@ pub enum FileError {
     },
     /// The number of keypoints does not identify a set.
     #[error(
-        "`{entry}` has {n} keypoints; the names are known only for 17, 18, 25, 26, 133, 135 or 136: otherwise set `keypoint_names` to \
-         one of {}",
+        "`{entry}` has {n} keypoints, but their names are known only for 17, 18, 25, 26, 133, 135 or 136 keypoints: set `keypoint_names` \
+         to one of {}",
         NameSet::known_sets().join(", ")
     )]
     UnknownSet {
@@ -80,7 +80,7 @@ pub enum FileError {
     },
     /// People have keypoints, but not of the body, or under another key.
     #[error(
-        "`{entry}` has no `pose_keypoints_2d` with keypoints of the body in the picture, but {}",
+        "`{entry}` has no `pose_keypoints_2d` with keypoints of the body in the picture; it has only {}",
         .keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
     )]
     OtherKeys {
@@ -98,7 +98,7 @@ pub enum FileError {
         source: NamesError,
     },
     /// There are too many items of some kind.
-    #[error("{got} {what}, at most {most} are read")]
+    #[error("the file has {got} {what}, but at most {most} can be read")]
     TooMany {
         /// Kind of item.
         what: String,
@@ -153,7 +153,7 @@ pub(crate) fn person(
         return Err(FileError::Length {
             entry: entry(),
             got: values.len(),
-            expected: format!("{}: 3 for each of {in_file} keypoints", 3 * in_file),
+            expected: format!("{} numbers, 3 for each of {in_file} keypoints", 3 * in_file),
         });
     }
     let values = &values[..3 * n];
@@ -189,7 +189,7 @@ pub(crate) fn told_by(n_values: usize, entry: impl Fn() -> String) -> Result<Nam
         return Err(FileError::Length {
             entry: entry(),
             got: n_values,
-            expected: "3 for each keypoint".to_owned(),
+            expected: "3 numbers for each keypoint".to_owned(),
         });
     }
     let n = n_values / 3;

@@ -17,7 +17,7 @@ pub enum KeypointFileError {
         source: io::Error,
     },
     /// A file is larger than the maximum.
-    #[error("{} has {bytes} bytes, at most {most} are read", path.display())]
+    #[error("{} has {bytes} bytes, but at most {most} bytes can be read", path.display())]
     TooLarge {
         /// Path of the file.
         path: PathBuf,
@@ -35,13 +35,13 @@ pub enum KeypointFileError {
         source: FileError,
     },
     /// A folder has no files of keypoints.
-    #[error("{} has no file that ends in .json: every frame needs a file, such as cam01_000000000012_keypoints.json", path.display())]
+    #[error("{} has no file with the extension .json: every frame needs a file, such as cam01_000000000012_keypoints.json", path.display())]
     Empty {
         /// Path of the folder.
         path: PathBuf,
     },
     /// The name of a file has no number, or one that is too large.
-    #[error("the name of {} has no number of a frame before .json, expected one such as cam01_000000000012_keypoints.json", path.display())]
+    #[error("the name of {} has no frame number before .json: expected a name such as cam01_000000000012_keypoints.json", path.display())]
     NoNumber {
         /// Path of the file.
         path: PathBuf,
@@ -55,7 +55,7 @@ pub enum KeypointFileError {
         paths: [PathBuf; 2],
     },
     /// The numbers of two files are too far apart.
-    #[error("the files of {} are of frames {first} to {last}, at most {most} frames are read", path.display())]
+    #[error("the files in {} are for the frames {first} to {last}, but at most {most} frames can be read", path.display())]
     TooManyFrames {
         /// Path of the folder.
         path: PathBuf,
@@ -67,15 +67,16 @@ pub enum KeypointFileError {
         most: u64,
     },
     /// No file has a person, so the names of the keypoints are not known.
-    #[error("no file of {} has a person: set the names of the keypoints (`keypoint_names`)", path.display())]
+    #[error("no file in {} has a person: set the names of the keypoints (`keypoint_names`)", path.display())]
     Nobody {
         /// Path of the folder.
         path: PathBuf,
     },
     /// There are 25 keypoints, but not in the usual order.
     #[error(
-        "{} has 25 keypoints, but not those of `body-25`: its pelvis would be {off:.2} of people's height away from the middle of their \
-         hips; set `keypoint_names = \"body-25b\"` if they are of OpenPose's experimental model, or \"body-25\" if this is right",
+        "{} has 25 keypoints, but probably not those of `body-25`: the pelvis would be {off:.2} of a person's height away from the middle \
+         of the hips; set `keypoint_names = \"body-25b\"` if the keypoints are from OpenPose's experimental model, or \"body-25\" if they \
+         really are from `body-25`",
         path.display()
     )]
     NotBody25 {

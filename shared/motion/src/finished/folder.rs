@@ -112,7 +112,7 @@ pub fn read_lines(
             Some(Ok(line)) => each(nth, line)?,
             Some(Err(_)) if !is_whole => {
                 let what = format!(
-                    "line {} of {} is cut off, and was left out",
+                    "line {} of {} is truncated and was left out",
                     nth + 1,
                     FrameLine::FILE
                 );
@@ -134,9 +134,9 @@ pub fn read_lines(
 fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
     let part = folder.join(format!("{}.part", FrameLine::FILE));
     let hint = if part.exists() {
-        "the run has not ended: its files are still called *.part"
+        "the run has not ended, because the names of its files still end in .part"
     } else {
-        "give the folder that is `output` in the deployment"
+        "give the folder that the key `output` of the deployment names"
     };
     in_file(path, error).with_hint(hint)
 }
@@ -156,18 +156,17 @@ pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
         let time_s = rate_hz.map_or(line.time_s, |rate| Some(line.frame as f64 / rate));
         let time_s = time_s.ok_or_else(|| {
             let what = format!("{}: line {} has no time", path.display(), nth + 1);
-            Failure::new(ExitKind::Input, what)
-                .with_hint("set the frames per second with --rate-hz")
+            Failure::new(ExitKind::Input, what).with_hint("set the frame rate with --rate-hz")
         })?;
         if let Some(&before_s) = times.last()
             && time_s <= before_s
         {
             let what = format!(
-                "{}: line {} is at {time_s} s, which is not after {before_s} s of the previous line",
+                "{}: times must increase: line {} is at {time_s} s, but the previous line is at {before_s} s",
                 path.display(),
                 nth + 1
             );
-            let hint = "lines must be in the order of their times; with --rate-hz, the times follow from the frame numbers";
+            let hint = "sort the lines by time, or use --rate-hz to compute the times from the frame numbers";
             return Err(Failure::new(ExitKind::Input, what).with_hint(hint));
         }
         for (nth, person) in line.people.iter().enumerate() {

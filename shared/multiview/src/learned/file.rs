@@ -160,7 +160,9 @@ pub enum FileError {
         expected: &'static str,
     },
     /// The file was learned for another model.
-    #[error("it was learned for a model with {got:?} types per part; this model has {expected:?}")]
+    #[error(
+        "the file was learned for a model with {got:?} types per part, but this model has {expected:?}"
+    )]
     Model {
         /// Number of types of every part in the file.
         got: Vec<usize>,
@@ -286,7 +288,7 @@ impl Learned {
         demand(
             mirror,
             "model.shape.mirror",
-            "its own inverse, a part for every part",
+            "a list of mutual mirror parts, one for every part",
         )?;
         let it = &self.weights;
         demand(in_range(it.alpha), "weights.alpha", "a number from 0")?;
@@ -325,12 +327,12 @@ impl Learned {
             demand(
                 is_new,
                 &format!("rigs[{nth}].name"),
-                "different from those before it",
+                "different from the preceding names",
             )?;
             for (pair, it) in rig.pairs.iter().enumerate() {
                 let field = format!("rigs[{nth}].pairs[{pair}]");
                 demand(it.counts.fits(shape), &field, SIZED)?;
-                demand(it.cameras[0] != it.cameras[1], &field, "of two cameras")?;
+                demand(it.cameras[0] != it.cameras[1], &field, "for two cameras")?;
             }
         }
         Ok(())

@@ -65,7 +65,7 @@ pub struct Pair<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LearnError {
     /// No view was close enough to the truth.
-    #[error("none of {views} views is near the truth, so nothing can be learned from them")]
+    #[error("none of the {views} views is near the true pose, so nothing can be learned from them")]
     Nothing {
         /// Number of views seen.
         views: u64,

@@ -289,7 +289,7 @@ fn a_file_of_another_model_is_refused() {
         ..shape()
     };
     let error = example().check_model(&other).unwrap_err();
-    assert!(error.to_string().starts_with("it was learned for a model with [3, 3,"));
+    assert!(error.to_string().starts_with("the file was learned for a model with [3, 3,"));
     example().check_model(&shape()).unwrap();
 }
 

@@ -7,7 +7,7 @@ use keypoints::OutputError;
 #[derive(Debug, thiserror::Error)]
 pub enum FitError {
     /// The card names an input or output that the network does not have.
-    #[error("the card names the {what} `{wanted}`, but the network has {has}")]
+    #[error("the card names the {what} `{wanted}`, but the network has only {has}")]
     Name {
         /// `input` or `output`.
         what: &'static str,
@@ -17,7 +17,7 @@ pub enum FitError {
         has: String,
     },
     /// There are several inputs or outputs, and the card does not select one.
-    #[error("the network has the {what}s {has}: the card must name one (`{key}`)")]
+    #[error("the network has the {what}s {has}: the card must name one of them (`{key}`)")]
     Several {
         /// `input` or `output`.
         what: &'static str,
@@ -59,7 +59,7 @@ pub enum LookError {
         error: OutputError,
     },
     /// An output does not consist of single-precision numbers.
-    #[error("output `{name}` is not of type f32")]
+    #[error("the output `{name}` is not of type f32")]
     Type {
         /// Name of the output.
         name: String,

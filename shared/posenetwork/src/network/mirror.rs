@@ -16,7 +16,9 @@ impl Mirror {
     /// * Returns an error if the network cannot process mirror images.
     pub(super) fn new(card: &Card, names: &[String]) -> Result<Self, String> {
         if matches!(card.output, Codec::Keypoints { .. }) {
-            return Err("positions cannot be compared with those of a mirror image".to_owned());
+            return Err(
+                "the positions cannot be compared with the positions in a mirror image".to_owned(),
+            );
         }
         let partner = |name: &String| {
             let Some(other) = mirrored(name) else {

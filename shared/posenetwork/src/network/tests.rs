@@ -63,7 +63,7 @@ fn an_input_of_another_name_or_other_sides_is_refused() {
     let named = CARD.replace("[crop]", "name = \"image\"\n[crop]");
     assert_eq!(
         refused(&network("Relu"), &named),
-        "the card names the input `image`, but the network has `picture` [1, 3, 16, 12]"
+        "the card names the input `image`, but the network has only `picture` [1, 3, 16, 12]"
     );
     for (from, to, expected) in [
         ("width = 12", "width = 24", "[1, 3, 16, 24]"),
@@ -104,7 +104,7 @@ fn an_output_that_is_not_there_is_refused() {
     let named = CARD.replace("refine", "maps = \"heat\"\nrefine");
     assert_eq!(
         refused(&network("Relu"), &named),
-        "the card names the output `heat`, but the network has `maps` [1, 3, 16, 12]"
+        "the card names the output `heat`, but the network has only `maps` [1, 3, 16, 12]"
     );
 }
 
@@ -129,7 +129,7 @@ fn another_number_of_maps_or_of_values_is_refused() {
 fn values_that_are_no_numbers_are_refused_when_they_come() {
     assert_eq!(
         refused(&network("Log"), CARD),
-        "output `maps`: value 0 of the output is -inf"
+        "output `maps`: value 0 of the output is -inf, which is not finite"
     );
     // The first run on an empty picture succeeds.
     let shifted = CARD.replace("[crop]", "mean = [-1.0, -1.0, -1.0]\n[crop]");

@@ -175,17 +175,17 @@ fn indices_out_of_range_are_rejected() {
         (
             "components_filterid 3 2 1 1 3 5",
             "components_filterid 3 2 1 1 3 7",
-            "part 3 names filter 7, but there are 6",
+            "part 3 names filter 7, but the model has only 6",
         ),
         (
             "components_biasid 2 2 3 1",
             "components_biasid 2 2 3 0",
-            "part 1 names bias 0, but there are 9",
+            "part 1 names bias 0, but the model has only 9",
         ),
         (
             "components_defid 3 2 1 0 1",
             "components_defid 3 2 1 0 0",
-            "part 2 names spring 0, but there are 4",
+            "part 2 names spring 0, but the model has only 4",
         ),
     ];
     for (from, to, expected) in cases {

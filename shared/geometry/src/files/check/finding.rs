@@ -164,7 +164,10 @@ impl fmt::Display for Finding {
             | Self::LensStrength { .. } => self.fmt_intrinsics(f),
             Self::LeftOut { camera, why } => write!(f, "{camera} is left out: {why}"),
             Self::UpUnknown => {
-                write!(f, "the rig has no up direction, so it must be found")
+                write!(
+                    f,
+                    "the rig has no up direction, so the up direction must be found"
+                )
             }
             Self::UpsideDown { camera, degrees } => write!(
                 f,
@@ -172,11 +175,11 @@ impl fmt::Display for Finding {
             ),
             Self::LooksElsewhere { camera } => write!(
                 f,
-                "{camera} does not see the place at which the cameras look: are the poses world to camera?"
+                "{camera} does not see the place at which the cameras look: do the poses map from the world to the camera?"
             ),
             Self::NothingShared { n_cameras } => write!(
                 f,
-                "no two of the {n_cameras} cameras see a common place: are the poses world to camera?"
+                "no two of the {n_cameras} cameras see a common place: do the poses map from the world to the camera?"
             ),
         }
     }
@@ -193,7 +196,8 @@ impl Finding {
                 let metres = Metres(*metres);
                 write!(
                     f,
-                    "{a} and {b} are {metres} m apart: is the unit right? `unit` is m, cm, mm, ft, in, or the side of a square of the board such as 30mm"
+                    "{a} and {b} are {metres} m apart: is the unit right? `unit` is m, cm, mm, ft or in, or the side of a square of the \
+                     board, such as 30mm"
                 )
             }
             Self::OnePlace { n_cameras, metres } => write!(
@@ -223,7 +227,7 @@ impl Finding {
             ),
             Self::Aspect { camera, ratio } => write!(
                 f,
-                "{camera}: fy / fx is {ratio:.3}, but 1 for square pixels"
+                "{camera}: fy / fx is {ratio:.3}, but it is 1 for square pixels"
             ),
             Self::FieldOfView { camera, degrees } => write!(
                 f,
@@ -244,7 +248,8 @@ impl Finding {
                 bent_degrees,
             } => write!(
                 f,
-                "{camera}: the distortion moves the corner of the image from {straight_degrees:.1} to {bent_degrees:.1} degrees off the axis: are the distortion coefficients right?"
+                "{camera}: the distortion moves the corner of the image from {straight_degrees:.1} to {bent_degrees:.1} degrees from the \
+                 optical axis: are the distortion coefficients right?"
             ),
             _ => Ok(()),
         }

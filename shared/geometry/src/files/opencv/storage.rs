@@ -37,8 +37,11 @@ impl Entry {
                 if rows * columns != numbers.len() as f64 {
                     return Err(ParseError::Shape {
                         field: key.to_owned(),
-                        expected: "as many numbers as the matrix has places",
-                        found: format!("{} numbers for {rows} rows of {columns}", numbers.len()),
+                        expected: "one number for each entry of the matrix",
+                        found: format!(
+                            "{} numbers for {rows} rows and {columns} columns",
+                            numbers.len()
+                        ),
                     });
                 }
             }

@@ -59,7 +59,7 @@ fn errors_of_the_own_format_name_the_field() {
             "rotation_rad",
             "rotation = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]",
         ),
-        &["cam0", "rotation", "determinant -1"],
+        &["cam0", "rotation", "the determinant is -1"],
     );
     refused(
         with("translation_metres", "translation_metres = [1, inf, 0]"),
@@ -185,7 +185,7 @@ fn errors_of_opencv_name_the_field() {
     );
     refused(
         read(&edited(&text, "   rows: 3", "   rows: 4")),
-        &["K_cam0", "9 numbers for 4 rows of 3"],
+        &["K_cam0", "9 numbers for 4 rows and 3 columns"],
     );
     refused(read("%YAML:1.0\n---\nnames: 3\n"), &["names"]);
     refused(read("%YAML:1.0\n---\nnames: []\n"), &["no camera"]);
@@ -210,7 +210,7 @@ fn errors_of_qualisys_name_the_field() {
     read(&text(good, "")).expect("nothing is wrong");
     refused(
         read(&text(r#"r32="1" r33="0""#, "")),
-        &["one", "r11 to r33", "determinant -1"],
+        &["one", "r11 to r33", "the determinant is -1"],
     );
     refused(
         read(&text(r#"r32="x" r33="0""#, "")),

@@ -91,7 +91,7 @@ fn frames_of_results_are_their_image_ids_as_numbers_or_texts() {
 fn what_cannot_be_is_refused_with_its_place() {
     let one = |image: &str| format!("[{}]", annotation(image, 1, &list(5.0, 0.5)));
     assert!(refused(&one("\"picture\"")).contains("[0].image_id"));
-    assert!(refused(&one("99999999999")).contains("a frame below 10000000"));
+    assert!(refused(&one("99999999999")).contains("a frame number below 10000000"));
     assert!(refused(&one("-1")).contains("image_id"));
     assert!(refused("[]").contains("without a person"));
     let unknown = refused(&set(&annotation("8", 1, &list(5.0, 0.5)), ""));

@@ -75,8 +75,8 @@ fn a_malformed_file_is_named_and_the_others_are_read() {
 
 #[test]
 fn folders_that_tell_no_frames_are_refused() {
-    assert!(refused(&[]).contains("no file that ends in .json"));
-    assert!(refused(&[("a.json", "{}")]).contains("a.json has no number"));
+    assert!(refused(&[]).contains("no file with the extension .json"));
+    assert!(refused(&[("a.json", "{}")]).contains("a.json has no frame number"));
     let one = frame(&[1.0]);
     let twice = refused(&[("a_1.json", &one), ("b_01.json", &one)]);
     assert!(
@@ -108,7 +108,7 @@ fn a_file_that_is_too_large_is_not_read() {
     let source = KeypointSource::open(folder.path(), names).unwrap();
     let error = source.of_frame(1, &mut Vec::new()).unwrap_err().to_string();
     assert!(
-        error.contains("2.json has 16777217 bytes, at most 16777216"),
+        error.contains("2.json has 16777217 bytes, but at most 16777216"),
         "{error}"
     );
 }

@@ -25,7 +25,7 @@ pub(super) enum YamlError {
         expected: &'static str,
     },
     /// The text has too many entries.
-    #[error("more than {MAX_ENTRIES} entries up to line {line}")]
+    #[error("more than {MAX_ENTRIES} entries before line {line}")]
     TooLong { line: usize },
 }
 
@@ -94,8 +94,13 @@ impl<'t> Reader<'t> {
             Event::Alias(anchor) => {
                 // An alias inside its own anchor has no entry yet.
                 let entry = self.anchors.get(&anchor).cloned();
-                let entry =
-                    entry.ok_or_else(|| shape("an alias of its own list", at, "an earlier one"))?;
+                let entry = entry.ok_or_else(|| {
+                    shape(
+                        "an alias inside the list that it names",
+                        at,
+                        "an alias of an earlier list",
+                    )
+                })?;
                 self.count(len(&entry), at)?;
                 (entry, 0)
             }
@@ -128,7 +133,11 @@ impl<'t> Reader<'t> {
             let (event, value_at) = self.next()?;
             let entry = self.entry(event, value_at)?;
             if map.contains_key(&key) {
-                return Err(shape(&format!("{key:?} again"), at, "every name once"));
+                return Err(shape(
+                    &format!("{key:?} again"),
+                    at,
+                    "each name at most once",
+                ));
             }
             map.insert(key, entry);
         }
