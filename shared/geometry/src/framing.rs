@@ -20,8 +20,7 @@ pub enum OutSize {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FramingError {
     /// The source does not have the size for which the camera was calibrated.
-    #[error("the source is {}x{} px, but the camera is calibrated for {}x{} px", .source_size[0], .source_size[1], .calibrated[0], \
-             .calibrated[1])]
+    #[error("the source is {}x{} px, but the camera is calibrated for {}x{} px", .source_size[0], .source_size[1], .calibrated[0], .calibrated[1])]
     SourceSize {
         /// Width and height of the source's frames.
         source_size: [u32; 2],

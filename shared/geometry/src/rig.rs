@@ -48,8 +48,7 @@ pub enum RigError {
         value: f64,
     },
     /// The image has no pixels.
-    #[error("camera {camera:?}: the image size is {width}x{height}, but both sides must be at least 1", width = .size[0], height = \
-             .size[1])]
+    #[error("camera {camera:?}: the image size is {width}x{height}, but both sides must be at least 1", width = .size[0], height = .size[1])]
     EmptyImage {
         /// Name of the camera.
         camera: String,
