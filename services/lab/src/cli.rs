@@ -57,7 +57,7 @@ pub(crate) enum Command {
     Model(model::Command),
     /// Make synthetic sequences of people, with ground truth.
     Synth(Box<synth::Arguments>),
-    /// Compare the smoothing methods on a finished run with the ground truth.
+    /// Compare the results of all smoothing methods on a finished run with the ground truth.
     Smooth(smooth::Arguments),
     /// Predict the processor cores, network capacity and latency of a deployment.
     #[command(subcommand)]

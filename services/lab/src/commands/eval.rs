@@ -88,30 +88,30 @@ pub(crate) struct Arguments {
     /// Folder for the report.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Versions to compare, separated by commas; the first is the baseline of the comparison.
+    /// Versions to compare, separated by commas. The first version is the baseline of the comparison.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     versions: Vec<Version>,
-    /// Settings of fusion: a TOML file with the keys of `[paper]`.
+    /// Settings for fusion: a TOML file with the keys of `[paper]`.
     #[arg(long, value_name = "FILE")]
     paper: Option<PathBuf>,
     /// Learned consistency (a file of `train consistency`), instead of the file in --paper; "shipped" for the shipped file.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// Network that sees in which direction people face, to tell left from right (`train orientation`); "shipped" for the shipped
-    /// network, "none" for no network.
+    /// Network that estimates the direction in which people face, to distinguish left from right (`train orientation`); "shipped" for the
+    /// shipped network, "none" for no network.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     orientation: PathBuf,
     /// Table of expected errors, in the format of the paper's authors.
     #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
     sigma: Option<PathBuf>,
-    /// Network that predicts the expected errors, an ONNX file; "shipped" for the shipped network.
+    /// Network that predicts the expected errors (an ONNX file); "shipped" for the shipped network.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
     network: Option<PathBuf>,
     /// Map from parts to joints (a file of `train joints`); "shipped" for the map of the shipped model. With "none", or for other models, a
     /// joint is the centre of its part.
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     joint_map: PathBuf,
-    /// Use the true errors as the expected errors: switch off parts whose error exceeds a tenth of the person's size.
+    /// Use the true errors as the expected errors, which switches off parts with an error above a tenth of the person's size.
     #[arg(long)]
     oracle: bool,
     /// Size of the frames.
@@ -123,22 +123,22 @@ pub(crate) struct Arguments {
     /// Do not rotate the frames upright.
     #[arg(long)]
     no_upright: bool,
-    /// Largest number of candidates per view.
+    /// Maximum number of candidates per view.
     #[arg(long, value_name = "N", default_value_t = 8)]
     candidates: usize,
     /// Use the first frame and every n-th frame after it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     every: usize,
-    /// Largest number of frames per sequence.
+    /// Maximum number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
     /// Single pictures: the people to evaluate. If not given, all are used.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     only: Option<Selection>,
-    /// Single pictures: the people to leave out.
+    /// For data sets of single pictures: the people to leave out.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     without: Option<Selection>,
-    /// The part of each sequence to use: 0.8-1 is the last fifth.
+    /// The section of each sequence to use, as fractions of its length: 0.8-1 is the last fifth.
     #[arg(long, value_name = "FROM-TO", value_parser = share)]
     share: Option<[f64; 2]>,
     /// Several people: the views to use, counted from 0, separated by commas. If not given, all are used.
@@ -147,10 +147,10 @@ pub(crate) struct Arguments {
     /// Evaluate all people in a finished run of the sequence; DIR is the folder with the run's results.
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
-    /// UMPM: compare every frame with the pose of the previous frame, as the released tools do.
+    /// For UMPM: compare every frame with the pose of the previous frame, as the released tools do.
     #[arg(long)]
     umpm_late: bool,
-    /// Length of the blocks of frames that the bootstrap draws for confidence intervals.
+    /// Length of the blocks that the bootstrap draws for confidence intervals, in frames.
     #[arg(long, value_name = "N", default_value_t = 1)]
     block: usize,
     /// Number of threads, which does not affect the numbers. If not given, one per core.

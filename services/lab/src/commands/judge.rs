@@ -61,7 +61,7 @@ Examples:
 pub(crate) struct Arguments {
     /// Model file with 26 parts, or a network that finds keypoints or people (.onnx).
     model: PathBuf,
-    /// Data set of people with 14 joints; for a detector, a file of `train finder-pictures`.
+    /// Data set of people with 14 joints. For a detector, a file made by `train finder-pictures`.
     dataset: PathBuf,
     /// The people to evaluate. If not given, all are used.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]

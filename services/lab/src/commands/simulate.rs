@@ -45,7 +45,7 @@ Examples:
     parallax-lab simulate hosts --report run.json --cameras 8,16 --cores 8
     parallax-lab simulate hosts --cameras 16 --hosts 1,2,3,4 --cores 16 --rate 30 --pose-ms 20")]
 pub(crate) struct Arguments {
-    /// Numbers of cameras, separated by commas.
+    /// Numbers of cameras to simulate, separated by commas.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "8,16,32,64", value_parser = clap::value_parser!(u16).range(1..=1024))]
     cameras: Vec<u16>,
     /// Numbers of hosts, separated by commas, including the fusing host.
@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
     /// Views of the fusing host. If not given, views are spread evenly by work.
     #[arg(long, value_name = "N")]
     near: Option<u16>,
-    /// Cores of each host.
+    /// Number of processor cores of each host.
     #[arg(long, value_name = "N", default_value_t = 16.0)]
     cores: f64,
     /// Frames per second.

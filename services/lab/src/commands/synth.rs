@@ -74,7 +74,7 @@ impl From<Format> for synth::Format {
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Folder to write, which must be empty or absent.
+    /// Folder to write. It must be empty or not exist.
     out: PathBuf,
     /// Cameras: humaneva, umpm, a ring (ring:N, ring:N:RADIUS, ring:N:RADIUS:HEIGHT), or a rig file.
     #[arg(long, value_name = "RIG", default_value = "humaneva", value_parser = rig)]
@@ -82,7 +82,7 @@ pub(crate) struct Arguments {
     /// Numbers of the subjects, for example 3 or 1-20,25.
     #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
     subjects: Subjects,
-    /// Number of other people who stand around the subject, at most 4.
+    /// Number of other people who stand around the subject (at most 4).
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=4))]
     others: u64,
     /// Number of other people who walk past the subject and each other, at most 4. The truth has the joints of all people, but masks and
@@ -98,13 +98,13 @@ pub(crate) struct Arguments {
     /// Frames per camera. If not given, 60, or the length of the recorded motion.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     frames: Option<u64>,
-    /// Frames per second; at a lower rate, successive pictures differ more.
+    /// Frames per second. At a lower rate, successive pictures differ more.
     #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = terminal::rate)]
     rate: f64,
     /// File format of pictures.
     #[arg(long, value_enum, default_value_t = Format::Png)]
     format: Format,
-    /// Write no masks.
+    /// Do not write masks.
     #[arg(long)]
     no_masks: bool,
     /// Use photographs from this folder as the background, instead of a room.
@@ -113,7 +113,7 @@ pub(crate) struct Arguments {
     /// Model for the deployment file. If not given, the shipped person model.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Write no pictures: the capture processes of the deployment render them during the run.
+    /// Do not write pictures. Instead, the capture processes of the deployment render them during the run.
     #[arg(long)]
     live: bool,
     /// Delay of each camera's pictures after the nominal instants of the frames, in milliseconds, in the order of the rig: 0,5,11,16.

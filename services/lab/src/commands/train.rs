@@ -68,13 +68,13 @@ pub(crate) enum Command {
     Fmp(Box<Arguments>),
     /// Learn the consistency between several views of a person: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
-    /// Train the network that sees in which direction a person faces, to tell left from right.
+    /// Train the network that estimates the direction in which a person faces, to distinguish left from right.
     Orientation(Box<orientation::Arguments>),
-    /// Learn the positions of joints relative to the parts of a model, on photographs of annotated people.
+    /// Learn the positions of joints relative to the parts of a model, from photographs of annotated people.
     Joints(Box<joints::Arguments>),
     /// Prepare people for training the network that finds joints.
     NetworkPeople(Box<network::people::Arguments>),
-    /// Train the network that finds joints, the direction of the trunk, and expected errors.
+    /// Train the network that estimates joints, the direction of the trunk, and expected errors.
     Network(Box<network::learn::Arguments>),
     /// Prepare pictures for training the network that finds people.
     FinderPictures(Box<finder::pictures::Arguments>),
@@ -102,7 +102,7 @@ pub(crate) struct Arguments {
     /// Print the settings of the training as TOML, and exit.
     #[arg(long)]
     print_settings: bool,
-    /// Random seed; overrides the settings.
+    /// Random seed. It overrides the seed in the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
     /// Number of threads, which does not affect the model. If not given, one per core.

@@ -22,7 +22,7 @@ pub(crate) enum Command {
     Latency(load::Arguments),
     /// Measure how many frames per second a deployment processes if no frame is dropped.
     Throughput(load::Arguments),
-    /// Measure the latency with one camera, with two, and so on.
+    /// Measure the latency with one camera, two cameras, and so on.
     Scale(load::Arguments),
     /// Measure how fast the filters search frames, on the GPU and on the processor.
     Gpu(gpu::Arguments),

@@ -55,13 +55,13 @@ pub(crate) struct Arguments {
     /// Folder for the report and the run.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     out: PathBuf,
-    /// Frames per camera. If not given, the frames of twenty seconds, at least 30.
+    /// Frames per camera. If not given, as many as in twenty seconds, but at least 30.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     frames: Option<u64>,
     /// Duration of the run in seconds, instead of --frames.
     #[arg(long, value_name = "S", conflicts_with = "frames", value_parser = clap::value_parser!(u32).range(2..=36_000))]
     seconds: Option<u32>,
-    /// Frames per second. If not given, as many as this machine can process, at most 5.
+    /// Frames per second. If not given, as many as this machine can process, up to 5.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
     /// Action of the person. `parallax-lab synth --help` lists the actions.

@@ -18,7 +18,7 @@ const UNMARKED: &str = "not a deployment: ignored";
 With a DEPLOYMENT, prints the table of `parallax top --once`: every process, its state, and the percentiles of its stages. \
 `parallax top --help` explains the table. With --json, times are in milliseconds, and memory is in bytes.")]
 pub(crate) struct StatusArguments {
-    /// Name or file of a running deployment whose processes and times are shown.
+    /// Name or file of a running deployment. If given, its processes and times are shown.
     deployment: Option<String>,
     /// Print JSON.
     #[arg(long)]
@@ -28,7 +28,7 @@ pub(crate) struct StatusArguments {
 /// Options of `parallax clean`.
 #[derive(Debug, Args)]
 pub(crate) struct CleanArguments {
-    /// Names of dead deployments. If none is given, all dead deployments.
+    /// Names of dead deployments. If not given, all dead deployments.
     names: Vec<String>,
     /// Print JSON.
     #[arg(long)]

@@ -75,8 +75,8 @@ pub(crate) struct Arguments {
     /// The model file. If not given, the person model that ships with Parallax.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Minimum heat of a person in a box of a detector: the mean heat of the joints, from 0 to 1. If not given, 0.5 with the shipped
-    /// detector, and 0 with --detector.
+    /// Minimum heat of a person in a box from the detector. The heat is the mean over the joints, from 0 to 1. If not given, 0.5 with the
+    /// shipped detector, and 0 with --detector.
     #[arg(long, value_name = "HEAT", value_parser = heat)]
     heat: Option<f64>,
     /// Minimum score of a detection by the filters. If not given, -0.5 for the shipped model. Other models use their trained
@@ -119,7 +119,7 @@ pub(crate) struct Arguments {
     /// the shipped model. With "none", and for other models, each joint is the centre of its part.
     #[arg(long, value_name = "FILE")]
     joint_map: Option<PathBuf>,
-    /// Network (.onnx) that finds the keypoints, "shipped" or "none". With "none" the filters find parts instead. If not given, the
+    /// Network (.onnx) that finds the keypoints, "shipped" or "none". With "none", the filters find parts instead. If not given, the
     /// shipped network, unless --model, --joints or --joint-map is given.
     #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,

@@ -38,7 +38,7 @@ Examples:
 pub(crate) struct StatusArguments {
     /// The deployment file.
     config: PathBuf,
-    /// Name of this machine in the deployment. If not given, the host with this machine's own name.
+    /// Name of this machine in the deployment. If not given, the host name of this machine.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the state as JSON.

@@ -60,11 +60,11 @@ pub(crate) struct Arguments {
     /// Footage of a camera in which the board is on the floor.
     #[arg(long, value_name = "NAME=PATH", requires = "board")]
     floor: Vec<String>,
-    /// Find the poses of the cameras from a person who walks about in their footage, and whose height is METRES.
+    /// Find the poses of the cameras from footage in which a person of height METRES walks about.
     #[arg(long, value_name = "METRES", conflicts_with = "floor", value_parser = height)]
     people: Option<f64>,
-    /// For cropped footage: position of its upper left pixel in the calibrated picture (`source_offset_px`). Give the option once per
-    /// camera.
+    /// For cropped footage: position of the footage's upper left pixel in the calibrated picture (`source_offset_px`). Give the option once
+    /// per camera.
     #[arg(long, value_name = "NAME=X,Y", value_parser = offset)]
     offset: Vec<Offset>,
     /// Upward direction in the world of the rig, for example 0,0,1.

@@ -21,7 +21,7 @@ Examples:
     parallax publish demo udp://192.168.1.20:9000 --beyond-this-machine
     nc -klu 127.0.0.1 9000                              print the datagrams")]
 pub(crate) struct Arguments {
-    /// Name or file of the deployment. It need not run yet.
+    /// Name or file of the deployment. The deployment need not be running yet.
     deployment: String,
     /// The target: udp://HOST:PORT for JSON lines, or osc://HOST:PORT (or udp://HOST:PORT?format=osc) for OSC.
     #[arg(required = true, value_name = "TARGET")]

@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set capture.scale=0.5`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host with this machine's own name.
+    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host name of this machine.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Print the summary as JSON.

@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     /// The first stage that is run.
     #[arg(long, value_name = "STAGE", value_parser = stage::parser(), default_value = "pose")]
     from: Stage,
-    /// Speed relative to the recording, or `max`. If not given, `max` with lossless delivery, otherwise 1.
+    /// Speed relative to the recording, or `max`. If not given, `max` with lossless delivery, and 1 otherwise.
     #[arg(long, value_name = "X", value_parser = speed)]
     speed: Option<Speed>,
     /// Folder for the results. If not given, the name of the recording with `-replay` appended.

@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set capture.scale=0.5`. May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host with this machine's own name.
+    /// Name of this machine in a deployment with several `[[host]]`. If not given, the host name of this machine.
     #[arg(long, value_name = "NAME")]
     host: Option<String>,
     /// Fail with exit code 6 if more than 1 frame in 100 takes longer than this from capture to result, in milliseconds. The same

@@ -71,7 +71,7 @@ pub(crate) struct Arguments {
     /// Start at this time in the footage of each camera, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     from: f64,
-    /// Length of the footage to use, in seconds. If not given, all of it.
+    /// Length of the footage to use, in seconds. If not given, all footage.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
     /// Write a page that plots the cost of each pair of cameras against its offset.

@@ -65,7 +65,7 @@ pub(crate) struct Arguments {
     /// Print the address of the page as JSON.
     #[arg(long)]
     json: bool,
-    /// End when the parent process ends, which has the other end of standard input.
+    /// End when the parent process ends or closes standard input.
     #[arg(long, hide = true)]
     with_parent: bool,
 }

@@ -12,11 +12,11 @@ use training::datasets::sequences::MotionOptions;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Recorded motion")]
 pub(super) struct MotionArguments {
-    /// Move the subjects as recorded in a C3D or TRC file, instead of an action.
+    /// Animate the subjects with the motion recorded in a C3D or TRC file, instead of an action.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["actions", "live"])]
     motion: Option<PathBuf>,
-    /// Table that maps the markers of the file to joints: cmu, pose2sim, parallax, optitrack36, or a file like those in
-    /// configs/markers. If not given, the first of these four tables whose markers are all in the file.
+    /// Table that maps the markers of the file to joints: cmu, pose2sim, parallax, optitrack36, or a file like those in configs/markers. If
+    /// not given, the first of these four tables for which the file has all markers.
     #[arg(long, value_name = "TABLE", requires = "motion")]
     markers: Option<PathBuf>,
     /// First and last frame, as numbered in the file. If not given, all frames.

@@ -50,10 +50,10 @@ pub(crate) struct Arguments {
     /// Held-out subjects, on which the weights are chosen, separated by commas. If not given, the last quarter of the subjects.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     hold_out: Vec<String>,
-    /// Largest number of instants of the held-out subjects for trying weights, evenly spaced.
+    /// Maximum number of instants of the held-out subjects on which weights are tried. The instants are evenly spaced.
     #[arg(long, value_name = "N", default_value_t = 48)]
     tries: usize,
-    /// Also learn tables by camera name, for the rig with this name. All sequences must be of one rig.
+    /// Also learn tables by camera name, for the rig with this name. All sequences must be from one rig.
     #[arg(long, value_name = "NAME")]
     rig: Option<String>,
     /// Do not learn the map from parts to joints.
@@ -71,7 +71,7 @@ pub(crate) struct Arguments {
     /// Use the first frame and every n-th frame after it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     every: usize,
-    /// Largest number of frames per sequence.
+    /// Maximum number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
     /// Number of threads, which does not affect the file. If not given, one per core.

@@ -20,10 +20,10 @@ pub(super) struct Learning {
     /// Print the settings of the training as TOML, and exit.
     #[arg(long)]
     pub(super) print_settings: bool,
-    /// Number of steps; overrides the settings.
+    /// Number of steps. It overrides the number in the settings.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(super) steps: Option<u32>,
-    /// Random seed; overrides the settings.
+    /// Random seed. It overrides the seed in the settings.
     #[arg(long, value_name = "N")]
     pub(super) seed: Option<u32>,
     /// Library for the computation: `built-in`, or `libtorch` if this executable was built with it.

@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     /// People of a data set to use. If not given, all are used.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
-    /// People of a data set for the evaluation; they are left out of the training.
+    /// People of a data set for the evaluation. These people are left out of the training.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     judge: Vec<String>,
     /// Number of synthetic scenes. Each scene gives several pictures from every camera.
@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     /// First and last number of the synthetic people in the scenes for the evaluation.
     #[arg(long, value_name = "FROM-TO", default_value = "901-920", value_parser = subjects)]
     judge_subjects: [u64; 2],
-    /// Frames per camera in a scene, some seconds apart.
+    /// Number of frames per camera in a scene. The frames are a few seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
     /// Folder of photographs without people. They replace the room as the background of every third scene.

@@ -13,7 +13,7 @@ pub(super) struct People {
     /// Annotated people: folders or files, described below.
     #[arg(value_name = "DATASET", required_unless_present = "print_settings")]
     datasets: Vec<PathBuf>,
-    /// Folder of images without people; the option can be repeated.
+    /// Folder of images without people. The option can be repeated.
     #[arg(long, value_name = "DIR", required_unless_present = "print_settings")]
     negatives: Vec<PathBuf>,
     /// People of a data set to train on. If not given, all are used.

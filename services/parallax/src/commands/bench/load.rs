@@ -66,7 +66,7 @@ pub(crate) struct Arguments {
     /// Limit on the 99th percentile of the end-to-end latency of the run with all cameras, in milliseconds.
     #[arg(long, value_name = "MS")]
     max_p99_ms: Option<f64>,
-    /// Minimum rate of results of the run with all cameras, per second.
+    /// Minimum number of results per second in the run with all cameras.
     #[arg(long, value_name = "HZ")]
     min_rate: Option<f64>,
     /// Output options.

@@ -53,7 +53,7 @@ Examples:
     parallax calibrate board --board charuco:7x5:40mm wide=a.mp4 b=b.mp4 --known lenses.toml --out rig.toml")]
 pub(crate) struct Arguments {
     /// One video, folder of pictures or pattern per camera, in the order of the rig. NAME=PATH names the camera. With --intrinsics, several
-    /// pictures may be given, all of one camera.
+    /// pictures of the same camera may be given.
     #[arg(value_name = "FOOTAGE", required_unless_present = "print", num_args = 1..)]
     footage: Vec<String>,
     /// The board.
@@ -93,7 +93,7 @@ pub(crate) struct Arguments {
     /// mirror image of the front, corner on corner, for cameras on both sides.
     #[arg(long, value_enum, conflicts_with = "mirrored")]
     back: Option<BackName>,
-    /// File for the calibration. With --print, file for the board (.pdf or .svg); if not given, both kinds are written.
+    /// File for the calibration. With --print, file for the board (.pdf or .svg). If not given, both a PDF and an SVG file are written.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Format of the calibration file.
@@ -118,7 +118,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Lens {
     /// Pinhole with k1, k2, k3, p1, p2.
     Five,
-    /// Pinhole with k1 to k6, p1, p2: for wide lenses, if there are many pictures.
+    /// Pinhole with k1 to k6, p1, p2. Suitable for wide lenses, if there are many pictures.
     Eight,
     /// Fisheye with k1 to k4.
     Fisheye,

@@ -22,7 +22,7 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} pictures, {per_sec}{le
 pub(super) struct WalkArguments {
     /// The deployment file. Its rig must have the intrinsics.
     pub(super) config: PathBuf,
-    /// Rig file to write. Nothing is written if the result is refused.
+    /// Rig file to write. The file is not written if the result is rejected.
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Write a page with residuals, positions of people in the pictures, uncertainties, the rig in space, and the worst pictures.
@@ -34,7 +34,7 @@ pub(super) struct WalkArguments {
     /// Start at this time in the footage of each camera, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds)]
     pub(super) from: f64,
-    /// Length of the footage to use, in seconds. If not given, all of it.
+    /// Length of the footage to use, in seconds. If not given, all footage.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) seconds: Option<f64>,
     /// Maximum number of instants to use, spread evenly over the footage.

@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     /// Card of the teacher. If not given, the file beside it.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Option<PathBuf>,
-    /// Folder of photographs without people; they are also the background of every third scene.
+    /// Folder of photographs without people. The photographs are also used as the background of every third scene.
     #[arg(long, value_name = "DIR")]
     empty: Option<PathBuf>,
     /// Number of synthetic scenes. Each scene gives several pictures from every camera.
@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     /// First and last number of the synthetic people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-400", value_parser = subjects)]
     subjects: [u64; 2],
-    /// Frames per camera in a scene, some seconds apart.
+    /// Number of frames per camera in a scene. The frames are a few seconds apart.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
     /// Random seed of the scenes.

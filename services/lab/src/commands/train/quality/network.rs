@@ -28,7 +28,7 @@ Example:
 /// The architecture of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Network {
-    /// A baseline: features of the search only, without the picture.
+    /// A baseline that uses only features of the search, without the picture.
     Evidence,
     /// A few separable convolutions, sampled around every part, together with the features of the search.
     Small,
@@ -65,10 +65,10 @@ pub(crate) struct Arguments {
     /// Print the settings of the training as TOML, and exit.
     #[arg(long)]
     print_settings: bool,
-    /// Architecture of the network; overrides the settings.
+    /// Architecture of the network. It overrides the architecture in the settings.
     #[arg(long, value_enum)]
     network: Option<Network>,
-    /// Random seed; overrides the settings.
+    /// Random seed. It overrides the seed in the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
     /// Initial weights: torchvision's VGG-16, as a .safetensors file.

@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// First and last number of the synthetic people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
     subjects: [u64; 2],
-    /// Frames per camera in a scene, some seconds apart.
+    /// Number of frames per camera in a scene. The frames are a few seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
     /// Folder of photographs without people. They replace the room as the background of every third scene.
