@@ -70,7 +70,8 @@ impl Deployment {
         if is_lossless && deadline_ms < 1000 {
             doubts.push(format!(
                 "`supervise.deadline_ms` is {deadline_ms}, although `capture.mode` is \"lossless\": a view whose frame takes longer is \
-                 left out of the result; 10000 is usual"
+                 left out of the result; the usual value \
+                 is 10000"
             ));
         }
         let hang_limit_s = self.hang_limit_s();

@@ -182,7 +182,7 @@ pub enum Switch {
 #[serde(
     untagged,
     expecting = "expected \"none\", \"learned\", \"humaneva\", \"humaneva-median\", \"umpm\", \"umpm-median\", a list with one number per \
-                                                                                            part, or { file = \"...\" }"
+                 part, or { file = \"...\" }"
 )]
 pub enum Tau {
     /// Thresholds with a known name.

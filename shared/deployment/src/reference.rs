@@ -13,9 +13,8 @@ const INTRODUCTION: &str = "\
 All keys of a deployment file, as `parallax config keys --markdown` prints them. A file needs `name`, `rig`, `output` and
 a `[[camera]]` for each camera; everything else has a default. Relative paths are relative to the file. `--set section.key=value`
 replaces a value for one run. `parallax config show FILE` prints all values and their origin, and `parallax config schema` prints a JSON
-schema for editors. `[network]` has the keys of `method = \"network\"`, and `[paper]` has the keys of `method = \"paper\"`; a key of the \
-                            other method
-is an error.
+schema for editors. `[network]` has the keys of `method = \"network\"`, and `[paper]` has the keys of `method = \"paper\"`; a key of the
+other method is an error.
 ";
 
 /// Returns every key with its accepted values, its default and its meaning.

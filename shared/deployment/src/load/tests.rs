@@ -247,7 +247,7 @@ fn whatever_runs_by_the_file_alone_may_be_given_cores_and_nothing_else() {
     assert!(
         got.ends_with(
             "`runtime.cores` is \"pose-2\", expected one of capture, pose, quality, fuse, triangulate, results, or a single process, such \
-                                          as pose-0"
+             as pose-0"
         ),
         "{got}"
     );

@@ -75,8 +75,9 @@ fn focal(camera: &CameraOutcome) -> (String, String) {
 fn cameras(out: &mut Html, page: &Page<'_>) {
     put!(
         out,
-        "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>pictures with the board<th>used<th>corners<th>left out\
-         <th>residual, px<th>with those left out<th>of the picture<th>focal lengths, px<th>standard deviation</tr>\n"
+        "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>pictures with the board<th>pictures used\
+         <th>corners used<th>corners left out<th>residual, px<th>residual with corners left out, px<th>picture covered\
+         <th>focal lengths, px<th>standard deviation, px</tr>\n"
     );
     for (name, it) in page.names.iter().zip(&page.outcome.cameras) {
         let (focal, sd) = focal(it);
@@ -106,7 +107,8 @@ fn cameras(out: &mut Html, page: &Page<'_>) {
 fn pairs(out: &mut Html, page: &Page<'_>) {
     put!(
         out,
-        "<h2>Pairs of cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>pair<th>frames together<th>of these agree<th>distance, m</tr>\n"
+        "<h2>Pairs of cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>pair<th>frames with the board in both<th>frames that \
+         agree<th>distance, m</tr>\n"
     );
     for it in &page.outcome.pairs {
         let [a, b] = it.cameras;

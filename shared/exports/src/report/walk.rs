@@ -18,8 +18,8 @@ const UNUSABLE: &str = "not to be used";
 /// Words for a rig with cautions.
 const ROUGH: &str = "usable, but not known well";
 /// Legend of the drawings in pictures.
-const DRAWN: &str =
-    "Ring: the joint as it was seen; line: to where the rig has it, from what all cameras see.";
+const DRAWN: &str = "Each ring is a detected joint; the line leads to the position that the rig predicts from the detections of all \
+    cameras.";
 /// Maximum number of skeletons that are drawn.
 const MOST_MOMENTS: usize = 150;
 
@@ -48,7 +48,8 @@ pub fn of_people(
     put!(
         out,
         "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>centre, m<th>joints<th>residual, px<th>fit, %\
-         <th>rotation &#177; degrees<th>centre &#177; mm<th>focal length, px<th>halves differ, degrees<th>mm<th>offset, ms</tr>\n"
+         <th>rotation &#177; degrees<th>centre &#177; mm<th>focal length, px<th>difference of halves, degrees<th>difference of halves, \
+         mm<th>offset, ms</tr>\n"
     );
     let each = names.iter().zip(&outcome.cameras).zip(&outcome.reports);
     for ((name, camera), it) in each {
@@ -80,8 +81,9 @@ pub fn of_people(
     }
     put!(
         out,
-        "</table></div>\n<p class=\"note\">The deviations are one standard deviation, by how blocks of the recording differ, and its halves; \
-         rigs laid upon one another. Halves: each half of the recording by itself, laid upon the other.</p>\n"
+        "</table></div>\n<p class=\"note\">Each &#177; is one standard deviation, estimated from the differences between blocks of the \
+         recording and between its halves, after the rigs are aligned. The difference of halves is the \
+         difference between the rigs of the two halves, after alignment.</p>\n"
     );
     coverage(&mut out, outcome, names);
     in_space(
