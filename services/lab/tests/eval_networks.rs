@@ -136,7 +136,7 @@ fn what_cannot_be_judged_is_refused() {
     refused(
         &["--detector-card", "wide.toml"],
         4,
-        "[1, 3, 64, 64], but the card says [1, 3, 64, 96]",
+        "[1, 3, 64, 64], but the card states [1, 3, 64, 96]",
     );
     let without = case.start(&["eval", "people", "--out", "out", "--stress", "all"]).wait();
     assert_eq!(without.status.code(), Some(2), "{}", without.stderr);

@@ -257,7 +257,7 @@ mod tests {
         let error = of(&["middle"]).unwrap_err().to_string();
         assert_eq!(
             error,
-            "deployment \"walk\" has no camera \"middle\", but left, right"
+            "deployment \"walk\" has no camera \"middle\"; its cameras are left, right"
         );
     }
 }

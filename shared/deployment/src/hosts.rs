@@ -143,7 +143,7 @@ fn names(it: &Deployment) -> Result<(), Complaint> {
             !name.is_empty() && name.chars().all(good),
             "host.name",
             &format!("{name:?}"),
-            "lower-case letters, digits and hyphens",
+            "a name of lower-case letters, digits and hyphens",
         )?;
         let whole = it.name_on(host);
         demand(
@@ -187,7 +187,7 @@ fn views(it: &Deployment) -> Result<(), Complaint> {
             n == 1,
             "host.views",
             &format!("{:?} in {n} places", camera.name),
-            "every camera on exactly one host",
+            "each camera on exactly one host",
         )?;
     }
     Ok(())
@@ -199,7 +199,7 @@ fn address(host: &Host) -> Result<(), Complaint> {
         return demand(
             !host.fuses,
             "host.address",
-            &format!("left out of host {:?}, which fuses", host.name),
+            &format!("missing for host {:?}, which fuses", host.name),
             "the address on which this host listens, such as \"192.168.1.5:7447\"",
         );
     };

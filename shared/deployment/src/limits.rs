@@ -11,7 +11,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
             length.is_finite() && length > 1e-9,
             "up",
             &format!("[{x}, {y}, {z}]"),
-            "a direction: three numbers, not all 0",
+            "a direction, which is three numbers that are not all 0",
         )?;
     }
     for camera in &it.cameras {

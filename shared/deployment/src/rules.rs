@@ -48,7 +48,7 @@ fn name(name: &str) -> Result<(), Complaint> {
         (1..=32).contains(&name.len()) && name.chars().all(good),
         "name",
         &format!("{name:?}"),
-        "1 to 32 lower-case letters, digits and hyphens",
+        "a name of 1 to 32 lower-case letters, digits and hyphens",
     )
 }
 
@@ -97,7 +97,7 @@ fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
     demand(
         !camera.source.is_empty() || camera.keypoints.is_some(),
         "camera.source",
-        &format!("left out of camera {:?}", camera.name),
+        &format!("missing for camera {:?}", camera.name),
         "footage, because every [[camera]] needs a `source`, or `keypoints` from another program",
     )?;
     is_path("camera.source", &camera.source)?;

@@ -52,7 +52,7 @@ pub fn beside(path: &Path) -> PathBuf {
 /// Opens the folder of a file, and returns it with the name of the file in it.
 fn split(path: &Path) -> io::Result<(Folder, &OsStr)> {
     let name = path.file_name().ok_or_else(|| {
-        let text = "does not end with the name of a file";
+        let text = "does not end with a file name";
         io::Error::new(io::ErrorKind::InvalidInput, text)
     })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

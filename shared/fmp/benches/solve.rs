@@ -29,7 +29,7 @@ fn main() {
         for isa in Isa::available() {
             let solver = Solver::on(isa, Arc::clone(&model));
             let alone = fastest(|| drop(black_box(solver.best(&evidence, None))));
-            println!("  {isa:?}: alone, one thread {alone:6.2} ms");
+            println!("  {isa:?}: on its own, on one thread, {alone:6.2} ms");
         }
         let solver = Solver::new(Arc::clone(&model));
         steps(&solver, &evidence, "one thread ");
@@ -67,8 +67,8 @@ fn steps(solver: &Solver, evidence: &Responses<'_>, threads: &str) {
     }
     let [pruned, kept] = least;
     println!(
-        "  {threads}: one step {full:6.2} ms; pruned to {} levels {pruned:6.2} ms; and with four \
-         of five terms unchanged {kept:6.2} ms",
+        "  {threads}: one step takes {full:6.2} ms; pruned to {} levels, it takes {pruned:6.2} ms; if four of five terms are also \
+         unchanged, it takes {kept:6.2} ms",
         incremental.n_levels()
     );
 }

@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn other_files_are_rejected_by_name() {
-        let expected = "dir/m is not a model: it begins with \".PNG.\", expected `PLXMODEL` (Parallax), \
+        let expected = "dir/m is not a model: the file begins with \".PNG.\", expected `PLXMODEL` (Parallax), \
                         `MATLAB 5.0` (Yang & Ramanan) or `partsNbr` (the authors' text)";
         assert_eq!(outcome("m", b"\x89PNG\n"), expected);
         assert_eq!(outcome("m", b""), "the model file dir/m is empty (0 bytes)");

@@ -15,7 +15,7 @@ pub enum FootageError {
         path: String,
     },
     /// The path is a camera, a stream or a device.
-    #[error("{path} is {what}, not footage: {instead}")]
+    #[error("{path} is {what}, but footage is expected: {instead}")]
     Live {
         /// Path as the user wrote it.
         path: String,
@@ -85,7 +85,7 @@ pub enum FootageError {
         expected: Size,
     },
     /// A live stream cannot be opened, or has ended.
-    #[error("no pictures from {address}: {message}")]
+    #[error("no pictures were received from {address}: {message}")]
     Stream {
         /// Address of the stream, without a password.
         address: String,

@@ -54,33 +54,33 @@ const KNOWN: [(Orientation, &str, &str); 8] = [
     (Orientation::NoTransforms, "as stored", ""),
     (
         Orientation::Rotate90,
-        "turned by 90 degrees to the right",
+        "rotated by 90 degrees to the right",
         "transpose=clock",
     ),
     (
         Orientation::Rotate180,
-        "turned by 180 degrees",
+        "rotated by 180 degrees",
         "hflip,vflip",
     ),
     (
         Orientation::Rotate270,
-        "turned by 90 degrees to the left",
+        "rotated by 90 degrees to the left",
         "transpose=cclock",
     ),
     (Orientation::FlipHorizontal, "mirrored", "hflip"),
     (
         Orientation::FlipVertical,
-        "turned by 180 degrees and mirrored",
+        "rotated by 180 degrees and mirrored",
         "vflip",
     ),
     (
         Orientation::Rotate90FlipH,
-        "turned by 90 degrees to the right and mirrored",
+        "rotated by 90 degrees to the right and mirrored",
         "transpose=cclock_flip",
     ),
     (
         Orientation::Rotate270FlipH,
-        "turned by 90 degrees to the left and mirrored",
+        "rotated by 90 degrees to the left and mirrored",
         "transpose=clock_flip",
     ),
 ];

@@ -109,7 +109,7 @@ pub enum LoadError {
 
 /// The library could not run the network.
 #[derive(Debug, thiserror::Error)]
-#[error("the network cannot be run")]
+#[error("the network failed when it was run")]
 pub struct RunError(#[source] pub(crate) EngineError);
 
 /// A network loaded by a library.

@@ -110,7 +110,11 @@ impl Network {
     /// Panics if the number of values does not match the shape.
     pub fn floats(&mut self, name: &str, shape: &[usize], values: Vec<f32>) {
         let n: usize = shape.iter().product();
-        assert_eq!(values.len(), n, "{name}: as many as the shape asks for");
+        assert_eq!(
+            values.len(),
+            n,
+            "{name}: the number of values must match the shape"
+        );
         self.constants.push(Constant {
             name: name.to_owned(),
             shape: shape.to_vec(),
@@ -125,7 +129,11 @@ impl Network {
     /// Panics if the number of values does not match the shape.
     pub fn halves(&mut self, name: &str, shape: &[usize], values: &[f32]) {
         let n: usize = shape.iter().product();
-        assert_eq!(values.len(), n, "{name}: as many as the shape asks for");
+        assert_eq!(
+            values.len(),
+            n,
+            "{name}: the number of values must match the shape"
+        );
         let stored = format!("{name}.half");
         self.constants.push(Constant {
             name: stored.clone(),

@@ -32,7 +32,7 @@ fn main() {
         let time = fastest(|| points.best(isa, from.iter().copied(), &spring));
         let (each, ratio) = (time / n_pairs, reference / time);
         println!(
-            "{}: {each:.2} ns a pair, {ratio:.1} times as fast",
+            "{}: {each:.2} ns per pair, {ratio:.1} times as fast",
             isa.name()
         );
     }

@@ -117,7 +117,7 @@ impl FilterBank {
             assert_eq!(
                 filter.weights.len(),
                 n_taps,
-                "one weight per channel of a cell"
+                "a filter must have one weight per channel of a cell"
             );
             let size = [filter.rows, filter.cols];
             match panels.last_mut() {
@@ -208,7 +208,7 @@ impl FilterBank {
             );
             n += n_filters * size[0] * size[1];
         }
-        assert_eq!(out.len(), n, "one map per level and filter");
+        assert_eq!(out.len(), n, "there must be one map per level and filter");
         workspace.pending.iter_mut().for_each(Pending::clear);
         self.isa.run(Correlate {
             panels,

@@ -36,7 +36,10 @@ impl ScoredPoints {
     /// Panics if there are no points, or the number of scores differs from the number of points.
     pub fn new(points: impl ExactSizeIterator<Item = [f64; 3]>, scores: &[f64]) -> Self {
         let n = points.len();
-        assert!(n > 0 && n == scores.len(), "a score for each point");
+        assert!(
+            n > 0 && n == scores.len(),
+            "there must be a score for each point"
+        );
         let padded = n.next_multiple_of(LANES);
         let mut at: [Vec<f64>; 3] = core::array::from_fn(|_| Vec::with_capacity(padded));
         for point in points {

@@ -120,7 +120,7 @@ pub fn hog(
     assert_eq!(
         out.len(),
         rows * cols * N_CHANNELS,
-        "one cell per map entry"
+        "there must be one cell per map entry"
     );
     assert!(
         image.width().min(image.height()) >= 3,

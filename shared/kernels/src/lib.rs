@@ -2,7 +2,7 @@
 //! every instruction set.
 #![expect(
     unsafe_code,
-    reason = "SIMD dispatch, loads and stores; every block states why it is sound"
+    reason = "needed for SIMD dispatch, loads and stores; every block states why it is sound"
 )]
 #![expect(
     clippy::inline_always,

@@ -114,11 +114,17 @@ impl MessageRule {
         choices: Vec<Vec<(usize, f32)>>,
     ) -> Self {
         for (child_type, spring) in &springs {
-            assert!(*child_type < n_child_types, "a spring of an existing type");
+            assert!(
+                *child_type < n_child_types,
+                "the spring must belong to an existing type"
+            );
             assert!(spring.w[0] > 0.0 && spring.w[2] > 0.0, "springs pull");
         }
         for (spring, _) in choices.iter().flatten() {
-            assert!(*spring < springs.len(), "a choice of an existing spring");
+            assert!(
+                *spring < springs.len(),
+                "the choice must be an existing spring"
+            );
         }
         Self {
             n_child_types,
@@ -148,7 +154,11 @@ impl MessageRule {
         self.check(child);
         let n_types = self.choices.len();
         assert_eq!(parent.len(), child.grid.len(n_types), "parent planes");
-        assert_eq!(ranges.len(), n_types, "one range per parent plane");
+        assert_eq!(
+            ranges.len(),
+            n_types,
+            "there must be one range per parent plane"
+        );
         if child.grid.is_empty() {
             return;
         }
@@ -166,7 +176,7 @@ impl MessageRule {
         assert_eq!(
             child.ranges.len(),
             self.n_child_types,
-            "one range per child plane"
+            "there must be one range per child plane"
         );
     }
 }

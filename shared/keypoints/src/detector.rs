@@ -267,7 +267,11 @@ impl DetectorCard {
     pub fn fill(&self, rgb: &[u8], size: [usize; 2], values: &mut [f32]) -> f64 {
         let [width, height] = [self.input.width, self.input.height];
         assert_eq!(rgb.len(), 3 * size[0] * size[1], "the picture is RGB");
-        assert_eq!(values.len(), 3 * width * height, "three values for a pixel");
+        assert_eq!(
+            values.len(),
+            3 * width * height,
+            "there must be three values for each pixel"
+        );
         let step = (size[0] as f64 / width as f64).max(size[1] as f64 / height as f64);
         for row in 0..height {
             for column in 0..width {

@@ -145,7 +145,11 @@ impl Window {
     pub fn fill(&self, card: &Card, rgb: &[u8], size: [usize; 2], values: &mut [f32]) {
         let [width, height] = self.input;
         assert_eq!(rgb.len(), 3 * size[0] * size[1], "the picture is RGB");
-        assert_eq!(values.len(), 3 * width * height, "three values for a pixel");
+        assert_eq!(
+            values.len(),
+            3 * width * height,
+            "there must be three values for each pixel"
+        );
         let plane = width * height;
         for row in 0..height {
             for column in 0..width {

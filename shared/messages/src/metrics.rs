@@ -137,7 +137,7 @@ impl TimedBy {
             Self::DRIVER => "driver",
             Self::CAMERA => "camera",
             Self::ARRIVAL => "arrival",
-            Self::DISBELIEVED => "arrival (its clock is not believed)",
+            Self::DISBELIEVED => "arrival (the camera's clock is not used)",
             Self(_) => "unknown",
         }
     }

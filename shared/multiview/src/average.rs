@@ -23,7 +23,7 @@ pub fn average(candidates: &[(f64, &[[f64; 2]])]) -> Option<FusedPose> {
     let n_parts = candidates.first()?.1.len();
     let mut sum = vec![[0.0; 2]; n_parts];
     for (_, centres) in candidates {
-        assert_eq!(centres.len(), n_parts, "one model for all pairs");
+        assert_eq!(centres.len(), n_parts, "all pairs must have the same model");
         for (sum, centre) in sum.iter_mut().zip(*centres) {
             sum[0] += centre[0];
             sum[1] += centre[1];

@@ -83,7 +83,7 @@ fn remove_unfinished(bus: &Bus, node: u128) {
         }
         let path = entry.path();
         match fs::remove_file(&path) {
-            Ok(()) => tracing::debug!(?path, "removed an incomplete file of a dead process"),
+            Ok(()) => tracing::debug!(?path, "an incomplete file of a dead process was removed"),
             Err(error) => {
                 tracing::debug!(%error, ?path, "cannot remove an incomplete file of a dead process");
             }

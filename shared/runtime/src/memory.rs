@@ -152,7 +152,7 @@ impl Mapping<'_> {
         // byte of it.
         let result = unsafe { madvise(address, len, Advice::LinuxPopulateWrite) };
         if let Err(error) = result {
-            tracing::debug!(%error, path = self.path, "the pool is not mapped before use");
+            tracing::debug!(%error, path = self.path, "the pool must be mapped before it is used");
         }
     }
 }

@@ -93,7 +93,7 @@ impl Shape {
     /// Panics if the length of `v` is not the number of coordinates of the shape.
     pub fn model(&self, v: &[f64], threshold: f64) -> Result<Model, ModelError> {
         let at = self.coordinates();
-        assert_eq!(v.len(), at.len(), "the vector of this shape");
+        assert_eq!(v.len(), at.len(), "the vector must have this shape");
         let n_types = at.first_type[self.n_parts()];
         let filters = (0..n_types).map(|i| Filter {
             rows: self.side,

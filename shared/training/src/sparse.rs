@@ -69,7 +69,10 @@ impl Sparse {
                     (own.len() - values.len(), values.len(), false)
                 }
                 Run::Shared { at, len } => {
-                    assert!(at + len <= n_shared, "a run within the shared values");
+                    assert!(
+                        at + len <= n_shared,
+                        "the run must be within the shared values"
+                    );
                     (at, len, true)
                 }
             };

@@ -51,7 +51,7 @@ pub enum NetworkError {
         expected: String,
     },
     /// The network's inputs contradict its card.
-    #[error("the network {takes} `evidence`, but its file {declares} its version")]
+    #[error("the network {takes} `evidence`, but the file {declares} a version of the evidence")]
     EvidenceVersion {
         /// `takes` or `does not take`, depending on the inputs.
         takes: &'static str,

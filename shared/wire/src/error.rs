@@ -58,7 +58,7 @@ pub enum WireError {
         expected: u64,
     },
     /// The message does not come from the sender of the topic.
-    #[error("{field} is {got}, but this is the topic of {expected}")]
+    #[error("{field} is {got}, but the sender of this topic must be {expected}")]
     Sender {
         /// Name of the field.
         field: &'static str,

@@ -80,7 +80,7 @@ pub enum BoardError {
         expected: &'static str,
     },
     /// The dictionary does not exist.
-    #[error("{text:?} is not a dictionary; expected one of {}", dictionary_names().collect::<Vec<_>>().join(", "))]
+    #[error("{text:?} is not a dictionary: expected one of {}", dictionary_names().collect::<Vec<_>>().join(", "))]
     Dictionary {
         /// The name that was given.
         text: String,
@@ -199,7 +199,7 @@ impl Board {
 
     fn set(&mut self, option: &str) -> Result<(), BoardError> {
         let expected = match self.kind {
-            Kind::Chessboard => "a chessboard has no options",
+            Kind::Chessboard => "a chessboard accepts no options",
             Kind::Charuco => {
                 "the options of a ChArUco board are a dictionary such as 5x5_100, the marker's side (marker=0.75 of the square, or \
                  marker=30mm), and legacy"

@@ -233,8 +233,13 @@ fn variants(board: &Board) -> Vec<Variant> {
     };
     let counts = |board: &Board| format!("{}x{}", board.columns, board.rows);
     for told in [board.clone(), board.turned()] {
-        let turned = (told != *board)
-            .then(|| format!("the board has {}, not {}", counts(&told), counts(board)));
+        let turned = (told != *board).then(|| {
+            format!(
+                "the board has {} squares, corners or tags, not {}",
+                counts(&told),
+                counts(board)
+            )
+        });
         match board.kind {
             Kind::Chessboard => {
                 if turned.is_none() {

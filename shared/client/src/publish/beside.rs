@@ -40,7 +40,7 @@ impl Companion {
             arguments.push("--beyond-this-machine".into());
         }
         let child = Child::start(executable, &arguments).map_err(|error| {
-            let text = format!("cannot start the process that publishes: {error}");
+            let text = format!("cannot start the process that sends the skeletons: {error}");
             Failure::new(ExitKind::Run, text)
         })?;
         Ok(Self { child })

@@ -271,8 +271,8 @@ fn a_camera_has_footage_or_keypoints_and_names_of_these_that_are_known() {
         read.map_err(|error| error.to_string())
     };
     for (lines, words) in [
-        ("", "`camera.source` is left out of camera \"c\""),
-        ("source = ''", "`camera.source` is left out of camera \"c\""),
+        ("", "`camera.source` is missing for camera \"c\""),
+        ("source = ''", "`camera.source` is missing for camera \"c\""),
         (
             "source = 'c.mp4'\nkeypoint_names = 'coco-17'",
             "expected no value, because this camera has no `keypoints`",

@@ -347,7 +347,7 @@ const EDITS: &[(&str, &str, &[&str])] = &[
         "source = \"/videos/b.mp4\"",
         "",
         &[
-            "`camera.source` is left out of camera \"b\"",
+            "`camera.source` is missing for camera \"b\"",
             "every [[camera]] needs",
             "`keypoints`",
         ],
@@ -356,7 +356,7 @@ const EDITS: &[(&str, &str, &[&str])] = &[
         "/videos/b.mp4",
         "",
         &[
-            "`camera.source` is left out of camera \"b\"",
+            "`camera.source` is missing for camera \"b\"",
             "every [[camera]] needs",
         ],
     ),

@@ -14,7 +14,7 @@ pub enum C3dError {
         got: u64,
     },
     /// The second byte is not the mark of the format.
-    #[error("not a C3D file: its second byte is {got:#04x}, not 0x50")]
+    #[error("the file is not a C3D file: the second byte is {got:#04x}, expected 0x50")]
     NotC3d {
         /// Value of the second byte.
         got: u8,

@@ -33,7 +33,7 @@ impl<'a> Bytes<'a> {
         }
         file.slice(0, BLOCK, "the header")?;
         let section = usize::from(block.max(1) - 1) * BLOCK;
-        let [_, _, _, code] = file.array(section, "the head of the parameters")?;
+        let [_, _, _, code] = file.array(section, "the header of the parameters")?;
         file.processor = match code {
             84 => Processor::Intel,
             85 => Processor::Dec,

@@ -35,7 +35,7 @@ pub enum ContainerError {
         expected: &'static str,
     },
     /// The sizes of an array and its number of values disagree.
-    #[error("an array of {sizes:?} holds {got} values")]
+    #[error("an array of size {sizes:?} contains {got} values")]
     Size {
         /// Sizes of the array.
         sizes: Vec<i32>,

@@ -70,7 +70,7 @@ impl Trc {
         };
         let rate = field("DataRate", "a DataRate")?;
         let rate_hz = rate.parse().map_err(|_error: std::num::ParseFloatError| {
-            let expected = "DataRate to be a number";
+            let expected = "a number as the DataRate";
             TrcError::Header { line: 3, expected }
         })?;
         let markers: Vec<String> = cells(4, "the names of the markers")?

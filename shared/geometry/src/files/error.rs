@@ -35,7 +35,7 @@ pub enum RigFileError {
         path: PathBuf,
     },
     /// The files have different formats, so that they cannot form one rig.
-    #[error("{path} is a {format} file, but the first one is a {first} file", path = .path.display())]
+    #[error("{path} is a {format} file, but the first file is a {first} file", path = .path.display())]
     Mixed {
         /// Path of the file with the different format.
         path: PathBuf,

@@ -61,7 +61,7 @@ pub(super) fn intrinsics(
     let place = |row: usize, column: usize| format!("{field}[{row}][{column}]");
     // Skew is not modelled. It is refused if it would move a point at the border by a hundredth of a pixel or more.
     if k[(0, 1)].abs() > 1e-5 * k[(0, 0)].abs() {
-        let requirement = "skew is not supported: it must be 0";
+        let requirement = "skew is not supported: the skew must be 0";
         return Err(ParseError::Value {
             field: place(0, 1),
             value: k[(0, 1)],

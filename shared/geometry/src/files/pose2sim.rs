@@ -36,7 +36,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
         .collect::<Result<Vec<_>, _>>()?;
     if cameras.is_empty() {
         return Err(ParseError::NoCameras {
-            expected: "a table with the key matrix for each view",
+            expected: "a table with the key `matrix` for each view",
         });
     }
     super::entry::rig(cameras, options.up, "", options)

@@ -70,7 +70,7 @@ fn camera(node: Node<'_, '_>, options: &ReadOptions) -> Result<Entry, ParseError
     };
     turned.zero_if_present(
         "viewrotation",
-        "a rotated view is not supported: it must be 0",
+        "a rotated view is not supported: the rotation must be 0",
     )?;
     let intrinsics = intrinsics(&child("intrinsic")?, &child("fov_video")?)?;
     let camera_from_world = pose(
@@ -88,7 +88,7 @@ fn intrinsics(
     inside: &Element<'_, '_>,
     video: &Element<'_, '_>,
 ) -> Result<crate::Intrinsics, ParseError> {
-    inside.zero_if_present("skew", "skew is not supported: it must be 0")?;
+    inside.zero_if_present("skew", "skew is not supported: the skew must be 0")?;
     let (left, top) = (video.number("left")?, video.number("top")?);
     let size = [
         numbers::pixels(&video.field, video.number("right")? - left + 1.0)?,

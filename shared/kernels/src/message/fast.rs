@@ -210,7 +210,7 @@ impl Block<'_> {
             let first = (ROW_ALIGN + x).wrapping_add_signed(offset);
             assert!(
                 first + scores.len() + S::LANES <= stride + 1,
-                "offsets end beside the grid"
+                "offsets must end beside the grid"
             );
             let mut best = [simd.splat(f32::NEG_INFINITY); R];
             for (at, score) in scores.iter().enumerate() {

@@ -215,7 +215,7 @@ fn collected(
     }
     let names = names.ok_or_else(|| FileError::Entry {
         entry: if list.is_empty() { "the list" } else { list }.to_owned(),
-        got: "without a person who has keypoints".to_owned(),
+        got: "without any person with keypoints".to_owned(),
         expected: "at least one person with keypoints, or the names of the keypoints".to_owned(),
     })?;
     Ok(Film {

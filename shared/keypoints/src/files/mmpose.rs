@@ -110,7 +110,7 @@ pub(super) fn film(text: &[u8], names: Option<&NameSet>) -> Result<Film, FileErr
     }
     let names = names.ok_or_else(|| FileError::Entry {
         entry: "the list".to_owned(),
-        got: "without a person who has keypoints".to_owned(),
+        got: "without any person with keypoints".to_owned(),
         expected: "at least one person with keypoints, or the names of the keypoints".to_owned(),
     })?;
     Ok(Film {

@@ -47,7 +47,7 @@ pub enum KeypointFileError {
         path: PathBuf,
     },
     /// Two files have the same frame number.
-    #[error("frame {number} has two files, {} and {}; a folder must hold the files of one camera only", paths[0].display(), paths[1].display())]
+    #[error("frame {number} has two files, {} and {}, but a folder must contain the files of one camera only", paths[0].display(), paths[1].display())]
     Twice {
         /// Number in the names of the files.
         number: u64,

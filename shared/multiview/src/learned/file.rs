@@ -15,7 +15,8 @@ const VERSION: u32 = 1;
 /// Maximum number of bins of half the circle.
 const MAX_BINS: usize = 180;
 /// The expected size of tables, for error messages.
-const SIZED: &str = "a matrix of counts for every part, as large as its types";
+const SIZED: &str =
+    "a matrix of counts for every part, with the size given by the numbers of types";
 
 /// The consistency parameters of one model.
 ///
@@ -281,7 +282,7 @@ impl Learned {
         demand(
             types && (1..=255).contains(&n_parts),
             "model.shape.n_types",
-            "1 to 255 types of 1 to 255 parts",
+            "a list of 1 to 255 parts with 1 to 255 types each",
         )?;
         let back = |(part, other): (usize, &usize)| shape.mirror.get(*other) == Some(&part);
         let mirror = shape.mirror.len() == n_parts && shape.mirror.iter().enumerate().all(back);
@@ -355,7 +356,7 @@ impl Learned {
             demand(
                 rows,
                 &field,
-                "a row of weights that sum to 1 for every joint",
+                "a row of weights with the sum 1 for every joint",
             )?;
         }
         Ok(())

@@ -143,7 +143,7 @@ fn settings_are_chosen_by_people_who_were_left_out() {
     assert!(tried.iter().all(|trial| trial.1[0] >= errors[0]));
     assert!(
         best.ridge < 1e-2,
-        "an offset without noise needs little ridge"
+        "an offset without noise needs little regularisation"
     );
 }
 

@@ -27,7 +27,7 @@ pub enum FitError {
         key: &'static str,
     },
     /// The input's dimensions differ from those on the card.
-    #[error("the input `{name}` of the network is {got}, but the card says {expected}")]
+    #[error("the input `{name}` of the network is {got}, but the card states {expected}")]
     InputShape {
         /// Name of the input.
         name: String,

@@ -72,7 +72,7 @@ fn an_input_of_another_name_or_other_sides_is_refused() {
         assert_eq!(
             refused(&network("Relu"), &CARD.replace(from, to)),
             format!(
-                "the input `picture` of the network is [1, 3, 16, 12], but the card says {expected}"
+                "the input `picture` of the network is [1, 3, 16, 12], but the card states {expected}"
             )
         );
     }
@@ -162,7 +162,7 @@ fn whole_numbers_as_output_are_refused() {
     net.nodes.clear();
     let keep = vec![("axis", Attribute::Int(1)), ("keepdims", Attribute::Int(1))];
     net.node("ArgMax", &["picture"], "maps", keep);
-    assert_eq!(refused(&net, CARD), "output `maps` is not of type f32");
+    assert_eq!(refused(&net, CARD), "the output `maps` is not of type f32");
 }
 
 /// Makes a network that returns distributions over columns and rows, from the brightest pixel of each; and its card.

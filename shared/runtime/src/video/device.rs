@@ -98,7 +98,7 @@ impl VideoDevice {
         let wanted = [
             (
                 raw::CAP_VIDEO_CAPTURE,
-                "it captures no pictures in one plane",
+                "it does not capture pictures in a single plane",
             ),
             (raw::CAP_STREAMING, "it cannot stream"),
         ];

@@ -12,7 +12,7 @@ pub enum MatLayoutError {
     #[error("not a readable MATLAB level 5 file")]
     Container(#[from] ContainerError),
     /// The variable is missing, or not an array of real numbers.
-    #[error("it contains no array of real numbers called `{variable}`")]
+    #[error("the file contains no array of real numbers called `{variable}`")]
     Missing {
         /// Name of the variable.
         variable: &'static str,

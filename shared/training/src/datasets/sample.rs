@@ -39,7 +39,7 @@ impl Sample {
         assert_eq!(
             joint_mirror.len(),
             self.joints.len(),
-            "one entry of the mirror a joint"
+            "the mirror must have one entry for each joint"
         );
         let mut image = self.image.clone();
         let size = image.size();

@@ -51,7 +51,7 @@ impl Sides {
         assert_eq!(
             joint_mirror.len(),
             person.joints.len(),
-            "one entry of the mirror a joint"
+            "the mirror must have one entry for each joint"
         );
         if self == Self::Marked || !is_from_behind(&person.joints, joint_mirror) {
             return person;

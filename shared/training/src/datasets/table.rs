@@ -123,7 +123,7 @@ pub enum TableError {
         other: String,
     },
     /// A part refers to a joint that does not exist.
-    #[error("part {part} ({name}) uses joint {joint}, but there are only {n_joints}")]
+    #[error("part {part} ({name}) uses joint {joint}, but there are only {n_joints} joints")]
     Joint {
         /// Number of the part, from 1.
         part: usize,

@@ -97,11 +97,14 @@ struct Writer<'a> {
 impl<'a> Writer<'a> {
     #[expect(
         clippy::expect_used,
-        reason = "documented: the caller's parameters fit the network"
+        reason = "the panic is documented: the caller's parameters must fit the network"
     )]
     fn parameter(&mut self, name: &str) -> &'a Parameter {
-        let found = self.parameters.next().expect("a parameter for every layer");
-        assert_eq!(found.name, name, "parameters in the order of the layers");
+        let found = self.parameters.next().expect("there must be a parameter for every layer");
+        assert_eq!(
+            found.name, name,
+            "parameters must be in the order of the layers"
+        );
         found
     }
 

@@ -129,7 +129,7 @@ impl<'a> Forward<'a> {
         self.next += 1;
         assert_eq!(
             self.parameters[at].name, name,
-            "parameters in the order of the layers"
+            "parameters must be in the order of the layers"
         );
         &self.tensors[at]
     }

@@ -163,13 +163,13 @@ fn evidence_requires_a_version_in_the_file() {
     net.metadata.clear();
     assert_eq!(
         rejection(&net),
-        "the network takes `evidence`, but its file does not declare its version"
+        "the network takes `evidence`, but the file does not declare a version of the evidence"
     );
     let mut net = of_colours();
     net.metadata = of_evidence().metadata;
     assert_eq!(
         rejection(&net),
-        "the network does not take `evidence`, but its file declares its version"
+        "the network does not take `evidence`, but the file declares a version of the evidence"
     );
 }
 

@@ -41,13 +41,13 @@ pub enum FileError {
         expected: usize,
     },
     /// The network has no hidden units, or too many.
-    #[error("the network has {got} hidden units; 1 to {MAX_HIDDEN} can be read")]
+    #[error("the network has {got} hidden units, expected 1 to {MAX_HIDDEN}")]
     Hidden {
         /// Number of hidden units in the file.
         got: usize,
     },
     /// The length of the file does not match its sizes.
-    #[error("there are {got} bytes of values, but the sizes in the header need {expected}")]
+    #[error("the file has {got} bytes of values, but the sizes in the header need {expected}")]
     Length {
         /// Number of bytes found.
         got: usize,

@@ -90,7 +90,7 @@ fn a_parent_with_one_type_may_exclude_a_type_of_its_child() {
 
 #[test]
 fn an_array_whose_sizes_and_values_disagree_is_refused() {
-    let expected = "not a readable MATLAB level 5 file: an array of [1, 2] holds 3 values";
+    let expected = "not a readable MATLAB level 5 file: an array of size [1, 2] contains 3 values";
     let said = outcome(&three_parts(), "maxsize", |mat| {
         *mat = Mat::Numbers(vec![1, 2], vec![2.0; 3]);
     });

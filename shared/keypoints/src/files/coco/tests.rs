@@ -93,7 +93,7 @@ fn what_cannot_be_is_refused_with_its_place() {
     assert!(refused(&one("\"picture\"")).contains("[0].image_id"));
     assert!(refused(&one("99999999999")).contains("a frame number below 10000000"));
     assert!(refused(&one("-1")).contains("image_id"));
-    assert!(refused("[]").contains("without a person"));
+    assert!(refused("[]").contains("without any person"));
     let unknown = refused(&set(&annotation("8", 1, &list(5.0, 0.5)), ""));
     assert!(
         unknown.contains("annotations[0].image_id") && unknown.contains("is 8"),
@@ -112,7 +112,7 @@ fn what_cannot_be_is_refused_with_its_place() {
 
 #[test]
 fn a_data_set_without_people_needs_names() {
-    assert!(refused(&set("", "")).contains("without a person"));
+    assert!(refused(&set("", "")).contains("without any person"));
     let names = NameSet::of_set("coco-17").unwrap();
     let film = parse(set("", "").as_bytes(), Some(&names)).unwrap();
     assert_eq!((film.n_frames, film.frames.len()), (3, 3));

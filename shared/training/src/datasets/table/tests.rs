@@ -106,7 +106,7 @@ fn errors_of_invalid_skeletons_have_name_and_number() {
             |table| table.weights[3] = vec![(8, 0.4), (7, 0.6)],
         ),
         (
-            "part 2 (neck) uses joint 15, but there are only 14",
+            "part 2 (neck) uses joint 15, but there are only 14 joints",
             |table| {
                 table.weights[1] = vec![(14, 1.0)];
             },

@@ -217,7 +217,10 @@ impl<'a> Record<'a> {
         let (size, size_of_map, size_of_weights) =
             (n_maps * channels, channels * cells, n_maps * cells);
         let part = |values: &'_ [f32], size: usize, sample: usize| -> core::ops::Range<usize> {
-            debug_assert!(values.len() >= (sample + 1) * size, "a sample of the batch");
+            debug_assert!(
+                values.len() >= (sample + 1) * size,
+                "the sample must be in the batch"
+            );
             sample * size..(sample + 1) * size
         };
         let (from, by) = (self.values(map), self.values(weights));

@@ -54,7 +54,11 @@ const SMALL: usize = 5;
 pub(super) fn add_product(sum: &mut [f32], a: Matrix<'_>, b: Matrix<'_>) {
     let (view_of_a, view_of_b) = (a.view(), b.view());
     let (rows, inner, columns) = (view_of_a.nrows(), view_of_a.ncols(), view_of_b.ncols());
-    assert_eq!(inner, view_of_b.nrows(), "matrices that can be multiplied");
+    assert_eq!(
+        inner,
+        view_of_b.nrows(),
+        "the sizes of the matrices must match"
+    );
     assert_eq!(sum.len(), rows * columns, "room for the product");
     if rows.min(inner).min(columns) <= SMALL {
         return add_small_product(sum, a, b);

@@ -114,7 +114,7 @@ impl<'a> Record<'a> {
         self.next += 1;
         assert_eq!(
             self.parameters[at].name, name,
-            "parameters in the order of the layers"
+            "parameters must be in the order of the layers"
         );
         at
     }

@@ -29,7 +29,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     let leg = median(all().flat_map(|frame| LEGS.map(|leg| length(frame, leg))));
     if !(LEG_METRES[0]..=LEG_METRES[1]).contains(&leg) {
         return refuse(format!(
-            "a leg would be {leg:.3} m long: is the unit wrong? (unit = \"mm\" in a marker table)"
+            "a leg would be {leg:.3} m long: is the unit wrong? (set unit = \"mm\" in a marker table)"
         ));
     }
     let head_above_foot = |frame: &[[f64; 3]; 14]| frame[HEAD][2] - frame[LEGS[0][2]][2];
@@ -37,7 +37,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     // A person may be lying. A head that is below the feet most of the time indicates a wrong axis.
     if head < -0.3 * leg {
         return refuse(format!(
-            "the head would be {:.2} m below the feet: does another axis point up? (up = \"y\" in a marker table)",
+            "the head would be {:.2} m below the feet: is another axis vertical? (set up = \"y\" in a marker table)",
             -head
         ));
     }
