@@ -143,7 +143,7 @@ mod tests {
             About::from_map(&map).unwrap_err().to_string()
         };
         assert!(refused("format", "4").contains("format \"4\""));
-        assert!(refused("session", "-1").contains("session is \"-1\""));
+        assert!(refused("session", "-1").contains("session in the recording is \"-1\""));
         assert!(refused("without_pixels", "maybe").contains("\"maybe\""));
     }
 }

@@ -154,7 +154,7 @@ mod tests {
         let said = |change: &dyn Fn(&mut String)| parse(&file(change)).unwrap_err().to_string();
         let renamed =
             said(&|header| *header = header.replace("features.28.bias", "features.30.bias"));
-        assert_eq!(renamed, "there is no `features.28.bias`");
+        assert_eq!(renamed, "the file has no `features.28.bias`");
         let half = said(&|header| *header = header.replacen("F32", "F16", 1));
         assert!(half.starts_with("`features.0.weight` is F16"), "{half}");
         assert!(matches!(
