@@ -34,11 +34,12 @@ const REMEMBERED_S: f64 = 60.0;
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
-/// A person takes no detection whose colour is nearer by this much to that of another person within this distance, in metres. A smaller
-/// difference counts as a distance of this many metres for each unit.
-const OTHER_COLOUR: f64 = 0.25;
+/// Cost of a detection whose colour is nearer to that of another person within this distance, in metres: so many metres for each unit of
+/// the difference.
 const RIVAL_M: f64 = 2.0;
 const COLOUR_M: f64 = 2.0;
+/// A person is left without a detection rather than given one that costs more than this multiple of the person's reach.
+const UNSEEN: f64 = 2.0;
 /// A missed person is recognised by the colour of the trunk within [`MISSED_M`], if the colours differ by less than this.
 const SAME_CLOTHES: f64 = 0.12;
 /// Number of views that must see a new person, or all views if there are fewer.
@@ -170,19 +171,26 @@ impl Tracker {
                 );
                 let fit = fit
                     .filter(|fit| fit.distance < self.tracks[track].reach(now.time_s, now.gap_s))?;
-                let by_colour = self.by_colour(now, track, free[column])?;
-                Some((fit, fit.distance + by_colour))
+                Some((fit, fit.distance + self.by_colour(now, track, free[column])))
             };
             let fits: Vec<_> = (0..rows.len())
                 .map(|row| (0..free.len()).map(|column| fit(row, column)).collect::<Vec<_>>())
                 .collect();
-            let cost =
-                |row: usize, column: usize| fits[row][column].map_or(NEVER, |(_, cost)| cost);
-            let assigned = assign(rows.len(), free.len(), cost);
+            let n = free.len();
+            let unseen = |row: usize| UNSEEN * self.tracks[rows[row]].reach(now.time_s, now.gap_s);
+            let cost = |row: usize, column: usize| {
+                if column < n {
+                    fits[row][column].map_or(NEVER, |(_, cost)| cost)
+                } else {
+                    unseen(row)
+                }
+            };
+            let assigned = assign(rows.len(), n + rows.len(), cost);
             let mut taken = Vec::new();
             for (row, column) in assigned.into_iter().enumerate() {
-                let Some((column, (fit, _))) =
-                    column.and_then(|column| Some((column, fits[row][column]?)))
+                let Some((column, (fit, _))) = column
+                    .filter(|column| *column < n)
+                    .and_then(|column| Some((column, fits[row][column]?)))
                 else {
                     continue;
                 };
@@ -196,12 +204,11 @@ impl Tracker {
         }
     }
 
-    /// Returns the cost of a detection whose colour is that of another person nearby rather than that of the track, in metres; `None` if it
-    /// cannot be the track's.
-    fn by_colour(&self, now: &Now<'_>, track: usize, at: Place) -> Option<f64> {
+    /// Returns the cost of a detection whose colour is that of another person nearby rather than that of the track, in metres.
+    fn by_colour(&self, now: &Now<'_>, track: usize, at: Place) -> f64 {
         let frame = now.frame;
         let Some(own) = self.tracks[track].colours.difference(frame, at) else {
-            return Some(0.0);
+            return 0.0;
         };
         let others = self.tracks.iter().zip(now.expected).enumerate();
         let others = others.filter_map(|(nth, (other, expected))| {
@@ -210,8 +217,7 @@ impl Tracker {
             (fit.distance < RIVAL_M).then_some(by)
         });
         let other = others.fold(f64::INFINITY, f64::min);
-        let excess = (own - other).max(0.0);
-        (excess < OTHER_COLOUR).then_some(COLOUR_M * excess)
+        COLOUR_M * (own - other).max(0.0)
     }
 
     /// Updates the people for whom detections were assigned.
