@@ -276,7 +276,10 @@ mod tests {
             assert_eq!(chosen(Some("desk"), "far"), "desk");
         } else {
             let error = choose(&it, Some("desk"), "far").unwrap_err();
-            assert!(error.to_string().contains("no hosts"), "{error}");
+            assert!(
+                error.to_string().contains("does not support hosts"),
+                "{error}"
+            );
         }
         let error = choose(&it, None, "laptop").unwrap_err();
         assert!(error.to_string().contains("desk, far"), "{error}");

@@ -173,7 +173,11 @@ mod long {
         let wrong = refine(&case, "wrong", "better.toml");
         let ended = right.wait();
         assert_eq!(ended.status.code(), Some(6), "{}", ended.stderr);
-        assert!(ended.stderr.contains("keep the rig"), "{}", ended.stderr);
+        assert!(
+            ended.stderr.contains("keep the old rig"),
+            "{}",
+            ended.stderr
+        );
         assert!(!case.path("right.toml").exists());
         let ended = wrong.wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

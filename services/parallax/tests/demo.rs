@@ -124,7 +124,7 @@ fn counts_are_those_of_the_results(case: &Case, report: &Value, page: &str) {
         if *results == 1 { "" } else { "s" }
     );
     assert!(
-        page.contains(&format!("gave {results} {said}")),
+        page.contains(&format!("produced {results} {said}")),
         "{said}: {page:.4000}"
     );
 }

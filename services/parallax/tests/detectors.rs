@@ -266,6 +266,6 @@ fn numbers_are_of_the_type_that_the_card_says() {
     );
     let ended = run(&case, &show, &[]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stdout);
-    let said = "det.onnx does not fit its card (det.toml)";
+    let said = "det.onnx does not match its card (det.toml)";
     assert!(ended.stderr.contains(said), "{}", ended.stderr);
 }

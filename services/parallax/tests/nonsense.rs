@@ -163,7 +163,7 @@ const SETTINGS: &[Row] = &[
         },
         CHECK,
         0,
-        &["`supervise.deadline_ms` is 5", "10000 is usual"],
+        &["`supervise.deadline_ms` is 5", "the usual value is 10000"],
     ),
 ];
 

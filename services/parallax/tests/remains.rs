@@ -104,7 +104,7 @@ fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
         "link clean photos: 1",
         "link status: 1",
         "link run deployment.toml: 1",
-        "that belongs to user nobody (65534)",
+        "is a symbolic link of user nobody (65534)",
     ] {
         assert!(said.contains(words), "{words}: {said}");
     }

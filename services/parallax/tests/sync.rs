@@ -216,7 +216,7 @@ fn clocks_are_found_by_the_sounds_of_the_videos() {
     let ended = estimate(&case, &["--by", "sound"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert!(
-        ended.stderr.contains("c2: 0 sounds begin"),
+        ended.stderr.contains("c2: only 0 sounds begin"),
         "{}",
         ended.stderr
     );

@@ -14,10 +14,10 @@ use crate::shipped::{SHIPPED, relative_to};
 pub struct Config {
     /// Network that finds joints: `"shipped"`, or an ONNX file with its card in its metadata or beside it (`.toml` for `.onnx`).
     pub file: PathBuf,
-    /// Detector that finds people: `"shipped"`, or an ONNX file with its card in its metadata or beside it. The detector gives boxes to the
-    /// network.
+    /// Detector that finds people and gives their boxes to the network: `"shipped"`, or an ONNX file with its card in its metadata or
+    /// beside it.
     pub detector: PathBuf,
-    /// Interval between searches for people, in frames. By default, there are two searches per second, or eight while people are near each
+    /// Interval between searches for people, in frames; by default, there are two searches per second, or eight while people are near each
     /// other or just after a person has appeared or left.
     pub find_every: Option<u64>,
     /// Minimum heat (from 0 to 1, as the mean over the joints) at which a person counts as visible.

@@ -291,7 +291,9 @@ mod tests {
         ] {
             let error = opened.unwrap_err().to_string();
             assert!(
-                error.starts_with(&format!("a symbolic link of {own} lies there")),
+                error.starts_with(&format!(
+                    "a symbolic link that belongs to {own} already exists"
+                )),
                 "{error}"
             );
         }

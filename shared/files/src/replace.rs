@@ -129,7 +129,10 @@ mod tests {
         std::os::unix::fs::symlink(&secret, &path).unwrap();
         std::os::unix::fs::symlink(&secret, beside(&path)).unwrap();
         let error = replace(&path, b"x").unwrap_err().to_string();
-        assert!(error.contains("a symbolic link of user "), "{error}");
+        assert!(
+            error.contains("a symbolic link that belongs to user "),
+            "{error}"
+        );
         fs::remove_file(beside(&path)).unwrap();
         replace(&path, b"x").unwrap();
         assert_eq!(fs::read_to_string(&secret).unwrap(), "kept");

@@ -48,7 +48,7 @@ pub enum ModelFileError {
     },
     /// The beginning of the file matches none of the formats.
     #[error(
-        "{} is not a model: it begins with \"{beginning}\", expected `PLXMODEL` (Parallax), `MATLAB 5.0` \
+        "{} is not a model: the file begins with \"{beginning}\", expected `PLXMODEL` (Parallax), `MATLAB 5.0` \
          (Yang & Ramanan) or `partsNbr` (the authors' text)",
         path.display()
     )]

@@ -101,7 +101,7 @@ pub enum ModelError {
         parent: usize,
     },
     /// An index in a part is out of range.
-    #[error("part {part} names {what} {index}, but there are {count}")]
+    #[error("part {part} names {what} {index}, but the model has only {count}")]
     Missing {
         /// The part in question, counted from 1.
         part: usize,

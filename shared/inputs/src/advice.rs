@@ -80,11 +80,11 @@ pub(crate) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
         .filter(|folder| !folder.is_dir());
     let message = match in_the_way {
         Some(file) => format!(
-            "cannot make the folder {}: {} is a file",
+            "cannot create the folder {}: {} is a file",
             folder.display(),
             file.display()
         ),
-        None => format!("cannot make the folder {}: {error}", folder.display()),
+        None => format!("cannot create the folder {}: {error}", folder.display()),
     };
     Failure::new(ExitKind::Input, message)
         .with_hint("choose a folder that can be written to, with `output` in the deployment file or with --out")

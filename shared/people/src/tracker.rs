@@ -38,7 +38,7 @@ const SAME_COLOUR: f64 = 0.2;
 /// the difference.
 const RIVAL_M: f64 = 2.0;
 const COLOUR_M: f64 = 2.0;
-/// A person is left without a detection rather than given one that costs more than this multiple of the person's reach.
+/// A person is left without a detection rather than given one that costs more than this multiple of the largest reach.
 const UNSEEN: f64 = 2.0;
 /// A missed person is recognised by the colour of the trunk within [`MISSED_M`], if the colours differ by less than this.
 const SAME_CLOTHES: f64 = 0.12;
@@ -161,6 +161,8 @@ impl Tracker {
         let rows: Vec<usize> = (0..self.tracks.len())
             .filter(|nth| self.is_established(&self.tracks[*nth]) == is_known)
             .collect();
+        let reaches = rows.iter().map(|track| self.tracks[*track].reach(now.time_s, now.gap_s));
+        let unseen = UNSEEN * reaches.fold(0.0, f64::max);
         for free in free.iter_mut() {
             let fit = |row: usize, column: usize| {
                 let track = rows[row];
@@ -177,12 +179,11 @@ impl Tracker {
                 .map(|row| (0..free.len()).map(|column| fit(row, column)).collect::<Vec<_>>())
                 .collect();
             let n = free.len();
-            let unseen = |row: usize| UNSEEN * self.tracks[rows[row]].reach(now.time_s, now.gap_s);
             let cost = |row: usize, column: usize| {
                 if column < n {
                     fits[row][column].map_or(NEVER, |(_, cost)| cost)
                 } else {
-                    unseen(row)
+                    unseen
                 }
             };
             let assigned = assign(rows.len(), n + rows.len(), cost);

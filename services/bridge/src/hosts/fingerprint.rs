@@ -77,7 +77,7 @@ mod tests {
             got,
             [
                 "rig differs: af63dc4c8601ec8c on this host, af63df4c8601f1a5 on the other host",
-                "network differs: nothing here, shipped there"
+                "network differs: nothing on this host, shipped on the other host"
             ]
         );
     }

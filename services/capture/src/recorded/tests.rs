@@ -141,7 +141,7 @@ fn what_a_recording_does_not_hold_is_said() {
     };
     let text = refused(&Recorded::address(&file, "right"));
     assert!(
-        text.contains("\"right\"") && text.contains("those of left"),
+        text.contains("\"right\"") && text.contains("pictures of left"),
         "{text}"
     );
     assert!(refused(&file.display().to_string()).contains("run.mcap#NAME"));

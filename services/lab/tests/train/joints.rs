@@ -93,7 +93,7 @@ fn knees_that_are_marked_lower_are_found_lower_with_the_file_that_was_learned() 
     assert_eq!((shipped, &of_other), (before, &plain), "of another model");
 
     let again = drawn.learn_joints("two.joints", &["--threads", "2"]);
-    assert!(again.stdout.contains("<- taken"), "{}", again.stdout);
+    assert!(again.stdout.contains("<- chosen"), "{}", again.stdout);
     assert!(drawn.model("one.joints") == drawn.model("two.joints"));
 
     assert_eq!(drawn.knee("shipped"), drawn.knee("none"));

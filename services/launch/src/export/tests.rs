@@ -219,7 +219,7 @@ fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
     let origin = Origin::read(folder.path(), &Given::default()).unwrap();
     let refused =
         |formats: &[&str]| exported(&origin, &job(folder.path(), formats)).unwrap_err().to_string();
-    assert!(refused(&["c3d", "csv"]).contains("the run has no frame rate"));
+    assert!(refused(&["c3d", "csv"]).contains("the frame rate of the run is not known"));
     assert!(refused(&["openpose"]).contains("deployment.json"));
     assert!(!folder.path().join("export").exists());
     exported(&origin, &job(folder.path(), &["csv"])).unwrap();

@@ -40,7 +40,7 @@ pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     let how = if offset < 0.0 { "before" } else { "after" };
     format!(
         "  clock         {camera} is out of step: according to the movement of people, its pictures were taken {:.0} ms {how} their \
-         stated times, +-{error:.0}\n",
+         stated times (+-{error:.0} ms)\n",
         offset.abs(),
     )
 }

@@ -111,7 +111,7 @@ const NO_FILES: &[Mistake] = &[
         "RTSP",
         |case| source(case, "rtsp://me:secret@127.0.0.1:9/live"),
         &[
-            "no pictures from rtsp://127.0.0.1:9/live",
+            "no pictures were received from rtsp://127.0.0.1:9/live",
             "Connection refused",
         ],
     ),

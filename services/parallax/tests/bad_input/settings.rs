@@ -54,7 +54,7 @@ const FILES: &[Mistake] = &[
         made: NOTHING,
         command: "config check a/0000.png",
         code: 4,
-        says: &["a/0000.png", "no text"],
+        says: &["a/0000.png", "not a text file"],
         tries: &["UTF-8"],
     },
     Mistake {

@@ -165,7 +165,11 @@ fn inverted_and_mirrored_pictures_are_found_and_named() {
 #[test]
 fn confused_counts_and_patterns_are_named() {
     for (told, printed, said) in [
-        ("charuco:7x5:30mm", "charuco:5x7:30mm", "5x7, not 7x5"),
+        (
+            "charuco:7x5:30mm",
+            "charuco:5x7:30mm",
+            "5x7 squares, corners or tags, not 7x5",
+        ),
         ("charuco:5x6:30mm", "charuco:5x6:30mm:legacy", "before 4.6"),
     ] {
         let finder = finder(told);

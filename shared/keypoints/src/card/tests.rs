@@ -60,7 +60,7 @@ const CASES: [[&str; 3]; 18] = [
     [
         "codec = \"heat-map\"",
         "codec = \"heat-map\"\nudp = true\ncentred = true",
-        "`output.centred` is true, expected false where `udp` is true",
+        "`output.centred` is true, expected false, because with `udp`",
     ],
     ["version = 1", "version = 2", "version 2, expected"],
     [

@@ -258,7 +258,7 @@ fn a_wrong_file_is_refused_with_the_field() {
         (
             "/model/shape/mirror/0",
             json!(3),
-            "`model.shape.mirror` is not its own inverse",
+            "`model.shape.mirror` is not a list of mutual mirror parts",
         ),
         (
             "/ring/0/same/0",

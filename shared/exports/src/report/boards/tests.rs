@@ -79,6 +79,6 @@ fn the_page_says_what_is_known_and_what_is_not_to_be_trusted() {
     testkit::chromium::check_in_browser(&good);
     let doubt = Doubt::FewBoards { camera: 0, n: 2 };
     let bad = page(&outcome(vec![doubt]), &["mirrored".to_owned()]);
-    assert!(bad.contains("not to be trusted") && bad.contains("in 2 pictures only"));
+    assert!(bad.contains("not to be trusted") && bad.contains("in only 2 pictures"));
     assert!(bad.contains("mirrored"));
 }
