@@ -15,7 +15,7 @@ pub(crate) struct Confuser {
     solver: Solver,
 }
 
-/// The loss of a pose: the mean over its parts, each between 0 and the same maximum.
+/// The loss of a pose: the mean of the losses of its parts, each between 0 and the same maximum.
 ///
 /// The solver adds this loss to the scores, which gives loss-augmented inference.
 #[derive(Debug)]

@@ -47,9 +47,9 @@ struct Group<K> {
 /// The group of an example, and the cost of violating its margin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost<K> {
-    /// Group of the example: only its worst example counts.
+    /// Group of the example; only the worst example of a group counts.
     pub group: K,
-    /// Cost per unit by which the group's worst example misses its margin.
+    /// Cost per unit by which the worst example of the group misses its margin.
     pub of_unit: f64,
 }
 
@@ -87,8 +87,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
 
     /// Adds a constraint. The cost of a group is the cost of its first example.
     ///
-    /// * `share`: share of the example in the solution; 0 for a new example, see
-    ///   [`Self::entries`].
+    /// * `share`: weight of the example in the solution; 0 for a new example, see [`Self::entries`].
     pub fn add(&mut self, cost: Cost<K>, tag: T, demand: Constraint, share: f64) {
         let Cost { group, of_unit } = cost;
         let groups = &mut self.groups;
@@ -150,8 +149,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         self.keep(&|entry| wanted(&entry.tag));
     }
 
-    /// Shrinks the working set. Removes examples without a share that exceed their margin by `room`. Then removes
-    /// other examples without a share, those with the largest slack first, until at most `bytes` are used.
+    /// Shrinks the working set. First removes the examples that have no share in the solution and exceed their margin by more than `room`.
+    /// Then removes other examples without a share, the ones with the largest slack first, until at most `bytes` are used.
     ///
     /// * `may_go`: returns true if an example with this tag may be removed.
     pub fn forget(&mut self, room: f64, bytes: usize, may_go: impl Fn(&T) -> bool) {

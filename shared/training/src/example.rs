@@ -13,7 +13,7 @@ use crate::sparse::{Run, Sparse};
 pub(crate) struct Example {
     /// Features of the pose.
     pub features: Sparse,
-    /// The part of the score due to the minimum stiffness, which is not trained.
+    /// The part of the score that comes from the minimum stiffness of the springs, which is not trained.
     pub fixed: f64,
 }
 
@@ -57,7 +57,7 @@ impl Example {
         Self::with(shape, at, pose, Some(Arc::clone(&pyramid.cells)), runs)
     }
 
-    /// Adds springs and biases to the runs of the filters.
+    /// Adds the features of springs and biases to those of the filters.
     fn with(
         shape: &Shape,
         at: &Coordinates,

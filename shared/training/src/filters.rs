@@ -10,9 +10,9 @@ use crate::sparse::Sparse;
 /// Settings for training the initial filters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FilterSettings {
-    /// Cost of a negative window that misses its margin.
+    /// Cost per unit by which a negative window misses its margin.
     pub cost: f64,
-    /// Cost of a positive window that misses its margin, as a multiple of the cost of a negative window.
+    /// Cost per unit by which a positive window misses its margin, as a multiple of the cost of a negative window.
     pub positive_weight: f64,
     /// Stopping criterion for the training of each machine.
     pub effort: Effort,

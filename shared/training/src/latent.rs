@@ -230,7 +230,7 @@ impl Search<'_> {
         self.cells[part].iter().map(of_cell).collect()
     }
 
-    /// Best score, and the cell that gives it, for every cell of the parent and type of the part.
+    /// For every cell of the parent and type of the part, the best score and the cell that gives it.
     fn votes(&self, part: usize, scores: &Scores) -> Vec<Vec<(f64, usize)>> {
         let Some(edge) = &self.model.spec().parts[part].edge else {
             return Vec::new();

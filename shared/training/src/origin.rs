@@ -40,7 +40,7 @@ impl Placed {
     }
 }
 
-/// The origin of an example. People are numbered as in the plan.
+/// The origin of an example. People have the same numbers as in the [`Plan`](crate::Plan).
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) enum Origin {
     /// The right pose of a person.
@@ -87,7 +87,7 @@ impl Origin {
         }
     }
 
-    /// Returns true if the image of the example shows a person, and the number of the image.
+    /// Returns two values: true if the image of the example shows a person, and the number of the image.
     pub(crate) fn source(&self) -> (bool, u32) {
         match self {
             Self::Right { person, .. } | Self::Mistake { person, .. } => (true, *person),

@@ -13,7 +13,7 @@ pub struct Tree {
     pub names: Vec<String>,
     /// Parent of every part, with a smaller index than the part; `None` for the root, which is part 0.
     pub parents: Vec<Option<usize>>,
-    /// For each part, the part on the other side of the body.
+    /// For each part, the corresponding part on the other side of the body.
     pub mirror: Option<Vec<usize>>,
 }
 
@@ -36,7 +36,7 @@ pub struct Plan {
 /// A person of the training set.
 #[derive(Debug, Clone, PartialEq)]
 struct Planned {
-    /// Number of the person in the album.
+    /// Number of the person in the [`Album`](crate::Album).
     person: usize,
     parts: Vec<[f64; 2]>,
     side: f64,
@@ -160,17 +160,17 @@ impl Plan {
         self.people.len()
     }
 
-    /// Number of people dropped because they are smaller than the filters.
+    /// Number of people left out because they are smaller than the filters.
     pub fn n_small(&self) -> usize {
         self.n_small
     }
 
-    /// Number in the album of a person to train on.
+    /// Number of a training person in the [`Album`](crate::Album). `it` is the person's number in the plan.
     pub fn person(&self, it: usize) -> usize {
         self.people[it].person
     }
 
-    /// Positions of a person's parts, with or without the types of the clusters.
+    /// Positions of a person's parts. If `with_types` is set, each part must have the type of its cluster; otherwise, any type is allowed.
     pub fn marked(&self, it: usize, with_types: bool) -> Marked {
         let person = &self.people[it];
         Marked {

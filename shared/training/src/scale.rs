@@ -4,9 +4,9 @@ use statistics::Sorted;
 
 /// Sizes of the part boxes of all people, in pixels of their images.
 ///
-/// The length of every edge of the tree is divided by its typical length relative to the first edge (neck to head). The side of a person's
-/// boxes is the upper quartile of the results. The box thus has the size that the head would have even if the head is tilted towards the
-/// camera. Source: the function `pointtobox` in the release of Yang & Ramanan 2013.
+/// The length of every edge of the tree is divided by the typical ratio of its length to the length of the first edge (neck to head). The
+/// side of a person's boxes is the upper quartile of the results. The box thus has the size that the head would have even if the head is
+/// tilted towards the camera. Source: the function `pointtobox` in the release of Yang & Ramanan 2013.
 ///
 /// * `people`: centres of the parts of every person, in pixels.
 /// * `parents`: parent of every part; `None` for the root.

@@ -14,8 +14,8 @@ pub struct Settings {
     pub n_types: usize,
     /// Offsets by which the parts are clustered into types.
     pub types_by: TypesBy,
-    /// True if the left side of the body is the mirror image of the right side, in types, filters, springs and
-    /// biases. Only valid if the training set contains the mirror images.
+    /// True if the types, filters, springs and biases of the left side of the body are the mirror image of those of the right side. Only
+    /// valid if the training set contains the mirror images.
     pub symmetric: bool,
     /// Number of random starts of every clustering; the tightest result is used.
     pub cluster_starts: usize,
@@ -43,17 +43,17 @@ pub struct Settings {
     /// Memory for the examples and their features, in MiB. Examples that the solution needs are kept even
     /// if they take more.
     pub cache_mib: usize,
-    /// Slack beyond the margin above which a negative is removed from the working set.
+    /// A negative is removed from the working set if it exceeds its margin by more than this value.
     pub room: f64,
     /// Maximum number of negatives that are added from one image at a time, best first.
     pub per_image: usize,
-    /// Number of background images that are searched between two solutions.
+    /// Number of background images that are searched before the machine is solved again.
     pub batch: usize,
     /// Number of rounds in which every part keeps the type of its cluster.
     pub fixed_rounds: usize,
     /// Number of later rounds in which the model chooses the types.
     pub latent_rounds: usize,
-    /// Number of passes over all background images in a round.
+    /// Number of passes over all background images in each round.
     pub passes: usize,
     /// Seed of all random numbers.
     pub seed: u64,

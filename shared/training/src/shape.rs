@@ -6,7 +6,8 @@ use fmp::{Edge, Filter, Model, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spri
 /// & Ramanan 2013).
 pub const MIN_STIFFNESS: f64 = 0.01;
 
-/// Scale of the root's bias: its part of the norm is weighted with the square of this factor, so that it is regularised weakly.
+/// Scale of the root's bias. In the norm, the square of the bias is multiplied by the square of this factor, so that the bias is
+/// regularised only weakly.
 const ROOT_BIAS_SCALE: f64 = 0.01;
 
 /// The fixed properties of a model: tree, sizes, names, and rest positions of the springs.
@@ -18,7 +19,7 @@ pub struct Shape {
     pub part_names: Vec<String>,
     /// Parent of every part, with a smaller index than the part; `None` for the root.
     pub parents: Vec<Option<usize>>,
-    /// For each part, the part on the other side of the body.
+    /// For each part, the corresponding part on the other side of the body.
     pub mirror: Option<Vec<usize>>,
     /// Rest position of each type of a part relative to its parent, `[x, y]` in cells: `[part][type]`.
     pub anchors: Vec<Vec<[i32; 2]>>,

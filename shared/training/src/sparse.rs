@@ -14,8 +14,8 @@ struct Span {
 
 /// A sparse vector, as runs of values in ascending order, times 1 or -1.
 ///
-/// The values of a run belong to the vector, or are in an array that many vectors share. The shared array holds the features of
-/// one image; each example refers to different windows of it.
+/// The values of a run belong to the vector, or are stored in an array that many vectors share. The shared array holds the features of one
+/// image; each example refers to different windows of it.
 ///
 /// Two vectors in one operation ([`Self::dot_sparse`], [`Self::minus`]) must have the same kinds of runs. Any two
 /// runs either begin at the same coordinate and have the same length, or share no coordinate.
@@ -42,7 +42,7 @@ pub enum Run {
 }
 
 impl Sparse {
-    /// Makes a vector of runs `(start, values)`, in ascending order and without overlap.
+    /// Makes a vector of runs `(start, values)`, which must be in ascending order and must not overlap.
     pub fn new<R: AsRef<[f32]>>(runs: impl IntoIterator<Item = (usize, R)>) -> Self {
         let runs = runs.into_iter();
         Self::sharing(

@@ -51,13 +51,13 @@ pub enum TrainError {
     /// There are no background images.
     #[error("there are no images without people: a model cannot be trained on people alone")]
     NoBackgrounds,
-    /// No person could be placed.
+    /// The model could not be placed on any person.
     #[error("none of {n_people} people could be placed on any level of the pyramid")]
     NobodyPlaced {
         /// Number of people to train on.
         n_people: usize,
     },
-    /// A pose is not on its image, which must have changed since the pose was found.
+    /// A stored pose is outside its image. The image must have changed since the pose was found.
     #[error("a pose is outside its image: an image has changed since the training began")]
     Moved,
     /// The trained parameters are not a valid model.
@@ -78,7 +78,7 @@ pub struct Trainer<'a> {
     machine: Machine<Group, Origin>,
     /// Features of the images without people, kept while examples use them.
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
-    /// Last placement of every person.
+    /// Most recent right pose of every person.
     right: Vec<Option<Placed>>,
     /// The symmetry of the model, if it is symmetric.
     symmetry: Option<Symmetry>,
@@ -207,10 +207,10 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    /// Places all people again, and replaces their examples.
+    /// Finds the right poses of all people again, and replaces the examples made from them.
     fn place(&mut self, round: usize) -> Result<(), TrainError> {
         let placed = self.best_placements(round < self.settings.fixed_rounds)?;
-        // Most people keep nearly the same placement, so their shares are a good start.
+        // Most right poses hardly change, so their old shares are good initial values.
         let mut shares = vec![0.0; self.plan.n_people()];
         for (origin, share) in self.machine.entries() {
             if let Origin::Right { person, .. } = origin {
@@ -253,7 +253,7 @@ impl<'a> Trainer<'a> {
     fn forget(&mut self) {
         let features = self.bytes() - self.machine.bytes();
         let room = (self.settings.cache_mib << 20).saturating_sub(features);
-        // A right pose without a share may be needed later, and would not be found again.
+        // A right pose is kept even if its share is 0: it may be needed later, and nothing would add it again.
         let may_go = |origin: &Origin| !matches!(origin, Origin::Right { .. });
         self.machine.forget(self.settings.room, room, may_go);
         let image = |origin: &Origin| match origin {

@@ -15,7 +15,7 @@ pub(crate) struct Types {
 
 /// Clusters every part of all people into types by k-means.
 ///
-/// If there is a mirror, type `k` of a part is the mirror image of type `k` of the part on the other side. The types of a part in the
+/// If `mirror` is given, type `k` of a part is the mirror image of type `k` of the part on the other side. The types of a part in the
 /// middle come in mirrored pairs: 0 and 1, 2 and 3, and so on. If the number of types is odd, such a part has one type fewer.
 ///
 /// There are fewer types if there are fewer different people.
@@ -74,7 +74,7 @@ struct Offsets {
 }
 
 impl Offsets {
-    /// Finds the parts whose offsets define the types of `part`, its parent first.
+    /// Finds the parts whose offsets define the types of `part`. The first one is the parent of `part`.
     fn new(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
         let children = (0..parents.len()).filter(|&i| parents[i] == Some(part));
         let mut neighbours: Vec<_> = parents[part].into_iter().collect();
@@ -152,7 +152,7 @@ impl OfPart {
     }
 }
 
-/// Types of a part in the middle, in pairs. Offsets to the left are mirrored before clustering.
+/// Types of a part in the middle of the body, as mirrored pairs. Offsets to the left are mirrored before clustering.
 ///
 /// * `both`: the offsets of every person, plain and mirrored.
 fn in_the_middle(

@@ -7,7 +7,7 @@ use crate::dual::Gap;
 pub enum Step {
     /// Train a separate filter for every part and type.
     Filters,
-    /// Find every person's best placement.
+    /// Find the best pose of every person near the annotated parts.
     Place {
         /// Number of the round, from 0.
         round: usize,
@@ -21,7 +21,7 @@ pub enum Step {
         /// Number of the batch within the pass, from 0.
         batch: usize,
     },
-    /// Find every person's best placement under the final model, to set the threshold.
+    /// Find the best pose of every person under the final model, and set the detection threshold from the scores.
     Judge,
 }
 
@@ -35,9 +35,9 @@ pub enum Event {
         /// Number of images in the step.
         of: usize,
     },
-    /// People were placed.
+    /// The best poses of the people were found.
     Placed {
-        /// Number of people placed.
+        /// Number of people for whom a pose was found.
         n: usize,
         /// Number of people who do not fit the model on any level.
         n_lost: usize,

@@ -9,9 +9,10 @@ pub struct ReadOptions {
     pub only: Option<Selection>,
     /// The people to leave out, such as a test set.
     pub without: Option<Selection>,
-    /// Number of joints of a person; if `None`, the number of joints of the first person.
+    /// Number of joints of a person; if `None`, every person must have as many joints as the first.
     pub n_joints: Option<usize>,
-    /// Largest accepted distance of a joint outside the image, in pixels. Hand-marked joints are up to 2 px outside.
+    /// Largest accepted distance between a joint outside the image and the border of the image, in pixels. Hand-marked joints are up to 2
+    /// px outside.
     pub outside_px: f64,
     /// True if people with unknown joints are read.
     pub unknown_joints: bool,

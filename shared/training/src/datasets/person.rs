@@ -72,7 +72,7 @@ pub enum Fault {
     /// More or fewer joints than the skeleton has.
     #[error("{got} {what}, expected {expected}")]
     Count {
-        /// The counted entries: joints, or marks of visibility.
+        /// The entries that were counted: joints, or visibility flags.
         what: &'static str,
         /// Number of entries found.
         got: usize,

@@ -26,7 +26,7 @@ impl Sample {
         })
     }
 
-    /// The mirror image: `x` becomes `width - 1 - x`, and left and right joints are exchanged.
+    /// The mirror image: `x` becomes `width - 1 - x`, and left and right joints are swapped.
     ///
     /// * `joint_mirror`: for every joint, the joint on the other side, see
     ///   [`SkeletonTable::joint_mirror`](crate::datasets::SkeletonTable::joint_mirror).

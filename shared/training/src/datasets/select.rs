@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 /// Some of the people of a data set.
 ///
 /// A selection is written as ranges of rows from 1 (`1-100,150`), or as the path of a list file. Each line of the file is a range, a row or
-/// the file name of an image. Every entry must match a person. Otherwise, a typing error in the list of a
-/// test set would add its people to the training set.
+/// the file name of an image. Every entry must match a person. If entries without a person were accepted, a typing error in the list of a
+/// test set would leave people of the test set in the training set.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Selection {
     rows: Vec<RangeInclusive<usize>>,

@@ -1,4 +1,4 @@
-//! Left and right: anatomical, or as seen in the picture.
+//! Conventions for left and right: anatomical, or as seen in the picture.
 
 use core::str::FromStr;
 
@@ -8,15 +8,14 @@ use crate::datasets::Person;
 
 /// The convention of left and right for the joints of a data set.
 ///
-/// A model of parts distinguishes the arms by the side of the picture, because a single view
-/// shows nothing else with certainty. LSP and LSP-extended use the anatomical sides. The two conventions differ for
-/// people seen from behind.
+/// A model made of parts calls an arm left or right by its position in the picture, because a single view shows nothing else with
+/// certainty. In LSP and LSP-extended, left and right are anatomical. The two conventions differ for people seen from behind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sides {
-    /// Sides as annotated.
+    /// Left and right as annotated.
     #[default]
     Marked,
-    /// Sides as if all people faced the camera: left and right are exchanged for people seen from behind.
+    /// Left and right as if all people faced the camera: they are swapped for people seen from behind.
     Seen,
 }
 
@@ -66,8 +65,8 @@ impl Sides {
     }
 }
 
-/// Returns true if the right joints are further right in the picture than the left ones. The median
-/// over all known pairs is used, so that crossed hands or feet have no influence.
+/// Returns true if the joints on the right of the body are to the right of the corresponding left joints in the picture. The median over
+/// all known pairs is used, so that crossed hands or feet have no influence.
 ///
 /// The first of two joints that mirror each other is the right one, as in PARSE and LSP.
 fn is_from_behind(joints: &[[f64; 2]], joint_mirror: &[usize]) -> bool {
@@ -107,7 +106,7 @@ mod tests {
         SkeletonTable::published().joint_mirror().to_vec()
     }
 
-    /// The annotation that the picture would have if it showed the person's back.
+    /// The annotation of the same picture if it showed the person's back: left and right joints are swapped.
     fn from_behind(person: &Person) -> Person {
         let mirror = mirror();
         Person {

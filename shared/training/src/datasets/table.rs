@@ -25,9 +25,8 @@ pub struct SkeletonSpec {
 /// A validated skeleton, for which a model is trained.
 ///
 /// * The parts form a tree: only part 0 is a root, and every other part comes after its parent.
-/// * Both mirrors are their own inverses. The mirror of the parts keeps the tree, and a mirrored part
-///   is between the mirrored joints. The parts of a mirrored person are therefore the mirrored
-///   parts.
+/// * Both mirrors are their own inverses. The parent of a mirrored part is the mirrored parent, and a mirrored part is computed from the
+///   mirrored joints. The parts of a mirrored person are therefore the mirrored parts.
 /// * The weights of every part add up to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonTable(SkeletonSpec);
@@ -102,7 +101,7 @@ pub enum TableError {
         /// Number of its mirror image, from 1.
         other: usize,
     },
-    /// The mirror does not keep the tree.
+    /// The parent of a mirrored part is not the mirrored parent.
     #[error("the mirror of part {part} ({name}) is not a child of the mirror of its parent")]
     MirrorTree {
         /// Number of the part, from 1.
@@ -330,7 +329,8 @@ fn check_weights(spec: &SkeletonSpec) -> Result<(), TableError> {
     Ok(())
 }
 
-/// Checks that the mirror keeps the tree, and maps joints of one side to joints of the other.
+/// Checks that the mirror of every part's parent is the parent of the part's mirror, and that mirrored parts are computed from mirrored
+/// joints.
 fn check_mirror(spec: &SkeletonSpec) -> Result<(), TableError> {
     let n_joints = spec.joint_names.len();
     for (part, &other) in spec.mirror.iter().enumerate() {

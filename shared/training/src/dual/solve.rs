@@ -1,4 +1,4 @@
-//! The steps of the descent.
+//! The steps of the dual coordinate descent.
 
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ impl Gap {
     }
 }
 
-/// The stopping criteria of the descent.
+/// The stopping criteria of the dual coordinate descent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Duality gap at which to stop, as a share of the objective.
@@ -38,7 +38,7 @@ pub struct Effort {
 /// Maximum number of passes over the active examples between two passes over all examples.
 const PASSES_OVER_MOVING: usize = 10;
 
-/// Slope, in margins, below which an example with a share between 0 and its cost counts as optimal.
+/// An example with a share between 0 and its cost counts as optimal if it misses or exceeds its margin by less than this.
 const RESTING: f64 = 0.01;
 
 /// Slack below which an example without a share stays active until the next pass over all examples.
@@ -64,9 +64,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             let at_stake = |i: &usize| self.entries[*i].share > 0.0 || slopes[*i] > -NEAR;
             let mut moving: Vec<_> = (0..self.entries.len()).filter(at_stake).collect();
             for _ in 0..PASSES_OVER_MOVING {
-                // Keeping the examples of one image together would make memory access faster. The descent would then
-                // need several times as many passes, because right and wrong examples must alternate to settle
-                // the root's bias.
+                // Memory access would be faster if the examples of one image stayed together. But the descent would need several times as
+                // many passes: the root's bias converges only if right and wrong examples alternate.
                 random.shuffle(&mut moving);
                 moving.retain(|&i| self.step(i));
             }
@@ -105,7 +104,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         }
     }
 
-    /// Amount by which an example misses its margin. This is the slope of the dual objective along its share.
+    /// Amount by which an example misses its margin. This is the derivative of the dual objective with respect to the share of the example.
     pub(super) fn slope(&self, at: usize) -> f64 {
         let Entry { margin, x, .. } = &self.entries[at];
         margin - x.dot(&self.solution)
@@ -142,7 +141,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         self.change(at, wanted.clamp(-entry.share, room.max(0.0))) && slope.abs() > RESTING
     }
 
-    /// Takes a share from the member of the group that needs it least, if this improves the solution.
+    /// Moves some of the share of the group member that needs it least to this example, if this improves the solution.
     fn exchange(&mut self, at: usize, slope: f64) -> bool {
         let members = &self.groups[self.entries[at].group].members;
         let givers = members

@@ -25,7 +25,7 @@ fn cost(group: usize, of_unit: f64) -> Cost<usize> {
 
 #[test]
 fn two_points_are_separated_in_the_middle() {
-    // The model is w x + b, with points at 1 (wrong) and 3 (right). Without regularisation of b, w = 1 and b = -2. As b is
+    // The model is w x + b, with a negative example at 1 and a positive one at 3. Without regularisation of b, w = 1 and b = -2. As b is
     // regularised too, the problem is min w^2 + b^2 with w + b <= -1 and 3 w + b >= 1.
     let mut machine = Machine::new(2, 0..0);
     machine.add(cost(0, 1e6), (), demand(&[3.0, 1.0], 1.0), 0.0);
@@ -120,8 +120,8 @@ proptest! {
         let mut machine = filled(&examples);
         let before = machine.gap();
         prop_assert!(before.dual <= before.primal + 1e-9);
-        // Groups that pull against each other along a direction with hardly any cost settle
-        // slowly. A few of ten thousand such problems need more than 3000 passes.
+        // The descent converges slowly if groups compete along a direction in which the objective hardly changes. A few of ten thousand
+        // such problems need more than 3000 passes.
         let gap = solve(&mut machine, Effort { tolerance: 1e-4, max_passes: 100_000 });
         prop_assert!(gap.dual <= gap.primal + 1e-6);
         prop_assert!(gap.relative() <= 1e-4 || gap.primal < 1e-9, "{gap:?}");

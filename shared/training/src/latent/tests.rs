@@ -50,7 +50,7 @@ fn overlap(model: &Model, layout: &Layout, pose: &Pose, part: usize) -> f64 {
     common / (area(it) + area(other) - common)
 }
 
-/// All placements of a part that overlap its marked box and have its type.
+/// All positions at which a part overlaps its marked box and has its required type.
 fn placements(
     model: &Model,
     layout: &Layout,

@@ -1,4 +1,4 @@
-//! The parameters of a previously trained network, from which a new training starts.
+//! The parameters of a previously trained network, from which a new training run starts.
 
 use std::collections::BTreeMap;
 
@@ -13,12 +13,12 @@ pub enum BeginError {
     /// The file is not an ONNX file.
     #[error("it is not an ONNX file")]
     Read(#[from] rten_onnx::protobuf::ProtobufError),
-    /// A layer is missing: the network is smaller or of a different kind.
+    /// A layer is missing: the network in the file is smaller or of a different kind.
     #[error(
         "it has no constant {name}; the network in the settings needs one with the dimensions {expected:?}"
     )]
     Missing {
-        /// Name of the layer and its role.
+        /// Name of the layer, with the role of its values.
         name: String,
         /// Expected dimensions.
         expected: Vec<usize>,
@@ -26,7 +26,7 @@ pub enum BeginError {
     /// A layer has unexpected dimensions.
     #[error("its {name} has the dimensions {got:?}, the network in the settings has {expected:?}")]
     Size {
-        /// Name of the layer and its role.
+        /// Name of the layer, with the role of its values.
         name: String,
         /// Dimensions in the file.
         got: Vec<i64>,
@@ -36,7 +36,7 @@ pub enum BeginError {
     /// A constant has a value that is not finite, the wrong number of bytes, or another type.
     #[error("its {name} does not consist of {n} finite numbers of half or single precision")]
     Numbers {
-        /// Name of the layer and its role.
+        /// Name of the layer, with the role of its values.
         name: String,
         /// Expected number of values.
         n: usize,
@@ -54,8 +54,9 @@ pub struct Begun {
 
 /// Reads the parameters of a network that this crate wrote.
 ///
-/// The weights in the file are standardised. The length of every channel becomes its gain, and the weights get the length that they have
-/// at the beginning of a training run. The resulting network gives the same output as the file, except for rounding.
+/// The weights in the file are standardised. The length of every channel's weight vector becomes the gain of the channel. The weights are
+/// then scaled to the length that they have at the beginning of a training run. The resulting network gives the same output as the file,
+/// except for rounding.
 ///
 /// * `all`: the untrained parameters of the network. They are kept for channels that are 0 in the file.
 /// * `may_lack`: prefix of the names of layers that the file may lack; these layers stay untrained.
@@ -87,7 +88,7 @@ pub(crate) fn begun(
         let (these, next) = all.split_at_mut(at + 1);
         let own = &mut these[at].values;
         match next.first_mut().filter(|next| is_gain(next)) {
-            // The gains of a convolution follow its weights.
+            // The gains of a convolution are stored directly after its weights.
             Some(gains) => split(&values, own, &mut gains.values),
             None => *own = values,
         }

@@ -23,7 +23,7 @@ pub enum StoreError {
     /// The file has a different kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The checksum is right, but the payload does not have the form that the header names.
+    /// The checksum is right, but the payload does not have the form that the header states.
     #[error("the payload does not have the expected form")]
     Payload(#[source] Box<bincode::error::DecodeError>),
     /// The content is too large for the format.
@@ -45,7 +45,7 @@ const fn envelope(magic: [u8; 8]) -> Envelope {
     Envelope { magic, version: 1 }
 }
 
-/// A payload with its header.
+/// Returns a payload with its header.
 pub(crate) fn wrap<T: Serialize>(magic: [u8; 8], payload: &T) -> Result<Vec<u8>, StoreError> {
     let payload = bincode::serde::encode_to_vec(payload, configuration());
     let payload = payload.map_err(|error| StoreError::Encode(Box::new(error)))?;

@@ -10,7 +10,7 @@ pub(crate) type Cost<'a> = dyn FnMut(&[Vec<f32>]) -> Vec<Vec<f32>> + 'a;
 /// Inputs of a network for one batch.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shown {
-    /// Number of samples.
+    /// Number of samples in the batch.
     pub n: usize,
     /// Values of every input, in the order of [`Network::inputs`](crate::networks::Network::inputs).
     pub inputs: Vec<Vec<f32>>,
@@ -29,7 +29,7 @@ pub(crate) struct Running<'a> {
 /// Mean and variance of every channel of a batch, at one normalisation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Statistics {
-    /// Index of the parameter with the running mean; the variance follows it.
+    /// Index of the parameter that contains the running mean. The next parameter contains the variance.
     pub(crate) at: usize,
     pub(crate) mean: Vec<f32>,
     pub(crate) variance: Vec<f32>,

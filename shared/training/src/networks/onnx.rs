@@ -18,7 +18,7 @@ pub struct Document {
     pub metadata: Vec<(String, String)>,
     /// True if weights are stored in half precision.
     pub has_half_weights: bool,
-    /// Weights of layers by name. They are written instead of the weights that follow from the parameters.
+    /// Weights of layers by name. They are written instead of the weights computed from the parameters.
     pub kept: BTreeMap<String, Vec<f32>>,
 }
 
@@ -151,7 +151,7 @@ impl<'a> Writer<'a> {
         self.reshaped(map, &dims)
     }
 
-    /// Weights around every position along one side of a map, `[n, positions, cells]`.
+    /// Weights of the cells along one side of a map for every position, `[n, positions, cells]`.
     fn along(&mut self, list: &Value, columns: &[usize], along: &Along) -> Value {
         let id = self.n;
         let [index, centre, scale] =
@@ -255,7 +255,7 @@ impl Ops for Writer<'_> {
         let factors = format!("factors_{}", self.n);
         self.graph.floats(&factors, &[4], vec![1.0, 1.0, 2.0, 2.0]);
         let dims = vec![map.dims[0], 2 * map.dims[1], 2 * map.dims[2]];
-        // Nearest neighbour, rounded down: every cell becomes four equal cells.
+        // Upsampling by nearest neighbour, rounded down: every cell becomes four equal cells.
         self.node("Resize", &[&map.name, "", &factors], vec![], dims)
     }
 
@@ -294,7 +294,7 @@ impl Ops for Writer<'_> {
         let sharp = self.node("Mul", &[&rows.name, &factor], vec![], rows.dims);
         let axis = vec![("axis", Attribute::Int(2))];
         let name = self.node("Softmax", &[&sharp.name], axis, sharp.dims).name;
-        // The value already has rows; the next operations only use its name.
+        // The value already has this layout; the next operations only use its name.
         Value {
             name,
             dims: maps.dims.clone(),

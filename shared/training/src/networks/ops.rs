@@ -5,8 +5,9 @@
 pub enum Scaling {
     /// No scaling of weights and bias.
     Plain,
-    /// Weights are standardised: every channel has mean 0, a length that preserves the variance through a `ReLU`, and a gain (Brock et al.
-    /// 2021, "Characterizing signal propagation to close the performance gap in unnormalized `ResNets`").
+    /// Weights are standardised: the weights of every channel have mean 0 and a length that preserves the variance through a `ReLU`, and
+    /// are multiplied by a gain (Brock et al. 2021, "Characterizing signal propagation to close the performance gap in unnormalized
+    /// `ResNets`").
     Standardised {
         /// Initial gain of every channel.
         gain: f32,
@@ -37,7 +38,7 @@ pub struct Places {
     pub x: Vec<usize>,
     /// Columns of the list with the vertical positions, in heights of the input from its centre.
     pub y: Vec<usize>,
-    /// Width of the input, in heights of the input.
+    /// Aspect ratio of the input: its width divided by its height.
     pub width: f32,
     /// Standard deviation of the Gaussian around a position, in cells of the map.
     pub deviation: f32,
@@ -66,7 +67,7 @@ pub trait Ops {
     fn add(&mut self, a: &Self::Value, b: &Self::Value) -> Self::Value;
     /// Doubles every cell of a map across and down.
     fn doubled(&mut self, map: &Self::Value) -> Self::Value;
-    /// Returns the largest of every 2 x 2 cells of a map.
+    /// Returns the largest value of every block of 2 x 2 cells of a map.
     fn pool(&mut self, map: &Self::Value) -> Self::Value;
     /// Returns the mean of every channel of a map, as a list.
     fn mean(&mut self, map: &Self::Value) -> Self::Value;
@@ -74,16 +75,17 @@ pub trait Ops {
     fn highest(&mut self, map: &Self::Value) -> Self::Value;
     /// Returns the values of a map as a list.
     fn flat(&mut self, map: &Self::Value) -> Self::Value;
-    /// Returns the same value without gradient: nothing before it is trained through it.
+    /// Returns the same value without a gradient, so that the operations before it are not trained by this use of the value.
     fn fixed(&mut self, value: &Self::Value) -> Self::Value;
-    /// Softmax over the cells of every map times `sharpness`: weights around the map's maximum.
+    /// Multiplies the maps by `sharpness`, and returns the softmax over the cells of each map: weights that are largest around the map's
+    /// maximum.
     fn softmax(&mut self, maps: &Self::Value, sharpness: f32) -> Self::Value;
     /// Gaussian weights around the positions in a list: one map for each position, of the size of the map `like`.
     ///
     /// The weights have no gradient.
     fn around(&mut self, list: &Self::Value, like: &Self::Value, places: &Places) -> Self::Value;
-    /// Weighted sums of the channels of a map, with each map of `weights`. The result is a list: all channels for the first weights, then
-    /// all channels for the second, and so on.
+    /// Weighted sums of every channel over the cells of a map, for each map in `weights`. The result is a list: all channels for the first
+    /// weights, then all channels for the second, and so on.
     fn look(&mut self, map: &Self::Value, weights: &Self::Value) -> Self::Value;
     /// Weighted means of the cell positions, for each map of weights. The result is a list of x, y and x² + y² for the first map, then for
     /// the second, and so on. `grid` defines x and y.
@@ -113,7 +115,7 @@ pub trait Network {
     fn inputs(&self) -> Vec<(&'static str, Dims)>;
     /// Outputs, in the order of [`Self::run`].
     fn outputs(&self) -> Vec<Output>;
-    /// Runs the network with the given operations.
+    /// Runs the network with the given implementation of the operations.
     fn run<O: Ops>(&self, ops: &mut O) -> Vec<O::Value>;
 }
 
@@ -135,12 +137,12 @@ pub(crate) fn grid(columns: usize, rows: usize) -> Vec<f32> {
 pub(crate) struct Along {
     /// Positions of the cell centres, in heights of the input from its centre.
     pub(crate) centres: Vec<f32>,
-    /// Factor of the squared distance from a centre in the exponent.
+    /// Factor by which the exponent multiplies the squared distance from a centre.
     pub(crate) factor: f32,
 }
 
 impl Along {
-    /// The cells along a side of the given length, in heights of the input. `deviation` is in cells.
+    /// The cells along a side of length `side`, which is given in heights of the input. `deviation` is in cells.
     pub(crate) fn new(cells: usize, side: f32, deviation: f32) -> Self {
         let cell = side / cells as f32;
         let centre = |at: usize| (at as f32 + 0.5) * cell - 0.5 * side;

@@ -9,7 +9,7 @@ use crate::networks::parameters::{Parameter, Role};
 const DECAYS: [f32; 2] = [0.9, 0.999];
 /// Value added to the root of the mean square of a gradient.
 const EPSILON: f32 = 1e-8;
-/// Share of a running statistic that every batch replaces.
+/// Share of a running statistic that is replaced with the value of every new batch.
 const MOMENTUM_OF_STATISTICS: f32 = 0.05;
 
 /// Step lengths that rise and then fall to 0 as a cosine (Loshchilov and Hutter 2017).
@@ -38,9 +38,9 @@ impl Schedule {
 /// The direction of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {
-    /// Against the gradient, plus a share of the last step.
+    /// Opposite to the gradient, plus a share of the last step.
     Momentum(f32),
-    /// Against the mean gradient divided by the root of the mean square (`AdamW`).
+    /// Opposite to the mean gradient, divided by the root of the mean squared gradient (`AdamW`).
     Adam,
 }
 
@@ -53,9 +53,9 @@ pub struct Step {
     pub rate: f32,
     /// Weight decay: the share of every weight that a step subtracts, before multiplication by the rate.
     pub decay: f32,
-    /// Gradient clipping: longer gradients are scaled to this length.
+    /// Largest length of the gradient: a longer gradient is scaled down to this length (gradient clipping).
     pub longest: f32,
-    /// Share of the mean of the parameters that every step replaces.
+    /// Share of the running mean of the parameters that is replaced in every step.
     pub averaged: f32,
 }
 
@@ -63,7 +63,7 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Memory {
     pub(crate) parameters: Vec<Parameter>,
-    /// Mean of the parameters over the last steps.
+    /// Running mean of the parameters over the last steps.
     pub(crate) averages: Vec<Parameter>,
     /// The last step, or the running mean of the gradients; empty before the first step.
     first: Vec<Vec<f32>>,

@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-/// An odd number whose multiples are spread over the whole range.
+/// An odd number whose multiples are spread evenly over the whole range of `u64`.
 const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Index of the sample with a given number. All samples are used once before any is used again.
@@ -19,7 +19,8 @@ pub(crate) fn dice(number: usize, seed: u64) -> Rng {
 
 /// The number at an index of a random order of `0..n`.
 ///
-/// It is computed by a Feistel network over the next power of 4, repeated until the result is below `n`. No list has to be stored.
+/// It is computed by a Feistel network over the next power of 4, repeated until the result is below `n`. The order therefore does not have
+/// to be stored as a list.
 fn shuffled(place: usize, n: usize, seed: u64) -> usize {
     let half = (usize::BITS - (n.max(2) - 1).leading_zeros()).div_ceil(2);
     let mask = (1usize << half) - 1;

@@ -19,14 +19,14 @@ pub enum Role {
     Weight,
     /// Trained without weight decay.
     Bias,
-    /// A statistic of the data: not trained.
+    /// A statistic of the data, which is not trained.
     Fixed,
 }
 
 /// One list of parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Layer and role, for example `stem1.weight`.
+    /// Name of the layer and role of the values, for example `stem1.weight`.
     pub name: String,
     /// Dimensions, row-major.
     pub dims: Vec<usize>,
@@ -88,8 +88,8 @@ pub(crate) fn normal(rng: &mut Rng) -> f32 {
     (radius * (core::f64::consts::TAU * rng.f64()).cos()) as f32
 }
 
-/// The standardised weights of a convolution. Every channel has mean 0 and a length that preserves the variance through a `ReLU`,
-/// multiplied by its gain.
+/// The standardised weights of a convolution. The weights of every channel have mean 0 and a length that preserves the variance through a
+/// `ReLU`, and are multiplied by the gain of the channel.
 ///
 /// * `weights`: `gains.len()` channels, one after the other.
 pub(crate) fn standardised(weights: &[f32], gains: &[f32]) -> Vec<f32> {

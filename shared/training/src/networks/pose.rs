@@ -8,8 +8,8 @@
 //! * [`file()`]: a trained network as an ONNX file; [`card()`] describes how to use it.
 //! * [`Score`]: measures of the network's quality.
 //!
-//! Labels are **as seen**: for a person seen from behind, left and right joints are exchanged, so that the label follows
-//! the picture. The direction in which the person faces is a separate output.
+//! Labels are **as seen**: for a person seen from behind, left and right joints are swapped, so that a label depends only on the position
+//! in the picture. The direction in which the person faces is a separate output.
 //!
 //! Pixels have their centres at integers.
 
@@ -42,7 +42,7 @@ pub const MIRROR: [usize; N_KEYPOINTS] = [
     5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13, 14, 16, 15, 18, 17,
 ];
 
-/// Position of the maximum of a map, in cells. It is moved by a quarter cell towards the higher neighbour.
+/// Position of the maximum of a map, in cells. The position is moved by a quarter of a cell towards the neighbour with the higher value.
 ///
 /// * `map`: row major, `columns` wide.
 pub fn peak(map: &[f32], columns: usize) -> [f32; 2] {

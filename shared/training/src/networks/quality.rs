@@ -1,7 +1,7 @@
 //! The networks that predict the error of every part in a single view (the paper's section 4.3): samples and training.
 //!
-//! * [`Sample`](sample::Sample): a person in a picture, the evidence of the search about the pose, and the errors of the parts.
-//! * [`QualityTask`](task::QualityTask): the training, by passes over the samples until the validation stops improving.
+//! * [`Sample`](sample::Sample): a person in a picture, values from the search for the pose (the evidence), and the errors of the parts.
+//! * [`QualityTask`](task::QualityTask): the training: passes over the samples until the result on the validation samples stops improving.
 //! * [`Kind`](network::Kind): the networks, including the paper's VGG-16, whose weights [`vgg`] reads.
 
 pub mod judge;

@@ -22,8 +22,8 @@ pub enum Precision {
     /// Single precision.
     #[default]
     F32,
-    /// Half as many bits; only available with `LibTorch`. It is faster if the processor has instructions for it (`avx512_bf16`), and much
-    /// slower otherwise.
+    /// Half as many bits (bfloat16); only available with `LibTorch`. It is faster if the processor has instructions for it (`avx512_bf16`),
+    /// and much slower otherwise.
     Bf16,
 }
 

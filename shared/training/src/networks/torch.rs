@@ -40,7 +40,7 @@ pub(crate) fn learn(
     forward.dice = Some(running.dice);
     let outputs = network.run(&mut forward);
     let values: Vec<Vec<f32>> = outputs.iter().map(|output| numbers(output)).collect();
-    // The gradients of this value with respect to the outputs are those of the cost.
+    // The gradients of this value with respect to the outputs are equal to the gradients of the cost.
     let slope = outputs
         .iter()
         .zip(cost(&values))
@@ -97,7 +97,7 @@ struct Forward<'a> {
     numbers: Kind,
     /// Index of the next parameter.
     next: usize,
-    /// Random generator for training; `None` otherwise.
+    /// Random generator; `None` if the network is not being trained.
     dice: Option<Rng>,
     statistics: Vec<Statistics>,
 }
@@ -156,7 +156,7 @@ impl<'a> Forward<'a> {
         channels_last(&rows.reshape(dims).to_kind(self.numbers))
     }
 
-    /// Normalises every channel over the batch, or by running statistics if the network is not being trained.
+    /// Normalises every channel with the statistics of the batch, or with running statistics if the network is not being trained.
     fn normalised(&mut self, map: &Tensor, name: &str) -> Tensor {
         let [scale, shift] =
             ["scale", "shift"].map(|what| self.parameter(&format!("{name}.{what}")));

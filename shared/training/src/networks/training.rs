@@ -61,7 +61,7 @@ pub trait Task: Sync {
     /// Measures of the network's quality.
     type Score: Kept;
 
-    /// Name of the samples in messages: `people`.
+    /// Name of the samples in messages, for example `people`.
     const LEARNED_FROM: &'static str;
 
     /// Hash of everything that the result depends on.
@@ -78,7 +78,7 @@ pub trait Task: Sync {
     fn seed(&self) -> u64;
     /// Returns the number of steps of the whole training.
     fn n_steps(&self) -> usize;
-    /// Returns the pass that follows the given numbers of steps and passes.
+    /// Returns the next pass, given the numbers of steps and passes that are finished.
     fn plan(&self, steps: usize, passes: usize) -> Plan;
     /// Returns true if the training restarts from the averaged parameters at a step.
     fn restarts(&self, _nth: usize) -> bool {
@@ -96,7 +96,7 @@ pub trait Task: Sync {
     fn mean(&self, costs: &[(usize, Self::Cost)]) -> Self::Cost;
     /// Evaluates a network on held-out samples.
     fn score(&self, find: &dyn Fn(&Shown) -> Vec<Vec<f32>>) -> Self::Score;
-    /// Returns the value by which the best pass is chosen: lower is better. Returns `None` if the last pass is used.
+    /// Returns the value by which the best pass is chosen; lower is better. Returns `None` if the network of the last pass is used instead.
     fn rank(&self, _score: &Self::Score) -> Option<f32> {
         None
     }
@@ -236,7 +236,7 @@ impl<T: Task> Trainer<T> {
         &self.state.memory.parameters
     }
 
-    /// The parameters of the resulting network: those of the best pass, or the mean over the last steps.
+    /// The parameters of the resulting network: the parameters of the best pass, or the mean over the last steps.
     pub fn trained(&self) -> &[Parameter] {
         let best = self.state.best.as_ref();
         best.map_or(&self.state.memory.averages, |best| &best.parameters)
@@ -297,7 +297,7 @@ impl<T: Task> Trainer<T> {
         true
     }
 
-    /// Runs one step. Returns the number of samples, and their cost before the step.
+    /// Runs one step. Returns the number of samples and their cost, computed before the step changes the parameters.
     fn learn(&self, memory: &mut Memory, nth: usize) -> Option<(usize, T::Cost)> {
         let Batch {
             network,

@@ -15,9 +15,9 @@ pub(crate) struct Trunk {
     pub(crate) channels: [usize; 4],
     /// Numbers of residual blocks at strides 4, 8, 16 and 32.
     pub(crate) blocks: [usize; 4],
-    /// Number of residual blocks at stride 4 after the features of all strides were added there.
+    /// Number of residual blocks at stride 4, applied after the features of all strides have been added.
     pub(crate) refined: usize,
-    /// Number of channels inside these blocks.
+    /// Number of channels inside the residual blocks counted by `refined`.
     pub(crate) hidden: usize,
 }
 

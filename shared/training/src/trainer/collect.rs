@@ -73,7 +73,7 @@ impl Trainer<'_> {
         Ok(shape.model(&self.v, 0.0)?)
     }
 
-    /// Examples of all people, placed as close to the marks as the cells allow, with the types of the clusters.
+    /// Examples of all people. The parts are as close to the marks as the cells allow, and have the types of their clusters.
     pub(super) fn nearest(&self) -> Result<Vec<Example>, TrainError> {
         let model = self.model()?;
         let all: Vec<_> = (0..self.plan.n_people()).collect();
@@ -143,7 +143,7 @@ impl Trainer<'_> {
         Ok(placed)
     }
 
-    /// Adds the examples of a batch: hard negatives of background images, and wrong poses.
+    /// Adds the examples of a batch: hard negatives in background images, and wrong poses of people.
     pub(super) fn collect(&mut self, step: Step) -> Result<(), TrainError> {
         let Step::Learn { round, pass, batch } = step else {
             return Ok(());
@@ -191,8 +191,8 @@ impl Trainer<'_> {
         }
         let found = self.visit_all(images, |&image| {
             let picture = self.background(image)?;
-            // All poses in the working set may score best, since each may have some slack. The search therefore allows for as many
-            // additional poses.
+            // The poses that are already in the working set may be the best ones again. The search therefore returns as many additional
+            // poses.
             let n_held = n_held.get(&image).copied().unwrap_or(0);
             let poses = miner.search(&picture, -1.0, self.settings.per_image + n_held);
             let origins = poses.iter().map(|pose| Origin::Background {

@@ -91,7 +91,7 @@ pub enum SequenceError {
     Text {
         /// The file.
         path: PathBuf,
-        /// Number of the line, from 1; 0 for the whole file.
+        /// Number of the line, counted from 1; 0 if the error concerns the whole file.
         line: usize,
         /// Fault of the line.
         what: String,
@@ -120,7 +120,7 @@ pub enum SyncError {
         /// Frames of motion capture per camera frame.
         rate: f64,
     },
-    /// A stream would begin before its first frame.
+    /// The synchronised trial would begin before the first frame of a stream.
     #[error("a camera would begin at frame {offset}, before its first frame, 1")]
     Before {
         /// Number of the frame, from 1.

@@ -28,7 +28,7 @@ const ALL_CAMERAS: [&str; 7] = ["C1", "C2", "C3", "BW1", "BW2", "BW3", "BW4"];
 /// Frames per second of the colour cameras.
 const FRAME_RATE_HZ: f64 = 60.0;
 
-/// The trial whose first half is the paper's test set. The data set's authors intended this part for validation.
+/// The trial whose first half is the paper's test set. The authors of the data set intended this half for validation.
 pub const TRIAL: u32 = 1;
 
 /// The test frames of the paper for one subject and action.
@@ -42,7 +42,7 @@ pub struct PaperTest {
     pub first: u64,
     /// The last frame.
     pub last: u64,
-    /// Number of frames of each camera with complete motion capture.
+    /// Number of frames, for each camera, in which all markers were captured.
     pub n_frames: usize,
 }
 
@@ -61,7 +61,7 @@ const fn test(
     }
 }
 
-/// The 4493 test frames of each camera, as in the released predictions of expected errors.
+/// The 4493 test frames of each camera. They are the frames for which the authors of the paper released predicted errors.
 pub const PAPER_TEST: [PaperTest; 12] = [
     test("S1", "Box", [6, 358], 249),
     test("S1", "Gestures", [6, 395], 390),

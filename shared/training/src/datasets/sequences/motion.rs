@@ -1,8 +1,8 @@
 //! The motion of one person from a C3D or TRC file: joints over time, in metres, z up.
 //!
-//! A [`MarkerTable`] converts markers to joints. Gaps are interpolated up to a limit. The motion is checked for
-//! plausibility: the legs have a possible length, the head is above the feet, and the knees bend backward. The last check finds
-//! mirrored axes and exchanged sides.
+//! A [`MarkerTable`] converts markers to joints. Gaps are interpolated up to a limit. The motion is checked for plausibility: the legs have
+//! a possible length, the head is above the feet, and the knees bend backward. The last check finds mirrored axes, and left and right
+//! joints that are swapped.
 
 mod check;
 mod error;
@@ -90,7 +90,7 @@ pub fn read_motion(
     Ok(motion)
 }
 
-/// The first preset whose markers a trial has.
+/// The first preset whose markers all exist in a trial.
 fn preset_for(trial: &Trial) -> Option<MarkerTable> {
     let mut tables = PRESETS.iter().filter_map(|name| MarkerTable::preset(name));
     tables.find(|table| table.markers().all(|name| trial.marker(name).is_some()))

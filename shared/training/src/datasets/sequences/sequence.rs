@@ -36,7 +36,7 @@ pub struct View {
     pub source: String,
     /// Number of the footage's frame (from 0) that is frame 0 of the sequence.
     pub first: u64,
-    /// The calibrated pixel of the footage's top-left pixel, if the footage lacks rows or columns.
+    /// Position of the footage's top-left pixel in the calibrated image, if the footage is a part of that image.
     pub source_offset_px: Option<[u32; 2]>,
 }
 
@@ -54,11 +54,10 @@ pub struct Frame {
 /// Alignment of UMPM's frames with its motion capture, which has twice the rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Alignment {
-    /// The first frame corresponds to the first pose, as documented by the data set.
+    /// The first frame corresponds to the first pose, as the documentation of the data set says.
     #[default]
     Direct,
-    /// Every frame corresponds to the pose of the frame before it. The tool released with the paper computes this,
-    /// apparently by mistake.
+    /// Every frame is combined with the pose of the frame before it. The tool released with the paper does this, apparently by mistake.
     OneLate,
 }
 
@@ -72,7 +71,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// The chosen range out of `n` frames.
+    /// The range of frames to read, for a sequence of `n` frames.
     pub(crate) fn range(&self, n: usize) -> std::ops::Range<usize> {
         let [from, to] = self.share.unwrap_or([0.0, 1.0]);
         let at = |share: f64| ((share.clamp(0.0, 1.0) * n as f64).round() as usize).min(n);
@@ -83,7 +82,7 @@ impl Options {
 impl Sequence {
     /// Keeps some of the frames.
     ///
-    /// * `every`: distance between two kept frames, counted from the first.
+    /// * `every`: keeps the first frame and every `every`-th frame after it.
     /// * `most`: maximum number of frames.
     pub fn thin_out(&mut self, every: usize, most: Option<usize>) {
         let kept = std::mem::take(&mut self.frames).into_iter();

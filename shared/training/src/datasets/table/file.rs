@@ -26,14 +26,14 @@ pub enum SkeletonFileError {
     /// The name of a part or joint is unknown.
     #[error("{whose} names the {what} {name:?}, which does not exist")]
     NoSuch {
-        /// Text that states where the name is used.
+        /// Description of the place where the name is used.
         whose: String,
         /// `part`, or `joint`.
         what: &'static str,
         /// The unknown name.
         name: String,
     },
-    /// A joint is in two pairs of the mirror.
+    /// A joint is in two mirror pairs.
     #[error("the joint {name:?} is in two pairs of `joint_mirror`")]
     MirroredTwice {
         /// Name of the joint.
@@ -78,9 +78,9 @@ impl SkeletonTable {
 
     /// Parses the text of a TOML file.
     ///
-    /// `joints` lists the names of the joints in the order of the annotation. `joint_mirror` lists the pairs that the mirror
-    /// exchanges. Every `[[part]]` has a `name`, a `parent` (except the first), and the `joints` with the weights that
-    /// determine its position. A part that is not its own mirror image also has a `mirror`. Names must match exactly.
+    /// `joints` lists the names of the joints in the order of the annotation. `joint_mirror` lists the pairs of joints that are mirror
+    /// images of each other. Every `[[part]]` has a `name`, a `parent` (except the first), and the `joints` with the weights that determine
+    /// its position. A part that is not its own mirror image also has a `mirror`. Names must match exactly.
     ///
     /// # Errors
     ///

@@ -6,8 +6,8 @@ use crate::networks::pose::{DEVIATION, FILL, MEAN};
 
 /// Minimum score of a box that is kept.
 const LEAST_SCORE: f64 = 0.2;
-/// Overlap (intersection over union) above which the worse of two boxes is dropped. Boxes of people who stand in front of each other can
-/// overlap by more than half.
+/// Overlap (intersection over union) above which the box with the lower score is dropped. Boxes of people who stand in front of each other
+/// can overlap by more than half.
 const MOST_OVERLAP: f64 = 0.65;
 
 /// Information for a card about the training.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::network::CHANNELS;
 
-/// Range in which the logarithm of a side is not clamped.
+/// Range to which the logarithm of a distance to a side of the box is clamped.
 const LOGARITHMS: core::ops::RangeInclusive<f32> = -3.0..=5.0;
 /// Limit of the log-odds of a cell, beyond which they are clamped.
 const MOST_LOG_ODDS: f32 = 15.0;
@@ -22,18 +22,18 @@ pub struct Truth {
 /// The parts of the cost of a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// The cost of the heat, per person.
+    /// The cost of the heat, divided by the number of people.
     pub heat: f32,
-    /// The cost of the boxes: the mean negative logarithm of the intersection over union with the true boxes.
+    /// The cost of the boxes: the mean of -log(IoU), where IoU is the intersection over union with the true box.
     pub sides: f32,
 }
 
 impl Truth {
     /// Returns the cost, and its gradient with respect to the output of the network.
     ///
-    /// The cost of the heat is the focal loss with lower penalties around a middle (Law and Deng 2018, "`CornerNet`", equation 1). The cost
-    /// of the boxes is the negative logarithm of the intersection over union (Yu et al. 2016, "`UnitBox`"), with cells weighted by their
-    /// heat.
+    /// The cost of the heat is the focal loss with lower penalties around the middle of a box (Law and Deng 2018, "`CornerNet`", equation
+    /// 1). The cost of the boxes is the negative logarithm of the intersection over union (Yu et al. 2016, "`UnitBox`"), with cells
+    /// weighted by their heat.
     ///
     /// * `cells`: columns times rows.
     /// * `weight`: weight of the boxes relative to the heat.
@@ -96,8 +96,8 @@ fn focal(log_odds: f32, heat: f32) -> [f32; 2] {
     ]
 }
 
-/// The negative logarithm of the intersection over union of two boxes around a point, and its derivatives with respect to the logarithms
-/// of the sides.
+/// The negative logarithm of the intersection over union of two boxes around a point, and its derivatives with respect to the logarithms of
+/// the distances to the sides.
 fn union(logarithms: [f32; 4], truth: [f32; 4]) -> (f32, [f32; 4]) {
     let sides = logarithms.map(|side| side.clamp(*LOGARITHMS.start(), *LOGARITHMS.end()).exp());
     let area = |[left, top, right, bottom]: [f32; 4]| (left + right) * (top + bottom);

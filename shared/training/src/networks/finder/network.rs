@@ -20,9 +20,9 @@ pub const BOXES: &str = "boxes";
 /// Sides of the input are multiples of this number.
 pub(crate) const MULTIPLE: usize = 32;
 
-/// The log-odds of an untrained cell.
+/// The log-odds that an untrained network gives for every cell.
 const HEAT_BIAS: f32 = -4.6;
-/// Logarithms of the sides of an untrained box, in cells: a person one third as high as the picture.
+/// Logarithms of the distances to the sides, in cells, that an untrained network gives: a person one third as high as the picture.
 const SIDE_BIAS: [f32; 4] = [1.4, 2.3, 1.4, 2.3];
 
 /// The sizes of the network.
@@ -108,7 +108,7 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 /// Reads the parameters of a network that [`file()`](super::file()) wrote, from which a training run starts.
 ///
 /// * `shape`: sizes of the network. The side of the input may differ from that of the file.
-/// * `seed`: seed for the weights of channels that are 0 in the file.
+/// * `seed`: seed for the initial weights of channels whose weights in the file are all 0.
 ///
 /// # Errors
 ///

@@ -10,7 +10,8 @@ pub const SIDE: usize = 320;
 pub struct Around {
     /// Left, top, right, bottom, in pixels.
     pub outline: [f32; 4],
-    /// True if the network should find this person. Otherwise the box is ignored: the person is hardly visible, or may not be a person.
+    /// True if the network should find this person. If false, the box is ignored: the person is hardly visible, or may not be a person at
+    /// all.
     pub counts: bool,
 }
 

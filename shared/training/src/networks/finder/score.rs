@@ -6,7 +6,7 @@ use super::picture::Around;
 
 /// Minimum overlap (intersection over union) for a found box to match a true one.
 const SAME: f32 = 0.5;
-/// Overlap with an ignored person above which a box does not count as false.
+/// A found box does not count as false if its overlap with an ignored person is larger than this.
 const UNASKED: f32 = 0.3;
 
 /// Measures of a network's quality.

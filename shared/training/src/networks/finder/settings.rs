@@ -25,11 +25,11 @@ pub struct Settings {
     pub rate: f32,
     /// Weight decay: the share of every weight that a step subtracts, before multiplication by the rate.
     pub decay: f32,
-    /// Gradient clipping: longer gradients are scaled to this length.
+    /// Largest length of the gradient: a longer gradient is scaled down to this length (gradient clipping).
     pub longest: f32,
-    /// Share of the mean of the parameters that every step replaces.
+    /// Share of the running mean of the parameters that is replaced in every step.
     pub averaged: f32,
-    /// Weight of the sides of boxes relative to the heat.
+    /// Weight of the cost of the boxes, relative to the cost of the heat.
     pub sides: f32,
     /// Random variation of the samples.
     pub vary: Vary,
@@ -39,7 +39,7 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {
-    /// Share of samples that show one picture. People from other pictures are pasted into the other samples.
+    /// Share of samples made from a single picture. In all other samples, people from other pictures are pasted in.
     pub single: f32,
     /// Maximum number of pasted pictures.
     pub most_pasted: usize,
@@ -47,9 +47,9 @@ pub struct Vary {
     pub least_height: f32,
     /// Largest height of a person, as a share of the height of the shown picture.
     pub most_height: f32,
-    /// Share of samples with reduced resolution.
+    /// Share of samples whose resolution is reduced.
     pub coarse: f32,
-    /// Share of samples without colour.
+    /// Share of samples that are converted to grey.
     pub grey: f32,
 }
 

@@ -190,7 +190,7 @@ impl Task for FinderTask<'_> {
             rate: self.rate(nth),
             decay: settings.decay,
             longest: settings.longest,
-            // At the beginning, the mean is over few steps.
+            // At the beginning of the training, there are only a few steps to average.
             averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
         }
     }

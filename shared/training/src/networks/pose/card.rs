@@ -15,7 +15,7 @@ pub struct About {
     pub samples: usize,
     /// True if the training started from a previously trained network.
     pub goes_on: bool,
-    /// True if only the extra keypoints were trained.
+    /// True if only the extra keypoints (nose, heels and big toes) were trained.
     pub extras_alone: bool,
     /// Quality of the network on the held-out people.
     pub score: Score,

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::network::{N_JOINTS, N_KEYPOINTS, STRIDE};
 use super::peak;
 
-/// Range in which the logarithm of an expected error is not clamped.
+/// Range to which the logarithm of an expected error is clamped.
 const LOGARITHMS: core::ops::RangeInclusive<f32> = -8.0..=2.0;
 /// Additional weight of a cell with heat 1, relative to a cell with heat 0.
 const HEAT: f32 = 9.0;
-/// Approximate weight of all cells of a map without heat.
+/// Approximate sum of the weights of all cells of a map in which no cell has heat.
 const CELLS: f32 = 40.0;
 
 /// The truth of a batch.
@@ -23,7 +23,7 @@ pub struct Truth {
     pub weights: Vec<f32>,
     /// Direction of the trunk; its length, 0 to 1, is the certainty: `[n, 2]`.
     pub fronts: Vec<f32>,
-    /// Positions of the keypoints in cells of the maps, NaN if not certain: `[n, keypoints, 2]`.
+    /// Positions of the keypoints in cells of the maps, NaN if a position is not certain: `[n, keypoints, 2]`.
     pub places: Vec<f32>,
 }
 
@@ -111,8 +111,8 @@ impl Truth {
         Part { cost, gradient }
     }
 
-    /// Negative log-likelihood of the errors of the maxima of the maps. They are assumed to be exponentially distributed with the expected
-    /// error as mean.
+    /// Negative log-likelihood of the distances between the maxima of the maps and the true positions. These errors are assumed to be
+    /// exponentially distributed, with the expected error as mean.
     pub(super) fn of_error(&self, logarithms: &[f32], maps: &[f32]) -> Part {
         let off = self.off(maps);
         let n_known = off.iter().flatten().count().max(1) as f32;
@@ -149,7 +149,7 @@ mod tests {
 
     use super::*;
 
-    /// Checks that the gradient of a part matches its change with every output.
+    /// Checks that the gradient of a part of the cost matches the change of the cost with every output.
     fn check(outputs: &[f32], part: &dyn Fn(&[f32]) -> Part) {
         let step = 1e-2;
         let gradient = part(outputs).gradient;

@@ -1,21 +1,24 @@
-//! True keypoints of a person, combined from the marks of an annotator and the results of a teacher, which is another network.
+//! True keypoints of a person, combined from two sources: positions marked by an annotator, and positions found by another network, the
+//! teacher.
 
 use super::person::Target;
 use super::{MIRROR, N_JOINTS, N_KEYPOINTS};
 
-/// Height of the teacher's peak above which a joint of a pair is used to decide about left and right.
+/// Height of the peak in the teacher's map above which a joint is used to decide about left and right.
 const SURE_OF_SIDES: f32 = 0.55;
-/// Height of the peak above which the teacher's joint is kept as an alternative to a mark that contradicts it.
+/// If the teacher contradicts a mark, the teacher's joint is kept as an alternative if its peak is higher than this.
 const SURE: f32 = 0.7;
-/// Height of the peak above which the teacher's joint is averaged with a mark that agrees.
+/// If the teacher agrees with a mark, the two positions are averaged if the teacher's peak is higher than this.
 const USABLE: f32 = 0.4;
-/// Height of the peak above which the teacher's joint is used if there is no mark.
+/// If there is no mark, the teacher's joint is used if its peak is higher than this.
 const ALONE: f32 = 0.5;
 /// Largest distance at which a mark and the teacher agree, in lengths of the trunk.
 const AGREED: f32 = 0.24;
-/// Minimum distance between left and right joints for a decision about the sides, in lengths of the trunk.
+/// Minimum distance between a left joint and the corresponding right joint, in lengths of the trunk. Joints that are closer are not used to
+/// decide about left and right.
 const APART: f32 = 0.23;
-/// The sides of a limb are exchanged if this reduces its distance to the teacher to at most this fraction.
+/// The marks of the left and right limb are swapped if the swap reduces their distance from the teacher's joints to at most this fraction
+/// of the distance without the swap.
 const NEARER: f32 = 0.6;
 
 /// Certainty of the teacher above which its extra keypoints are used.
@@ -25,7 +28,7 @@ const AGREED_BESIDE: f32 = 0.18;
 /// The joint near every extra keypoint: neck, then the ankles.
 const BESIDE: [usize; N_KEYPOINTS - N_JOINTS] = [12, 5, 0, 5, 0];
 
-/// Joints of both legs, and of both arms.
+/// Joints of both legs, then joints of both arms.
 const LIMBS: [[usize; 6]; 2] = [[0, 1, 2, 3, 4, 5], [6, 7, 8, 9, 10, 11]];
 
 /// Keypoints of a person according to the annotator and the teacher, in the order of [`Person::targets`](super::Person::targets). Unknown
@@ -40,7 +43,7 @@ pub struct Marks {
     pub trunk: f32,
 }
 
-/// The same keypoints with left and right exchanged.
+/// The same keypoints with left and right swapped.
 ///
 /// * `of`: all keypoints, or only the joints.
 pub fn exchange_sides<T: Copy, const N: usize>(of: &[T; N]) -> [T; N] {
@@ -56,9 +59,8 @@ fn mean(of: &[f32]) -> f32 {
 }
 
 impl Marks {
-    /// Exchanges left and right of limbs whose marks the teacher clearly contradicts.
-    ///
-    /// * Returns two values: true if the legs were exchanged, and true if the arms were exchanged.
+    /// Swaps the marks of left and right legs, or of left and right arms, if the teacher clearly contradicts them. * Returns two values:
+    /// true if the legs were swapped, and true if the arms were swapped.
     pub fn mend_sides(&mut self) -> [bool; 2] {
         LIMBS.map(|limb| {
             let is_sure = |joint: &usize| {
@@ -90,7 +92,7 @@ impl Marks {
 
     /// Takes extra keypoints that the teacher does not have from another teacher, if the other teacher finds the nearby joint at its mark.
     ///
-    /// * `other`: results of the other teacher, as in [`taught`](Self::taught), with the same sides.
+    /// * `other`: results of the other teacher, as in [`taught`](Self::taught), with the same convention for left and right.
     pub fn add_extras(&mut self, other: &[([f32; 2], f32); N_KEYPOINTS]) {
         for keypoint in N_JOINTS..N_KEYPOINTS {
             if self.taught[keypoint].1 <= 0.0 && self.is_beside(keypoint, other) {
@@ -99,13 +101,13 @@ impl Marks {
         }
     }
 
-    /// Returns true if a teacher finds the joint near an extra keypoint at that joint's mark.
+    /// Returns true if a teacher finds the joint near an extra keypoint close to the annotator's mark of that joint.
     fn is_beside(&self, keypoint: usize, taught: &[([f32; 2], f32); N_KEYPOINTS]) -> bool {
         let beside = BESIDE[keypoint - N_JOINTS];
         distance(self.marked[beside], taught[beside].0) < AGREED_BESIDE * self.trunk
     }
 
-    /// Exchanges left and right in both marks and the teacher's results.
+    /// Swaps left and right, both in the marks and in the teacher's results.
     pub fn exchange(&mut self) {
         self.marked = exchange_sides(&self.marked);
         self.taught = exchange_sides(&self.taught);

@@ -34,12 +34,12 @@ pub const STRIDE: usize = 4;
 /// The sides of the input must be multiples of this number.
 pub(crate) const MULTIPLE: usize = 32;
 
-/// Factor of the logits of a map in the softmax for features at its maximum.
+/// Factor by which the logits of a map are multiplied in the softmax that selects features at the maximum of the map.
 const SHARPNESS: f32 = 2.0;
-/// Factor of the logits in the softmax in which lower maxima should also count.
+/// Factor by which the logits are multiplied in the softmax in which lower maxima should also count.
 const WIDE: f32 = 1.0;
 
-/// The log-odds of an untrained map.
+/// The log-odds that an untrained network gives for every cell of a map.
 const MAP_BIAS: f32 = -4.0;
 /// The logarithm of the expected error before training: a tenth of the input's height.
 const ERROR_BIAS: f32 = -2.3;
@@ -125,7 +125,8 @@ impl Network for Shape {
     }
 }
 
-/// The parameters of an untrained network. At first, the last dense layers give outputs that are likely for any person.
+/// The parameters of an untrained network. Before training, its outputs for the direction and the errors are values that are plausible for
+/// any person.
 pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     let mut all = parameters::initial(shape, seed);
     for parameter in &mut all {
@@ -146,7 +147,7 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 /// If the file lacks the layers of the [extra keypoints](EXTRAS), these layers stay untrained.
 ///
 /// * `shape`: sizes of the network. Width and height of the input may differ from those of the file.
-/// * `seed`: seed for the weights of channels that are 0 in the file.
+/// * `seed`: seed for the initial weights of channels whose weights in the file are all 0.
 ///
 /// # Errors
 ///

@@ -6,7 +6,7 @@ use super::{N_JOINTS, N_KEYPOINTS};
 
 /// Side of the square picture that is stored for a person, in pixels.
 pub const SIDE: usize = 256;
-/// Height of the network's window in this picture, according to the box around the marked joints, in pixels.
+/// Height, in pixels of this picture, of the window that the network gets. The window is computed from the box around the marked joints.
 pub const WINDOW: f64 = 176.0;
 
 /// Origin of a picture.
@@ -18,12 +18,12 @@ pub enum Source {
     Scene,
 }
 
-/// Target of the network for a keypoint.
+/// Position of a keypoint that the network is trained to find.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Position in pixels; not finite if unknown.
     pub at: [f32; 2],
-    /// An equally likely position, if the mark and the teacher contradict each other.
+    /// A second, equally likely position, if the annotator's mark and the teacher contradict each other.
     pub or: Option<[f32; 2]>,
     /// Weight of the keypoint, 0 to 1.
     pub weight: f32,
@@ -31,7 +31,7 @@ pub struct Target {
     pub is_marked: bool,
 }
 
-/// A picture of a person, and the keypoints as seen.
+/// A picture of a person, and the keypoints. Left and right are as seen in the picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Person {
     /// Origin of the picture.
@@ -48,7 +48,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// The positions of the joints that are known well enough to determine a box around them.
+    /// The positions of the joints that are known well enough to be used for the box around the person.
     pub fn places(&self) -> impl Iterator<Item = [f32; 2]> {
         let is_known =
             |target: &&Target| target.weight > 0.0 && target.at.iter().all(|side| side.is_finite());

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{N_JOINTS, N_KEYPOINTS};
 
-/// The limbs whose ends are evaluated (PCP). Each end is the mean of the listed joints.
+/// The limbs whose ends are evaluated (PCP). Each end of a limb is the mean of the listed joints.
 const STICKS: [(&[usize], &[usize]); 10] = [
     (&[8, 9], &[2, 3]),
     (&[2], &[1]),
@@ -18,7 +18,7 @@ const STICKS: [(&[usize], &[usize]); 10] = [
     (&[12], &[13]),
 ];
 
-/// Neck and top of the head.
+/// Indices of the neck and the top of the head.
 const HEAD: [usize; 2] = [12, 13];
 
 /// Found keypoints of one person, and the true ones.
@@ -45,7 +45,7 @@ pub struct Score {
     pub mean_of_ends: f32,
     /// Share of limbs for which the error of each end is at most half the length of the limb.
     pub both_ends: f32,
-    /// Share of people with a known direction for whom the network prefers that direction to the opposite one.
+    /// Among the people whose true direction is known, the share for whom the network prefers that direction to the opposite one.
     pub front: f32,
     /// Area under the ROC curve: the probability that a joint with an error of more than half a head has a larger expected error
     /// than a joint with a smaller error.

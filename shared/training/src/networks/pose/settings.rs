@@ -22,15 +22,15 @@ pub struct Settings {
     /// Share of the steps, counted from the first, with inputs that are 32 pixels smaller across and down: three fifths of the pixels by
     /// default.
     pub small: f32,
-    /// Number of later steps that train only the expected error, on held-out people.
+    /// Number of steps, after all other steps, that train only the expected error, on held-out people.
     pub error_steps: usize,
     /// Length of the longest step. It is reached after a tenth of the training, and then decreases as a cosine.
     pub rate: f32,
     /// Weight decay: the share of every weight that a step subtracts, before multiplication by the rate.
     pub decay: f32,
-    /// Gradient clipping: longer gradients are scaled to this length.
+    /// Largest length of the gradient: a longer gradient is scaled down to this length (gradient clipping).
     pub longest: f32,
-    /// Share of the mean of the parameters that every step replaces.
+    /// Share of the running mean of the parameters that is replaced in every step.
     pub averaged: f32,
     /// True to train only the extra keypoints. All other parameters in the file stay as in the network from which the training starts.
     pub extras_alone: bool,
@@ -54,13 +54,13 @@ pub struct Vary {
     pub turn: f32,
     /// Standard deviation of the logarithm of the scale.
     pub scale: f32,
-    /// Standard deviation of the position, in heights of the window.
+    /// Standard deviation of the shift of the window, in heights of the window.
     pub shift: f32,
     /// Share of samples that are partly covered.
     pub covered: f32,
-    /// Share of samples with reduced resolution.
+    /// Share of samples whose resolution is reduced.
     pub coarse: f32,
-    /// Share of samples without colour.
+    /// Share of samples that are converted to grey.
     pub grey: f32,
 }
 

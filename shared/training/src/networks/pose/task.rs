@@ -18,7 +18,7 @@ use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
-/// Number of consecutive people that belong together.
+/// Number of consecutive people in the list that are assigned together to one of the two parts of [`KeptApart`].
 const RUN: usize = 16;
 /// Number of people that are evaluated at once.
 const JUDGED_AT_ONCE: usize = 32;
@@ -83,7 +83,7 @@ struct KeptApart<'a> {
 }
 
 impl<'a> KeptApart<'a> {
-    /// Assigns groups of [`RUN`] people alternately to the two parts, since neighbours in a list can be pictures of the same person. If
+    /// Assigns groups of [`RUN`] people alternately to the two parts, because neighbouring pictures in a list may show the same person. If
     /// there are too few people, all are used for both.
     fn new(people: &'a [Person]) -> Self {
         let (calibrating, judged): (Vec<_>, Vec<_>) =
@@ -259,7 +259,7 @@ impl Task for PoseTask<'_> {
             rate: self.rate(nth),
             decay: settings.decay,
             longest: settings.longest,
-            // At the beginning, the mean is over few steps.
+            // At the beginning of the training, there are only a few steps to average.
             averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
         }
     }

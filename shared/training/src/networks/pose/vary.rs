@@ -18,7 +18,7 @@ pub const FILL: f32 = 110.0;
 pub const MEAN: f32 = 110.0;
 /// Value by which a colour is divided after [`MEAN`] is subtracted.
 pub const DEVIATION: f32 = 60.0;
-/// Largest shift, in standard deviations.
+/// Random values are limited to this number of standard deviations.
 const MOST: f32 = 2.5;
 
 /// An input of the network, and the true outputs.
@@ -32,7 +32,7 @@ pub struct NetworkSample {
     pub weights: [f32; N_KEYPOINTS],
     /// Direction of the trunk: components towards the right of the picture and towards the camera. Its length is the certainty.
     pub front: [f32; 2],
-    /// Positions of the keypoints, in cells; NaN if not certain.
+    /// Positions of the keypoints, in cells; NaN if a position is not certain.
     pub places: [[f32; 2]; N_KEYPOINTS],
 }
 
@@ -95,7 +95,7 @@ fn turned(at: [f32; 2], [cosine, sine]: [f32; 2]) -> [f32; 2] {
     [cosine * x - sine * y, sine * x + cosine * y]
 }
 
-/// A sample as the network normally gets it: the person, cut out by the box around the joints, rotated upright or not.
+/// A sample as the network normally gets it: the person, cut out along the box around the joints, without random variation.
 pub fn plain(person: &Person, shape: &Shape) -> Option<NetworkSample> {
     let view = view(person, shape, [1.0, 0.0], (1.0, [0.0; 2], false))?;
     Some(sample(person, shape, &view, &pixels(person, &view)))
@@ -144,7 +144,7 @@ fn lean(person: &Person) -> f32 {
     if angle.is_finite() { angle } else { 0.0 }
 }
 
-/// The window around the joints; `None` if they have hardly any extent.
+/// The window around the joints; `None` if the joints are almost at the same point.
 fn view(
     person: &Person,
     shape: &Shape,

@@ -17,7 +17,7 @@ pub struct Judgement {
     pub rank_correlation: Vec<Option<f64>>,
     /// Mean absolute difference of predicted and true error, as a share of the height that the tile shows.
     pub inaccuracy: Vec<f64>,
-    /// Share of the samples whose error is larger than tau.
+    /// For each part, the share of the samples whose error is larger than tau.
     pub beyond: Vec<f64>,
 }
 
@@ -66,12 +66,12 @@ impl Judgement {
         judgement
     }
 
-    /// Mean area over the parts that have one.
+    /// Mean of the area under the ROC curve, over the parts for which it is known.
     pub fn mean_area(&self) -> f64 {
         mean(&self.area)
     }
 
-    /// Mean rank correlation over the parts that have one.
+    /// Mean rank correlation, over the parts for which it is known.
     pub fn mean_rank_correlation(&self) -> f64 {
         mean(&self.rank_correlation)
     }

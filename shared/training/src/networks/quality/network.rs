@@ -39,11 +39,11 @@ pub(crate) fn column(part: usize, name: &str) -> Option<usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// The evidence alone, without pixels: the baseline.
+    /// A network that uses only the evidence and no pixels: the baseline.
     Evidence,
-    /// A few separable convolutions, pooled around every part, and the evidence.
+    /// A network that uses the evidence, and a few separable convolutions that are pooled around every part.
     Small,
-    /// The paper's network: VGG-16 with a different top, on the tile alone.
+    /// The paper's network: VGG-16 with different last layers. It uses only the tile.
     Vgg16,
 }
 

@@ -24,15 +24,16 @@ pub struct Sample {
     pub errors_px: Vec<f32>,
 }
 
-/// Height and width of the picture that a sample with such a tile stores.
+/// Height and width of the picture that is stored in a sample: the tile with its margin.
 pub fn picture_size(tile: TileShape) -> [usize; 2] {
     [tile.height, tile.width].map(|side| side + 2 * MARGIN)
 }
 
 /// Distance of every part from the truth.
 ///
-/// A single view cannot tell whether it sees the person from behind, and the model names parts by the side of the picture. Therefore, the
-/// assignment of left and right with the smaller errors is used. In the pipeline, all views together decide this.
+/// A single view does not show reliably whether a person is seen from behind, and the model names parts by their side in the picture. Both
+/// assignments of left and right are therefore tried, and the one with the smaller errors is used. In the pipeline, left and right are
+/// decided from all views together.
 pub fn part_errors(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Vec<f64> {
     let errors = |of: &dyn Fn(usize) -> usize| -> Vec<f64> {
         let error = |(part, at): (usize, &[f64; 2])| {

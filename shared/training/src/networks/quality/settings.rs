@@ -11,7 +11,7 @@ use crate::networks::settings::{SettingsError, check, count, from_zero};
 pub enum Loss {
     /// Half the squared length of the vector of differences, as in the paper.
     L2,
-    /// The same as `L2` for small differences, but linear for differences above 1 (Huber).
+    /// The Huber loss: the same as `L2` for differences up to 1, and linear above.
     Robust,
 }
 
@@ -79,7 +79,7 @@ pub struct Settings {
     pub momentum: f32,
     /// Weight decay.
     pub decay: f32,
-    /// Gradient clipping: longer gradients are scaled to this length.
+    /// Largest length of the gradient: a longer gradient is scaled down to this length (gradient clipping).
     pub longest: f32,
     /// Share of the groups (subjects, images) used for validation.
     pub validation: f32,
@@ -89,7 +89,7 @@ pub struct Settings {
     pub hidden: usize,
     /// Share of the hidden layer's values that are dropped.
     pub dropout: f32,
-    /// For VGG-16, number of passes in which only the top is trained.
+    /// For VGG-16, number of passes in which only the new last layers are trained.
     pub frozen_epochs: u32,
     /// For VGG-16, number of blocks of convolutions that are trained after the frozen passes, counted from the last block.
     pub unfrozen_blocks: usize,

@@ -27,7 +27,7 @@ pub struct Validated {
     pub area: f64,
 }
 
-/// Reason why samples or weights do not match a training run.
+/// Reason why a training run cannot use its samples or weights.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TaskError {
     /// There are no samples for training, or for validation.
@@ -73,7 +73,7 @@ pub struct QualityTask<'a> {
 impl<'a> QualityTask<'a> {
     /// Prepares a training run.
     ///
-    /// * `weights`: initial parameters by name; all others are random.
+    /// * `weights`: initial parameters by name; parameters that are not listed are random.
     ///
     /// # Errors
     ///
@@ -405,7 +405,7 @@ fn stamp(settings: &Settings, samples: &Samples, weights: &[Parameter]) -> u64 {
     )
 }
 
-/// The parameters before the first step, with which the network predicts the mean error of every part.
+/// The initial parameters. With these, the network predicts the mean error of every part.
 fn begin(
     settings: &Settings,
     samples: &[&Sample],

@@ -56,8 +56,8 @@ pub fn plain(sample: &Sample, tile: TileShape, with_tile: bool) -> NetworkSample
 
 /// A randomly augmented sample.
 ///
-/// * `unknown`: values for unknown evidence (the means). They replace the types of a mirrored person, since
-///   the types of a part and of the part on the other side do not correspond.
+/// * `unknown`: values for unknown evidence (the means). If a person is mirrored, the types of the parts are replaced with them, because
+///   the types on the left and right side of the body do not correspond.
 pub fn varied(
     sample: &Sample,
     (tile, with_tile): (TileShape, bool),

@@ -172,7 +172,7 @@ impl<'a> Record<'a> {
             }
         });
         let dims = self.dims(maps).to_vec();
-        // The backward pass needs the values again.
+        // The backward pass needs these values again.
         let kept = if self.leads(maps) {
             values.clone()
         } else {

@@ -167,7 +167,7 @@ fn shown(network: &One, n: usize) -> Shown {
     }
 }
 
-/// Parameters that differ from the initial values, many of which are equal.
+/// Parameters that differ from the initial values. Many of the initial values are equal.
 fn parameters(network: &One) -> Vec<Parameter> {
     let mut dice = Rng::with_seed(5);
     let mut all = initial(network, 7);
@@ -247,7 +247,7 @@ fn the_gradient_of_every_operation_is_its_change() {
             }
             let share = off.sqrt() / length.sqrt().max(0.1);
             let name = &parameters[at].name;
-            // Some steps cross a point where an operation is not differentiable.
+            // Some finite differences cross a point where an operation is not differentiable.
             assert!(share < 0.02, "{network:?}: {name} is {share} off");
         }
     }

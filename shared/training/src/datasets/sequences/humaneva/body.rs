@@ -18,7 +18,7 @@ const PELVIS_MM: f64 = -50.0;
 /// Half the size of a marker, in mm.
 const HALF_MARKER_MM: f64 = 7.0;
 
-/// The markers that must all be visible in a pose; some have a second name.
+/// The markers that must all be visible in a pose, each with its possible names.
 const MARKERS: [&[&str]; 39] = [
     &["RASI"],
     &["LASI"],
@@ -277,7 +277,7 @@ impl Pose<'_> {
     }
 }
 
-/// A point in a frame; `None` for a lost point, which is marked as lost or is exactly at the origin.
+/// A point in a frame; `None` if the file marks the point as lost, or if it is exactly at the origin.
 fn seen(trial: &C3d, frame: usize, point: usize) -> Option<Vector3<f64>> {
     let position = trial.frame(frame)[point]?;
     (position != [0.0; 3]).then(|| position.into())

@@ -46,8 +46,8 @@ pub struct Sync {
 }
 
 impl Sync {
-    /// * `offsets`: offsets of all cameras of the trial, in the toolbox's order (`C1` to `C3`, then `BW1` to `BW4`).
-    ///   The cameras that are not evaluated count too.
+    /// * `offsets`: offsets of all cameras of the trial, in the toolbox's order (`C1` to `C3`, then `BW1` to `BW4`). The offsets of cameras
+    ///   that are not evaluated are needed, too.
     pub(crate) fn new(offsets: &[Option<Offset>]) -> Result<Self, SyncError> {
         let known: Vec<&Offset> = offsets.iter().flatten().collect();
         let first = *known.first().ok_or(SyncError::Nothing)?;

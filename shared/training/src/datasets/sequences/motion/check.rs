@@ -14,7 +14,7 @@ const HEAD: usize = 13;
 /// Plausible lengths of a leg, in metres: from a small child to the tallest man with badly placed markers.
 const LEG_METRES: [f64; 2] = [0.3, 1.5];
 
-/// Refuses a motion that is impossible for a person.
+/// Returns an error if the motion is impossible for a person.
 pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     let refuse = |what: String| {
         let path = path.to_owned();

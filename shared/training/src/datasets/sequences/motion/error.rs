@@ -93,7 +93,7 @@ pub enum MotionError {
         /// Names of the markers in the file.
         markers: Vec<String>,
     },
-    /// The table does not define a joint.
+    /// The marker table does not define a required joint.
     #[error("{}: the marker table does not define {joint:?}", .path.display())]
     NoJoint {
         /// Path of the motion file.

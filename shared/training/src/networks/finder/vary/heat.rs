@@ -2,13 +2,14 @@
 
 use super::{Around, STRIDE};
 
-/// Standard deviation of the heat around the middle of a box, as a share of its width and height.
+/// Standard deviation of the heat around the middle of a box, as a share of the box's width and height.
 const SPREAD: f32 = 0.08;
 /// Minimum standard deviation, in cells.
 const LEAST_SPREAD: f32 = 0.7;
 /// Minimum heat of a cell that belongs to a box.
 const BOXED: f32 = 0.4;
-/// Size of the central part of an ignored person's box in which cells do not count, as a share of the box's sides.
+/// Cells in the central part of an ignored person's box do not count. This is the size of that part, as a share of the width and height of
+/// the box.
 const UNASKED: f32 = 0.7;
 
 /// Heat and sides of every cell; see [`Truth`](crate::networks::finder::Truth).

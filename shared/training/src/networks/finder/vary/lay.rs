@@ -38,7 +38,7 @@ pub(super) fn layers<'a>(
     layers
 }
 
-/// The limits of a sample whose picture fills a frame at the top-left corner.
+/// The window of a picture that fills a frame at the top-left corner of the sample: left, top, right, bottom.
 fn window(frame: [f32; 2]) -> [f32; 4] {
     [-0.5, -0.5, frame[0] - 0.5, frame[1] - 0.5]
 }

@@ -4,7 +4,7 @@ use super::{Around, FILL, Picture};
 
 /// Minimum visible share of a person whom the network should find.
 const SEEN: f32 = 0.3;
-/// Share of a person below which the person counts as invisible.
+/// Visible share of a person below which the person counts as invisible.
 const UNSEEN: f32 = 0.04;
 /// Minimum height of a person, in pixels of the input.
 const LEAST_PX: f32 = 14.0;
@@ -22,7 +22,7 @@ pub(super) struct Layer<'a> {
     pub(super) is_mirrored: bool,
     /// The part of the sample that shows the picture: left, top, right, bottom.
     pub(super) window: [f32; 4],
-    /// True if the corners of the window are left out, so that they show the layer below.
+    /// True if the corners of the window are transparent, so that they show the layer below.
     pub(super) is_round: bool,
 }
 
@@ -83,7 +83,7 @@ impl Layer<'_> {
         }
     }
 
-    /// The colour at a point: bilinear, or a mean if the picture is reduced.
+    /// The colour at a point: interpolated bilinearly, or averaged if the picture is reduced in size.
     fn colour(&self, [x, y]: [f32; 2]) -> [f32; 3] {
         let Picture { size, rgb, .. } = self.picture;
         let last = size.map(|side| side as f32 - 1.0);
