@@ -32,12 +32,12 @@ impl Similarity {
     }
 }
 
-/// Difference between two rigs in one camera.
+/// Difference between two poses of one camera, one from each of two rigs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
     /// Angle between the two rotations, radians.
     pub turn: f64,
-    /// Distance between the two centres, in units of the second rig.
+    /// Distance between the two camera centres, in units of the second rig.
     pub way: f64,
 }
 

@@ -35,7 +35,7 @@ pub use rig::calibrate;
 pub use still::standing_board;
 pub use verdict::Doubt;
 
-/// Minimum number of visible corners for a picture of the board to be used.
+/// Minimum number of visible corners. A picture of the board with fewer is not used.
 pub const LEAST_CORNERS: usize = 6;
 /// Minimum number of pictures of the board from which intrinsics are found.
 pub const LEAST_BOARDS: usize = 3;
@@ -87,22 +87,22 @@ impl Sight {
 /// Lens parameters that are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LensKind {
-    /// Pinhole with k1, k2, k3, p1, p2.
+    /// Pinhole lens with the distortion coefficients k1, k2, k3, p1 and p2.
     #[default]
     Five,
-    /// Pinhole with k1 to k6, p1, p2.
+    /// Pinhole lens with the distortion coefficients k1 to k6, p1 and p2.
     Eight,
-    /// Fisheye with k1 to k4.
+    /// Fisheye lens with the distortion coefficients k1 to k4.
     Fisheye,
 }
 
-/// Loss functions of corners, in standard deviations.
+/// Loss functions for the residuals of corners, which are given in standard deviations.
 struct CornerLoss;
 
 impl CornerLoss {
     /// Loss while wrong corners may still be included.
     const ROBUST: Loss = Loss::Cauchy(2.0);
-    /// Loss after wrong corners were left out.
+    /// Loss after wrong corners have been removed.
     const FINAL: Loss = Loss::Huber(4.0);
 }
 
@@ -113,13 +113,13 @@ pub struct Task {
     pub names: Vec<String>,
     /// Width and height of each camera's pictures, in pixels.
     pub sizes: Vec<[u32; 2]>,
-    /// Known intrinsics of each camera, which are kept.
+    /// Known intrinsics of each camera. Known intrinsics are not changed.
     pub known: Vec<Option<Intrinsics>>,
     /// Lens parameters to estimate for cameras without known intrinsics.
     pub lens: LensKind,
     /// Points of the board by number, in metres.
     pub board: Vec<Point2<f64>>,
-    /// Rotations after which the board looks the same; each is given as the numbers that the points then have.
+    /// Rotations after which the board looks the same. Each one is given as a list of the numbers that the points have after the rotation.
     pub look_alikes: Vec<Vec<usize>>,
     /// All pictures in which the board was seen.
     pub sights: Vec<Sight>,
@@ -195,12 +195,13 @@ pub struct Together {
     pub n_agree: usize,
 }
 
-/// Evidence that pictures of one frame were not taken at the same time: all cameras together do not fit as well as each one alone.
+/// Evidence that pictures of one frame were not taken at the same time: the residuals of a fit to all cameras together are larger than
+/// those of separate fits to each camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutOfStep {
-    /// Root mean square of the residuals of each camera alone, in pixels.
+    /// Root mean square of the residuals if each camera is fitted alone, in pixels.
     pub alone_px: f64,
-    /// Root mean square of the residuals of all cameras together, with free lens parameters, in pixels.
+    /// Root mean square of the residuals if all cameras are fitted together, with free lens parameters, in pixels.
     pub together_px: f64,
     /// Largest change of a focal length between the two adjustments, as a fraction.
     pub bent: f64,
@@ -215,7 +216,7 @@ pub struct Outcome {
     pub pairs: Vec<Together>,
     /// Pose of the board in the world, by frame.
     pub boards: Vec<(usize, Isometry3<f64>)>,
-    /// Standard deviation of a corner along each axis, pixels.
+    /// Standard deviation of a corner's position along each axis, in pixels.
     pub sigma_px: f64,
     /// Evidence that pictures of one frame were not taken at the same time, if there is any.
     pub out_of_step: Option<OutOfStep>,
@@ -247,7 +248,7 @@ pub enum BoardError {
         /// Name of the camera.
         camera: String,
     },
-    /// The cameras form groups that never saw the board together.
+    /// The cameras form several groups, and no camera saw the board at the same time as a camera of another group.
     #[error(
         "these groups of cameras never saw the board at the same time: {}; show the board to cameras of different groups at the same time",
         .groups.iter().map(|group| group.join(", ")).collect::<Vec<_>>().join(" | ")

@@ -1,4 +1,4 @@
-//! Calibration of cameras from what they see.
+//! Calibration of cameras from their pictures.
 //!
 //! Each calibration is one adjustment of all unknowns at once, by [`geometry::bundle`]. This crate finds the initial values, defines
 //! the terms of the adjustment, and judges the result. It uses no clock, file or thread.

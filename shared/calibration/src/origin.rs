@@ -24,7 +24,7 @@ pub enum OriginError {
         /// Number of cameras that saw the point.
         views: usize,
     },
-    /// The rays to a point do not meet.
+    /// The rays from the cameras to a point do not meet.
     #[error(
         "the rays to point {point} miss each other by {rms_px:.1} px: was the same point marked in all cameras?"
     )]
@@ -48,7 +48,7 @@ pub enum OriginError {
     /// No camera sees the board.
     #[error("no camera sees enough of the board")]
     NoBoard,
-    /// The cameras see the board in different places.
+    /// Different cameras give different positions of the board.
     #[error(
         "the cameras disagree about the board by {rms_px:.1} px: did the board lie still, and is it the right board?"
     )]
@@ -64,7 +64,7 @@ pub enum OriginError {
 /// Index of a camera, and a pixel in its picture.
 pub type Click = (usize, Point2<f64>);
 
-/// Largest residual of a clicked point, and of a board, in pixels.
+/// Largest accepted residual, in pixels: of a clicked point, and of a board.
 const CLICK_PX: f64 = 15.0;
 const BOARD_PX: f64 = 5.0;
 
@@ -142,7 +142,7 @@ pub fn from_board(
 }
 
 /// Finds the new world from the floor that people stood on. The origin is the centre of their positions, and the x axis is as near as
-/// possible to that of the old world.
+/// possible to the x axis of the old world.
 pub fn from_floor(floor: &Floor) -> Isometry3<f64> {
     let along = match floor.up.x.abs() {
         x if x < 0.9 => Vector3::x(),
@@ -151,7 +151,8 @@ pub fn from_floor(floor: &Floor) -> Isometry3<f64> {
     frame(floor.middle, along, floor.up.into_inner())
 }
 
-/// Returns `new_from_old` for a world with this origin, with x as near as possible to `along` and z along `up`.
+/// Returns the transformation `new_from_old` to a world with the given origin. Its z axis is `up`, and its x axis is as near as possible to
+/// `along`.
 fn frame(origin: Point3<f64>, along: Vector3<f64>, up: Vector3<f64>) -> Isometry3<f64> {
     let z = up.scale(1.0 / up.norm());
     let flat = along - z * z.dot(&along);

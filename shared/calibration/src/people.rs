@@ -2,13 +2,13 @@
 //!
 //! The estimate has three steps:
 //!
-//! - The joints that two cameras see at one instant give the relative pose of both. It is found by the eight-point essential matrix
-//!   with RANSAC, and refined robustly from several starts.
-//! - Each other camera is placed from the joints that are then known (resection).
+//! - The joints that two cameras see at the same instant give the pose of one camera relative to the other. It is found by the eight-point
+//!   essential matrix with RANSAC, and refined robustly from several starts.
+//! - The pose of each further camera is found from the joints whose positions are then known (resection).
 //! - All cameras, joints, bone lengths and time offsets are adjusted together.
 //!
 //! Pictures have no scale. The scale comes from a person's height, from one known distance, or from a given rig. The vertical and the floor
-//! come from feet that stand. One person is enough. If there are several, the person that the cameras see longest is used.
+//! come from feet that stand. One person is enough. If there are several people, the person whom the cameras see longest is used.
 //!
 //! To check the result, two halves of the recording are calibrated independently. They must give the same rig.
 
@@ -50,14 +50,14 @@ use geometry::Camera;
 pub struct Settings {
     /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
     pub n_joints: usize,
-    /// For each joint, the index of its mirror on the other side of the body.
+    /// For each joint, the index of the corresponding joint on the other side of the body.
     pub sides: Vec<usize>,
     /// True if some camera labels left and right as they appear in the picture, so that cameras may contradict each other.
     pub as_seen: bool,
     /// Known offset to add to the times of each camera to get common times, in seconds.
     pub offsets_s: Vec<f64>,
-    /// Largest possible error of these offsets, in seconds; offsets are searched within this range. Errors of a few frames are found even
-    /// if this range is 0.
+    /// Largest possible error of `offsets_s`, in seconds; offsets are searched within this range. Errors of a few frames are found even if
+    /// this range is 0.
     pub window_s: f64,
     /// Source of the scale.
     pub scale: Scale,
@@ -69,8 +69,8 @@ pub struct Settings {
     pub seed: u64,
 }
 
-/// Films of the cameras, and the cameras in the same order. Only the intrinsics of the cameras are used, except with [`Scale::Rig`],
-/// which also uses their poses.
+/// The cameras, and their films (the people in each camera's pictures) in the same order. Only the intrinsics of the cameras are used,
+/// except with [`Scale::Rig`], which also uses their poses.
 #[derive(Debug, Clone, Copy)]
 pub struct Recording<'a> {
     /// The cameras.

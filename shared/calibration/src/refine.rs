@@ -1,9 +1,9 @@
 //! Refinement of an existing rig from a recording, or repair of a rig after a camera was moved.
 //!
-//! The given rig is trusted to within stated deviations. The prior on a camera's pose has a loss that saturates, so a moved camera can
-//! break away from it. Only cameras whose poses the joints determine better than the prior are changed; the other cameras are held. The new
-//! rig is judged on blocks of the recording that it was not fitted to. There, each camera's joints are compared with the positions that
-//! the other cameras predict.
+//! The poses of the given rig are assumed to be correct up to stated standard deviations. The prior on a camera's pose has a loss that
+//! saturates, so that the prior does not hold a moved camera at its old pose. A camera is changed only if the joints determine its pose
+//! better than the prior does; otherwise its pose is fixed. The new rig is evaluated on parts of the recording that were not used for the
+//! fit. In these parts, each camera's joints are compared with the positions that the other cameras predict.
 
 mod held_out;
 
@@ -25,10 +25,10 @@ use crate::people::solve::{Solved, rounds};
 use crate::people::{Doubt, PeopleError, Recording, Skeletons};
 use held_out::{Blocks, chosen};
 
-/// A camera is changed if its standard deviation is below this fraction of the prior's standard deviation.
+/// A camera is changed if the standard deviation of its new pose is below this fraction of the prior's standard deviation.
 const TOLD: f64 = 0.8;
-/// A camera counts as moved if freeing its pose improves the fit of the joints by the first value, as a fraction. The gain must also be
-/// larger than the gain of any other camera by the second value, as a factor.
+/// A camera counts as moved if the fit of the joints improves by at least the first value, as a fraction, when only this camera's pose is
+/// free. The improvement must also be larger, by the second value as a factor, than the improvement for any other camera.
 const SUSPECT: [f64; 2] = [0.15, 1.5];
 
 /// Settings of a refinement.
@@ -36,7 +36,7 @@ const SUSPECT: [f64; 2] = [0.15, 1.5];
 pub struct Settings {
     /// Number of joints; the first 14 are those of `skeleton::PARSE14`.
     pub n_joints: usize,
-    /// For each joint, the index of its mirror on the other side of the body.
+    /// For each joint, the index of the corresponding joint on the other side of the body.
     pub sides: Vec<usize>,
     /// Offset to add to the times of each camera to get common times, in seconds.
     pub offsets_s: Vec<f64>,
@@ -57,12 +57,12 @@ pub struct Change {
     pub moved: [f64; 2],
     /// Standard deviation of the new pose, in degrees and metres.
     pub sd: [f64; 2],
-    /// True if the joints determine the pose of the camera; otherwise it is held.
+    /// True if the joints determine the pose of the camera; otherwise the pose is fixed.
     pub is_told: bool,
     /// Median residual of the rig fitted to the whole recording, in pixels.
     pub residual_px: f64,
-    /// Median distance of the camera's joints from the positions that the other cameras predict, on held-out blocks, in pixels: before and
-    /// after.
+    /// Median distance of the camera's joints from the positions that the other cameras predict, on held-out parts of the recording, in
+    /// pixels: with the given rig, then with the new one.
     pub held_out_px: [f64; 2],
     /// Offset to add to the camera's times to get common times, in seconds.
     pub offset_s: f64,
@@ -73,17 +73,17 @@ pub struct Change {
 pub struct Outcome {
     /// The new rig.
     pub cameras: Vec<Camera>,
-    /// Changes of the cameras; empty if nothing could be done.
+    /// Changes of the cameras; empty if the rig could not be refined.
     pub changes: Vec<Change>,
-    /// Median distance over all cameras on held-out blocks, in pixels: before and after.
+    /// Median distance over all cameras, on held-out parts of the recording, in pixels: with the given rig, then with the new one.
     pub held_out_px: [f64; 2],
-    /// Mean gain of a block divided by its standard error; a value above 2 is unlikely to be chance.
+    /// Mean improvement over the held-out blocks, divided by its standard error. A value above 2 is unlikely to be due to chance.
     pub certainty: f64,
-    /// Number of held-out blocks, and number of these that improved.
+    /// Number of held-out blocks of time, and number of blocks in which the new rig fits better.
     pub blocks: [usize; 2],
     /// True if the new rig is better.
     pub is_better: bool,
-    /// All reasons for which neither the given rig nor the new one can be trusted.
+    /// Reasons to trust neither the given rig nor the new one.
     pub doubts: Vec<Doubt>,
     /// Number of instants that were used.
     pub n_instants: usize,
@@ -212,14 +212,14 @@ fn better(
 /// The cameras that may change.
 #[derive(Debug, Clone)]
 struct Moving {
-    /// Index of a camera that was moved; it has no prior on its pose.
+    /// Index of a camera that was moved; its pose has no prior.
     suspect: Option<usize>,
-    /// True for each camera whose pose the joints determine; the poses of the other cameras are held.
+    /// True for each camera whose pose the joints determine; the poses of all other cameras are fixed.
     told: Vec<bool>,
 }
 
-/// Returns the camera that was moved, if any. Freeing this camera alone improves the fit of the joints much more than freeing any other
-/// camera does.
+/// Returns the camera that was moved, if any. If only the pose of this camera is free, the fit of the joints improves much more than with
+/// any other camera.
 fn suspect(
     study: &Study<'_>,
     choices: &[Choice],
@@ -256,7 +256,8 @@ fn suspect(
     Ok(is_one.then_some(best.1))
 }
 
-/// Returns the rig that best fits both the joints and the given rig. Cameras that the joints do not determine are kept.
+/// Returns the rig that best fits both the joints and the given rig. Cameras whose poses the joints do not determine keep their given
+/// poses.
 fn fitted(
     study: &Study<'_>,
     choices: &[Choice],
@@ -289,11 +290,11 @@ fn fitted(
     rounds(study, cameras, choices.to_vec(), &beliefs)
 }
 
-/// Returns the standard deviation of every camera's pose, in degrees and metres. It is 0 for a camera that is held, and infinite if nothing
-/// is known.
+/// Returns the standard deviation of every camera's pose, in degrees and metres. It is 0 for a camera with a fixed pose, and infinite if
+/// nothing determines the pose.
 fn deviations(all: &Solved) -> Vec<[f64; 2]> {
     let inflation = all.report.variance().sqrt().max(1.0);
-    // Strengthening the priors has the same effect as weakening the joints.
+    // Giving the priors more weight has the same effect as giving the joints less.
     let known = covariance(&all.problem.believing(inflation)).ok();
     let cameras = all.problem.cameras();
     let of = |camera: usize| {
@@ -318,7 +319,7 @@ fn told(all: &Solved, settings: &Settings) -> Vec<bool> {
         .collect()
 }
 
-/// Compares the rigs of both halves and adds doubts if they disagree.
+/// Compares the rigs fitted to the two halves of the recording, and adds doubts if they differ too much.
 fn disagreement(rigs: &[Vec<Camera>], all: &Solved, settings: &Settings, outcome: &mut Outcome) {
     let [one, other] = rigs else { return };
     let skeletons = all.skeletons(settings.n_joints);

@@ -1,11 +1,11 @@
 //! Offset and drift of the clocks of cameras, from the movement of people that they see, or from the sounds that they record.
 //!
-//! A joint that two cameras see at the same instant satisfies their epipolar constraint. At different instants it does not, because the
-//! person moves. The offset between two clocks is the one at which the constraint is satisfied best.
+//! A joint that two cameras see at the same instant satisfies their epipolar constraint. Positions from different instants do not satisfy
+//! it, because the person moves. The offset between two clocks is the value for which the constraint is satisfied best.
 //!
 //! Suggested reading order:
 //!
-//! - [`Film`]: the people that a camera saw, by its own clock.
+//! - [`Film`]: the people in the pictures of one camera, with times of its own clock.
 //! - [`estimate`]: the whole estimation.
 //! - [`Outcome`]: the result, with every [`Doubt`] that forbids using it.
 //!

@@ -1,4 +1,4 @@
-//! Adjustment of all parameters at once, and again without wrong corners.
+//! Adjustment of all parameters at once, repeated without wrong corners.
 
 use geometry::Camera;
 use geometry::bundle::{Cameras, Free, Loss, Settings, solve};
@@ -9,7 +9,7 @@ use super::outcome::{Adjusted, Shown, middle, outcome};
 use super::problem::{BoardProblem, Observation};
 use super::{BoardError, CornerLoss, Outcome, Task};
 
-/// Corners with a residual above this many standard deviations are wrong, unless the residual is below a limit in pixels.
+/// A corner is wrong if its residual exceeds both this number of standard deviations and a limit in pixels.
 const WRONG_SIGMAS: f64 = 5.0;
 const WRONG_PX: f64 = 0.7;
 /// Median length of a residual, in standard deviations along an axis.

@@ -10,12 +10,12 @@ use super::Sight;
 
 /// Number of cells of a picture along each side.
 const CELLS: [usize; 2] = [8, 6];
-/// Number of steps of the board's apparent size (a factor of 1.5 each), and of its tilt.
+/// Number of classes of the board's apparent size, each 1.5 times as large as the one before, and number of classes of its tilt.
 const SIZES: usize = 8;
 const TILTS: usize = 6;
 /// Returns the frames of `sights` with the best coverage, at most `most`, in their original order.
 ///
-/// Frames are chosen one by one. Each choice is the frame that adds most to the features that were seen least so far: cells of each
+/// Frames are chosen one by one. Each time, the frame is chosen that adds most to the features that have been covered least: cells of each
 /// camera's picture, sizes and tilts of the board, and pairs of cameras that see the board together.
 pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<usize> {
     let mut all: Vec<usize> = sights.iter().map(|sight| sight.frame).collect();
@@ -42,7 +42,7 @@ pub(crate) fn frames(sights: &[Sight], sizes: &[[u32; 2]], most: usize) -> Vec<u
                 for b in &own {
                     if a.camera < b.camera {
                         let pair = a.camera * n_cameras + b.camera;
-                        // Pairs connect the cameras of the rig, so they count several times.
+                        // Pairs of cameras count several times, because they connect the cameras of the rig.
                         list.extend([n_cameras * per_camera + pair; 6]);
                     }
                 }

@@ -5,13 +5,13 @@ use nalgebra::{Isometry3, UnitQuaternion};
 /// A board seen by two cameras at the same time.
 #[derive(Debug, Clone)]
 pub(crate) struct Meeting {
-    /// Possible poses of the pair, one for each orientation in which the board looks the same; the first is the most likely.
+    /// Possible relative poses of the two cameras: one for each orientation in which the board looks the same, the most likely first.
     pub(crate) a_from_b: Vec<Isometry3<f64>>,
     /// Weight of this board.
     pub(crate) weight: f64,
 }
 
-/// The relative pose of a pair, and the number of boards that agree with it.
+/// The relative pose of a pair of cameras, and the number of board positions that agree with it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pair {
     pub(crate) a_from_b: Isometry3<f64>,
@@ -19,12 +19,12 @@ pub(crate) struct Pair {
     pub(crate) n: usize,
 }
 
-/// Largest difference between two poses of a pair that agree: a rotation in radians, and a shift as a fraction of the distance between
-/// the cameras.
+/// Two relative poses of a pair of cameras agree if they differ by at most a rotation, in radians, and a shift, as a fraction of the
+/// distance between the cameras.
 const SAME_TURN: f64 = 0.1;
 const SAME_SHIFT: f64 = 0.15;
 
-/// Finds the pose that the largest number of meetings agrees with, and returns the mean over these meetings.
+/// Finds the relative pose with which the largest number of shared sights of the board agree, and returns the mean over these.
 pub(crate) fn pair(meetings: &[Meeting]) -> Option<Pair> {
     let step = meetings.len().div_ceil(60).max(1);
     let candidates = meetings.iter().step_by(step).flat_map(|meeting| meeting.a_from_b.iter());
@@ -82,7 +82,7 @@ pub(crate) struct Standing {
     pub(crate) groups: Vec<Vec<usize>>,
 }
 
-/// Finds the poses of all cameras along the strongest connections: a tree of the pairs with most meetings.
+/// Finds the poses of all cameras along the strongest connections: a tree of the camera pairs that saw the board together most often.
 ///
 /// * `pairs`: cameras a < b, and their relative pose.
 pub(crate) fn standing(n_cameras: usize, pairs: &[([usize; 2], Pair)]) -> Standing {

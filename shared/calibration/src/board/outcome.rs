@@ -99,9 +99,9 @@ fn rms(off: impl Iterator<Item = nalgebra::Vector2<f64>>) -> f64 {
 
 /// Returns every free parameter with its standard deviation, which is infinite if the pictures do not determine the parameter.
 ///
-/// The standard deviation is the larger of two. One assumes that corners have independent errors. The other is computed from the
-/// differences between parts of the recording. It also covers errors that successive frames share: a moving board is blurred, scanned row
-/// by row, and in a different position in the next camera's picture.
+/// It is the larger of two estimates. The first assumes that the errors of corners are independent. The second is computed from the
+/// differences between parts of the recording. It therefore also covers errors that are common to successive frames: a moving board is
+/// blurred, scanned row by row, and in a different position in the next camera's picture.
 fn numbers(solved: &BoardProblem<'_>) -> Vec<Known> {
     let spread = covariance(solved).ok();
     let n_parts = solved.boards.len().min(MOST_PARTS);

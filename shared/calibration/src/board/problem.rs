@@ -5,8 +5,8 @@ use geometry::{Camera, LensModel};
 use nalgebra::{Isometry3, Matrix2x3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 
 /// Prior on every camera, as standard deviations. Pixels are square to half a percent, the principal point is within a few percent of the
-/// centre, and lenses are centred. The prior fixes parameters that few pictures leave open. It has no influence if the pictures cover much
-/// of the view, because they then determine each parameter at least ten times better.
+/// centre, and lenses are centred. The prior determines parameters that a small number of pictures cannot determine. It has hardly any
+/// influence if the board covers much of the picture: the corners then determine each parameter at least ten times better than the prior.
 const PRINCIPAL_POINT: f64 = 0.04;
 const ASPECT: f64 = 0.005;
 const RADIAL: f64 = 0.5;
@@ -33,13 +33,13 @@ pub(crate) struct BoardProblem<'a> {
     pub(crate) boards: Vec<Isometry3<f64>>,
     /// Corners observed in every frame.
     pub(crate) seen: &'a [Vec<Observation>],
-    /// Standard deviation of a corner, pixels.
+    /// Standard deviation of a corner's position, in pixels.
     pub(crate) sigma_px: f64,
     pub(crate) loss: Loss,
 }
 
 impl BoardProblem<'_> {
-    /// Returns the residuals of a frame (projected minus seen position, in pixels); `None` for a point without an image.
+    /// Returns the residuals of a frame (projected minus observed position, in pixels); `None` for a point without an image.
     pub(crate) fn residuals(&self, frame: usize) -> Vec<Option<nalgebra::Vector2<f64>>> {
         let residual = |observation: &Observation| {
             let camera: &Camera = &self.cameras.cameras()[observation.camera];

@@ -15,8 +15,8 @@ use super::{
 
 /// Maximum number of pictures for the initial intrinsics of one camera.
 const MOST_FOR_START: usize = 60;
-/// Cameras are out of step if the residuals of all cameras together exceed those of each camera alone by this factor, and also exceed a
-/// limit in pixels.
+/// Cameras are out of step if fitting all of them together gives residuals that are larger by this factor than fitting each camera alone,
+/// and that also exceed a limit in pixels.
 const OUT_OF_STEP: f64 = 1.4;
 const OUT_OF_STEP_PX: f64 = 0.4;
 
@@ -70,8 +70,8 @@ pub fn calibrate(task: &Task) -> Result<Outcome, BoardError> {
     Ok(outcome)
 }
 
-/// Returns evidence that cameras fit worse together than each one alone. The evidence is in the residuals, or in the lenses: if few frames
-/// have several cameras, lenses are distorted to reduce the residuals.
+/// Returns evidence that the cameras fit worse together than each one alone. The evidence is either larger residuals or changed lenses: if
+/// only a few frames show the board in several cameras, the adjustment changes the lenses to keep the residuals small.
 fn out_of_step(alone: &Outcome, together: &Outcome) -> Option<OutOfStep> {
     let [alone_px, together_px] = [alone, together].map(pooled);
     let is_worse = together_px > OUT_OF_STEP * alone_px && together_px > OUT_OF_STEP_PX;
@@ -87,11 +87,9 @@ fn out_of_step(alone: &Outcome, together: &Outcome) -> Option<OutOfStep> {
     })
 }
 
-/// Places cameras whose pictures of one frame were not taken at the same time.
-///
-/// Such pictures give wrong poses of the board, and an adjustment distorts lenses to fit them. The lens of each camera is therefore
-/// found with board poses of its own, as if the camera were alone. For the poses of the cameras, a sight of a faster board has a lower
-/// weight.
+/// Finds the poses of cameras whose pictures of one frame were not taken at the same time. Such pictures give wrong poses of the board, and
+/// an adjustment of everything would change the lenses to fit them. The lens of each camera is therefore found with board poses of its own,
+/// as if the camera were alone. For the poses of the cameras, a picture of a faster board has a lower weight.
 fn in_step(
     task: &Task,
     (cameras, alone): (Vec<Camera>, &Outcome),
@@ -115,8 +113,8 @@ fn in_step(
     shown.sort_by_key(|board| board.frame);
     let free: Vec<Free> = (0..cameras.len()).map(|nth| free_of(task, nth, nth != 0)).collect();
     let mut outcome = adjusted(task, cameras, &free, &shown)?;
-    // Keep one board per frame, and each camera's corners once. Residuals are those of the camera alone, because the other cameras took
-    // their pictures at other times.
+    // Keep one board per frame, and each camera's corners once. The residuals come from the fit of each camera alone, because the other
+    // cameras took their pictures at other times.
     outcome.boards.dedup_by_key(|(frame, _)| *frame);
     for (camera, alone) in outcome.cameras.iter_mut().zip(&alone.cameras) {
         *camera = CameraOutcome {
@@ -228,7 +226,7 @@ fn first_intrinsics(
     let chosen = own.iter().filter(|sight| frames.contains(&sight.frame));
     let boards: Vec<_> = chosen.map(Sight::sighted).collect();
     let kind = task.lens;
-    // A fit of eight coefficients starts from a fit of five, which converges from further away.
+    // A fit of eight coefficients starts from a fit of five, because the latter converges from less accurate initial values.
     let first = if kind == LensKind::Eight {
         LensKind::Five
     } else {

@@ -7,7 +7,7 @@ const FEW_BOARDS: usize = 6;
 const LITTLE_COVERED: f64 = 0.2;
 const LARGE_PX: f64 = 3.0;
 const FOCAL_SHARE: f64 = 0.01;
-/// Largest uncertainty of a focal length (as a fraction) at which a change of it is evidence that cameras are out of step.
+/// A changed focal length is evidence that cameras are out of step only if its uncertainty, as a fraction, is at most this.
 const TOLD_SHARE: f64 = 0.1;
 /// Two lenses are equal if they differ by less than this many standard deviations.
 const SAME_SIGMAS: f64 = 3.0;
@@ -17,8 +17,8 @@ const PLACE_SHARE: f64 = 0.02;
 const TURN_DEGREES: f64 = 0.5;
 const WRONG_SHARE: f64 = 0.15;
 const AGREEING_SHARE: f64 = 0.6;
-/// Limits of residuals are for a picture whose longer side has this many pixels; other pictures have limits in proportion, but at least
-/// half of the limit.
+/// The limits of residuals are given for a picture whose longer side has this number of pixels. For other sizes, they change in proportion,
+/// but never fall below half.
 const USUAL_SIDE: f64 = 1280.0;
 
 /// Reason not to trust a calibration.
@@ -51,7 +51,7 @@ pub enum Doubt {
     Focal {
         /// Index of the camera.
         camera: usize,
-        /// Standard deviation of the focal length, as a fraction of it.
+        /// Standard deviation of the focal length, as a fraction of the focal length.
         share: f64,
     },
     /// Pictures of one frame were not taken at the same time, and the pose of the camera is too uncertain.
@@ -70,7 +70,7 @@ pub enum Doubt {
         /// Fraction of corners that do not fit, from 0 to 1.
         share: f64,
     },
-    /// Frames of a pair contradict each other.
+    /// Different frames give different relative poses of two cameras.
     Disagreement {
         /// Indices of the two cameras.
         cameras: [usize; 2],
@@ -155,7 +155,7 @@ pub(super) fn is_spread(sight: &Sight) -> bool {
     finite && eigenvalues.min() > 0.01 * eigenvalues.max()
 }
 
-/// Returns the standard deviation of a focal length as a fraction of it; infinite if it is not determined.
+/// Returns the relative standard deviation of a focal length; infinite if the pictures do not determine the focal length.
 fn focal_share(camera: &CameraOutcome) -> f64 {
     let focal = camera.numbers.iter().find(|number| number.name == "focal length");
     focal.map_or(f64::INFINITY, |focal| focal.sd / focal.value)
@@ -166,7 +166,7 @@ fn is_lens_told(camera: &CameraOutcome) -> bool {
     camera.is_known || focal_share(camera) <= TOLD_SHARE
 }
 
-/// Returns true if a joint adjustment changed no lens that the camera's own pictures determine.
+/// Returns true if adjusting all cameras together changed no lens that the camera's own pictures determine.
 pub(super) fn are_lenses_the_same(joint: &Outcome, alone: &Outcome) -> bool {
     let is_same = |(joint, alone): (&CameraOutcome, &CameraOutcome)| {
         let [own, joint] = [alone, joint].map(|camera| camera.camera.intrinsics.fx);
@@ -191,7 +191,8 @@ pub(super) fn doubt(task: &Task, outcome: &mut Outcome) {
     for (camera, it) in outcome.cameras.iter().enumerate() {
         let side = f64::from(task.sizes[camera][0].max(task.sizes[camera][1]));
         let limit_px = LARGE_PX * (side / USUAL_SIDE).max(0.5);
-        // If cameras are out of step, the joint residuals reflect the time differences, and the deviations already include the effect.
+        // If cameras are out of step, the time differences enlarge the residuals of the common fit. The standard deviations already
+        // include this effect.
         let rms_px = outcome.out_of_step.map_or(it.rms_px, |out_of_step| out_of_step.alone_px);
         if outcome.out_of_step.is_some() {
             let [degrees, metres] = place_of(it);

@@ -15,11 +15,11 @@ const USUAL_TAGS: &str = "DICT_APRILTAG_36h11";
 /// Pattern of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Black and white squares; columns and rows are counted in inner corners.
+    /// Black and white squares; the numbers of columns and rows are those of the inner corners.
     Chessboard,
-    /// Black and white squares with a marker in each white one; columns and rows are counted in squares.
+    /// Black and white squares with a marker in each white one; the numbers of columns and rows are those of the squares.
     Charuco,
-    /// Markers side by side; columns and rows are counted in markers.
+    /// Markers side by side; the numbers of columns and rows are those of the markers.
     Grid,
 }
 
@@ -136,7 +136,7 @@ impl Board {
         other.check().is_ok().then_some(other)
     }
 
-    /// Returns the board with columns and rows exchanged.
+    /// Returns the board with columns and rows swapped.
     #[must_use]
     pub fn turned(&self) -> Self {
         Self {

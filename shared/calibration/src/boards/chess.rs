@@ -136,7 +136,7 @@ fn placed(
     Ok(best)
 }
 
-/// Returns the number of a corner of the board, after exchanging the axes of a grid or counting from the other end.
+/// Returns the number of a corner of the board, for a grid whose axes may be swapped or whose corners may be counted from the other end.
 fn number(
     at: [usize; 2],
     [turn, flip_column, flip_row]: [bool; 3],
@@ -157,7 +157,7 @@ pub(crate) fn look_alikes(board: &Board) -> Vec<Vec<usize>> {
     let size = [board.columns, board.rows];
     let mut turns: Vec<[bool; 3]> = Vec::new();
     let is_even = |count: usize| count.is_multiple_of(2);
-    // Half a turn keeps the colours if both counts of squares are odd, or both are even.
+    // A rotation by 180 degrees keeps the colours if the numbers of columns and rows are both odd or both even.
     if is_even(board.columns) == is_even(board.rows) {
         turns.push([false, true, true]);
     }

@@ -11,7 +11,7 @@ const LAST_STEP: f64 = 1e-3;
 /// Returns the corner near `start` (Förstner & Gülch 1987; `cornerSubPix` in `OpenCV`). It is the point q that minimises the weighted sum
 /// of (g · (p - q))², where g is the gradient of the picture at a nearby point p.
 ///
-/// * `radius`: half the side of the window, in pixels. The weight is a Gaussian with 0.7 times this standard deviation.
+/// * `radius`: half the side of the window, in pixels. The weight is a Gaussian whose standard deviation is 0.7 times the radius.
 ///
 /// Returns `None` if all gradients have the same direction (an edge), or if the corner is not within `radius` of `start`.
 pub(crate) fn refine(picture: &Picture, start: Point2<f64>, radius: f64) -> Option<Point2<f64>> {

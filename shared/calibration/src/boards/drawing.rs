@@ -48,9 +48,10 @@ pub struct Drawing {
 /// Size of the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Paper {
-    /// The smallest of A4 to A0 that the board fits on, in portrait or landscape; otherwise as large as the board needs.
+    /// The smallest paper size from A4 to A0 on which the board fits, in portrait or landscape. If the board fits on none, the page is as
+    /// large as the board needs.
     Fitting,
-    /// A size in millimetres; the page is rotated if the board only fits then.
+    /// A width and height in millimetres. The page is rotated if the board fits only in that way.
     Sized([f64; 2]),
 }
 
@@ -116,7 +117,7 @@ impl FromStr for Paper {
 }
 
 impl Drawing {
-    /// Returns the name of the page, in the form that [`Paper`] is parsed from, if it has a name.
+    /// Returns the name of the page in the form from which [`Paper`] is parsed; `None` if the page has no name.
     pub fn paper(&self) -> Option<&'static str> {
         let [width, height] = self.page;
         let is_page = |size: &[f64; 2]| *size == [width, height] || *size == [height, width];

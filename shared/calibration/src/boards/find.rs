@@ -20,9 +20,9 @@ pub struct Found {
     pub corners: Vec<Corner>,
     /// Index of the board in [`Finder::variants`].
     pub variant: usize,
-    /// True if black and white are exchanged.
+    /// True if black and white are swapped.
     pub is_inverted: bool,
-    /// True if left and right are exchanged, which only markers show.
+    /// True if left and right are swapped. This can only be detected with markers.
     pub is_mirrored: bool,
     /// Number of markers that were read.
     pub n_markers: usize,
@@ -31,13 +31,13 @@ pub struct Found {
 /// Hints from other pictures of the same camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Hints {
-    /// True if black and white are exchanged.
+    /// True if black and white are swapped.
     pub is_inverted: Option<bool>,
     /// Index of the board's variant.
     pub variant: Option<usize>,
 }
 
-/// A board that may have been described wrongly, in a possible other form.
+/// A possible form of a board whose description may be wrong.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variant {
     /// The board in this form.
@@ -56,7 +56,7 @@ pub struct Finder {
 }
 
 impl Finder {
-    /// Creates a finder for a board and for boards that may be confused with it: with rows and columns exchanged, with the older pattern of
+    /// Creates a finder for a board and for boards that may be confused with it: with rows and columns swapped, with the older pattern of
     /// `OpenCV`, or with tags counted from below.
     pub fn new(board: &Board) -> Self {
         let codes = board.codes().map(|dictionary| {
@@ -173,7 +173,7 @@ impl Finder {
         }
     }
 
-    /// Returns the variant that most sightings agree with, and these sightings.
+    /// Returns the variant of the board with which most detected markers agree, and these markers.
     fn agreed(&self, sightings: &[Sighting], hints: Hints) -> Option<(usize, Vec<Sighting>)> {
         let mut best: Option<(usize, Vec<Sighting>)> = None;
         for (index, variant) in self.variants.iter().enumerate() {

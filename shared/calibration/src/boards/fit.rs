@@ -5,12 +5,14 @@ use nalgebra::Point2;
 use crate::boards::marker::Sighting;
 use crate::boards::{Homography, Layout};
 
-/// Largest distance of a marker from the position predicted by the other markers, in sides of the marker. It allows for lens distortion.
+/// Largest distance of a marker from the position predicted by the other markers, in sides of the marker. The limit is large enough for
+/// lens distortion.
 const OFF_SIDES: f64 = 0.45;
 /// Maximum number of pairs of markers to try.
 const MOST_PAIRS: usize = 300;
 
-/// Returns the largest set of sightings that one projective map takes to the layout, with at least two sightings and no number twice.
+/// Returns the largest set of detected markers that one projective map takes to their positions in the layout. It has at least two markers,
+/// and no number occurs twice.
 pub(crate) fn agreeing(layout: &Layout, sightings: &[Sighting]) -> Vec<Sighting> {
     let mut best: (f64, Vec<Sighting>) = (f64::MAX, Vec::new());
     let pairs = (0..sightings.len()).flat_map(|a| (a + 1..sightings.len()).map(move |b| [a, b]));
@@ -33,7 +35,7 @@ pub(crate) fn agreeing(layout: &Layout, sightings: &[Sighting]) -> Vec<Sighting>
             best = found;
         }
     }
-    // Repeat with the map that was fitted to all these sightings.
+    // Repeat with the map that was fitted to all these markers.
     if let Some(map) = map_of(layout, &best.1) {
         let found = supporters(layout, &map, sightings);
         if found.1.len() >= best.1.len() {
@@ -55,7 +57,8 @@ fn map_of(layout: &Layout, sightings: &[Sighting]) -> Option<Homography> {
     Homography::fit(pairs.flatten())
 }
 
-/// Returns the sightings near the positions that a map predicts, and the sum of their distances in sides.
+/// Returns the detected markers near the positions that a map predicts, and the sum of their distances from these positions, in sides of a
+/// marker.
 fn supporters(layout: &Layout, map: &Homography, sightings: &[Sighting]) -> (f64, Vec<Sighting>) {
     let mut kept: Vec<(f64, Sighting)> = Vec::new();
     for sighting in sightings {
@@ -84,7 +87,7 @@ fn off_sides(layout: &Layout, map: &Homography, sighting: &Sighting) -> Option<f
     Some(worst)
 }
 
-/// Returns the map near a point of the board; known points near it have the largest weight.
+/// Returns the map that holds near a point of the board; known points near that point have the largest weight.
 ///
 /// * `known`: position on the board (metres), position in the picture (pixels), and weight.
 /// * `reach`: distance in metres beyond which points have a low weight.

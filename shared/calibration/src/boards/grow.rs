@@ -20,7 +20,7 @@ pub(crate) type Known = (Point2<f64>, Point2<f64>, f64);
 
 /// Returns every visible corner of the layout, found from known positions.
 ///
-/// `picture` has the polarity of the print: black is dark.
+/// In `picture`, the black squares of the board must be dark.
 pub(crate) fn grow(
     picture: &Picture,
     board: &Board,
@@ -87,7 +87,8 @@ fn look(
     is_there.then_some(at)
 }
 
-/// Returns true if black and white around a corner are as on the board; `value` gives the grey value at an offset in squares.
+/// Returns true if the black and white squares around a corner are arranged as on the board; `value` gives the grey value at an offset in
+/// squares.
 fn is_crossing(
     is_black_before: bool,
     board: &Board,

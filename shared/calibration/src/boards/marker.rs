@@ -6,9 +6,9 @@ use crate::boards::{Homography, Picture};
 
 /// Minimum difference between black and white in a marker, in grey values.
 const LEAST_CONTRAST: f64 = 12.0;
-/// Largest fraction of the frame's cells that may be white.
+/// Largest fraction of the cells in a marker's black frame that may look white.
 const WHITE_FRAME: f64 = 0.15;
-/// Maximum number of wrong bits that are tolerated, even if codes differ by many bits.
+/// Maximum number of wrong bits that are tolerated, even if the codes of the dictionary differ by many more bits.
 const MOST_WRONG_BITS: u32 = 3;
 
 /// The codes of a board's markers.
@@ -128,7 +128,7 @@ impl Codes {
     }
 }
 
-/// Returns the four readings of a code, one with each corner of the marker as the first.
+/// Returns the four readings of a code; each takes a different corner of the marker as the first.
 fn turns(code: u64, side: usize) -> [u64; 4] {
     let mut turns = [code; 4];
     for i in 1..4 {

@@ -80,7 +80,7 @@ impl Picture {
             && at.y <= self.height as f64 - 1.0 - margin
     }
 
-    /// Returns the picture with black and white exchanged.
+    /// Returns the picture with black and white swapped.
     #[must_use]
     pub(crate) fn inverted(&self) -> Self {
         Self {
@@ -89,7 +89,7 @@ impl Picture {
         }
     }
 
-    /// Returns the picture with left and right exchanged.
+    /// Returns the picture with left and right swapped.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let rows = self.pixels.chunks_exact(self.width);

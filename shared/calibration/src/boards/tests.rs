@@ -135,7 +135,7 @@ fn printed_boards_are_found_where_they_are() {
         let found = finder(text).find(&shot.picture, Hints::default());
         let found = found.unwrap_or_else(|error| panic!("{text}: {error:?}"));
         let (share, worst) = compared(&found, &shot.truth);
-        // The corners of tags are not crossings: bright areas spill over dark ones.
+        // The corners of tags are not crossings of four squares, so they shift because bright areas spread over dark ones.
         let limit = if text.starts_with("aprilgrid") {
             0.4
         } else {

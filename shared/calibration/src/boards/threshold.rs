@@ -2,10 +2,10 @@
 
 use crate::boards::Picture;
 
-/// Minimum difference between a pixel and the brighter mean around it, in grey values.
+/// Minimum amount by which a dark pixel is darker than the mean around it, in grey values.
 const DARKER: i64 = 7;
 
-/// Returns true for every pixel that is darker than the mean of the square of `2 radius + 1` pixels around it.
+/// Returns true for every pixel that is darker than the mean of the square around it whose side is `2 radius + 1` pixels.
 pub(crate) fn dark(picture: &Picture, radius: usize) -> Vec<bool> {
     let (width, height) = (picture.width(), picture.height());
     let sums = Sums::new(picture);

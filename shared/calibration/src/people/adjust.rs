@@ -10,7 +10,7 @@ use super::bias::Biases;
 use super::instant::{Instant, Seen, WIDTH, instant};
 use super::sightings::Sightings;
 
-/// Distance below which two positions of a joint count as one place, as a fraction of the size of the person.
+/// Two positions of a joint count as the same place if their distance is below this fraction of the person's size.
 const PLACE: f64 = 0.04;
 /// Standard deviation of a bone's length over time, as a fraction of its length.
 const BONE_SPREAD: f64 = 0.06;
@@ -23,14 +23,14 @@ pub(crate) struct PosePrior {
     pub(crate) sd: [f64; 2],
 }
 
-/// Prior terms, in addition to the observations.
+/// Terms of the adjustment that do not come from observations.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Beliefs {
     /// Two cameras and the distance between them, which fixes the scale. Its uncertainty is negligible.
     pub(crate) baseline: Option<(usize, usize, f64)>,
     /// Prior poses, by camera.
     pub(crate) poses: Vec<Option<PosePrior>>,
-    /// Standard deviation of a time offset about its current value, in seconds; `None` if offsets are held.
+    /// Standard deviation of a time offset about its current value, in seconds; `None` if offsets are fixed.
     pub(crate) offset_sd_s: Option<f64>,
     /// Standard deviation of focal lengths about the given values, as a fraction.
     pub(crate) focal_sd: f64,
@@ -45,7 +45,7 @@ pub(crate) struct Residual {
     pub(crate) joint: usize,
     /// Predicted position minus seen position.
     pub(crate) whole: Vector2<f64>,
-    /// The same difference without the constant error of the joint in this camera.
+    /// The same difference after subtracting the constant error of the joint in this camera.
     pub(crate) own: Vector2<f64>,
     /// Position where the joint is seen.
     pub(crate) at: Point2<f64>,
@@ -68,7 +68,7 @@ pub(crate) struct Adjustment {
     n_instants: usize,
 }
 
-/// Returns true if the length of a bone is the same in every posture.
+/// Returns true if a bone of this kind has the same length in every posture.
 fn is_stiff(kind: Kind) -> bool {
     matches!(
         kind,
@@ -125,7 +125,8 @@ impl Adjustment {
         it
     }
 
-    /// Finds the weights of joints. The error of a joint is the same while it stays in one place, so all instants there count as one.
+    /// Finds the weights of joints. The error of a joint is the same while the joint stays in one place, so all these instants together
+    /// count as one.
     fn find_shares(&mut self) {
         let sizes: Vec<f64> = self.instants.iter().map(Instant::size).collect();
         let near = PLACE * Sorted::new(sizes).upper_median().unwrap_or(0.0);
@@ -145,7 +146,7 @@ impl Adjustment {
         }
     }
 
-    /// Finds the initial lengths of bones: medians over left and right together.
+    /// Finds the initial lengths of bones: medians over the bones of both sides of the body.
     fn find_bones(&mut self) {
         let mut kinds: Vec<(Kind, usize)> = Vec::new();
         for (nth, bone) in BONES.iter().enumerate() {
@@ -173,8 +174,8 @@ impl Adjustment {
         }
     }
 
-    /// Returns the same problem with priors of poses that are stronger by a factor. This has the same effect as lower weights of the
-    /// joints.
+    /// Returns the same problem with stronger priors on the poses, by the factor `times`. This has the same effect as giving the joints
+    /// less weight.
     pub(crate) fn believing(&self, times: f64) -> Self {
         let mut it = self.clone();
         for prior in it.beliefs.poses.iter_mut().flatten() {

@@ -12,20 +12,20 @@ use super::resect::{Known, resected};
 use super::sightings::{Chain, Sightings};
 use super::two_view::{Match, Relative, normalised, relative};
 
-/// Expected error of a joint at the start, as a fraction of the size of the person.
+/// Initial value for the expected error of a joint, as a fraction of the size of the person.
 pub(crate) const SHARE: f64 = 0.015;
 /// Maximum number of pairs of cameras to try as the first pair.
 const MOST_PAIRS: usize = 10;
-/// Minimum fraction of joints that must agree in the first pair.
+/// Minimum fraction of joints that must agree with the relative pose of the first pair of cameras.
 const LEAST_INLIERS: f64 = 0.4;
 /// Angle between rays above which a larger angle no longer makes a pair better, in radians.
 const WIDE: f64 = 0.5;
-/// Largest mean cost of a joint, log(1 + (residual / sigma)^2), at which a camera can be placed.
+/// A camera's pose is accepted if the mean cost of its joints, log(1 + (residual / sigma)^2), is at most this.
 const MOST_COST: f64 = 3.2;
 /// Step between the offsets that are searched, in seconds.
 const STEP_S: f64 = 0.1;
 
-/// Choice of the person seen by a camera, the offset of its clock, and whether left and right are exchanged.
+/// Choice for one camera: the person that it sees, the offset of its clock, and whether left and right are swapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Choice {
     pub(crate) chain: usize,
@@ -81,7 +81,7 @@ pub(crate) fn choices(n_chains: usize, offset_s: f64, window_s: f64, as_seen: bo
 }
 
 impl Study<'_> {
-    /// Returns the sightings of the chosen chains.
+    /// Returns the joints of the chosen people.
     pub(crate) fn sightings(&self, chosen: &[Option<Choice>]) -> Sightings {
         let chains = chosen.iter().enumerate();
         let chains: Vec<Option<&Chain>> =
@@ -143,7 +143,7 @@ impl Study<'_> {
         let mut most = 0.0;
         for (pair, _) in pairs {
             let [a, b] = pair;
-            // The clock and sides of the first camera are the reference for the other camera.
+            // The clock of the first camera, and its convention for left and right, are the reference for the other camera.
             let mut of_a = self.choices[a].clone();
             let first = of_a[0];
             of_a.retain(|choice| {
@@ -206,7 +206,7 @@ impl Study<'_> {
         })
     }
 
-    /// Adjusts the cameras that are placed so far.
+    /// Adjusts the cameras whose poses have been found so far.
     fn settle(&self, cameras: &mut Vec<Camera>, choices: &[Option<Choice>], pair: [usize; 2]) {
         let free: Vec<Free> = choices
             .iter()
@@ -241,7 +241,7 @@ impl Study<'_> {
         choices.iter().enumerate().map(of).collect()
     }
 
-    /// Returns the camera that can be placed best, and its pose.
+    /// Returns the camera whose pose can be determined best, and this pose.
     fn next(
         &self,
         cameras: &[Camera],
@@ -274,7 +274,7 @@ impl Study<'_> {
         best
     }
 
-    /// Returns the joints as triangulated by the placed cameras, by instant and joint.
+    /// Returns the joints as triangulated from the cameras with known poses, by instant and joint.
     fn points(
         &self,
         cameras: &[Camera],

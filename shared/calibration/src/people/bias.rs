@@ -1,4 +1,5 @@
-//! Constant error of a joint in a camera. For example, a hip is marked in a different place from the front than from the side.
+//! Constant error of a joint in a camera. For example, a joint detector finds a hip in a different place in a front view than in a side
+//! view.
 //!
 //! Such errors do not average out over a recording in which a person stays in one place. Each error is therefore an unknown. Its prior
 //! has mean 0 and a standard deviation estimated from the residuals. If people walk about, the estimated error is close to 0.
@@ -9,11 +10,11 @@ use statistics::Sorted;
 
 use super::instant::Instant;
 
-/// Minimum number of times that a camera must see a joint for the joint to have a bias of its own.
+/// A joint has a bias of its own in a camera only if the camera sees it at least this number of times.
 const LEAST: usize = 6;
 /// Largest prior standard deviation of a constant error, as a fraction of the size of the person.
 const MOST: f64 = 0.02;
-/// Smallest constant error that can be determined, as a fraction of the size of the person.
+/// A constant error below this fraction of the person's size counts as negligible.
 const NOTHING: f64 = 0.0005;
 /// Median of the square of a standard normal variable.
 const MEDIAN_SQUARE: f64 = 0.4549;

@@ -13,18 +13,17 @@ use super::outcome::Outcome;
 use super::solve::{Solved, Wanted, solved};
 use crate::align::{Difference, aligned, differences};
 
-/// Largest accepted standard deviation of a camera: degrees, and fraction of its distance to the people.
+/// Largest accepted standard deviation of a camera's pose: rotation in degrees, and position as a fraction of its distance to the people.
 const MOST_SD: [f64; 2] = [1.5, 0.04];
-/// Standard deviation below which a camera is known well: degrees, and fraction of its distance to the people. Calibrations should reach
-/// this.
+/// Standard deviation below which the pose of a camera counts as well known, in the units of [`MOST_SD`]. Calibrations should reach it.
 const GOOD_SD: [f64; 2] = [0.3, 0.01];
-/// Largest accepted difference between halves. If the error of the whole is `MOST_SD`, the error of each half is √2 times as large, and
-/// the difference between two halves is √2 times that again.
+/// Largest accepted difference between the rigs from the two halves of the recording. If the error of the rig from the whole recording is
+/// `MOST_SD`, the error of each half is √2 times as large, and the difference between two halves is √2 times that again.
 pub(crate) const MOST_HALVES: [f64; 2] = [2.0 * MOST_SD[0], 2.0 * MOST_SD[1]];
-/// Minimum length of a block of the recording, in seconds. The halves take blocks alternately.
+/// Minimum length of a block of the recording, in seconds. The blocks belong to the first half and the second half alternately.
 pub(crate) const BLOCK_S: f64 = 1.0;
-/// Minimum and maximum number of blocks that give the standard deviations. With 8 blocks, a deviation is known to 27 %; with 16 blocks,
-/// to 18 %. Longer blocks contain more of the errors that neighbouring instants share.
+/// Minimum and maximum number of blocks from which the standard deviations are computed. With 8 blocks, a standard deviation is known to 27
+/// %; with 16 blocks, to 18 %. Fewer, longer blocks account better for errors that are common to neighbouring instants.
 const BLOCKS: [f64; 2] = [8.0, 16.0];
 
 /// Returns the blocks of time to which the local blocks of an adjustment belong.
@@ -38,8 +37,8 @@ pub(super) fn blocks(problem: &Adjustment, times_s: &[f64]) -> Vec<usize> {
     problem.numbers().map(of).collect()
 }
 
-/// Returns the standard deviation of every camera's pose, in degrees and units of the solution. Rigs that are one standard deviation away
-/// along each axis of the covariance are aligned with the rig that was found, so that no camera counts as exact.
+/// Returns the standard deviation of every camera's pose, in degrees and units of the solution. Along each axis of the covariance, the rig
+/// is moved by one standard deviation and then aligned with the rig that was found. In this way, no camera counts as exact.
 pub(super) fn spread(all: &Solved, known: &Covariance) -> Vec<[f64; 2]> {
     let cameras = all.problem.cameras();
     let n = cameras.n_parameters();
@@ -74,7 +73,8 @@ fn distances(outcome: &Outcome) -> Vec<f64> {
 }
 
 /// Adds to the standard deviations of the rotations an error that no block of the recording shows. If a network finds the joints, rigs of
-/// few cameras have the same rotation error in every block, a few tenths of a degree. The median residual as an angle is about as large.
+/// few cameras have the same rotation error in every block, a few tenths of a degree. This error is about as large as the median residual,
+/// expressed as an angle.
 fn add_common(outcome: &mut Outcome) {
     for (report, camera) in outcome.reports.iter_mut().zip(&outcome.cameras) {
         let focal_px = 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy);
@@ -116,7 +116,7 @@ fn widen(outcome: &mut Outcome, apart: &[Difference]) {
     }
 }
 
-/// Returns the half to which an instant belongs; blocks alternate between the halves.
+/// Returns the half to which an instant belongs; successive blocks belong to the two halves alternately.
 pub(crate) fn half_of(time_s: f64, [from, to]: [f64; 2]) -> usize {
     let n = ((to - from) / BLOCK_S).floor().clamp(2.0, 16.0);
     let n = 2.0 * (n / 2.0).floor();

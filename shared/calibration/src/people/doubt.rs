@@ -22,9 +22,9 @@ pub enum Doubt {
         /// Minimum number of instants.
         least: usize,
     },
-    /// No two cameras see enough of one person at the same time to determine their relative pose.
+    /// No two cameras see enough of one person at the same time to determine the relative pose of the cameras.
     NoPair,
-    /// A camera cannot be placed relative to the others.
+    /// The pose of a camera relative to the others cannot be determined.
     Unplaced {
         /// Index of the camera.
         camera: usize,

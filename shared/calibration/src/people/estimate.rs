@@ -37,12 +37,12 @@ pub enum PeopleError {
         /// Number of films.
         films: usize,
     },
-    /// There are fewer joints than a body has, or the number of sides differs from the number of joints.
+    /// There are fewer joints than a body has, or `sides` does not have one entry per joint.
     #[error("there are {joints} joints and {sides} sides, but at least {least} joints are needed, each with its side", least = N_JOINTS)]
     Joints {
         /// Number of joints.
         joints: usize,
-        /// Number of sides.
+        /// Number of entries in `sides`.
         sides: usize,
     },
     /// A length is not a positive number.
@@ -145,7 +145,7 @@ fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), 
     }
 }
 
-/// Checks that the joints are those of a body, and that every side is one of the joints.
+/// Checks that there are at least as many joints as a body has, and that every entry of `sides` is the index of a joint.
 pub(crate) fn check_joints(joints: usize, sides: &[usize]) -> Result<(), PeopleError> {
     if joints < N_JOINTS || sides.len() != joints || sides.iter().any(|side| *side >= joints) {
         let sides = sides.len();

@@ -1,4 +1,4 @@
-//! Floor of a rig that is already known, from people who stood on it.
+//! Position of the floor in the world of a rig, from people who stood on the floor.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use statistics::Sorted;
@@ -98,7 +98,7 @@ mod tests {
         assert_ne!(found.vertical, Vertical::Feet);
         let nobody: Skeletons = vec![vec![None; 14]; times_s.len()];
         assert_eq!(floor(&times_s, &nobody), None);
-        // This person is carried past and never stands.
+        // The feet of this person never stand still.
         let mut carried = walk(0.0, 0.0).1;
         for (skeleton, time_s) in carried.iter_mut().zip(&times_s) {
             for joint in skeleton.iter_mut().flatten() {

@@ -1,4 +1,4 @@
-//! World coordinates for a rig without any: scale, vertical and floor.
+//! World coordinates for a rig whose scale, vertical and floor are not known yet.
 
 use geometry::Camera;
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, UnitQuaternion, UnitVector3, Vector3};
@@ -7,19 +7,20 @@ use statistics::Sorted;
 
 use crate::align::{Similarity, aligned};
 
-/// Speed below which an ankle counts as standing, in metres per second.
+/// Speed below which a foot counts as standing, in metres per second. The speed is that of the ankle.
 const STANDING_M_S: f64 = 0.25;
-/// Minimum distance between standing feet, and largest deviation from a plane, for the plane to be the floor, both in metres.
+/// Conditions for a plane through standing feet to be the floor, in metres: the minimum distance between the feet, and their largest
+/// deviation from the plane.
 const FLOOR_M: [f64; 2] = [0.3, 0.06];
-/// Largest angle between the normal of the floor and the direction of bodies, in radians.
+/// Largest angle between the normal of the floor and the direction from feet to head of standing people, in radians.
 const FROM_BODIES: f64 = 0.5;
 /// Largest bend of the legs of a person who stands, in radians.
 const STRAIGHT: f64 = 0.35;
 /// Height of the ankle above the floor as a fraction of the stature (Drillis & Contini 1966).
 pub(crate) const ANKLE: f64 = 0.039;
-/// Minimum number of skeletons or feet for an estimate.
+/// Minimum number of skeletons, or of standing feet, from which anything is estimated.
 pub(crate) const LEAST: usize = 5;
-/// Ankle, knee and hip of each side, and the neck.
+/// Indices of the ankle, knee and hip of each leg, and of the neck.
 const LEGS: [[usize; 3]; 2] = [[0, 1, 2], [5, 4, 3]];
 const NECK: usize = 12;
 
@@ -39,9 +40,9 @@ pub enum Scale {
 pub enum Vertical {
     /// The plane in which the feet stand.
     Feet,
-    /// People who stand upright.
+    /// The direction from feet to head of people who stand upright.
     Bodies,
-    /// Mean direction of bodies, used if nobody stands with straight legs. It may be wrong by many degrees.
+    /// The mean direction from feet to head of all people, used if nobody stands with straight legs. It may be wrong by many degrees.
     Leaning,
     /// The given rig.
     Rig,
@@ -173,7 +174,7 @@ fn of_height(skeletons: &Skeletons, metres: f64) -> Option<(f64, f64)> {
     Some((factor, sd / metres))
 }
 
-/// Returns the lower ankle of every instant at which it stands, in metres.
+/// Returns the position of the lower ankle at every instant at which this foot stands, in metres.
 ///
 /// * `up`: approximate up direction.
 pub(crate) fn standing(
@@ -289,7 +290,8 @@ fn middle(all: &[Vector3<f64>]) -> Option<UnitVector3<f64>> {
     UnitVector3::try_new(Vector3::new(axis(0)?, axis(1)?, axis(2)?), 1e-9)
 }
 
-/// Returns the change of bone lengths over time: the median over bones of their median deviation, as a fraction.
+/// Returns the change of bone lengths over time: the median, over all bones, of the median deviation from the bone's median length, as a
+/// fraction.
 pub(crate) fn bone_spread(skeletons: &Skeletons) -> Option<f64> {
     let mut each = Vec::new();
     for bone in BONES.iter().filter(|bone| bone.from[0] == bone.from[1]) {

@@ -4,21 +4,23 @@ use statistics::Sorted;
 use super::adjust::Adjustment;
 use super::bias::share_of;
 
-/// Minimum number of residuals of a joint for an expected error of its own; below this, the error of all joints is used.
+/// A joint has an expected error of its own if there are at least this many residuals of the joint. Otherwise, the expected error of all
+/// joints is used.
 const LEAST: usize = 30;
 /// Smallest expected error, in pixels.
 const LEAST_PX: f64 = 0.3;
 /// Median length of a residual in the plane, in standard deviations of one axis.
 const MEDIAN: f64 = 1.1774;
-/// Correction because joints are compared with a fit that includes them: the eight numbers of four views determine three coordinates.
+/// Factor that corrects residuals for the fact that the same joints were used in the fit. It is computed for four views, whose eight
+/// numbers determine three coordinates.
 const FITTED: f64 = 1.25;
 /// Number of cells of a picture along each axis.
 pub(crate) const CELLS: usize = 8;
 
 /// Returns the expected errors from the residuals, by camera and joint.
 ///
-/// Each joint has one error relative to the size of the person, estimated from all cameras together. With separate errors for each camera,
-/// a single camera could dominate the result.
+/// Each joint has one error relative to the size of the person, estimated from all cameras together. If each camera had its own expected
+/// errors, a single camera could dominate the result.
 ///
 /// * `sizes_px`: size of the person in each camera.
 pub(crate) fn sigmas(problem: &Adjustment, sizes_px: &[f64], n_joints: usize) -> Vec<Vec<f64>> {

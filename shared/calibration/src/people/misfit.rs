@@ -7,7 +7,7 @@ use statistics::Sorted;
 
 use super::frame::Skeletons;
 
-/// Minimum number of joints of a person to judge the fit.
+/// Minimum number of joints of a person for which the fit is evaluated.
 const LEAST: usize = 6;
 /// Minimum time between two pictures of a camera, in seconds.
 const APART_S: f64 = 0.5;
@@ -21,7 +21,7 @@ pub struct Fitted<'a> {
     pub films: &'a [Film],
     /// Offset to add to the times of each camera to get common times, in seconds.
     pub offsets_s: &'a [f64],
-    /// For each joint, the index of its mirror on the other side of the body.
+    /// For each joint, the index of the corresponding joint on the other side of the body.
     pub sides: &'a [usize],
     /// Instants in seconds on the common clock, and the skeleton at each.
     pub skeletons: (&'a [f64], &'a Skeletons),
@@ -90,7 +90,7 @@ impl Fitted<'_> {
         found
     }
 
-    /// Returns the fit of a person to a skeleton; left and right are exchanged if that fits better.
+    /// Returns the fit of a person to a skeleton; left and right are swapped if that fits better.
     fn fit(
         &self,
         camera: usize,
@@ -149,7 +149,7 @@ mod tests {
                         score: 1.0,
                     })
                 });
-                // One camera has left and right exchanged.
+                // In one camera, left and right are swapped.
                 let other = |joint: usize| if nth == 2 { sides()[joint] } else { joint };
                 let joints = (0..14).map(|i| joints[other(i)]).collect();
                 Shot {

@@ -21,7 +21,7 @@ pub struct CameraReport {
     pub sd: [f64; 2],
     /// Standard deviation of the focal length in pixels, if it was estimated.
     pub focal_sd_px: Option<f64>,
-    /// Difference between the halves of the recording, in degrees and metres.
+    /// Difference between the camera's poses from the two halves of the recording, in degrees and metres.
     pub halves: Option<[f64; 2]>,
     /// Offset to add to the camera's times to get common times, and its standard deviation, in seconds.
     pub offset_s: [f64; 2],
@@ -52,7 +52,7 @@ pub struct Outcome {
     pub n_instants: usize,
     /// First and last instant, in seconds on the common clock.
     pub span_s: [f64; 2],
-    /// Number of views whose left and right were exchanged.
+    /// Number of pictures in which left and right were swapped.
     pub n_exchanged: usize,
     /// Instants that were used, in seconds on the common clock.
     pub times_s: Vec<f64>,

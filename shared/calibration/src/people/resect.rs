@@ -12,7 +12,7 @@ use super::two_view::normalised;
 
 /// Number of samples of six joints.
 const SAMPLES: usize = 250;
-/// Number of joints by which a sample is judged, and number of joints to which a pose is fitted.
+/// Number of joints with which a sample is evaluated, and number to which a pose is fitted.
 const JUDGES: [usize; 2] = [250, 700];
 /// Number of poses to fit: the best of the samples.
 const STARTS: usize = 5;

@@ -1,4 +1,4 @@
-//! Detection of views in which left and right are exchanged at an instant.
+//! Detection of views in which left and right are swapped at an instant.
 
 use geometry::{Camera, Observation};
 use nalgebra::Point3;
@@ -7,12 +7,12 @@ use super::instant::place;
 use super::sightings::{Sight, Sightings};
 use super::two_view::{Match, essential_of, normalised, sampson};
 
-/// Minimum decrease of the cost for an exchange.
+/// Left and right are swapped only if this decreases the cost by at least this value.
 const CLEARLY: f64 = 4.0;
-/// Minimum number of joints with sides to compare.
+/// Minimum number of joints, among those with a left and a right, that must be compared.
 pub(crate) const LEAST_JOINTS: usize = 4;
 
-/// Costs of joints with sides as named and with sides exchanged.
+/// Costs of the joints with left and right as named, and with left and right swapped.
 #[derive(Default)]
 struct Costs {
     here: f64,
@@ -26,9 +26,8 @@ impl Costs {
     }
 }
 
-/// Exchanges the sides of a view at an instant if the other views clearly indicate it. Returns the number of exchanges.
-///
-/// With three or more views, each view is compared with the joints that the others triangulate. With two views, epipolar lines are used.
+/// Swaps left and right of a view at an instant if the other views clearly contradict its naming. Returns the number of swaps. With three
+/// or more views, each view is compared with the joints as triangulated from the others. With two views, epipolar lines are used.
 pub(crate) fn exchange(
     cameras: &[Camera],
     sightings: &mut Sightings,
@@ -37,7 +36,7 @@ pub(crate) fn exchange(
 ) -> usize {
     let mut n = 0;
     for instant in 0..sightings.seen.len() {
-        // The worst view of an instant is handled first, because an exchanged view makes the others look wrong.
+        // The worst view of an instant is handled first, because a view in which left and right are swapped makes the others look wrong.
         for _ in 0..cameras.len() {
             let seen = &sightings.seen[instant];
             let gain = |camera: usize| {

@@ -7,13 +7,14 @@ use statistics::Sorted;
 
 /// Standard deviation of the kernel that smooths positions over time, in intervals between pictures and in seconds.
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
-/// Largest gap between two tracks of a camera that can be one person, in seconds.
+/// Largest gap between two tracks of a camera that may show the same person, in seconds.
 const LONGEST_GAP_S: f64 = 3.0;
-/// Largest overlap of two tracks in one place that can be one person, in seconds. For a moment, one person may be detected in two poses.
+/// Largest overlap in time of two tracks in the same place that may show the same person, in seconds. For a moment, one person may be
+/// detected in two poses.
 const LONGEST_OVERLAP_S: f64 = 0.25;
-/// Largest distance between the end of one track and the start of another at which they count as one place, in sizes of the person.
+/// The end of one track and the start of another count as the same place if their distance is at most this, in sizes of the person.
 const ONE_PLACE: f64 = 0.3;
-/// Maximum number of chains of a camera; those with the best visibility are used.
+/// Maximum number of chains of a camera. The chains in which the person is seen best are used.
 const MOST_CHAINS: usize = 3;
 /// Minimum length of a chain relative to the longest one.
 const LEAST_SHARE: f64 = 0.15;
@@ -29,7 +30,7 @@ pub(crate) struct Sight {
     pub(crate) weight: f64,
 }
 
-/// Successive tracks of a camera that may be one person.
+/// Successive tracks in one camera that may show the same person.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     tracks: Vec<Track>,
@@ -79,8 +80,8 @@ impl Chain {
 
     /// Returns the speed of a joint, from its positions one picture before and one after.
     ///
-    /// The slope of the line that gives the position is not suitable. Between two pictures, it has the same errors as the position. An
-    /// adjustment would then move clocks until both errors cancel, half a picture away from the truth.
+    /// The slope of the line from which the position is computed is not suitable: between two pictures, its errors are correlated with
+    /// those of the position. An adjustment would then move clocks until both errors cancel, half a picture away from the truth.
     fn speed(&self, track: &Track, joint: usize, time_s: f64) -> Vector2<f64> {
         let at = |time_s: f64| Some(Vector2::from(track.place(joint, time_s)?.at));
         let ends = [-1.0, 1.0].map(|sign| at(time_s + sign * self.interval_s));
@@ -121,7 +122,7 @@ impl Chain {
     }
 }
 
-/// Returns the people that a camera sees longest, in descending order of visibility.
+/// Returns the people whom a camera sees longest, in descending order of how well and how long they are seen.
 pub(crate) fn chains(film: &Film, camera: &Camera, n_joints: usize, interval_s: f64) -> Vec<Chain> {
     let own_s = self::interval_s(film).unwrap_or(interval_s);
     let sigma_s = (SMOOTHING[0] * interval_s).max(SMOOTHING[1]);
@@ -196,14 +197,14 @@ impl Sightings {
         }
     }
 
-    /// Exchanges left and right of a camera at one instant.
+    /// Swaps left and right of a camera at one instant.
     pub(crate) fn exchange(&mut self, instant: usize, camera: usize, sides: &[usize]) {
         let own = &self.seen[instant][camera];
         let other = sides.iter().map(|side| own.get(*side).copied().flatten());
         self.seen[instant][camera] = other.collect();
     }
 
-    /// Exchanges left and right of a camera at all instants.
+    /// Swaps left and right of a camera at all instants.
     pub(crate) fn exchange_all(&mut self, camera: usize, sides: &[usize]) {
         for instant in 0..self.seen.len() {
             self.exchange(instant, camera, sides);

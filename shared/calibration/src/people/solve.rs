@@ -12,7 +12,7 @@ use super::measure::{Fit, biases, fits, sigmas};
 use super::sides::exchange;
 use super::sightings::Sightings;
 
-/// Number of rounds. Each round finds clocks, sides and expected errors, then adjusts everything else.
+/// Number of rounds. Each round determines clocks, left and right, and expected errors, then adjusts everything else.
 const ROUNDS: usize = 4;
 /// Standard deviation of an offset about its initial value, in seconds.
 const OFFSET_SD_S: f64 = 0.1;
@@ -27,7 +27,7 @@ pub(crate) struct Solved {
     pub(crate) report: Report,
     /// Expected errors by camera and joint, in pixels.
     pub(crate) sigmas_px: Vec<Vec<f64>>,
-    /// Number of views whose sides were exchanged.
+    /// Number of pictures in which left and right were swapped.
     pub(crate) n_exchanged: usize,
 }
 
@@ -42,7 +42,7 @@ impl Solved {
     }
 }
 
-/// Minimum improvement of the fit at which the joints count as contradicting the given clocks, as a fraction.
+/// The joints contradict the given clocks if other clocks improve the fit by at least this fraction.
 const BETTER: f64 = 0.15;
 
 /// Treatment of the clocks.
@@ -54,7 +54,7 @@ pub(crate) enum Clocks {
     Found,
 }
 
-/// Free parameters.
+/// The parameters that are estimated.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wanted {
     pub(crate) focal: bool,
@@ -64,7 +64,7 @@ pub(crate) struct Wanted {
 /// Solves a rig without prior poses. The given clocks are used unless the joints contradict them.
 ///
 /// If a person walks in a circle, a change of a camera's clock looks much like a change of its position. Only the swing of the limbs
-/// distinguishes them, and errors of the joints have similar effects. Clocks with little effect on the fit of the joints are left
+/// distinguishes the two, and errors of the joints have similar effects. Clocks with little effect on the fit of the joints are left
 /// unchanged.
 ///
 /// * `search`: true if clocks are searched over a wide range.
@@ -133,7 +133,7 @@ fn from(study: &Study<'_>, start: Start, wanted: Wanted) -> Result<Solved, Doubt
     rounds(study, Cameras::new(cameras, &free), choices, &beliefs)
 }
 
-/// Alternates between clocks, sides, expected errors and the adjustment of everything else.
+/// Alternately determines clocks, left and right, and expected errors, and adjusts everything else.
 pub(crate) fn rounds(
     study: &Study<'_>,
     mut cameras: Cameras,

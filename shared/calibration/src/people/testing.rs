@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 pub(crate) const N_JOINTS: usize = 14;
 pub(crate) const RADIUS: f64 = 5.0;
 
-/// Returns, for each joint, the index of its mirror on the other side of the body.
+/// Returns, for each joint, the index of the corresponding joint on the other side of the body.
 pub(crate) fn sides() -> Vec<usize> {
     vec![5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13]
 }
@@ -164,7 +164,7 @@ impl Flaws {
         }
     }
 
-    /// Returns typical flaws: 5 % of views exchanged, 10 % of joints wrong, 10 % missing, and 3 px of noise.
+    /// Returns typical flaws: left and right swapped in 5 % of the pictures, 10 % of the joints wrong, 10 % missing, and 3 px of noise.
     pub(crate) fn usual(seed: u64) -> Self {
         Self {
             noise_px: 3.0,

@@ -179,7 +179,7 @@ fn a_rig_that_is_not_known_well_says_so() {
 #[test]
 fn what_cannot_be_known_is_refused() {
     let truth = ring(3);
-    // Cameras that see different moments cannot be matched.
+    // Cameras that filmed at different times cannot be calibrated together.
     let mut films = Flaws::none(1).films(&truth);
     let far = Flaws::none(40).films(&truth);
     films[2] = far[2].clone();
@@ -190,7 +190,7 @@ fn what_cannot_be_known_is_refused() {
     let outcome = estimate(&recording, &settings()).unwrap();
     assert!(!outcome.doubts.is_empty());
 
-    // This camera sees nobody.
+    // There are no people in the film of this camera.
     films[1] = Film::default();
     let recording = Recording {
         cameras: &truth,

@@ -8,7 +8,7 @@ use nalgebra::{
 
 /// Number of samples of eight joints.
 const SAMPLES: usize = 400;
-/// Number of matches by which a sample is judged, and number of matches to which a pose is fitted.
+/// Number of matches with which a sample is evaluated, and number to which a pose is fitted.
 const JUDGES: [usize; 2] = [250, 700];
 /// Number of poses to fit: the best of the samples.
 const STARTS: usize = 6;
@@ -65,7 +65,7 @@ pub(crate) fn relative(matches: &[Match], sigma: f64, random: &mut Rng) -> Optio
     let best = poses
         .map(|pose| (mean_cost(&fitted, &essential_of(&pose), sigma), pose))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    // The fit uses the essential matrix alone, so the matches select one of its four poses again.
+    // The fit determines only the essential matrix, so one of its four poses is selected again with the matches.
     let pose = decompose(&essential_of(&best.1), &fitted, sigma)?;
     Some(judged(pose, best.0, &fitted, sigma))
 }
@@ -144,7 +144,7 @@ fn normaliser(points: &[Vector2<f64>; 8]) -> Option<Matrix3<f64>> {
     scale.is_finite().then_some(matrix)
 }
 
-/// Returns the pose with most matches in front of both cameras, among the four poses of an essential matrix.
+/// Returns the pose for which most matches are in front of both cameras, among the four poses of an essential matrix.
 fn decompose(essential: &Matrix3<f64>, matches: &[Match], sigma: f64) -> Option<Isometry3<f64>> {
     let svd = essential.svd(true, true);
     let (mut u, mut v_t) = (svd.u?, svd.v_t?);

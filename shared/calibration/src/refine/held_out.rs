@@ -10,14 +10,14 @@ use crate::people::begin::{Choice, Study};
 use crate::people::certainty::BLOCK_S;
 use crate::people::sides::{exchange, of_pair, point};
 
-/// Minimum decrease of the distance for a rig to be better, as a fraction.
+/// A rig counts as better if it decreases the distance by at least this fraction.
 const LEAST_GAIN: f64 = 0.02;
-/// Minimum mean gain of a block for a rig to be better, in standard errors.
+/// A rig counts as better if its mean improvement over the blocks is at least this number of standard errors.
 const CERTAIN: f64 = 2.0;
 /// Minimum number of joints in a block.
 const LEAST: usize = 20;
 
-/// Returns for each camera the chain that fits the other cameras best, according to the given rig.
+/// Returns, for each camera, the chain (one person's tracks) that best fits the other cameras with the given rig.
 pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     let choice = |(camera, chain): (usize, usize)| Choice {
         chain,
@@ -26,7 +26,7 @@ pub(super) fn chosen(study: &Study<'_>, offsets_s: &[f64]) -> Vec<Choice> {
     };
     let n = study.cameras.len();
     let n_chains = |camera: usize| study.chains[camera].len();
-    // Each person seen by the camera with the fewest people is a candidate for the person that all cameras see.
+    // The person that all cameras see is searched for among the people of the camera that sees the fewest.
     let anchor = (0..n).min_by_key(|i| n_chains(*i)).unwrap_or(0);
     let followed = (0..n_chains(anchor)).map(|chain| {
         let with = |camera: usize| {
@@ -74,17 +74,17 @@ fn distance(study: &Study<'_>, pair: [(usize, usize); 2], choices: [Choice; 2]) 
     })
 }
 
-/// Distances of joints from the positions that the other cameras predict, by block of time, before and after.
+/// Distances of joints from the positions that the other cameras predict, by block of time, with the given rig and with the new one.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
-    /// Mean robust costs of each block, before and after.
+    /// Mean robust cost of each block, with the given rig and with the new one.
     costs: BTreeMap<i64, [f64; 2]>,
-    /// All distances of each camera in pixels, before and after.
+    /// All distances of each camera in pixels, with the given rig and with the new one.
     distances: Vec<[Vec<f64>; 2]>,
 }
 
 impl Blocks {
-    /// Adds data that a rig was not fitted to.
+    /// Adds data to which the rigs were not fitted.
     pub(super) fn add(
         &mut self,
         rest: &Study<'_>,
@@ -133,7 +133,7 @@ impl Blocks {
         }
     }
 
-    /// Returns the median distances of a camera in pixels, before and after.
+    /// Returns the median distance of a camera in pixels, with the given rig and with the new one.
     pub(super) fn of_camera(&self, camera: usize) -> [f64; 2] {
         let of = |distances: &Vec<f64>| {
             Sorted::new(distances.clone()).upper_median().unwrap_or(f64::NAN)

@@ -7,7 +7,7 @@ use crate::synchronisation::track::{LEAST_JOINTS, Track};
 
 /// Step between the offsets that are tried, and between the times at which people are compared, in seconds.
 pub(crate) const STEP_S: f64 = 0.01;
-/// Maximum number of samples of a pair.
+/// Maximum number of samples for a pair of cameras.
 const MOST_SAMPLES: usize = 500;
 
 /// People of one camera at multiples of [`STEP_S`], by the camera's own clock.
@@ -61,12 +61,12 @@ impl Grid {
     }
 }
 
-/// One person of the first camera at one time, with the cost of each offset.
+/// One person of the first camera at one time, and the cost of each offset for this person.
 #[derive(Debug, Clone)]
 pub(crate) struct Costs {
     /// Time in seconds by the clock of the first camera.
     pub(crate) time_s: f64,
-    /// Cost by offset; NaN if the second camera sees nobody.
+    /// Cost by offset; NaN if the second camera sees no person at that time.
     each: Vec<f32>,
     /// Mean over the offsets that have a cost.
     mean: f64,
@@ -95,7 +95,7 @@ pub struct Curve {
     pub first_s: f64,
     /// Decrease of the cost by offset relative to the mean of all offsets, over all samples.
     pub gain: Vec<f64>,
-    /// Mean cost by offset; NaN if nothing overlaps.
+    /// Mean cost by offset; NaN if the recordings do not overlap at this offset.
     pub cost: Vec<f64>,
     /// Number of samples by offset.
     pub n: Vec<f64>,
@@ -106,7 +106,8 @@ impl Curve {
     /// Searches all offsets.
     ///
     /// * `window_s`: largest offset in both directions.
-    /// * `mirror`: for each joint, the index of its mirror, if sides may be exchanged.
+    /// * `mirror`: for each joint, the index of the corresponding joint on the other side of the body; `None` if left and right are never
+    ///   swapped.
     pub(crate) fn search(
         numbers: [usize; 2],
         cameras: [&Camera; 2],

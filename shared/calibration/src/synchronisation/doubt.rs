@@ -1,11 +1,11 @@
-//! Reasons not to trust offsets.
+//! Reasons not to trust estimated offsets.
 
 use core::fmt;
 
-/// Reason not to trust offsets. Cameras are indices of the given list.
+/// Reason not to trust offsets. Cameras are given by their indices in the list.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
-    /// A camera hardly sees anyone.
+    /// A camera sees people for too short a time.
     NoPeople {
         /// Index of the camera.
         camera: usize,
@@ -14,7 +14,7 @@ pub enum Doubt {
         /// Minimum time, in seconds.
         least_s: f64,
     },
-    /// Nothing connects a camera to the others. The cameras are in one place, or see people at different times.
+    /// No shared observations connect a camera to the others: the cameras are in the same place, or see people at different times.
     Unconnected {
         /// Index of the camera.
         camera: usize,
@@ -27,18 +27,18 @@ pub enum Doubt {
     Ambiguous {
         /// Indices of the cameras.
         cameras: Vec<usize>,
-        /// Difference between the other offset and the best one, in seconds.
+        /// Difference between the other offset and the best offset, in seconds.
         away_s: f64,
-        /// Gain of the other offset relative to the best one.
+        /// Gain of the other offset as a fraction of the gain of the best offset.
         ratio: f64,
         /// Largest accepted ratio.
         most_ratio: f64,
-        /// Difference between both gains, in standard errors.
+        /// Difference between the two gains, in standard errors.
         t: f64,
         /// Smallest accepted difference, in standard errors.
         least_t: f64,
     },
-    /// The offset is at the edge of the search, so the correct offset may be outside.
+    /// The best offset is at the edge of the search window, so the correct offset may be outside.
     Edge {
         /// Index of the camera.
         camera: usize,
@@ -47,7 +47,7 @@ pub enum Doubt {
         /// Search window, in seconds.
         window_s: f64,
     },
-    /// The minimum is flat, because there is too little movement.
+    /// The minimum of the cost is flat, because there is too little movement.
     Flat {
         /// Index of the camera.
         camera: usize,
@@ -65,7 +65,8 @@ pub enum Doubt {
         /// Smallest accepted decrease.
         least: f64,
     },
-    /// The views do not fit each other at any offset: cameras were exchanged or moved, or are from different scenes.
+    /// The views do not fit each other at any offset: cameras were moved, footage was assigned to the wrong camera, or the views are from
+    /// different scenes.
     Misfit {
         /// Index of the camera.
         camera: usize,
@@ -74,13 +75,13 @@ pub enum Doubt {
         /// Largest accepted residual, in percent.
         most: f64,
     },
-    /// A pair with a clear offset of its own contradicts the common solution.
+    /// Two cameras, compared alone, have a clear offset that contradicts the common solution.
     Pair {
         /// Indices of the two cameras.
         cameras: [usize; 2],
         /// Difference between the pair's own offset and the common one, in seconds.
         away_s: f64,
-        /// Gain of the common offset relative to the pair's best.
+        /// Gain of the common offset as a fraction of the gain of the pair's best offset.
         share: f64,
         /// Smallest accepted ratio of gains.
         least_share: f64,
@@ -98,16 +99,17 @@ pub enum Doubt {
     Quiet {
         /// Index of the camera.
         camera: usize,
-        /// Number of sounds that begin.
+        /// Number of sudden sounds in the recording.
         n: usize,
         /// Minimum number of sounds.
         least: usize,
     },
-    /// A camera did not record the sounds of the others, or its sounds fit at several offsets. `cameras` is the pair that fits best.
+    /// A camera did not record the same sounds as the others, or its sounds fit at several offsets. `cameras` is the pair with the best
+    /// fit.
     Unheard {
         /// Indices of the two cameras.
         cameras: [usize; 2],
-        /// Number of sounds that begin at the same time.
+        /// Number of sounds that begin at the same time in both recordings.
         n: usize,
         /// Minimum number of sounds.
         least: usize,
@@ -115,7 +117,7 @@ pub enum Doubt {
         cosine: f64,
         /// Smallest accepted cosine.
         least_cosine: f64,
-        /// Quality of another offset relative to the best one.
+        /// Cosine at the second-best offset as a fraction of the cosine at the best.
         ratio: f64,
         /// Largest accepted ratio.
         most_ratio: f64,

@@ -14,7 +14,8 @@ use crate::synchronisation::track::{Track, tracks};
 
 /// Standard deviation of the kernel that smooths positions over time, in intervals between pictures and in seconds.
 const SMOOTHING: [f64; 2] = [0.75, 0.015];
-/// Length of footage that is searched in full, in seconds: the part with most movement. The rest is used for the drift only.
+/// Length of the part of the footage in which all offsets are tried, in seconds. It is the part with most movement. The rest is used for
+/// the drift only.
 const SEARCHED_S: f64 = 60.0;
 /// Minimum time for which a person must be followed in a camera, in seconds.
 const LEAST_SEEN_S: f64 = 0.5;
@@ -22,7 +23,7 @@ const LEAST_SEEN_S: f64 = 0.5;
 const LEAST_DRIFT_S: f64 = 10.0;
 /// Largest accepted error of a drift, accumulated over the footage, in seconds.
 const MOST_DRIFT_ERROR_S: f64 = 0.005;
-/// Minimum size of a drift for the drift to be used, in standard errors.
+/// A drift is used only if it is at least this number of standard errors.
 const SURE_DRIFT: f64 = 4.0;
 
 /// Settings of the estimation of clocks.
@@ -32,7 +33,8 @@ pub struct Settings {
     pub reference: usize,
     /// Largest offset between two cameras to search, in both directions, in seconds.
     pub window_s: f64,
-    /// For each joint, the index of its mirror on the other side of the body, if the joint detector may have exchanged sides.
+    /// For each joint, the index of the corresponding joint on the other side of the body; `None` if the joint detector never swaps left
+    /// and right.
     pub mirror: Option<Vec<usize>>,
     /// Number of joints of a person.
     pub n_joints: usize,
@@ -52,13 +54,13 @@ pub struct CameraClock {
     pub drift_error: Option<f64>,
     /// Number of joints that the camera sees together with other cameras.
     pub n: usize,
-    /// Median residual without offsets, in pixels; NaN if nothing overlaps.
+    /// Median residual without offsets, in pixels; NaN if the films do not overlap.
     pub before_px: f64,
     /// Median residual with offsets, in pixels.
     pub after_px: f64,
 }
 
-/// Result for a pair of cameras alone.
+/// Result for one pair of cameras, without the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairReport {
     /// Indices of the two cameras.
@@ -69,7 +71,7 @@ pub struct PairReport {
     pub best_s: f64,
     /// Second-best offset of the pair alone, in seconds.
     pub second_s: f64,
-    /// Gain of the second-best offset relative to the best.
+    /// Gain of the second-best offset (for sounds, its cosine) as a fraction of the best.
     pub ratio: f64,
     /// Number of samples at the best offset.
     pub n: usize,
@@ -84,11 +86,12 @@ pub struct Outcome {
     pub pairs: Vec<PairReport>,
     /// Cost by offset, for each pair that was searched.
     pub curves: Vec<Curve>,
-    /// Quality of the second-best offset as a fraction of the best, for the group of cameras whose offset is most doubtful.
+    /// Gain of the second-best offset (for sounds, its cosine) as a fraction of the best, for the group of cameras whose offset is most
+    /// doubtful.
     pub second_best: f64,
     /// Every reason not to use the result; if empty, the result can be used.
     pub doubts: Vec<Doubt>,
-    /// Length of the footage in which people are seen, in seconds.
+    /// Length of the common footage in which people are seen, in seconds.
     pub length_s: f64,
 }
 
@@ -146,7 +149,7 @@ fn check(cameras: &[Camera], films: &[Film], settings: &Settings) -> Result<(), 
     each.try_for_each(|(camera, it)| it.check(camera))
 }
 
-/// Refuses settings with which no clocks can be compared.
+/// Returns an error for settings with which no clocks can be compared.
 pub(crate) fn check_settings(n: usize, reference: usize, window_s: f64) -> Result<(), FilmError> {
     if n < 2 {
         return Err(FilmError::OneCamera { cameras: n });
@@ -295,7 +298,7 @@ impl Study<'_> {
         }
     }
 
-    /// Returns the span of common time in which at least two cameras see people.
+    /// Returns the first and last time on the common clock at which at least two cameras see people.
     fn span(&self, clocks: &[Clock]) -> [f64; 2] {
         let (mut starts, mut ends) = (Vec::new(), Vec::new());
         for &camera in self.active {

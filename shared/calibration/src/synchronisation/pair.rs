@@ -4,7 +4,7 @@ use geometry::Camera;
 use geometry::epipolar::fundamental;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Expected error of a joint in a picture, in sizes of the person: 4 pixels for a person 400 pixels high.
+/// Expected error of a joint in a picture, as a fraction of the size of the person: 4 pixels for a person 400 pixels high.
 pub(crate) const NOISE: f64 = 0.01;
 
 /// The epipolar geometry of two cameras.

@@ -11,8 +11,8 @@ use crate::synchronisation::track::{LEAST_JOINTS, Place, Track};
 
 /// Maximum number of times at which a pair is compared, in each direction.
 const MOST_TIMES: usize = 300;
-/// Half-widths of the parabolas that are fitted to the costs, in seconds: wide for slow movement, narrow for fast movement. The one with
-/// the smallest standard errors is used.
+/// Half-widths of the parabolas that are fitted to the costs, in seconds: wide for slow movement, narrow for fast movement. The half-width
+/// with the smallest standard errors is used.
 const REACHES_S: [f64; 4] = [0.16, 0.08, 0.04, 0.02];
 /// Largest half-width, as a fraction of the footage. It is limited because joints must be visible over the whole width.
 const MOST_REACH: f64 = 0.05;
@@ -20,8 +20,8 @@ const MOST_REACH: f64 = 0.05;
 const MOVED_S: f64 = 0.005;
 /// Maximum number of passes.
 const MOST_PASSES: usize = 4;
-/// Time over which joints of a pair of cameras have the same bias, in seconds. The joint detector shifts joints depending on the direction
-/// from which it sees a person.
+/// Time over which the bias of a joint in a pair of cameras is assumed constant, in seconds. The joint detector shifts joints depending on
+/// the direction from which it sees a person.
 const BIAS_S: f64 = 20.0;
 /// Time after which errors of a joint are independent, in seconds.
 const INDEPENDENT_S: f64 = 0.25;
@@ -60,7 +60,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) pairs: Vec<([usize; 2], Epipolar)>,
     /// Index of the camera whose clock is the common one.
     pub(crate) reference: usize,
-    /// For each joint, the index of its mirror on the other side, if sides may be exchanged.
+    /// For each joint, the index of the corresponding joint on the other side of the body; `None` if left and right are never swapped.
     pub(crate) mirror: Option<&'a [usize]>,
     pub(crate) n_joints: usize,
 }
@@ -99,7 +99,7 @@ struct Timed {
     block: i64,
 }
 
-/// Costs of all pairs near given clocks.
+/// Costs of all pairs of cameras for offsets near those of the given clocks.
 struct Table {
     pieces: Vec<Piece>,
     /// Cameras, residual in expected errors, and pixels per expected error.
@@ -272,7 +272,8 @@ impl Problem<'_> {
         in_a.iter().enumerate().filter_map(row).collect()
     }
 
-    /// Returns the map from joints of the first camera to those of the second; `None` if sides cannot be exchanged.
+    /// Returns the map from joints of the first camera to those of the second; `None` if left and right should be swapped but are never
+    /// swapped in these films.
     fn sides(&self, is_exchanged: bool) -> Option<impl Fn(usize) -> usize + Copy> {
         let mirror = self.mirror.filter(|_| is_exchanged);
         (mirror.is_some() || !is_exchanged)

@@ -2,9 +2,9 @@
 
 use crate::synchronisation::curve::{Curve, STEP_S};
 
-/// Number of samples without a gain that are added, so that a small number of samples has a low weight.
+/// Number of samples with a gain of 0 that are added, so that a gain from few samples has a low weight.
 const PRIOR_SAMPLES: f64 = 20.0;
-/// Fraction of the best value at which the basin of the best offset ends.
+/// The basin around the best offset ends where the gain falls below this fraction of the best gain.
 const BASIN: f64 = 0.6;
 /// Number of neighbours on each side that an entry is compared with; the entry is a peak if no neighbour is higher.
 const NEAR: usize = 3;
@@ -18,11 +18,11 @@ const MOST_DIVIDED: usize = 8;
 pub(crate) struct Rival {
     /// Cameras of the group without the reference.
     pub(crate) group: Vec<usize>,
-    /// Second-best offset of the group relative to the best, in seconds.
+    /// Difference between the second-best and the best offset of the group, in seconds.
     pub(crate) away_s: f64,
-    /// Second-best gain relative to the best.
+    /// Gain of the second-best offset as a fraction of the gain of the best.
     pub(crate) ratio: f64,
-    /// Difference of both gains, in standard errors.
+    /// Difference of the two gains, in standard errors.
     pub(crate) t: f64,
 }
 
@@ -109,7 +109,7 @@ fn starts(n_cameras: usize, active: &[usize], curves: &[Curve]) -> Vec<Vec<f64>>
     starts
 }
 
-/// Returns offsets along pairs; earlier pairs take precedence.
+/// Returns offsets that follow from the offsets of pairs; earlier pairs in the list take precedence.
 fn spread(n_cameras: usize, peaks: &[(f64, [usize; 2], f64)]) -> Vec<f64> {
     let mut offsets_s = vec![0.0; n_cameras];
     let mut tree: Vec<usize> = (0..n_cameras).collect();
@@ -137,7 +137,7 @@ pub(crate) fn peak(curve: &Curve) -> (usize, f64) {
     each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
 }
 
-/// Returns the second-best minimum of a pair: its entry, and its gain relative to the best.
+/// Returns the second-best minimum of a pair: its entry, and its gain as a fraction of the best.
 pub(crate) fn second(curve: &Curve) -> Option<(usize, f64)> {
     let (best, _) = peak(curve);
     let each = curve.gain.iter().zip(&curve.n);

@@ -22,19 +22,19 @@ use parts::parts;
 const SPEED_M_S: f64 = 343.0;
 /// Assumed largest distance between two cameras if it is unknown, in metres.
 const FAR_M: f64 = 10.0;
-/// Error of the time at which a sound begins, in seconds.
+/// Standard error of the time at which a sound begins, in seconds.
 const HEARD_S: f64 = 0.002;
 /// Minimum number of beginnings that two cameras share.
 const LEAST: usize = 3;
 /// Smallest accepted cosine between the beginnings of two cameras.
 const LEAST_COSINE: f64 = 0.2;
-/// Minimum difference between the best offset and the mean of all offsets, in standard deviations over all offsets.
+/// Minimum difference between the cosine at the best offset and the mean cosine over all offsets, in standard deviations of the cosines.
 const LEAST_CONTRAST: f64 = 8.0;
-/// Largest accepted quality of the second-best offset relative to the best.
+/// Largest accepted cosine at the second-best offset, as a fraction of the cosine at the best.
 const MOST_RATIO: f64 = 0.75;
-/// Largest accepted contradiction between pairs in addition to the travel time of sound, in seconds.
+/// Largest accepted difference between the offsets of pairs, in addition to the travel time of sound, in seconds.
 const SPARE_S: f64 = 0.01;
-/// Length of the part that is searched in full, in seconds.
+/// Length of the part of the recording in which all offsets are tried, in seconds.
 const SEARCHED_S: f64 = 60.0;
 
 /// Recording from the microphone of a camera.
@@ -199,7 +199,7 @@ impl Study<'_> {
                 (is_connected[*a], is_connected[*b]) = (either, either);
             }
         }
-        // The reference is held at 0; a camera without connection has an equation of its own.
+        // The offset of the reference is fixed at 0. A camera that no pair connects has an equation of its own.
         let mut normal = DMatrix::<f64>::zeros(n, n);
         let mut right = DVector::<f64>::zeros(n);
         for it in &sure {
@@ -270,7 +270,7 @@ impl Study<'_> {
     }
 }
 
-/// Returns the largest number of beginnings that a camera shares with another one.
+/// Returns the largest number of beginnings of sounds that a camera shares with another camera.
 fn shared(pairs: &[Pair], camera: usize) -> usize {
     let own = pairs.iter().filter(|pair| pair.cameras.contains(&camera));
     own.map(|pair| pair.found.n).max().unwrap_or(0)

@@ -106,7 +106,7 @@ pub(crate) struct Recording {
     /// Start and end on the common clock.
     pub(crate) span: [f64; 2],
     pub(crate) noise_px: f64,
-    /// Fractions of joints that are missing, of joints that are displaced, and of pictures whose sides are exchanged.
+    /// Fractions of joints that are missing, of joints that are displaced, and of pictures in which left and right are swapped.
     pub(crate) missing: f64,
     pub(crate) outliers: f64,
     pub(crate) exchanged: f64,
@@ -194,7 +194,7 @@ impl Recording {
     }
 }
 
-/// Returns, for each joint, the index of its mirror on the other side of the body.
+/// Returns, for each joint, the index of the corresponding joint on the other side of the body.
 pub(crate) fn mirror() -> [usize; N_JOINTS] {
     [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13]
 }

@@ -5,15 +5,15 @@ use nalgebra::Point2;
 
 use crate::synchronisation::film::{Film, Person};
 
-/// Longest gap over which a person is linked, in seconds.
+/// Longest gap in a person's detections that a track can bridge, in seconds.
 const LONGEST_GAP_S: f64 = 0.25;
 /// Largest movement of a person's joints between two pictures, in sizes of the person: a constant, and an amount per second.
 const FARTHEST: [f64; 2] = [0.15, 4.0];
-/// Distance from the prediction of its neighbours in time beyond which a joint is an outlier, in sizes of the person. For a moving joint, a
-/// fraction of the distance between the neighbours is added.
+/// A joint is an outlier if its distance from the position predicted by its neighbours in time exceeds this, in sizes of the person. For a
+/// moving joint, a fraction of the distance between the neighbours is added to the limit.
 const OUTLIER: f64 = 0.03;
 const TURNING: f64 = 0.25;
-/// Number of neighbours on each side.
+/// Number of neighbours in time on each side.
 const NEIGHBOURS: usize = 3;
 /// Minimum score of a joint.
 const LEAST_SCORE: f64 = 0.05;
@@ -65,7 +65,7 @@ impl Track {
         self.size
     }
 
-    /// Returns the mean score of the joints; 0 without any.
+    /// Returns the mean score of the joints; 0 if there are none.
     pub fn score(&self) -> f64 {
         let scores = self.joints.iter().flatten().map(|joint| joint.score);
         let n = self.joints.iter().map(Vec::len).sum::<usize>();

@@ -8,9 +8,9 @@ use crate::synchronisation::search::{Found, Rival, peak, second};
 
 /// Minimum number of joints that a camera must see together with other cameras, in both directions.
 const LEAST_JOINTS: usize = 200;
-/// Limits of the second-best offset: its gain relative to the best, and its distance in standard errors.
+/// Limits for the second-best offset: its gain as a fraction of the best gain, and the difference of the gains in standard errors.
 const MOST_RATIO: f64 = 0.8;
-/// Gain relative to the best below which a second-best offset is never a rival, even for short footage.
+/// A second-best offset whose gain is below this fraction of the best gain is never a rival, even in short footage.
 const NO_RIVAL: f64 = 0.3;
 const LEAST_T: f64 = 4.0;
 /// Largest standard error of an offset, in seconds and in intervals between pictures.
@@ -19,8 +19,8 @@ const MOST_ERROR: [f64; 2] = [0.006, 0.2];
 const LEAST_GAIN: f64 = 0.08;
 /// Largest median residual, in expected errors.
 const MOST_RESIDUAL: f64 = 3.0;
-/// A pair has a clear offset if the gain of its second best is below the first value, relative to its best. It agrees with the common
-/// offset if the gain there reaches the second value.
+/// A pair of cameras has a clear offset if the gain of its second-best offset is below the first value, as a fraction of its best gain. It
+/// agrees with the common offset if the gain at that offset reaches the second value.
 const SURE_PAIR: [f64; 2] = [0.6, 0.5];
 /// Largest difference between offsets of parts of the footage, in seconds and in standard errors.
 const MOST_APART: [f64; 2] = [0.02, 4.0];

@@ -9,11 +9,11 @@ pub(super) const REACH: i64 = 4;
 pub(super) const HALF: i64 = REACH + 3;
 /// Length of the blocks of time whose errors are assumed independent, in seconds.
 pub(super) const BLOCK_S: f64 = 0.5;
-/// Factor on the variance, because errors are correlated between joints and over more than a block.
+/// Factor by which variances are multiplied, because errors are correlated between joints and over more than one block.
 const ALIKE: f64 = 2.0;
 /// Minimum and maximum number of parts of the footage that are left out in turn to estimate an error.
 const PARTS: [usize; 2] = [4, 12];
-/// Factor on the variance between parts, because adjacent parts are correlated.
+/// Factor by which the variance between parts is multiplied, because adjacent parts are correlated.
 const ALIKE_PARTS: f64 = 1.5;
 const MOST_STEPS: usize = 20;
 /// Largest and smallest change of offsets in a step, in seconds.
@@ -81,7 +81,7 @@ impl Piece {
     }
 }
 
-/// Sums of all costs. The unknowns of every camera are its offset, and its drift times half the length.
+/// Sums of all costs. The unknowns of every camera are its offset, and its drift times half the length of the footage.
 pub(super) struct Sums<'a> {
     pieces: &'a [Piece],
     /// True for unknowns that stay 0.

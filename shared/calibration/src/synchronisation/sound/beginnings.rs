@@ -19,7 +19,7 @@ const TOGETHER: i64 = 6;
 const SMOOTH: i64 = 4;
 /// Minimum number of hops between the best offset and another.
 const OTHER: usize = 30;
-/// Minimum fraction of each recording's energy within the overlap.
+/// Minimum fraction of each recording's energy that is within the overlap of the two recordings.
 const LEAST_SHARE: f64 = 0.15;
 
 /// Suddenness of sounds over time.
@@ -38,13 +38,13 @@ pub(super) struct Beginnings {
 pub(super) struct Match {
     /// Offset of the first of `cosines`, in seconds.
     pub(super) first_s: f64,
-    /// Smoothed cosine between both recordings by offset; NaN if they hardly overlap.
+    /// Smoothed cosine between both recordings by offset; NaN if the recordings hardly overlap.
     pub(super) cosines: Vec<f64>,
     /// Best offset in seconds. It is added to a time of the first recording to get the time of the second.
     pub(super) offset_s: f64,
     /// Cosine at the best offset.
     pub(super) cosine: f64,
-    /// Difference between the best cosine and the mean of all offsets, in standard deviations over all offsets.
+    /// Difference between the best cosine and the mean cosine over all offsets, in standard deviations of the cosines.
     pub(super) contrast: f64,
     /// Second-best offset in seconds, followed by its cosine.
     pub(super) second_s: f64,
@@ -54,7 +54,7 @@ pub(super) struct Match {
 }
 
 impl Match {
-    /// Returns the quality of the second-best offset relative to the best.
+    /// Returns the cosine at the second-best offset as a fraction of the cosine at the best.
     pub(super) fn ratio(&self) -> f64 {
         if self.cosine > 0.0 {
             self.second / self.cosine
@@ -71,7 +71,7 @@ impl Beginnings {
         let mut sorted: Vec<f64> =
             energies.iter().copied().filter(|energy| *energy > 0.0).collect();
         sorted.sort_by(f64::total_cmp);
-        // The floor is at least the energy of one converter step in every sample.
+        // The noise floor is at least the energy of a signal of one quantisation step.
         let floor = sorted.get(sorted.len() / 2).map_or(1.0, |sorted| sorted.max(1.0));
         let mut sums = vec![0.0];
         for energy in &energies {
@@ -134,7 +134,7 @@ impl Beginnings {
     /// Searches all offsets.
     ///
     /// * `span`: part of this recording to compare, in hops.
-    /// * `around_s`: centre of the offsets and their largest deviation in both directions, in seconds.
+    /// * `around_s`: centre of the searched offsets, and their largest deviation from it in both directions, in seconds.
     pub(super) fn compare(&self, other: &Self, span: [i64; 2], around_s: [f64; 2]) -> Match {
         let [centre, half] = around_s.map(|around_s| (around_s / HOP_S).round() as i64);
         let own: Vec<(i64, f64)> = (span[0]..span[1])

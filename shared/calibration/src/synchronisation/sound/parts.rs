@@ -8,11 +8,11 @@ use crate::synchronisation::doubt::Doubt;
 const PART_S: f64 = 20.0;
 /// Minimum number of parts with an offset for an estimate of the drift.
 const LEAST_PARTS: usize = 5;
-/// Range of the search in a part around the common offset, in seconds.
+/// In each part, offsets are searched up to this distance from the common offset, in seconds.
 const AROUND_S: f64 = 0.5;
 /// Largest accepted error of a drift, accumulated over the recording, in seconds.
 const MOST_ERROR_S: f64 = 0.01;
-/// Minimum size of a drift for the drift to be used, in standard errors.
+/// A drift is used only if it is at least this number of standard errors.
 const SURE: f64 = 4.0;
 /// Largest accepted fraction of parts that contradict the others.
 const MOST_AWAY: f64 = 0.25;
@@ -21,7 +21,8 @@ const MOST_AWAY: f64 = 0.25;
 #[derive(Debug)]
 pub(super) struct Drift {
     line: Option<Line>,
-    /// If too many parts contradict the line: their deviation from it, and the largest accepted deviation, in seconds.
+    /// The deviation of parts from the line, and the largest accepted deviation, in seconds; `None` unless too many parts contradict the
+    /// line.
     contradiction_s: Option<[f64; 2]>,
 }
 
