@@ -7,13 +7,13 @@
 //! | what | where |
 //! |---|---|
 //! | definition of a problem | [`Problem`], [`Term`], [`Loss`] |
-//! | cameras of a problem, with free or held poses, focal lengths, centres and lenses | [`Cameras`], [`Free`] |
+//! | cameras of a problem, with free or fixed poses, focal lengths, centres and lenses | [`Cameras`], [`Free`] |
 //! | minimisation of the cost, by the Levenberg-Marquardt method | [`solve`], [`Settings`], [`Report`] |
 //! | uncertainty of the shared parameters, and parameters that are not determined | [`covariance`], [`clustered`], [`Undetermined`] |
 //! | comparison of derivatives with numeric ones, for tests | [`derivative_error`] |
 //!
-//! Values that are held, such as the pose of the first camera (the gauge), are not parameters. A term without a local block fixes the scale
-//! ([`Problem::priors`]). The functions are pure: the same input gives the same result, bit for bit.
+//! Values that are fixed, such as the pose of the first camera (the gauge), are not parameters. A term without a local block fixes the
+//! scale ([`Problem::priors`]). The functions are pure: the same input gives the same result, bit for bit.
 
 mod cameras;
 mod covariance;

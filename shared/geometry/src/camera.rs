@@ -7,7 +7,7 @@ use nalgebra::{
 
 use crate::Lens;
 
-/// Minimum distance of a point from the camera plane, in metres along the axis. Nearer points have no image.
+/// Minimum distance of a point from the camera plane, in metres along the axis. Points that are nearer have no image.
 const NEAREST: f64 = 1e-9;
 
 /// The intrinsic parameters of a camera: focal lengths, principal point, image size and lens.
@@ -59,7 +59,7 @@ pub struct Ray {
 /// A calibrated camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// Name of the view, unique in a rig.
+    /// Name of the camera, unique in a rig.
     pub name: String,
     /// Focal lengths, principal point, image size and lens.
     pub intrinsics: Intrinsics,

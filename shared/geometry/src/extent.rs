@@ -1,6 +1,6 @@
 //! Extent of points in an image.
 
-/// Returns the longer side of the upright rectangle around points, in their unit; `None` if there are no points.
+/// Returns the longer side of the upright rectangle around points, in the unit of the points; `None` if there are no points.
 pub fn longer_side(points: impl Iterator<Item = [f64; 2]>) -> Option<f64> {
     let corners = points.map(|point| [point; 2]).reduce(|[low, high], [point, _]| {
         let of = |pick: fn(f64, f64) -> f64, corner: [f64; 2]| {

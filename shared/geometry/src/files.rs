@@ -142,7 +142,7 @@ impl Unit {
     }
 }
 
-/// Values that a file may leave out.
+/// Values to use if a calibration file does not contain them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadOptions {
     /// Unit of lengths, if it differs from the usual unit of the format.
@@ -301,7 +301,7 @@ fn combine(
         .collect::<Vec<_>>()
         .join(", ");
     if first.format == Format::OpenCv {
-        // One camera may be spread over several of these files.
+        // The data of one camera may be in several of these files.
         let stems: Vec<String> = documents.iter().map(Document::stem).collect();
         let texts = documents.iter().zip(&stems).map(|(d, stem)| (stem.as_str(), d.text.as_str()));
         let rig = opencv::parse(&texts.collect::<Vec<_>>(), options);

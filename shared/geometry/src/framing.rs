@@ -27,12 +27,12 @@ pub enum FramingError {
         /// Width and height of the calibrated image.
         calibrated: [u32; 2],
     },
-    /// The source, moved by its offset, extends beyond the calibrated image.
+    /// The source, placed at its offset in the calibrated image, extends beyond this image.
     #[error("a source of {}x{} px at offset ({}, {}) extends beyond the {}x{} px for which the camera is calibrated", .source_size[0], .source_size[1], .offset_px[0], .offset_px[1], .calibrated[0], .calibrated[1])]
     SourceOffset {
         /// Width and height of the source's frames.
         source_size: [u32; 2],
-        /// Calibrated pixel of the source's top-left pixel.
+        /// Position of the source's top-left pixel in the calibrated image.
         offset_px: [u32; 2],
         /// Width and height of the calibrated image.
         calibrated: [u32; 2],
@@ -70,13 +70,14 @@ impl Framing {
     /// Computes the mapping.
     ///
     /// * `source_size`: width and height of the source's frames, in pixels.
-    /// * `source_offset_px`: calibrated pixel of the source's top-left pixel, for a source that lacks rows or columns of the calibrated
-    ///   image. If it is `None`, the sizes must be equal.
+    /// * `source_offset_px`: position of the source's top-left pixel in the calibrated image, for a source that is a part of this image. If
+    ///   it is `None`, the sizes must be equal.
     /// * `roll`: angle by which the picture is rotated clockwise, in radians; see [`upright_roll`].
     ///
     /// # Errors
     ///
-    /// Returns a [`FramingError`] if an argument is invalid. A source of a different size is an error; no offset is guessed.
+    /// Returns a [`FramingError`] if an argument is invalid. A source whose size differs from the calibrated size is an error, unless an
+    /// offset is given.
     pub fn new(
         camera: &Camera,
         source_size: [u32; 2],
@@ -224,7 +225,7 @@ pub fn upright_roll(camera: &Camera, rig: &Rig) -> Option<f64> {
     if direction.norm() < 1e-6 {
         return None;
     }
-    // Up in the picture is (0, -1); the result is the angle from `direction` to it.
+    // The up direction of the picture is (0, -1). The result is the angle from `direction` to (0, -1).
     Some((-direction.x).atan2(-direction.y))
 }
 

@@ -49,8 +49,8 @@ impl std::fmt::Display for LensModel {
 
 /// A lens: its model, and the part of the image in which the model can be inverted.
 ///
-/// Distortion polynomials stop being monotonic at some radius outside the image they were fitted to. A lens refuses every ray beyond the
-/// first such radius, and every ray more than 87 degrees off the axis.
+/// Distortion polynomials stop being monotonic at some radius outside the image they were fitted to. A [`Lens`] gives no image for rays
+/// beyond the first such radius, or more than 87 degrees off the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
     model: LensModel,
@@ -70,7 +70,7 @@ impl From<LensModel> for Lens {
 }
 
 impl Lens {
-    /// Creates a lens and finds the valid range of `model`. This takes microseconds, so do it once per camera.
+    /// Creates a lens and finds the valid range of `model`. This takes microseconds, so it should be done once per camera.
     pub fn new(model: LensModel) -> Self {
         Self {
             model,
@@ -100,7 +100,7 @@ impl Lens {
         &self,
         point: &Point2<f64>,
     ) -> Option<(Point2<f64>, Matrix2<f64>)> {
-        // The range check also refuses NaN.
+        // The range check also fails for NaN.
         if !(0.0..=self.max_radius).contains(&point.coords.norm()) {
             return None;
         }
@@ -117,7 +117,7 @@ impl Lens {
 }
 
 impl LensModel {
-    /// Returns true if the model moves no point.
+    /// Returns true if the model has no distortion.
     pub fn is_pinhole(&self) -> bool {
         match self {
             Self::Pinhole => true,

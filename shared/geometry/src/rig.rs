@@ -8,7 +8,7 @@ use crate::{Camera, Intrinsics};
 const FOCAL_LIMIT: f64 = 1e4;
 /// Maximum lens coefficient. Calibrations that fit noise have coefficients in the thousands.
 const COEFFICIENT_LIMIT: f64 = 1e7;
-/// Maximum distance of a camera from the origin; geocentric coordinates are within it.
+/// Maximum distance of a camera from the origin; geocentric coordinates are within this distance.
 const PLACE_LIMIT_METRES: f64 = 1e7;
 
 /// Reason why a set of cameras does not form a rig.
@@ -175,7 +175,7 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
 pub struct LeftOut {
     /// Name of the camera.
     pub camera: String,
-    /// Reason for the user why the pose is not known.
+    /// Reason why the pose is not known, as text for the user.
     pub why: &'static str,
 }
 
@@ -228,13 +228,13 @@ impl Rig {
         })
     }
 
-    /// Returns the rig with a list of the cameras for which its file has no pose.
+    /// Returns the same rig, with a list of the cameras for which its file has no pose.
     #[must_use]
     pub fn with_left_out(self, left_out: Vec<LeftOut>) -> Self {
         Self { left_out, ..self }
     }
 
-    /// Returns the rig with a different up direction.
+    /// Returns the same rig with a different up direction.
     #[must_use]
     pub fn with_up(self, up_in_world: Option<UnitVector3<f64>>) -> Self {
         Self {
@@ -243,8 +243,9 @@ impl Rig {
         }
     }
 
-    /// Returns the cameras for which the rig's file has no pose. If lenses suffice, these cameras are also among
-    /// [`cameras`](Self::cameras), at the origin.
+    /// Returns the cameras for which the rig's file has no pose. If the rig was read with
+    /// [`ReadOptions::lenses_suffice`](crate::files::ReadOptions::lenses_suffice), these cameras are also among [`cameras`](Self::cameras),
+    /// at the origin.
     pub fn left_out(&self) -> &[LeftOut] {
         &self.left_out
     }
@@ -346,7 +347,7 @@ fn check_finite(camera: &Camera) -> Result<(), RigError> {
     }
 }
 
-/// Refuses magnitudes that would leave too few digits for computations.
+/// Returns an error for numbers so large that computations with them would lose too many digits.
 fn check_size(camera: &Camera) -> Result<(), RigError> {
     let Intrinsics {
         fx, fy, size, lens, ..

@@ -18,33 +18,34 @@ pub use swap::{Contradiction, Swap, SwapWatch};
 const WINDOW: usize = 60;
 /// Minimum number of frames for a result.
 const MIN_FRAMES: usize = 12;
-/// Number of successive usable frames in which a camera must be suspected before it is reported.
+/// Number of successive usable frames in which a camera must be suspected of having moved before it is reported.
 const PERSISTENT: u32 = 8;
 /// Minimum number of points of a usable frame.
 const MIN_POINTS: usize = 5;
 /// Minimum sine of the angle between two rays; below it, their intersection is too uncertain.
 const MIN_SINE: f64 = 0.2;
-/// A camera is suspected if the residual with it is at least this many times the residual without it. The residual must also reach limits
-/// in degrees and pixels. Detections are on a grid of cells of four pixels, and may always be off by half a cell in the same direction.
+/// A camera is suspected if the residual of the camera groups that contain it is at least this many times the residual of the groups
+/// without it. The residual must also reach limits in degrees and pixels. Detections are on a grid of cells of four pixels, and may always
+/// be off by half a cell in the same direction.
 const FACTOR: f64 = 2.5;
 const MIN_DEGREES: f64 = 0.5;
 const MIN_PX: f64 = 4.0;
-/// Largest residual between the other cameras at which a camera can be suspected.
+/// A camera can be suspected only if the residual of the other cameras is at most this.
 const MAX_DEGREES: f64 = 1.5;
 
 /// Tracks the residuals of the same points in all cameras, with and without each camera.
 ///
-/// With four or more cameras, a point is triangulated from the rays of every two other cameras, and projected into the camera. The residual
-/// is the offset of the camera's own observation from this projection. Two medians are taken: over the points of a frame, in x and in y;
-/// then over the last frames of each group of three cameras, as a vector. The length of this vector is used, because errors of detections
-/// change direction, but the offset of a moved camera does not. The residual of a camera is the median over all groups that contain it. A
-/// single wrong camera only affects these groups.
+/// With four or more cameras, a point is triangulated from the rays of each pair of other cameras, and projected into the camera. The
+/// offset of the camera's own observation from this projection is measured. Two medians are taken: over the points of a frame, in x and in
+/// y; then over the last frames of each group of three cameras, as a vector. The residual of the group is the length of this vector: errors
+/// of detections change direction and cancel out, but the offset of a moved camera does not. The residual of a camera is the median over
+/// all groups that contain it. A single moved camera only affects the groups that contain it.
 ///
 /// With three cameras, the epipolar distance to the ray of one other camera is used instead, without its direction, because the two
 /// remaining cameras may agree by chance. This hardly detects a camera that is rotated along its epipolar lines. With two cameras, it is
 /// impossible to decide which one is wrong.
 ///
-/// This is not a calibration: it detects that a camera was moved, but not its new pose.
+/// This is not a calibration: it detects that a camera was moved, but does not determine the new pose.
 #[derive(Debug, Clone)]
 pub struct RigWatch {
     cameras: Vec<Camera>,
@@ -58,7 +59,7 @@ pub struct RigWatch {
 /// A group of cameras, and their residuals on the same points.
 #[derive(Debug, Clone)]
 struct Group {
-    /// The camera that is projected into, then the two other cameras; if there is only one other, it is listed twice.
+    /// The camera into which points are projected, then the two other cameras; if there is only one other, it is listed twice.
     views: [usize; 3],
     /// Median offset of the observed from the predicted points in each of the last frames, in pixels.
     offsets_px: VecDeque<[f64; 2]>,
@@ -69,9 +70,9 @@ struct Group {
 pub struct Suspect {
     /// Index of the camera.
     pub view: usize,
-    /// Residual of the groups with this camera, in pixels.
+    /// Residual of the camera groups that contain this camera, in pixels.
     pub residual_px: f64,
-    /// Residual of the groups without this camera, in pixels.
+    /// Residual of the camera groups that do not contain it, in pixels.
     pub without_px: f64,
 }
 
@@ -148,12 +149,12 @@ impl RigWatch {
         self.reported.get(view).copied().unwrap_or(false)
     }
 
-    /// Returns the residual of the groups with a camera, in pixels; `None` while there are too few observations.
+    /// Returns the residual of the camera groups that contain a camera, in pixels; `None` while there are too few observations.
     pub fn residual_px(&self, view: usize) -> Option<f64> {
         self.median_residual(|group| group.views.contains(&view))
     }
 
-    /// Returns the residual of the groups without a camera, in pixels.
+    /// Returns the residual of the camera groups that do not contain a camera, in pixels.
     pub fn without_px(&self, view: usize) -> Option<f64> {
         self.median_residual(|group| !group.views.contains(&view))
     }
@@ -166,8 +167,8 @@ impl RigWatch {
 
     /// Returns the cameras whose poses differ from the calibration.
     ///
-    /// Cameras are found one at a time: the first is the one without which the others agree best. A wrong camera affects the residuals of
-    /// the others, so a second one is searched for among the remaining cameras only. At least four must remain.
+    /// Cameras are found one at a time: the first is the one without which the others agree best. A moved camera affects the residuals of
+    /// the others, so a second one is searched for only among the remaining cameras. At least four cameras must remain.
     pub fn suspects(&self) -> Vec<Suspect> {
         let mut left_out = Vec::new();
         let mut found = Vec::new();
@@ -181,7 +182,7 @@ impl RigWatch {
         found
     }
 
-    /// Returns the camera without which the others agree best, if it is wrong, among those not left out.
+    /// Returns the camera without which the others agree best, if it has moved. Cameras in `left_out` are ignored.
     fn worst(&self, left_out: &[usize]) -> Option<Suspect> {
         let views = (0..self.cameras.len()).filter(|view| !left_out.contains(view));
         let suspects = views.filter_map(|view| self.suspect(view, left_out));

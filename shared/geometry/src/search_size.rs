@@ -9,19 +9,18 @@ pub use shared_space::PERSON_METRES;
 
 /// Target height of a person, in pixels of the searched frame.
 pub const AIM_PX: f64 = 200.0;
-/// Range of heights of a person at which the search is best, in pixels of the searched frame.
+/// Range of a person's height for which the search works best, in pixels of the searched frame.
 pub const GOOD_PX: [f64; 2] = [150.0, 250.0];
-/// Range of heights of a person at which the search still works well, in pixels of the searched frame.
+/// Range of a person's height for which the search still works well, in pixels of the searched frame.
 pub const USABLE_PX: [f64; 2] = [110.0, 350.0];
-/// Maximum number of pixels of a searched frame unless more are requested. This number costs about 0.41 CPU-seconds.
-///
-/// Processor time was measured for four views of 1088x1920 with all defaults, per frame and view, over all processes together (Intel Xeon,
-/// two cores, AVX-512): 0.22 s at 272x480, 0.32 s at 363x640, 0.43 s at 435x768 and 0.63 s at 544x960. Full HD becomes 640x360 at most;
-/// 640x480 keeps its size.
+/// Maximum number of pixels of a searched frame unless more are requested. Searching a frame of this size takes about 0.41 s of processor
+/// time. The processor time of all processes together, per frame and view, was measured for four views of 1088x1920 with default settings
+/// (Intel Xeon, two cores, AVX-512): 0.22 s at 272x480, 0.32 s at 363x640, 0.43 s at 435x768 and 0.63 s at 544x960. With this limit, a Full
+/// HD frame is reduced to at most 640x360; 640x480 keeps its size.
 pub const MOST_PIXELS: u64 = 320_000;
 
 /// Scales to choose from, largest first. Neighbours differ by at most a quarter, so that the height of a person is within 16 % of
-/// [`AIM_PX`]. Resampling by one over a whole number is exact.
+/// [`AIM_PX`]. Resampling by a factor of one over a whole number is exact.
 const SCALES: [f64; 15] = [
     1.0,
     0.75,
@@ -49,10 +48,10 @@ pub struct SearchSize {
     pub scale: f64,
     /// Width and height of the frame, in pixels.
     pub frame_size: [u32; 2],
-    /// Height of a person of [`PERSON_METRES`] in the calibrated image, in pixels: the median over the space that the camera shares with
-    /// others. It is `None` for a camera that shares no space.
+    /// Height of a person of [`PERSON_METRES`] in the calibrated image, in pixels: the median over the space that this camera and other
+    /// cameras see. It is `None` for a camera that sees no such space.
     pub person_px: Option<f64>,
-    /// Scale that would be chosen without the limit on processor time; larger than `scale` if the limit applies.
+    /// Scale that would be chosen without the limit on processor time; larger than `scale` if the limit reduces the scale.
     pub wanted: f64,
 }
 
@@ -74,7 +73,7 @@ impl SearchSize {
 pub struct SearchSizes {
     /// Size for every camera, in the order of the rig.
     pub cameras: Vec<SearchSize>,
-    /// Maximum number of cameras that share a space in which a person can stand; 0 if no two cameras do.
+    /// Maximum number of cameras that see a common space in which a person can stand; 0 if no two cameras do.
     pub n_sharing: usize,
 }
 
@@ -107,7 +106,7 @@ pub fn search_sizes(rig: &Rig) -> SearchSizes {
     }
 }
 
-/// Returns the scale that gives good heights in all cameras and is nearest to the target, if there is one.
+/// Returns the scale that gives good heights in all cameras, if there is one; among several, the one that is nearest to the target height.
 fn common(person_px: &[Option<f64>], limits: &[f64]) -> Option<f64> {
     let known: Vec<f64> = person_px.iter().flatten().copied().collect();
     let limits = person_px.iter().zip(limits).filter(|camera| camera.0.is_some());
@@ -148,7 +147,7 @@ fn at_scale(image: [u32; 2], scale: f64) -> [u32; 2] {
 ///
 /// * `seen`: for every camera, the scale at which it was searched, and the height of people in its frames in pixels.
 ///
-/// Returns `None` if `seen` is empty. A scale above 1 enlarges.
+/// Returns `None` if `seen` is empty. A scale above 1 enlarges the frames.
 pub fn better_scale(seen: &[[f64; 2]]) -> Option<f64> {
     let logs: Vec<f64> = seen.iter().map(|[scale, px]| (scale * AIM_PX / px).ln()).collect();
     let mean = logs.iter().sum::<f64>() / logs.len() as f64;

@@ -3,8 +3,8 @@
 //! The *skew* of a picture is the time from the instant of its frame to the picture, in seconds; it is negative if the picture is earlier.
 //! There are two corrections: a point is moved to the instant by its own velocity ([`Tracks`], [`moved`]), or its standard deviation is
 //! increased by the distance that it may have moved ([`widened_px`]). The test `clock` of the crate `pipeline` measures both. Moving the
-//! points is far better. It works best if the standard deviation is increased for points without a known velocity, and for points moved
-//! beyond the observed interval.
+//! points is far better. It works best in combination with a larger standard deviation for two kinds of points: points without a known
+//! velocity, and points moved beyond the observed interval.
 
 use std::collections::VecDeque;
 
@@ -69,7 +69,7 @@ impl Tracks {
     ///
     /// * `taken_s`: time of the new picture, in seconds.
     /// * `height_px`: height of the person, in pixels; the longer side of the rectangle around the points.
-    /// * Returns `None` for a point that is too fast, that was not seen before, or whose previous velocity was different.
+    /// * Returns `None` for a point that is too fast, that was not seen before, or whose velocity has changed too much.
     pub fn velocity(
         &self,
         nth: usize,
@@ -98,10 +98,9 @@ fn between((from_s, from): (f64, Point2<f64>), (to_s, to): (f64, Point2<f64>)) -
         .then_some(Velocity { px_per_s, gap_s })
 }
 
-/// Returns the position of a point at the instant of its frame, in pixels, and the standard deviation to add to its own.
-///
-/// A moved point is as accurate as an observed one while the instant is between the two pictures that give its velocity. At a time `s`
-/// after the later picture (negative for before), `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
+/// Returns the position of a point at the instant of its frame, in pixels, and the standard deviation to add to its own. If the instant is
+/// between the two pictures that give the velocity, a moved point is as accurate as an observed one. At a time `s` after the later picture
+/// (negative if before it), `x + (x - x') s / gap` has `(1 + s / gap)^2 + (s / gap)^2` times the variance of `x`.
 ///
 /// * `velocity`: result of [`Tracks::velocity`]. A point without a velocity, or with a skew that is too long for the velocity, keeps its
 ///   position and gets a larger standard deviation.

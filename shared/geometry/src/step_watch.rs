@@ -10,12 +10,12 @@ use crate::Camera;
 use crate::extent::longer_side;
 use block::{Block, Estimate};
 
-/// Number of frames whose samples give one estimate, and number of estimates to store.
+/// Number of frames from which one estimate is computed, and number of estimates to store.
 const N_BLOCK: usize = 60;
 const N_KEPT: usize = 12;
 /// Minimum number of estimates for a result.
 const MIN_BLOCKS: usize = 5;
-/// Offset above which a camera is out of step. The offset must exceed it by a number of standard errors.
+/// Offset above which a camera is out of step. The offset must exceed this limit by a number of standard errors.
 pub const OUT_OF_STEP_MS: f64 = 5.0;
 const N_ERRORS: f64 = 3.0;
 /// Minimum standard error, in seconds.
@@ -24,22 +24,24 @@ const MIN_ERROR_S: f64 = 0.001;
 const MIN_POINTS: usize = 5;
 /// Maximum time between the previous and the next picture that give a speed, in seconds.
 const LONGEST_GAP_S: f64 = 0.35;
-/// Maximum speed of a point, in longer sides of the person per second; a faster point is taken for a different one.
+/// Maximum speed of a point, per second, relative to the longer side of the rectangle around the person; a faster point is taken for a
+/// different one.
 const MOST_SPEED: f64 = 9.0;
-/// Maximum distance of a point from the epipolar line, relative to the longer side of the person in the picture. A point further away is
-/// taken for a different one.
+/// Maximum distance of a point from the epipolar line, relative to the longer side of the rectangle around the person. A point further away
+/// is taken for a different one.
 const MOST_MISS: f64 = 0.2;
 
 /// Estimates how much later each camera took its pictures than their times state.
 ///
 /// If camera B is late by `d`, a point that moves at `u` (pixels per second) is seen `u d` ahead. The epipolar residual is then `e = g d`
-/// with `g = n . u`, where `n` is the normal of the epipolar line. With the true motion, the velocities in both pictures give the same `g`,
-/// but their errors are independent. The estimate `d = sum(e g) / sum(g_a g_b)` is therefore not biased towards zero, and a person who
-/// stands does not affect it.
+/// with `g = n . u`, where `n` is the normal of the epipolar line. The true velocities in both pictures would give the same `g`, and the
+/// errors of the measured velocities are independent. The estimate `d = sum(e g) / sum(g_a g_b)` is therefore not biased towards zero. A
+/// person who stands still does not affect it.
 ///
-/// The means over the points of a frame, and over the frames of a point, are subtracted. The offset from a moved camera is nearly the same
-/// for the whole person, and for some seconds for each point, while limbs move back and forth. The offsets of all pairs of views give the
-/// offsets of the views, relative to their median. The result is the mean of the last estimates, weighted by their certainty.
+/// The means over the points of a frame, and over the frames of a point, are subtracted. This removes the residuals caused by a moved
+/// camera: they are nearly the same for all points of a person, and for each point over some seconds, while limbs move back and forth. The
+/// offsets of the single views, relative to their median, are computed from the offsets of all pairs of views. The result is the mean of
+/// the last estimates, weighted by their certainty.
 ///
 /// This is not a synchronisation. Offsets beyond 40 ms come out too large (60 ms as 69), because limbs do not move evenly for that long.
 #[derive(Debug, Clone)]
@@ -54,17 +56,17 @@ pub struct StepWatch {
     reported: Vec<bool>,
 }
 
-/// Offset of a camera relative to the median of all.
+/// Time offset of a camera relative to the median of all cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Time by which the camera's pictures were taken later than stated, in milliseconds; negative if they were earlier.
+    /// Time by which the camera's pictures were taken later than stated, in milliseconds; negative if they were taken earlier.
     pub offset_ms: f64,
     /// Standard error of the offset, in milliseconds.
     pub error_ms: f64,
 }
 
 impl Step {
-    /// Returns true if the offset exceeds [`OUT_OF_STEP_MS`] beyond doubt.
+    /// Returns true if the offset exceeds [`OUT_OF_STEP_MS`] by several standard errors.
     pub fn is_out(&self) -> bool {
         self.offset_ms.abs() - N_ERRORS * self.error_ms > OUT_OF_STEP_MS
     }
@@ -79,7 +81,7 @@ struct Frame {
 /// Observation of a view in a frame.
 #[derive(Debug, Clone)]
 struct View {
-    /// Time of the picture in seconds, then its delay after the instant of the frame.
+    /// Time of the picture in seconds. The next field is the delay of the picture after the instant of the frame.
     seconds: f64,
     skew_s: f64,
     /// Points, undistorted and normalised.
@@ -95,7 +97,7 @@ type Moving = (Point2<f64>, Vector2<f64>);
 #[derive(Debug, Clone)]
 struct Seen {
     points: Vec<Option<Moving>>,
-    /// Longer side of the person in the picture.
+    /// Longer side of the rectangle around the person in the picture.
     side: f64,
     skew_s: f64,
 }
@@ -118,7 +120,7 @@ impl StepWatch {
     /// * `instant_s`: instant of the frame, in seconds; frames must be in order.
     /// * `points_px`: one entry per camera, `None` without a detection. All cameras list the same points of the world in the same order, in
     ///   pixels of the recorded image.
-    /// * `skews_s`: for each camera, the stated time from the instant to its picture, in seconds.
+    /// * `skews_s`: for each camera, the stated time from the instant of the frame to the camera's picture, in seconds.
     pub fn note(&mut self, instant_s: f64, points_px: &[Option<Vec<[f64; 2]>>], skews_s: &[f64]) {
         let views = self.cameras.iter().enumerate().map(|(nth, camera)| {
             let points = points_px.get(nth)?.as_ref()?;
@@ -179,7 +181,7 @@ impl StepWatch {
         let all: f64 = kept.iter().map(weight).sum();
         let sum: f64 = kept.iter().map(|estimate| weight(estimate) * estimate.offset_s).sum();
         let offset = sum / all;
-        // Two errors are known, from the samples and from the scatter of the estimates; the larger is used.
+        // There are two values for the error, one from the samples and one from the scatter of the estimates. The larger is used.
         let off = |estimate: &Estimate| (weight(estimate) * (estimate.offset_s - offset)).powi(2);
         let scatter = kept.iter().map(off).sum::<f64>() * n / (n - 1.0) / (all * all);
         let error = scatter.max(1.0 / all).sqrt().max(MIN_ERROR_S);

@@ -18,10 +18,10 @@ pub struct Survey {
     pub apart_m: Option<[f64; 2]>,
     /// Point nearest to all optical axes, in the world.
     pub focus: Option<Point3<f64>>,
-    /// The space that all cameras see.
+    /// The space that all cameras see; `None` if there is none.
     pub shared: Option<Shared>,
-    /// Expected error of a point at the focus, in millimetres: the root of the summed variances along the three axes. Every view that sees
-    /// the point is assumed to have an error of one pixel (standard deviation, in x and y).
+    /// Expected error of a point at the focus, in millimetres: the square root of the sum of the variances along the three axes. Every view
+    /// that sees the point is assumed to have an error of one pixel (standard deviation, in x and y).
     pub error_mm: Option<f64>,
 }
 

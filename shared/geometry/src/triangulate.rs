@@ -31,13 +31,13 @@ pub struct Observation<'a> {
 /// How observations are weighted and rejected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Width of the Cauchy loss on the reprojection error, in pixels; infinite for plain least squares.
+    /// Width of the Cauchy loss for the reprojection error, in pixels; infinite for plain least squares.
     pub loss_px: f64,
     /// Largest distance in pixels between an observation and the point's image; observations beyond it are left out.
     pub max_reprojection_px: Option<f64>,
     /// Minimum number of observations of a point; never less than 2.
     pub min_views: usize,
-    /// Minimum of the widest angle between two viewing rays, in radians.
+    /// Minimum value of the widest angle between two viewing rays, in radians.
     pub min_angle: f64,
 }
 
@@ -99,7 +99,7 @@ pub enum TriangulateError {
         /// Index of the observation.
         view: usize,
     },
-    /// There is no subset of enough views that agree.
+    /// There is no sufficiently large subset of views that agree.
     #[error(
         "no {needed} views agree: the smallest reprojection error is {residual_px} px, but the limit is {limit_px} px"
     )]
@@ -136,13 +136,13 @@ pub struct Triangulated {
     pub reprojection_px: f64,
     /// Bit mask of the observations used: bit i is set if observation i was used.
     pub views_used: u32,
-    /// Reprojection error of each observation, used or not, in pixels. It is NaN if the view does not show the point, and beyond the last
-    /// observation.
+    /// Reprojection error of each observation, used or not, in pixels. It is NaN for a view in which the point has no image, and for
+    /// indices beyond the last observation.
     pub residuals_px: [f64; MAX_VIEWS],
 }
 
 impl Triangulated {
-    /// Returns true if an observation was used, by its index in the list.
+    /// Returns true if the observation with the given index was used.
     pub fn uses(&self, view: usize) -> bool {
         view < MAX_VIEWS && self.views_used & (1 << view) != 0
     }
@@ -153,7 +153,7 @@ impl Triangulated {
 /// The refinement (Levenberg & Marquardt) minimises `Σ ρ(‖e‖²) / σ²` over the distorted pixel errors `e` with the Cauchy loss `ρ(s) = c²
 /// ln(1 + s / c²)`, c = `loss_px`. The width of the loss shrinks from the worst initial error down to c, so that a single outlier does not
 /// determine the minimum. If the error of a view exceeds `max_reprojection_px`, every view is left out in turn, and the subset with the
-/// smallest worst error is kept. This repeats down to `min_views`.
+/// smallest worst error is kept. This is repeated while more than `min_views` views are left.
 ///
 /// The covariance is the inverse of the normal matrix `Σ ρ' Jᵀ J / σ²`; it is as accurate as the given `sigma_px`. The result depends
 /// only on the arguments and their order. The function does not allocate. An observation beyond the valid range of its camera's lens is not

@@ -1,4 +1,4 @@
-//! Rotations of the world so that a given axis points up, for files whose readers expect that.
+//! Rotations of the world so that a given axis points up, for files whose readers expect this.
 
 use nalgebra::{Matrix3, Rotation3, UnitVector3, Vector3};
 

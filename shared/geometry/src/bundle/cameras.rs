@@ -10,7 +10,7 @@ use crate::{Camera, Lens, LensModel};
 /// Residual of a point without an image (behind the camera or beyond its lens), in standard deviations.
 const NO_IMAGE: f64 = 1e3;
 
-/// The parameters of a camera that are free; the others are held.
+/// The parameters of a camera that are free; all others are fixed.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each parameter is free or fixed separately"
@@ -122,7 +122,7 @@ impl Cameras {
         format!("{}: {number}", camera.name)
     }
 
-    /// Returns the parameters of a camera's rotation and centre, in this order; `None` if its pose is held.
+    /// Returns the parameters of a camera's rotation and centre, in this order; `None` if its pose is fixed.
     pub fn pose_parameters(&self, camera: usize) -> Option<[usize; 6]> {
         let first = self.first[camera];
         let is_pose =
@@ -130,7 +130,7 @@ impl Cameras {
         is_pose.then(|| core::array::from_fn(|nth| first + nth))
     }
 
-    /// Returns the parameter of a camera's focal length; `None` if it is held.
+    /// Returns the parameter of a camera's focal length; `None` if the focal length is fixed.
     pub fn focal_parameter(&self, camera: usize) -> Option<usize> {
         let own = self.first[camera]..self.first[camera + 1];
         own.into_iter().find(|i| self.numbers[*i].1 == Number::Focal)

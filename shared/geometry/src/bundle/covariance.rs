@@ -5,10 +5,10 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::Problem;
 use super::equations::Equations;
 
-/// Smallest eigenvalue of the information matrix relative to the largest, after each parameter is scaled by its own information. Below this
-/// ratio, the data do not determine the direction.
+/// Smallest eigenvalue of the information matrix relative to the largest, after each parameter is scaled by its own information. If an
+/// eigenvalue is below this ratio, the data do not determine the direction of its eigenvector.
 const LEAST_EIGENVALUE: f64 = 1e-11;
-/// A parameter is named if its component in such a direction is at least this fraction of the largest component.
+/// A parameter is named as not determined if its component in an undetermined direction is at least this fraction of the largest component.
 const NAMED: f64 = 0.2;
 
 /// Covariance of the shared parameters, if the residuals of terms have variance 1.

@@ -4,7 +4,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::{Problem, Step, Term};
 
-/// Smallest diagonal entry for damping, relative to the largest of its block. It keeps undetermined parameters in place.
+/// Smallest value that damping uses for a diagonal entry, relative to the largest entry of its block. It prevents large steps of parameters
+/// that are not determined.
 const LEAST_DIAGONAL: f64 = 1e-12;
 
 /// Equations of one local block.
@@ -27,7 +28,7 @@ pub(super) struct Equations {
     pub(super) cost: f64,
     /// Number of residuals.
     pub(super) n_residuals: usize,
-    /// Sums over all residuals: of the weights, and of the curvatures of the losses.
+    /// Sum of the weights, and sum of the curvatures of the losses, over all residuals.
     pub(super) weights: [f64; 2],
 }
 

@@ -13,7 +13,7 @@ const LEAST_DAMPING: f64 = 1e-12;
 pub struct Settings {
     /// Maximum number of iterations.
     pub max_iterations: usize,
-    /// Minimum decrease of the cost in an iteration, as a fraction; the search ends below it.
+    /// The search ends if an iteration decreases the cost by less than this fraction.
     pub least_gain: f64,
 }
 
@@ -72,8 +72,8 @@ impl Report {
 
 /// Minimises the cost near the current values (Levenberg-Marquardt method, damping after Nielsen 1999).
 ///
-/// Losses other than squares get new weights at every step. A parameter that is not determined stays near its value; use
-/// [`covariance`](super::covariance) to find out whether all are determined.
+/// The weights of losses other than least squares are computed again at every step. A parameter that is not determined stays near its
+/// initial value; use [`covariance`](super::covariance) to find out whether all are determined.
 pub fn solve<P: Problem>(start: P, settings: &Settings) -> (P, Report) {
     let mut at = start;
     let mut equations = Equations::new(&at);

@@ -1,6 +1,6 @@
 //! A term of the sum: residuals, their derivatives, and a loss.
 
-/// Loss: the cost as a function of s, the squared length of a term's residuals (in standard deviations).
+/// Loss function of a term: its cost as a function of s, the squared length of its residuals (in standard deviations).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Loss {
     /// Least squares: s.
@@ -27,7 +27,7 @@ impl Loss {
     }
 
     /// Returns the mean second derivative of half the cost along each of `n_residuals` residuals. It determines how far a small change
-    /// moves the minimum. The weight overstates this for large residuals.
+    /// moves the minimum. For large residuals, the weight would overstate the curvature.
     pub fn curvature(self, s: f64, n_residuals: usize) -> f64 {
         let weight = self.of(s).1;
         let by_s = match self {
@@ -49,10 +49,10 @@ pub struct Term {
     pub(super) loss: Loss,
     /// Weight of the term.
     share: f64,
-    /// Indices of shared parameters; the next field has their columns one after another.
+    /// Indices of shared parameters. The next field contains the column of derivatives for each of them, one after another.
     pub(super) shared: Vec<usize>,
     pub(super) by_shared: Vec<f64>,
-    /// Coordinates of the local block; the next field has their columns one after another.
+    /// Coordinates of the local block. The next field contains the column of derivatives for each of them, one after another.
     pub(super) local: Vec<usize>,
     pub(super) by_local: Vec<f64>,
 }
@@ -70,7 +70,8 @@ impl Term {
         self.by_local.clear();
     }
 
-    /// Sets the weight of the term as a fraction of one, for several terms with the same error. The loss does not depend on it.
+    /// Sets the weight of the term, from 0 to 1. It is below 1 if several terms have the same error. The loss function does not depend on
+    /// this weight.
     pub fn counts(&mut self, share: f64) {
         self.share = share;
     }

@@ -238,7 +238,7 @@ fn the_covariance_is_how_answers_spread() {
         let [a, b] = [&truth, &found].map(|cloud| cloud.cameras.cameras()[2].centre_in_world());
         spread += (a.y - b.y).powi(2) / f64::from(n);
     }
-    // A variance from 60 samples is known to 18 %; three times that is accepted.
+    // A variance from 60 samples is known to 18 %; three times this deviation is accepted.
     let ratio = spread / covariance.sd(place).powi(2);
     assert!((0.5..1.7).contains(&ratio), "{ratio}");
 }
@@ -272,7 +272,7 @@ fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
         by_residuals += covariance(&found).unwrap().sd(place).powi(2);
     }
     assert!(spread > 2.5 * by_residuals, "{spread} {by_residuals}");
-    // A variance from 60 samples is known to 18 %; three times that is accepted.
+    // A variance from 60 samples is known to 18 %; three times this deviation is accepted.
     let ratio = spread / by_clusters;
     assert!((0.5..1.7).contains(&ratio), "{ratio}");
     assert_eq!(clustered(&truth, &[0; 60]), Ok(None));

@@ -52,7 +52,7 @@ pub fn epipolar_curve(
         .collect()
 }
 
-/// Returns the part of the ray that the lens of B can show, as a segment of its normalised plane.
+/// Returns the part of the ray that the lens of B can show, as a segment of B's normalised plane.
 fn visible_line(a: &Camera, b: &Camera, point: &Point2<f64>) -> Option<(Point2<f64>, Point2<f64>)> {
     let ray = a.ray(point)?;
     let origin = (b.camera_from_world * ray.origin).coords;
@@ -84,7 +84,7 @@ fn normalised(v: &Vector3<f64>) -> Option<Vector2<f64>> {
         .filter(|p| p.iter().all(|c| c.is_finite()))
 }
 
-/// Returns a radius of the normalised plane that contains every ray of the image.
+/// Returns the radius of a circle in the normalised plane that contains every ray of the image.
 fn image_radius(camera: &Camera) -> f64 {
     let [width, height] = camera.intrinsics.size.map(f64::from);
     let limit = camera.intrinsics.lens.max_radius();

@@ -1,4 +1,4 @@
-//! Tests that images of one point are on each other's epipolar lines and curves.
+//! Tests that the images of one point in two cameras are on each other's epipolar lines and curves.
 
 use proptest::prelude::*;
 

@@ -10,7 +10,7 @@ use crate::{Camera, Rig, upright_roll};
 pub use agreement::{CameraError, EpipolarReport, PairError, epipolar_check};
 pub use finding::{Finding, Severity};
 
-/// Cameras count as being in one place if all distances between them are below this number of metres.
+/// Cameras count as being in the same place if all distances between them are below this, in metres.
 const ONE_PLACE: f64 = 0.01;
 /// Distance from the origin beyond which a camera is reported as far away, in metres.
 const FAR_AWAY: f64 = 10_000.0;
@@ -152,7 +152,7 @@ fn one_place(cameras: &[Camera]) -> Option<Finding> {
     })
 }
 
-/// Finds a rig in which no two cameras see a common place within twenty times the size of the rig.
+/// Finds a rig in which no two cameras see a common region within twenty times the size of the rig.
 fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
     const STEPS: usize = 8;
     const DEPTHS: usize = 40;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Format, own, panoptic, pose2sim};
 
-/// Detects the format by content, and by extension if the content is only numbers.
+/// Detects the format from the content, or from the extension if the content is only numbers.
 ///
 /// Returns `None` for anything that no reader accepts.
 pub fn detect(path: &Path, text: &str) -> Option<Format> {

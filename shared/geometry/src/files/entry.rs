@@ -6,16 +6,16 @@ use super::{ParseError, ReadOptions};
 use crate::rig::LeftOut;
 use crate::{Camera, Intrinsics, Rig};
 
-/// Reason why a camera with a lens is left out.
+/// Reason why a camera is left out although its lens is known.
 const NO_PLACE: &str = "its file has a lens but no pose";
 
-/// A camera of a file.
+/// A camera in a calibration file.
 pub(super) enum Entry {
     /// A camera with its lens and pose.
     Placed(Camera),
-    /// A camera with its lens alone, at the origin.
+    /// A camera with only its lens, placed at the origin.
     Lens(Camera),
-    /// Only the name of a camera, and the reason why its pose is not known.
+    /// A camera of which only the name is known, with the reason why its pose is not known.
     Name(LeftOut),
 }
 
@@ -38,7 +38,8 @@ impl Entry {
     }
 }
 
-/// Returns the rig of the cameras that have a pose and, if lenses suffice, of those without a pose too.
+/// Returns the rig of the cameras that have a pose. If [`ReadOptions::lenses_suffice`](super::ReadOptions::lenses_suffice) is set, it also
+/// contains the cameras without a pose.
 pub(super) fn rig(
     entries: Vec<Entry>,
     up: Option<UnitVector3<f64>>,

@@ -173,7 +173,7 @@ pub enum UnwritableRig {
     },
 }
 
-/// Refuses camera names that would lead to a file outside the folder.
+/// Returns an error for camera names that would refer to a file outside the folder.
 pub(super) fn check_file_name(camera: &Camera) -> Result<(), UnwritableRig> {
     if camera.name.contains(['/', '\\', '\0']) || camera.name.starts_with('.') {
         return Err(UnwritableRig::Name {

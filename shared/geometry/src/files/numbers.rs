@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use super::{ParseError, Unit};
 use crate::{Intrinsics, Lens, LensModel, rotation_from_matrix};
 
-/// Refuses a number that is not finite.
+/// Returns an error for a number that is not finite.
 pub(super) fn finite(field: &str, value: f64) -> Result<f64, ParseError> {
     if value.is_finite() {
         return Ok(value);
@@ -59,7 +59,7 @@ pub(super) fn intrinsics(
         finite(field, entry)?;
     }
     let place = |row: usize, column: usize| format!("{field}[{row}][{column}]");
-    // Skew is not modelled. It is refused if it would move a point at the border by a hundredth of a pixel or more.
+    // Skew is not modelled. It is an error if it would move a point at the border by a hundredth of a pixel or more.
     if k[(0, 1)].abs() > 1e-5 * k[(0, 0)].abs() {
         let requirement = "skew is not supported: the skew must be 0";
         return Err(ParseError::Value {

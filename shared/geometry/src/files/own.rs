@@ -17,7 +17,7 @@
 //! translation_metres = [0.32, 0.96, 2.89] # both left out where only the lens is known
 //! ```
 //!
-//! A point X of the world is `R X + t` in the camera, which looks along +z with y down (`OpenCV`).
+//! A point X of the world has the camera coordinates `R X + t`. The camera looks along +z with y down (`OpenCV`).
 
 use std::fmt::Debug;
 
@@ -70,8 +70,8 @@ pub(super) fn is_own(text: &str) -> bool {
         || text.lines().any(|line| line.starts_with("format = \"parallax-rig\""))
 }
 
-/// Reads a rig file. The image size of `options` is ignored, because the file has it. A unit in `options` overrides metres, for a file that
-/// was written in a wrong unit.
+/// Reads a rig file. The image size of `options` is ignored, because the file has it. A unit in `options` replaces metres, for a file that
+/// was written in the wrong unit.
 ///
 /// # Errors
 ///

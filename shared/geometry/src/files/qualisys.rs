@@ -1,6 +1,6 @@
 //! Calibration files of Qualisys (`.qca.txt`, XML): millimetres, and pixels in 64ths.
 //!
-//! The conventions were established with a file whose cameras are also known in `OpenCV` terms:
+//! The conventions were determined from a file whose cameras are also known in the conventions of `OpenCV`:
 //!
 //! - `x y z` is the centre of the camera.
 //! - `r11..r33`, row by row, takes the world to coordinates with x to the right, y up and z backward, so y and z change sign.

@@ -297,7 +297,7 @@ fn qualisys_lengths_are_in_64ths_of_a_pixel_but_distortion_is_not() {
     assert_eq!(intrinsics.lens.model(), &lens);
     let centre = camera.centre_in_world();
     assert!((centre.coords - Vector3::new(1.0, -2.0, 0.5)).norm() < 1e-12);
-    // The picture's right is the world's x, and its up is the world's z, so the camera looks along y.
+    // The right of the picture is the world's x, and the top is the world's z, so the camera looks along y.
     assert!((camera.axis_in_world().into_inner() - Vector3::y()).norm() < 1e-12);
     let above = camera.project(&nalgebra::Point3::new(1.0, 3.0, 0.6)).expect("in front");
     assert!(above.y < 960.0);

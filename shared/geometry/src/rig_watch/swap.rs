@@ -1,42 +1,42 @@
-//! Detects that the footage of two cameras was exchanged, from the points of a person seen by the cameras.
+//! Detects that the footage of two cameras was swapped, from the points of a person seen by the cameras.
 
 use nalgebra::{Matrix3, Point2, Point3, UnitVector3, Vector3};
 
 use super::median;
 use crate::{Framing, Ray};
 
-/// Maximum number of frames to examine; footage is exchanged from the beginning, or not at all.
+/// Maximum number of frames to examine; footage is swapped from the beginning, or not at all.
 const MAX_FRAMES: usize = 60;
 /// Minimum number of frames for a result.
 const MIN_FRAMES: usize = 12;
 /// Minimum number of points of a usable frame.
 const MIN_POINTS: usize = 5;
-/// Maximum number of cameras for which exchanged left and right are tried; with more, it would take too long.
+/// Maximum number of cameras for which swapping left and right is tried. With more cameras, this would take too long.
 const MAX_TO_MIRROR: usize = 8;
-/// Two cameras were exchanged if the angular residual is at least `MIN_DEGREES` as configured. With the two exchanged, it must be at most
-/// `MAX_DEGREES` and smaller by `FACTOR`. The exchanged pair is certain if every other exchange leaves a residual larger by the factor
-/// `LEAD`.
+/// The footage of two cameras was swapped if the angular residual with the configured cameras is at least `MIN_DEGREES`. With the two
+/// swapped back, the residual must be at most `MAX_DEGREES`, and smaller by the factor `FACTOR`. The pair is certain if swapping any other
+/// pair gives a residual that is larger by the factor `LEAD`.
 const MIN_DEGREES: f64 = 0.75;
 const MAX_DEGREES: f64 = 1.5;
 const FACTOR: f64 = 2.5;
 const LEAD: f64 = 1.5;
 /// Angular residual above which the cameras do not see one person at the position that the rig gives.
 const CONTRADICTION_DEGREES: f64 = 2.5;
-/// Angular residual that is reported after a few frames, because no correct detection of a person has such a large residual.
+/// Angular residual that is reported even before [`MIN_FRAMES`] frames, because no correct detection of a person has such a large residual.
 const IMPOSSIBLE_DEGREES: f64 = 5.0;
 
-/// Computes, frame by frame, the angular residual of the rays with the footage of two cameras exchanged.
+/// Computes, frame by frame, the angular residual of the rays with the footage of two cameras swapped.
 ///
 /// For every point, the rays of all views are intersected in the least-squares sense. The residual is the angle between a ray and the
 /// direction to that point; the residual of a frame is the median over views and points. Every pair of cameras is tried. Two cameras were
-/// exchanged if exchanging them lowers the residual from far above the usual detection error to the usual value. Any view may have left and
-/// right exchanged.
+/// swapped if swapping them back lowers the residual from far above the usual detection error to the usual value. In addition, left and
+/// right may be swapped in any view.
 #[derive(Debug, Clone)]
 pub struct SwapWatch {
     framings: Vec<Framing>,
-    /// For each point, the point on the other side of the body.
+    /// For each point, the corresponding point on the other side of the body.
     mirror: Option<Vec<usize>>,
-    /// For each pair of views, the residuals of every frame as configured and with the two exchanged, in degrees.
+    /// For each pair of views, the residuals of every frame in degrees: as configured, then with the two views swapped.
     tried: Vec<([usize; 2], Vec<[f64; 2]>)>,
     /// Residual of every frame as configured, in degrees.
     configured: Vec<f64>,
@@ -45,24 +45,24 @@ pub struct SwapWatch {
 /// Evidence that the cameras do not see one person where the rig predicts, for any reason.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contradiction {
-    /// Median angular residual of the rays to the same part, in degrees.
+    /// Median angular residual of the rays to the same body part, in degrees.
     pub degrees: f64,
-    /// Largest usual residual, in degrees.
+    /// Largest residual that is usual for a correct rig, in degrees.
     pub usual_degrees: f64,
-    /// The two views whose exchange fits best, if it fits better than the configuration.
+    /// The two views that fit best when swapped, if they fit better than the configuration.
     pub likely: Option<[usize; 2]>,
 }
 
-/// Two cameras whose footage was exchanged.
+/// Two cameras whose footage was swapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Swap {
     /// Indices of the two views.
     pub views: [usize; 2],
     /// Angular residual as configured, in degrees.
     pub degrees: f64,
-    /// Angular residual with the two exchanged, in degrees.
+    /// Angular residual with the two views swapped, in degrees.
     pub exchanged_degrees: f64,
-    /// True if the pair is certain. With three cameras at equal angles around people, exchanging any two fits almost equally well.
+    /// True if the pair is certain. With three cameras at equal angles around people, swapping any two fits almost equally well.
     pub is_sure: bool,
 }
 
@@ -70,7 +70,7 @@ impl SwapWatch {
     /// Creates a watch without observations.
     ///
     /// * `framings`: framings of the views.
-    /// * `mirror`: for each point, the point on the other side of the body.
+    /// * `mirror`: for each point, the corresponding point on the other side of the body.
     pub fn new(framings: Vec<Framing>, mirror: Option<Vec<usize>>) -> Self {
         let n = framings.len();
         let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
@@ -113,7 +113,7 @@ impl SwapWatch {
         }
     }
 
-    /// Returns the two cameras that were exchanged, if any.
+    /// Returns the two cameras that were swapped, if any.
     pub fn swap(&self) -> Option<Swap> {
         let all = self.best(MIN_FRAMES);
         let best = *all.first()?;
@@ -125,11 +125,10 @@ impl SwapWatch {
         is_swap.then_some(Swap { is_sure, ..best })
     }
 
-    /// Returns evidence that the observations contradict the rig: exchanged footage, the rig of other footage, unsynchronised views, or
-    /// wrong detections in every view.
-    ///
-    /// An impossible residual is reported from the first frame on. An exchange that is not clear enough for [`Self::swap`] is also
-    /// reported. The reason is that frames rotated upright for another camera show tilted people, and the detections in them fit no camera.
+    /// Returns evidence that the observations contradict the rig: swapped footage, a rig that belongs to other footage, unsynchronised
+    /// views, or wrong detections in every view. An impossible residual is reported from the first frame on. Swapped footage that is not
+    /// clear enough for [`Self::swap`] is also reported. It can be unclear because a frame that is rotated upright for the wrong camera
+    /// shows a tilted person, and the detections in it fit no camera.
     pub fn contradiction(&self) -> Option<Contradiction> {
         let least = if self.configured.len() >= MIN_FRAMES {
             CONTRADICTION_DEGREES
@@ -146,7 +145,7 @@ impl SwapWatch {
         })
     }
 
-    /// Returns all pairs with at least `n_frames` frames, those whose exchange fits best first.
+    /// Returns all pairs with at least `n_frames` frames, those that fit best when swapped first.
     pub(super) fn best(&self, n_frames: usize) -> Vec<Swap> {
         let usable = self.tried.iter().filter(|(_, frames)| frames.len() >= n_frames);
         let mut all: Vec<Swap> = usable
@@ -188,7 +187,7 @@ impl SwapWatch {
         at.iter().all(|value| value.is_finite()).then_some(at)
     }
 
-    /// Returns the angular residual in degrees if the footage of view `i` is that of camera `camera_of[i]`, with left and right exchanged
+    /// Returns the angular residual in degrees if the footage of view `i` is that of camera `camera_of[i]`, with left and right swapped
     /// where that fits better.
     fn residual_degrees(&self, rays: &[Vec<Vec<Option<Ray>>>], camera_of: &[usize]) -> Option<f64> {
         let mut is_mirrored = vec![false; rays.len()];

@@ -120,7 +120,7 @@ fn one_tilted_camera_of_three_is_suspected() {
 fn an_offset_of_half_a_grid_cell_is_no_moved_camera() {
     let cameras = around(4);
     let mut believed = cameras.clone();
-    // The camera has a constant offset of two pixels.
+    // The believed principal point is wrong by two pixels.
     believed[1].intrinsics.cx += 2.0;
     let watch = watch(&cameras, believed, 0.0, 5, 30);
     assert!(watch.residual_px(1) > watch.without_px(1).map(|px| FACTOR * px));

@@ -1,4 +1,4 @@
-//! Space that cameras share, and the height at which a standing person is seen there.
+//! The space that several cameras see, and the height of a standing person there in their pictures.
 
 use nalgebra::{Point2, Point3, UnitVector3, Vector3};
 use statistics::Sorted;
@@ -7,11 +7,11 @@ use crate::{Camera, Rig};
 
 /// Height of a standing person, in metres.
 pub const PERSON_METRES: f64 = 1.7;
-/// Numbers of sample points: cells of a camera's image in either direction, and depths along each ray.
+/// Numbers of sample points: cells along each side of a camera's image, and depths along each ray.
 const CELLS: usize = 9;
 const DEPTHS: usize = 24;
-/// Maximum height of a person who must be entirely in the image, and of one who may be cut off, relative to the image's side along the
-/// person.
+/// Maximum height of a person relative to the side of the image along the person: for a person who must be entirely in the image, and for
+/// one who may be cut off.
 const MAX_SHARE_WHOLE: f64 = 1.25;
 const MAX_SHARE_PARTIAL: f64 = 4.0;
 /// Minimum height of a person, relative to the same side.
@@ -24,22 +24,22 @@ const BOUNDS: [Bound; 4] = [
     Bound::MinShare(0.125),
     Bound::MinShare(MIN_SHARE),
 ];
-/// Largest ratio between a depth and the depth of the focus for them to count as near each other.
+/// Largest ratio between a depth and the depth of the rig's focus at which the two count as near each other.
 const NEAR_FACTOR: f64 = 1.6;
 /// Minimum angle between optical axes that have a common focus, in radians (4 degrees).
 const MIN_AXIS_ANGLE: f64 = 0.07;
-/// Minimum size of a space shared by more than two cameras, relative to the space shared by two.
+/// Minimum size of a space seen by more than two cameras, relative to the space seen by two.
 const MIN_SPACE_SHARE: f64 = 0.03;
-/// Minimum height of a person seen from above, relative to the height seen from the side. There is a minimum because the size of the parts
-/// does not change.
+/// Minimum height of a person seen from above, relative to the height seen from the side. There is a minimum because the size of the body
+/// parts in the picture does not change.
 const MIN_FORESHORTENING: f64 = 0.7;
 
-/// Height of a standing person in each camera, in the space which that camera shares with others.
+/// Height of a standing person in each camera, in the space that this camera and other cameras see.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Heights {
-    /// Median height in every camera, in pixels of the calibrated image; `None` for a camera that shares no space.
+    /// Median height in every camera, in pixels of the calibrated image; `None` for a camera that sees no space together with others.
     pub(super) median_px: Vec<Option<f64>>,
-    /// Maximum number of cameras that share a sufficiently large space; 0 if no two cameras do.
+    /// Maximum number of cameras that see a common space of sufficient size; 0 if no two cameras do.
     pub(super) n_sharing: usize,
 }
 
@@ -57,7 +57,7 @@ enum Bound {
 struct Projection {
     /// Height, in pixels of the calibrated image.
     px: f64,
-    /// Height relative to the image's side along the person.
+    /// Height relative to the side of the image along the person.
     share: f64,
     /// Ratio between the depth and the depth of the focus, or its inverse, whichever is larger; infinite without a focus.
     from_focus: f64,
@@ -88,8 +88,8 @@ impl Place {
     }
 }
 
-/// Finds the heights of a standing person in the space that the cameras share. Positions with the whole person in the images are preferred
-/// over those with only the middle of the person in the images.
+/// Finds the heights of a standing person in the space that the cameras share. Positions at which the images show the whole person are
+/// preferred over positions at which they show only the middle of the person.
 ///
 /// Without an up direction, the height is measured as seen from the side.
 pub(super) fn heights(rig: &Rig) -> Heights {
@@ -113,7 +113,8 @@ pub(super) fn heights(rig: &Rig) -> Heights {
     }
 }
 
-/// Returns the maximum number of cameras that share enough of the space that two cameras share; 0 if there is none.
+/// Returns the maximum number of cameras that see a sufficient part of the space seen by two cameras; 0 if no two cameras see a common
+/// space.
 fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
     let n_of: Vec<usize> = places.iter().map(|place| place.n_seen(bound)).collect();
     let shared_by = |n: usize| n_of.iter().filter(|value| **value >= n).count();
@@ -123,7 +124,7 @@ fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
     found.unwrap_or(0)
 }
 
-/// Returns the median height in a camera, over the positions that it shares with as many others as possible.
+/// Returns the median height in a camera, over the positions that as many other cameras as possible also see.
 fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) -> Option<f64> {
     let of = |n: usize, bound: Bound| {
         let shared = places.iter().filter(|place| place.n_seen(bound) >= n);
@@ -168,7 +169,7 @@ struct Viewpoint<'a> {
     focus_depth: Option<f64>,
     /// Mean focal length, in pixels.
     focal: f64,
-    /// Side of the image along a standing person, in pixels.
+    /// Side of the image that is along a standing person, in pixels.
     side: f64,
 }
 

@@ -6,13 +6,13 @@ use super::{MIN_POINTS, MOST_MISS, Moving, Seen};
 use crate::Camera;
 use crate::rig_watch::median;
 
-/// Minimum movement along the normals of epipolar lines, as root mean square per second, relative to the longer side of the person in the
-/// picture. The value is our choice.
+/// Minimum movement along the normals of epipolar lines, as root mean square per second, relative to the longer side of the rectangle
+/// around the person. The value is not from a publication.
 const MIN_MOVEMENT: f64 = 0.08;
 /// Minimum number of samples of a pair of views.
 const MIN_SAMPLES: f64 = 100.0;
 
-/// Sums of every pair of views.
+/// Sums over the samples of every pair of views.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     n_views: usize,
@@ -30,7 +30,7 @@ struct Pair {
     /// Sums over all samples, followed by the sums over the samples of each point.
     all: Sums,
     points: Vec<Sums>,
-    /// Sum of the squared longer sides.
+    /// Sum of the squares of the longer sides of the rectangles around people.
     sides: f64,
 }
 
@@ -40,7 +40,7 @@ struct Sums {
     n: f64,
     miss: f64,
     along: [f64; 2],
-    /// Sum of `e^2`; the next fields are the sums of `e (g_a + g_b) / 2` and of `g_a g_b`.
+    /// Sum of `e^2`; the next two fields are the sums of `e (g_a + g_b) / 2` and of `g_a g_b`.
     squares: f64,
     both: f64,
     movement: f64,
@@ -128,7 +128,7 @@ impl Block {
         let slopes = self.pairs.iter().filter_map(|pair| Some((pair.views, pair.slope()?)));
         let slopes: Vec<([usize; 2], Slope)> = slopes.collect();
         let linked = linked(self.n_views, slopes.iter().map(|slope| slope.0))?;
-        // Every pair gives the difference of its two offsets. Offsets without a pair are held at 0.
+        // Every pair gives the difference between the offsets of its two views. The offset of a view without a pair is fixed at 0.
         let all: f64 = slopes.iter().map(|slope| slope.1.weight).sum();
         let mut normal = DMatrix::identity(self.n_views, self.n_views) * (1e-9 * all);
         let mut right = DVector::zeros(self.n_views);
@@ -150,7 +150,7 @@ impl Block {
         let middle = middle(unknown.iter().flatten().copied().collect())?;
         let of_view = |(view, it): (usize, Option<f64>)| {
             let offset_s = it? - middle;
-            // The variance assumes that the other offsets are exact.
+            // This variance assumes that the offsets of all other views are exact.
             let variance = 1.0 / normal[(view, view)];
             let is_number = offset_s.is_finite() && variance.is_finite();
             is_number.then_some(Estimate { offset_s, variance })
@@ -166,7 +166,7 @@ struct Slope {
     weight: f64,
 }
 
-/// Returns true for each view that is in a pair; `None` if these views are not all connected by pairs.
+/// For each view, returns true if it is in a pair. Returns `None` if pairs do not connect all these views.
 fn linked(n_views: usize, pairs: impl Iterator<Item = [usize; 2]> + Clone) -> Option<Vec<bool>> {
     let mut reached = vec![false; n_views];
     reached[pairs.clone().next()?[0]] = true;

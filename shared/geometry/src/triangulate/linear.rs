@@ -43,7 +43,8 @@ fn widest_angle(views: &Views<'_>, used: Subset) -> f64 {
     for a in used.iter() {
         for b in used.iter().take_while(|&b| b < a) {
             if let (Some(a), Some(b)) = (direction(a), direction(b)) {
-                // The angle or its supplement is used, whichever is smaller, because opposite rays are as useless as equal ones.
+                // The angle or its supplement is used, whichever is smaller, because opposite rays determine the depth as little as equal
+                // ones.
                 widest = a.cross(&b).norm().atan2(a.dot(&b).abs()).max(widest);
             }
         }

@@ -29,7 +29,7 @@ struct Objective {
     worst_px: f64,
 }
 
-/// Refines `start` with a loss that narrows from the worst initial error down to `loss_px`.
+/// Refines `start` with a loss whose width decreases from the worst initial error to `loss_px`.
 pub(super) fn refine(
     views: &Views<'_>,
     used: Subset,

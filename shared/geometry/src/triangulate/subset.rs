@@ -1,4 +1,4 @@
-//! Selection of the views to use: all, or the largest subset found that agrees.
+//! Selection of the views to use: all views, or the largest subset found that agrees.
 
 use super::{
     Settings, TriangulateError, linear,

@@ -49,7 +49,7 @@ proptest! {
         prop_assume!((a.centre_in_world() - b.centre_in_world()).norm() > 0.5);
         let cameras = [a, b, c];
         prop_assume!(cameras.iter().all(|camera| camera.project(&point).is_some()));
-        // Opposite cameras and a point between them have parallel rays; the third camera may be beside one of them.
+        // Opposite cameras and a point between them have parallel rays; the third camera may be next to one of them.
         let Ok(got) = triangulate(&observe(&cameras, &point, &[]), &Settings { min_angle: 0.05, ..Settings::default() }) else { return Ok(()) };
         prop_assert!((got.in_world - point).norm() < 1e-6, "{} is not {point}", got.in_world);
         prop_assert!(got.views_used == 0b111 && got.reprojection_px < 1e-5);

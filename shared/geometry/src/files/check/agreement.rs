@@ -1,22 +1,23 @@
-//! Epipolar errors of a rig on points seen by several cameras.
+//! Epipolar errors of a rig, measured with points seen by several cameras.
 
 use nalgebra::Point2;
 use statistics::Sorted;
 
 use crate::{Camera, Rig, epipolar};
 
-/// Epipolar error of a pair of cameras on the points that both saw.
+/// Epipolar error of a pair of cameras, measured with the points that both saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairError {
     /// Indices of the two cameras in the rig.
     pub cameras: [usize; 2],
     /// Number of points that both cameras saw.
     pub n_points: usize,
-    /// Median over the points of the distance to the epipolar line, as the mean of both directions, in ideal pixels.
+    /// Median distance of the points from their epipolar lines, in ideal pixels. For each point, the distances in the two images are
+    /// averaged.
     pub median_px: f64,
 }
 
-/// Epipolar error of a camera with all others.
+/// Epipolar error of a camera, measured together with all other cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraError {
     /// Index of the camera in the rig.
@@ -27,7 +28,7 @@ pub struct CameraError {
     pub median_px: f64,
 }
 
-/// Epipolar errors of a rig on correspondences.
+/// Epipolar errors of a rig, measured with corresponding points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpipolarReport {
     /// Errors of each pair of cameras that saw a common point.

@@ -9,7 +9,7 @@ pub enum Severity {
     Note,
     /// The finding is probably a mistake.
     Warning,
-    /// Nothing can be located in space with this rig, and a run refuses it.
+    /// Nothing can be located in space with this rig, and a run does not accept it.
     Error,
 }
 
@@ -23,7 +23,7 @@ pub enum Finding {
         /// Distance between the cameras.
         metres: f64,
     },
-    /// All cameras are in one place, so that nothing can be triangulated.
+    /// All cameras are in the same place, so that nothing can be triangulated.
     OnePlace {
         /// Number of cameras.
         n_cameras: usize,
@@ -70,7 +70,7 @@ pub enum Finding {
         /// Fraction of the image, 0 to 1; 0 if only corners are affected.
         share: f64,
     },
-    /// The distortion moves the corner of the image by more than any real lens does.
+    /// The distortion moves the corner of the image further than any real lens would.
     LensStrength {
         /// Name of the camera.
         camera: String,
@@ -95,12 +95,12 @@ pub enum Finding {
         /// Rotation that would make the camera upright, in degrees.
         degrees: f64,
     },
-    /// A camera does not see the place at which the others are aimed.
+    /// A camera does not see the point at which the other cameras are aimed.
     LooksElsewhere {
         /// Name of the camera.
         camera: String,
     },
-    /// No two cameras see a common place.
+    /// No two cameras see a common region.
     NothingShared {
         /// Number of cameras.
         n_cameras: usize,
@@ -141,7 +141,7 @@ impl Finding {
         }
     }
 
-    /// Returns true if a wrong unit of length would explain the finding.
+    /// Returns true if a wrong unit of length could be the cause of the finding.
     pub fn is_of_unit(&self) -> bool {
         matches!(
             self,

@@ -35,7 +35,7 @@ const BENT: LensModel = LensModel::BrownConrady {
     p: [-0.0043, 0.0041],
 };
 
-/// Reads a file with the option that lenses suffice, and returns the rig, with the error that the file gives without that option.
+/// Reads a file with the option `lenses_suffice`. Returns the rig, and the error that the file gives without this option.
 fn read_lens(name: &str, text: &str) -> (Rig, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);

@@ -8,7 +8,7 @@ use crate::{Framing, OutSize};
 /// Number of points of one side; head and neck precede both sides.
 const SIDE: usize = 12;
 const N: usize = 2 + 2 * SIDE;
-/// Number of points of the arm, which are the first points of a side.
+/// Number of points of an arm. They are the first points of a side.
 const ARM: usize = 5;
 
 fn mirror() -> Vec<usize> {
@@ -83,8 +83,8 @@ impl Film {
             .collect()
     }
 
-    /// Detects the person in one view, with noise, arms lost for some frames, and sometimes with left and right exchanged or a shifted
-    /// person.
+    /// Detects the person in one view, with noise. Arms are lost for some frames; sometimes left and right are swapped, or the person is
+    /// shifted.
     fn detect(
         &mut self,
         view: usize,
@@ -186,7 +186,7 @@ fn framed(cameras: &[Camera]) -> Vec<Framing> {
     cameras.iter().enumerate().map(framing).collect()
 }
 
-/// Returns a watch of views in which the footage of view `i` is that of camera `footage[i]`.
+/// Returns a watch in which view `i` shows the footage of camera `footage[i]`.
 fn watched(cameras: &[Camera], footage: &[usize], seed: u64, gestures: bool) -> SwapWatch {
     let mut film = Film::new(cameras, seed, gestures);
     let framings = framed(cameras);
@@ -238,7 +238,7 @@ fn exchanged_footage_of_two_cameras_is_detected() {
             footage.swap(a, b);
             let watch = watched(&cameras, &footage, seed, seed % 2 == 0);
             let found = watch.swap();
-            // In a ring of three, it can only be detected that some two cameras are exchanged, not which.
+            // In a ring of three, it can be detected that two cameras are swapped, but not which ones.
             let is_right =
                 found.is_some_and(|swap| swap.views == [a.min(b), a.max(b)] && swap.is_sure);
             let is_unsure = rig == 0 && found.is_some_and(|swap| !swap.is_sure);
@@ -269,7 +269,7 @@ fn no_exchange_is_reported_where_none_was_made() {
 
 #[test]
 fn cyclically_exchanged_footage_of_three_cameras_is_detected() {
-    // In a ring, this would look like an exchange of two cameras.
+    // In a ring, this would look like two swapped cameras.
     let cameras = rigs().pop().expect("cameras at irregular places");
     for seed in 0..8 {
         let watch = watched(&cameras, &[1, 2, 0, 3], seed, seed % 2 == 0);

@@ -20,7 +20,7 @@ pub(super) fn parse(text: &str) -> Result<BTreeMap<String, Entry>, ParseError> {
 
 /// Converts an element.
 ///
-/// * `is_top`: true for an element below the root; its child elements are named, or form a list of `_`.
+/// * `is_top`: true for an element below the root; its child elements are either named entries or a list of `_` elements.
 fn entry(node: Node<'_, '_>, is_top: bool) -> Entry {
     let children: Vec<Node<'_, '_>> = node.children().filter(Node::is_element).collect();
     if is_top && !children.is_empty() {
